@@ -1,0 +1,3 @@
+//! The emulated board running the real firmware inside a simulated rig.
+
+fn main() {}

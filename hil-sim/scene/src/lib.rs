@@ -1,0 +1,1 @@
+//! What a camera would see: scenes, textures, lens, point spread functions, exposure and noise.

@@ -1,0 +1,1 @@
+//! Silhouettes, shadows, embedding and activity recognition; pure, no input or output.

@@ -1,0 +1,1 @@
+//! The serial client, cameras and capture workflows.

@@ -1,0 +1,1 @@
+//! Depth from defocus: optics, operators, run time, metrics; pure, no input or output.

@@ -1,0 +1,170 @@
+//! Bytes on the wire.
+//!
+//! ```text
+//! COBS( version u8 | kind u8 | id u32 | boot u32 | postcard body | CRC-32 ) 0x00
+//! ```
+//! All numbers little-endian. The CRC is CRC-32/ISO-HDLC over everything before it. A frame is at most
+//! [`FRAME_MAX`] bytes with its delimiter. The layout of this header and of the CRC is the same in every
+//! protocol version, so that a board can refuse a version it does not speak.
+//!
+//! Cost: one pass over the bytes for each of COBS and CRC; no allocation.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Largest frame on the wire in bytes, delimiter included.
+pub const FRAME_MAX: usize = 256;
+/// Bytes before the body.
+pub const HEADER: usize = 10;
+/// Bytes of the CRC after the body.
+pub const CRC_BYTES: usize = 4;
+/// Largest body: [`FRAME_MAX`] less header, CRC, delimiter and what COBS may add.
+pub const BODY_MAX: usize = FRAME_MAX - HEADER - CRC_BYTES - 3;
+
+const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// An encoded frame, ready for the wire.
+pub type Encoded = Vec<u8, FRAME_MAX>;
+
+/// What a frame carries.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Kind {
+    /// Host to board: [`crate::Request`]; id = request id.
+    Request = 1,
+    /// Board to host: [`crate::Response`]; id = request id.
+    Response = 2,
+    /// Board to host: [`crate::RequestError`]; id = request id.
+    Error = 3,
+    /// Board to host: [`crate::Event`]; id = event number.
+    Event = 4,
+}
+
+impl Kind {
+    fn from_byte(byte: u8) -> Option<Self> {
+        [Self::Request, Self::Response, Self::Error, Self::Event].into_iter().find(|kind| *kind as u8 == byte)
+    }
+}
+
+/// What stands before the body.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Header {
+    /// Protocol version of the body.
+    pub version: u8,
+    /// What the body is.
+    pub kind: Kind,
+    /// Request id, or event number.
+    pub id: u32,
+    /// Boot number of the board; 0 = not known yet.
+    pub boot: u32,
+}
+
+/// A frame whose CRC is right; its body is not decoded yet.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Packet {
+    /// The header.
+    pub header: Header,
+    /// The postcard body.
+    pub body: Vec<u8, BODY_MAX>,
+}
+
+impl Packet {
+    /// Decodes the body. `None` where it is no `T`, or where bytes are left over.
+    pub fn message<'a, T: Deserialize<'a>>(&'a self) -> Option<T> {
+        match postcard::take_from_bytes(&self.body) {
+            Ok((message, [])) => Some(message),
+            _ => None,
+        }
+    }
+}
+
+/// Why bytes between two delimiters are no frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum FrameError {
+    /// More than [`FRAME_MAX`] bytes without a delimiter.
+    TooLong,
+    /// Fewer bytes than a header and a CRC.
+    TooShort,
+    /// Not COBS.
+    Encoding,
+    /// The CRC does not fit the bytes.
+    Crc,
+    /// The kind is none of [`Kind`].
+    Kind,
+}
+
+/// Encodes a message. `None` where it does not fit a frame, which no message of [`crate::message`] does.
+pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
+    let mut raw = [0u8; HEADER + BODY_MAX + CRC_BYTES];
+    raw[0] = header.version;
+    raw[1] = header.kind as u8;
+    raw[2..6].copy_from_slice(&header.id.to_le_bytes());
+    raw[6..HEADER].copy_from_slice(&header.boot.to_le_bytes());
+    let body = postcard::to_slice(message, &mut raw[HEADER..HEADER + BODY_MAX]).ok()?.len();
+    let end = HEADER + body;
+    let crc = CRC.checksum(&raw[..end]);
+    raw[end..end + CRC_BYTES].copy_from_slice(&crc.to_le_bytes());
+
+    let mut wire = Encoded::new();
+    wire.resize(FRAME_MAX, 0).ok()?;
+    let length = cobs::encode(&raw[..end + CRC_BYTES], &mut wire);
+    wire.truncate(length + 1); // the byte after the encoding is still 0: the delimiter
+    Some(wire)
+}
+
+/// Decodes the bytes between two delimiters (delimiters not included).
+pub fn decode(between: &[u8]) -> Result<Packet, FrameError> {
+    if between.len() >= FRAME_MAX {
+        return Err(FrameError::TooLong);
+    }
+    let mut raw = [0u8; FRAME_MAX];
+    let length = cobs::decode(between, &mut raw).map_err(|_| FrameError::Encoding)?;
+    let raw = raw.get(..length).ok_or(FrameError::Encoding)?;
+    let (content, crc) = raw.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::TooShort)?;
+    let (head, body) = content.split_first_chunk::<HEADER>().ok_or(FrameError::TooShort)?;
+    if CRC.checksum(content) != u32::from_le_bytes(*crc) {
+        return Err(FrameError::Crc);
+    }
+    let [version, kind, i0, i1, i2, i3, b0, b1, b2, b3] = *head;
+    Ok(Packet {
+        header: Header {
+            version,
+            kind: Kind::from_byte(kind).ok_or(FrameError::Kind)?,
+            id: u32::from_le_bytes([i0, i1, i2, i3]),
+            boot: u32::from_le_bytes([b0, b1, b2, b3]),
+        },
+        body: Vec::from_slice(body).map_err(|_| FrameError::TooLong)?,
+    })
+}
+
+/// Cuts a stream of bytes into frames; after any garbage it is right again at the next delimiter.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    between: Vec<u8, FRAME_MAX>,
+    overlong: bool,
+}
+
+impl Decoder {
+    /// A decoder that starts in the middle of anything.
+    pub const fn new() -> Self {
+        Self { between: Vec::new(), overlong: false }
+    }
+
+    /// Takes one byte; at a delimiter gives the frame before it, or what is wrong with it. Empty frames (two
+    /// delimiters in a row) are skipped: a sender may put one in front to flush garbage.
+    pub fn push(&mut self, byte: u8) -> Option<Result<Packet, FrameError>> {
+        if byte != 0 {
+            self.overlong |= self.between.push(byte).is_err();
+            return None;
+        }
+        let result = match (self.overlong, self.between.is_empty()) {
+            (true, _) => Some(Err(FrameError::TooLong)),
+            (false, true) => None,
+            (false, false) => Some(decode(&self.between)),
+        };
+        self.between.clear();
+        self.overlong = false;
+        result
+    }
+}

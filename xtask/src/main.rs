@@ -1,0 +1,3 @@
+//! Set-up, demo, tests and measurements of this repository.
+
+fn main() {}
