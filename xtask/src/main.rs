@@ -1,3 +1,55 @@
-//! Set-up, demo, tests and measurements of this repository.
+//! `cargo xtask`: set-up, demo, tests and measurements of this repository, with nothing but a Rust toolchain.
+//!
+//! One file per job. Every step says what it does before it does it, and every failure says what to type next.
 
-fn main() {}
+mod demo;
+mod firmware;
+mod install;
+mod run;
+mod sizes;
+mod test;
+mod thumb;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Set-up, demo, tests and measurements of farnear.
+#[derive(Parser)]
+#[command(name = "cargo xtask", after_help = "Example: cargo xtask demo")]
+struct Arguments {
+    #[command(subcommand)]
+    job: Job,
+}
+
+#[derive(Subcommand)]
+enum Job {
+    /// Build everything, capture a pair on the emulated rig, compute its depth, write out/demo/.
+    Demo,
+    /// Everything CI runs: format, lints, firmware build and budgets, host tests, tests on the emulated board.
+    Test,
+    /// Build the firmware and lay its ELF beside the host programs.
+    Firmware,
+    /// The firmware's flash and static RAM against their budgets.
+    Sizes,
+    /// Install farnear and farnear-sim (with the firmware's ELF beside it) into cargo's bin folder.
+    Install,
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().job {
+        Job::Demo => demo::run(),
+        Job::Test => test::run(),
+        Job::Firmware => firmware::build().map(|elf| println!("{}", elf.display())),
+        Job::Sizes => firmware::build().and_then(|elf| sizes::check(&elf)),
+        Job::Install => install::run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
+        Err(error) => {
+            eprintln!("\nxtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Builds the firmware and lays its ELF beside the host programs, where `farnear-sim` looks for it.
+
+use std::{fs, path::PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::{
+    run::{ROOT, finish, step, target_folder},
+    thumb::{TARGET, Way},
+};
+
+/// Name of the firmware's package and program.
+const PROGRAM: &str = "farnear-nucleo-f429zi";
+
+/// The firmware's own workspace.
+pub fn folder() -> PathBuf {
+    ROOT.join("firmware/nucleo-f429zi")
+}
+
+/// Builds the firmware; gives the path of its ELF.
+pub fn build() -> Result<PathBuf> {
+    step("firmware for the NUCLEO-F429ZI");
+    build_with(Way::find()?)
+}
+
+/// Builds the firmware in a way that was found before.
+pub fn build_with(way: Way) -> Result<PathBuf> {
+    finish(way.cargo(&folder(), "build").args(["--release", "--locked"]))?;
+    let elf = folder().join("target").join(TARGET).join("release").join(PROGRAM);
+    if !elf.exists() {
+        bail!("the build ended well but left no {}", elf.display());
+    }
+    for profile in ["debug", "release"] {
+        let beside = target_folder().join(profile);
+        let copy = beside.join(format!("{PROGRAM}.elf"));
+        fs::create_dir_all(&beside)
+            .and_then(|()| fs::copy(&elf, &copy))
+            .with_context(|| format!("cannot write {}", copy.display()))?;
+    }
+    Ok(elf)
+}

@@ -1,0 +1,46 @@
+//! Installs the programs where the shell finds them.
+
+use std::{fs, path::PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::{
+    firmware,
+    run::{cargo, finish, step, target_folder},
+};
+
+/// Builds the host programs in the release profile; gives their folder.
+pub fn build_release() -> Result<PathBuf> {
+    step("host programs (the first build takes some minutes)");
+    finish(&mut cargo([
+        "build",
+        "--release",
+        "--locked",
+        "--package",
+        "farnear",
+        "--package",
+        "farnear-sim",
+    ]))?;
+    Ok(target_folder().join("release"))
+}
+
+/// Copies `farnear`, `farnear-sim` and the firmware's ELF into cargo's bin folder.
+pub fn run() -> Result<()> {
+    firmware::build()?;
+    let built = build_release()?;
+    let home = std::env::var_os("CARGO_HOME")
+        .map(PathBuf::from)
+        .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")))
+        .context("no home folder: set CARGO_HOME to the folder whose bin/ is to take the programs")?;
+    let bin = home.join("bin");
+    fs::create_dir_all(&bin).with_context(|| format!("cannot create {}", bin.display()))?;
+    for name in ["farnear", "farnear-sim", "farnear-nucleo-f429zi.elf"] {
+        // Aside first: a program that runs cannot be overwritten, but it can be replaced.
+        let (aside, place) = (bin.join(format!(".{name}.new")), bin.join(name));
+        fs::copy(built.join(name), &aside)
+            .and_then(|_| fs::rename(&aside, &place))
+            .with_context(|| format!("cannot write {}", place.display()))?;
+        println!("{}", place.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,78 @@
+//! Starting other programs: where the repository is, which flags its cargo calls need, clear failures.
+
+use std::{
+    ffi::OsStr,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::LazyLock,
+};
+
+use anyhow::{Context, Result, bail};
+
+/// The repository's root.
+pub static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(1).unwrap_or(Path::new(".")).into()
+});
+
+/// The oldest compiler for which the emulator's crates need no `--ignore-rust-version` (rigless says 1.98).
+const EMULATOR_RUST_MINOR: u32 = 98;
+
+/// The folder into which cargo builds the host programs.
+pub fn target_folder() -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(folder) => ROOT.join(folder),
+        None => ROOT.join("target"),
+    }
+}
+
+/// A cargo call in the root workspace. For `build`, `test` and `clippy` the flag that lets the emulator build on
+/// an older compiler is added where the compiler is older; no cargo configuration key can do that.
+pub fn cargo<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut arguments = arguments.into_iter();
+    if let Some(job) = arguments.next() {
+        command.arg(&job);
+        let compiles = ["build", "test", "clippy", "doc"].iter().any(|known| job.as_ref() == *known);
+        if compiles && host_rust_minor().is_some_and(|minor| minor < EMULATOR_RUST_MINOR) {
+            command.arg("--ignore-rust-version");
+        }
+    }
+    command.args(arguments).current_dir(&*ROOT);
+    command
+}
+
+fn host_rust_minor() -> Option<u32> {
+    let output = Command::new("rustc").arg("--version").current_dir(&*ROOT).output().ok()?;
+    // "rustc 1.95.0 (...)"
+    let text = String::from_utf8(output.stdout).ok()?;
+    text.split_whitespace().nth(1)?.split('.').nth(1)?.parse().ok()
+}
+
+/// Says what is about to happen.
+pub fn step(what: &str) {
+    eprintln!("\n== {what}");
+}
+
+/// Runs a program to its end; fails unless it succeeds.
+pub fn finish(command: &mut Command) -> Result<()> {
+    let status = command.status().with_context(|| format!("cannot start {}", describe(command)))?;
+    if !status.success() {
+        bail!("failed ({status}): {}", describe(command));
+    }
+    Ok(())
+}
+
+/// Runs a program to its end and gives what it printed; fails unless it succeeds.
+pub fn output(command: &mut Command) -> Result<String> {
+    command.stderr(std::process::Stdio::inherit());
+    let output = command.output().with_context(|| format!("cannot start {}", describe(command)))?;
+    if !output.status.success() {
+        bail!("failed ({}): {}", output.status, describe(command));
+    }
+    String::from_utf8(output.stdout).with_context(|| format!("{} printed no text", describe(command)))
+}
+
+fn describe(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,191 @@
+//! A toolchain for the board: `thumbv7em-none-eabihf`.
+//!
+//! Three ways, the first that works is taken and named: the target is installed; `rustup target add` can fetch
+//! it; Debian's Rust (with the sources of `core`) builds it. The last is for networks that reach a Debian
+//! mirror but not Rust's servers.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use anyhow::{Result, bail};
+
+use crate::run::{finish, output, step};
+
+/// The board's target.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// Debian's packages that build the target: compiler, cargo, sources of `core`, clippy.
+const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "rust-web-clippy"];
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// How the firmware is built on this machine.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// With the toolchain that builds the host programs, which has the target.
+    Installed,
+    /// With Debian's toolchain, which builds `core` from its sources.
+    Debian,
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Installed => "the Rust toolchain on the PATH, which has the target",
+            Self::Debian => "Debian's rustc-web, cargo-web and rust-web-src, building core from source",
+        })
+    }
+}
+
+impl Way {
+    /// Finds the way, installing what is missing where that is possible.
+    pub fn find() -> Result<Self> {
+        let way = Self::find_quietly()?;
+        eprintln!("{TARGET}: {way}");
+        Ok(way)
+    }
+
+    fn find_quietly() -> Result<Self> {
+        if target_installed() || rustup_adds_target() {
+            return Ok(Self::Installed);
+        }
+        if debian_ready() || (apt_installs() && debian_ready()) {
+            return Ok(Self::Debian);
+        }
+        bail!(
+            "the firmware's target {TARGET} is missing, and no way to get it works here. Do one of these:\n  \
+             rustup target add {TARGET}\n  \
+             sudo apt-get update && sudo apt-get install {}\nand run the command again.",
+            DEBIAN_PACKAGES.join(" ")
+        );
+    }
+
+    /// A cargo call for the firmware workspace in `folder`.
+    pub fn cargo(self, folder: &Path, job: &str) -> Command {
+        let mut command = match self {
+            Self::Installed => Command::new("cargo"),
+            Self::Debian => Command::new(DEBIAN_CARGO),
+        };
+        command.arg(job).args(["--target", TARGET]).current_dir(folder);
+        // What cargo set for this program is not meant for another toolchain's cargo.
+        for name in ["CARGO", "RUSTC", "RUSTFLAGS", "CARGO_TARGET_DIR", "CARGO_ENCODED_RUSTFLAGS"] {
+            command.env_remove(name);
+        }
+        if self == Self::Debian {
+            command.args(["-Z", "build-std=core"]);
+            command
+                .env("RUSTC_BOOTSTRAP", "1")
+                .env("RUSTC", DEBIAN_RUSTC)
+                .env("PATH", path_with_debian_first());
+            for name in ["RUSTUP_TOOLCHAIN", "LD_LIBRARY_PATH"] {
+                command.env_remove(name);
+            }
+            if let Some(linker) = linker() {
+                command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker);
+            }
+        }
+        command
+    }
+
+    /// Whether clippy can check the firmware here.
+    pub fn has_clippy(self) -> bool {
+        match self {
+            Self::Installed => true,
+            Self::Debian => Path::new("/usr/bin/cargo-clippy").exists(),
+        }
+    }
+}
+
+fn target_installed() -> bool {
+    let folder = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    folder.is_ok_and(|found| {
+        found.status.success() && Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_dir()
+    })
+}
+
+/// `rustup target add`, given up after two minutes: a closed network may hang instead of refusing.
+fn rustup_adds_target() -> bool {
+    if !succeeds(Command::new("rustup").arg("--version")) {
+        return false;
+    }
+    step(&format!("rustup target add {TARGET}"));
+    let Ok(mut child) = Command::new("rustup").args(["target", "add", TARGET]).spawn() else {
+        return false;
+    };
+    let deadline = Instant::now() + Duration::from_secs(120);
+    while Instant::now() < deadline {
+        match child.try_wait() {
+            Ok(Some(status)) if status.success() => return target_installed(),
+            Ok(None) => std::thread::sleep(Duration::from_millis(100)),
+            _ => break,
+        }
+    }
+    // Either fails harmlessly where the child has ended already.
+    let _ = child.kill();
+    let _ = child.wait();
+    eprintln!("rustup cannot fetch the target here; trying Debian's packages");
+    false
+}
+
+fn debian_ready() -> bool {
+    let Ok(sysroot) =
+        output(Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"]).env_remove("LD_LIBRARY_PATH"))
+    else {
+        return false;
+    };
+    let sources = Path::new(sysroot.trim()).join("lib/rustlib/src/rust/library/core");
+    Path::new(DEBIAN_CARGO).exists() && sources.exists() && linker().is_some()
+}
+
+/// Installs Debian's packages as root, or with a sudo that asks nothing.
+fn apt_installs() -> bool {
+    if !succeeds(Command::new("apt-get").arg("--version")) {
+        return false;
+    }
+    let root = output(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0");
+    let apt = |arguments: &[&str]| {
+        let mut command = if root {
+            Command::new("apt-get")
+        } else {
+            let mut sudo = Command::new("sudo");
+            sudo.args(["-n", "apt-get"]);
+            sudo
+        };
+        finish(command.args(arguments).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()))
+    };
+    step(&format!("apt-get install {}", DEBIAN_PACKAGES.join(" ")));
+    let install: Vec<&str> =
+        ["install", "--yes", "--no-install-recommends"].into_iter().chain(DEBIAN_PACKAGES).collect();
+    // An old package list may still serve, so a failing update does not end the attempt.
+    if let Err(error) = apt(&["update", "--quiet"]) {
+        eprintln!("{error:#}");
+    }
+    apt(&install).inspect_err(|error| eprintln!("{error:#}")).is_ok()
+}
+
+/// A linker for ELF files: the one inside the host toolchain, or LLVM's on the PATH.
+fn linker() -> Option<PathBuf> {
+    let libdir = output(Command::new("rustc").args(["--print", "target-libdir"])).ok()?;
+    let bundled = Path::new(libdir.trim()).parent()?.join("bin/rust-lld");
+    if bundled.exists() {
+        return Some(bundled);
+    }
+    ["rust-lld", "ld.lld"]
+        .map(PathBuf::from)
+        .into_iter()
+        .find(|lld| succeeds(Command::new(lld).arg("--version")))
+}
+
+fn path_with_debian_first() -> std::ffi::OsString {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(PathBuf::from("/usr/bin")).chain(std::env::split_paths(&path));
+    std::env::join_paths(folders).unwrap_or(path)
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    command.stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success())
+}
