@@ -1,0 +1,129 @@
+//! The seam between behaviour and board: what the rig is told and what it orders, once per control tick.
+//!
+//! The board binary moves bytes and registers; everything with a decision in it is on this side. Each tick it
+//! 1. reads the hardware into [`Inputs`],
+//! 2. calls [`crate::Rig::tick`],
+//! 3. carries out [`Outputs`] at once, in the order of its fields.
+//!
+//! The inputs of a tick already reflect the outputs of the tick before: segments handed over count as queued,
+//! so [`StepperState::idle`] is false, and an ordered abort has emptied the queue.
+//!
+//! # Step pulses
+//! A [`Segment`] is some pulses of equal spacing. An advanced timer plays one from its repetition counter (8 bit:
+//! 256 pulses) while the next waits in the preload registers; one-pulse mode is on whenever no next one waits.
+//! No segment lasts more than [`SEGMENT_MAX_TICKS`] (1 ms), so that clearing the queue and letting the running
+//! segment end stops the motor within a millisecond, with an exact count.
+
+use farnear_protocol::{BoardMicros, Micros};
+use heapless::Vec;
+
+/// Control ticks per second. 5 kHz = 25 samples per period of the piezo's 200 Hz resonance.
+pub const TICK_HZ: u32 = 5_000;
+/// Microseconds between control ticks.
+pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
+
+/// Clock of the step timer: the advanced timer's 168 MHz divided by 4, so that a period of 1 ms fits 16 bits and
+/// 40 kHz is exactly 1050 ticks.
+pub const STEP_TIMER_HZ: u32 = 42_000_000;
+/// Longest segment, in step timer ticks: 1 ms, which bounds the time a stop takes.
+pub const SEGMENT_MAX_TICKS: u32 = STEP_TIMER_HZ / 1_000;
+/// Most pulses in a segment: what the 8-bit repetition counter holds.
+pub const SEGMENT_MAX_PULSES: u16 = 256;
+/// Most segments handed over in one tick.
+pub const SEGMENTS_PER_TICK: usize = 4;
+
+/// Coarse encoder: nanometres per count (0.5 mm screw, 4000 counts per turn).
+pub const ENCODER_NM_PER_COUNT: i32 = 125;
+
+/// Largest code of the piezo's DAC (16 bit). Code 0 = 0 V.
+pub const DAC_CODE_MAX: u16 = u16::MAX;
+/// Free stroke of the piezo at [`DAC_CODE_MAX`] in nanometres; code / 65535 * 200 um, 3.05 nm per code.
+pub const DAC_FULL_SCALE_NM: i32 = 200_000;
+
+/// Largest code of the strain gauge's converter (18 bit).
+pub const GAUGE_CODE_MAX: u32 = (1 << 18) - 1;
+/// Code of the strain gauge at the relaxed piezo (0 nm). One code is 1 nm, so the converter covers -10.000 to
+/// +252.143 um and sees both ends of the stroke with room for drift; codes 0 and [`GAUGE_CODE_MAX`] mean that it
+/// is saturated or not connected.
+pub const GAUGE_CODE_ZERO: u32 = 10_000;
+
+/// What the step timer reports.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct StepperState {
+    /// STEP pulses emitted since the reset, wrapping. Exact whenever `idle`; while a segment runs it counts at
+    /// least the finished segments and at most the pulses that left the pin.
+    pub pulses: u32,
+    /// No segment runs and none waits.
+    pub idle: bool,
+    /// The timer ran dry after a segment without [`Segment::last`]. Stays set until [`Outputs::abort_steps`].
+    pub underrun: bool,
+    /// Segments that can be handed over in this tick.
+    pub room: u8,
+}
+
+/// The edges of one exposure, in board time.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ExposureEdges {
+    /// Rising edge of the trigger output.
+    pub trigger: BoardMicros,
+    /// Rising edge of the camera's exposure-active signal.
+    pub strobe_start: BoardMicros,
+    /// Its falling edge.
+    pub strobe_end: BoardMicros,
+}
+
+/// What the board saw; read at the start of a control tick.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Inputs {
+    /// Board time of this tick.
+    pub now: BoardMicros,
+    /// Coarse encoder since the reset, [`ENCODER_NM_PER_COUNT`] each, extended beyond the counter's 16 bits;
+    /// counts up when the sensor moves away from the lens.
+    pub encoder_coarse_counts: i32,
+    /// Strain gauge, 18 bit, see [`GAUGE_CODE_ZERO`]; `None` where the converter did not answer.
+    pub gauge_code: Option<u32>,
+    /// The home switch is closed.
+    pub home_switch: bool,
+    /// The far switch is closed.
+    pub far_switch: bool,
+    /// The stepper driver pulls its DIAG line.
+    pub driver_fault: bool,
+    /// The step timer.
+    pub stepper: StepperState,
+    /// The edges of the last ordered exposure, given once, in the first tick after all three are known.
+    pub exposure: Option<ExposureEdges>,
+}
+
+/// STEP pulses of equal spacing. `pulses * period_ticks` is at most [`SEGMENT_MAX_TICKS`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Segment {
+    /// Pulses, 1 to [`SEGMENT_MAX_PULSES`].
+    pub pulses: u16,
+    /// Ticks of the step timer ([`STEP_TIMER_HZ`]) from one STEP edge to the next; the last pulse of a segment
+    /// is followed by its full period too, so that segments join without a jump.
+    pub period_ticks: u16,
+    /// The motor stands after this segment: running dry behind it is no underrun.
+    pub last: bool,
+}
+
+/// What the board is to do now.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Outputs {
+    /// Code for the piezo's DAC.
+    pub piezo_dac: u16,
+    /// Stepper driver enabled (current in the coils).
+    pub enable: bool,
+    /// Level of DIR: the sensor moves away from the lens. Changes only while the stepper is idle, at least one
+    /// tick before the first segment.
+    pub direction_away: bool,
+    /// Empty the segment queue and let the motor stop with the running segment; clears
+    /// [`StepperState::underrun`]. Never together with new `segments`.
+    pub abort_steps: bool,
+    /// New segments, to be played in this order behind those that wait; never more than
+    /// [`StepperState::room`].
+    pub segments: Vec<Segment, SEGMENTS_PER_TICK>,
+    /// Give a trigger pulse of this length now, and capture its edges.
+    pub trigger: Option<Micros>,
+    /// Reset the microcontroller now; the answers have left.
+    pub reset: bool,
+}
