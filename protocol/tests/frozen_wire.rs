@@ -29,6 +29,11 @@ fn by_hand() {
 const BY_HAND: &str = "0401010501010604030201030602e7c2ff6400";
 
 #[test]
+fn the_schema_key_changes_only_with_the_table() {
+    assert_eq!(format!("{SCHEMA_KEY:016x}"), "a5f8c1b2d8b56e50");
+}
+
+#[test]
 fn requests() {
     let shot = Shot {
         axis: Axis::SensorFine,
