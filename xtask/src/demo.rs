@@ -1,7 +1,66 @@
 //! The whole rig without hardware: build, capture on the emulated board, compute depth, compare with the truth.
 
-use anyhow::Result;
+use std::{fs, path::Path, process::Command};
 
+use anyhow::{Context, Result};
+
+use crate::{
+    firmware, install,
+    run::{ROOT, output, step},
+};
+
+/// The demo's scene: the noisy 8-bit staircase under a Gaussian point spread function.
+const SCENE: [&str; 8] =
+    ["--scene", "staircase", "--psf", "gaussian:k=0.4578", "--noise", "8bit", "--seed", "1"];
+/// Pixels next to a depth step, where a window sees two depths, that the figure leaves out.
+const AWAY_FROM_EDGES_PX: &str = "8";
+
+/// Runs the demo; ends with its one line of figures.
 pub fn run() -> Result<()> {
+    firmware::build()?;
+    let programs = install::build_release()?;
+    let farnear = |arguments: &[&str]| {
+        let mut command = Command::new(programs.join("farnear"));
+        command.args(arguments).current_dir(&*ROOT);
+        command
+    };
+    let optics = "examples/rig.toml";
+    let out = Path::new("out/demo");
+    let whole = ROOT.join(out);
+    if whole.exists() {
+        fs::remove_dir_all(&whole).with_context(|| format!("cannot clear {}", whole.display()))?;
+    }
+    let path = |name: &str| out.join(name).to_string_lossy().into_owned();
+
+    step("home the emulated stage and capture a far- and a near-focused image");
+    let capture = ["rig", "capture", "--port", "sim", "--optics", optics, "--out", &path(""), "--json"];
+    let captured = output(farnear(&capture).args(SCENE))?;
+
+    step("depth from the pair");
+    let (far, near) = (path("far.png"), path("near.png"));
+    let depth = ["depth", &far, &near, "--optics", optics, "--out", &path(""), "--json"];
+    output(&mut farnear(&depth))?;
+
+    step("compare with what the camera really saw");
+    let truth = path("truth");
+    output(farnear(&["render", "--optics", optics, "--out", &truth]).args(SCENE))?;
+    let (map, known) = (path("depth.npy"), format!("{truth}/truth.npy"));
+    let compare = ["compare", &map, &known, "--away-from-edges", AWAY_FROM_EDGES_PX, "--json"];
+    let compared = output(&mut farnear(&compare))?;
+
+    eprintln!("\nlook at {}", path("view.png"));
+    println!(
+        "demo rmse_mm={} pair_ms={} out={}",
+        figure(&compared, "rmse_mm")?,
+        figure(&captured, "pair_ms")?,
+        out.display()
+    );
     Ok(())
+}
+
+/// The number behind a key of a flat JSON object.
+fn figure<'a>(json: &'a str, key: &str) -> Result<&'a str> {
+    let quoted = format!("\"{key}\":");
+    let after = json.split_once(&quoted).with_context(|| format!("no {key} in {json}"))?.1;
+    Ok(after.split([',', '}']).next().unwrap_or(after).trim())
 }
