@@ -1,0 +1,209 @@
+//! What can go wrong between this program and the rig, each with what was seen and what to do.
+
+use std::time::Duration;
+
+use farnear_protocol::message::{Axis, Failure, RequestError, ResetCause};
+
+use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
+
+/// The port could not be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum PortError {
+    /// There is no such port.
+    #[error("there is no port {port}; {}", present_ports(present))]
+    Absent {
+        /// What was asked for.
+        port: String,
+        /// What the system lists.
+        present: Vec<String>,
+    },
+    /// The path leads to something else.
+    #[error("{port} is not a serial port")]
+    NoPort {
+        /// What was asked for.
+        port: String,
+    },
+    /// Another program holds it.
+    #[error(
+        "port {port} is busy: another program holds it; end that program (a terminal, another farnear) first"
+    )]
+    Busy {
+        /// What was asked for.
+        port: String,
+    },
+    /// The user may not open it.
+    #[error(
+        "no permission to open {port}; on Linux, add yourself to its group (often `dialout`) and log in again"
+    )]
+    Denied {
+        /// What was asked for.
+        port: String,
+    },
+    /// Anything else.
+    #[error("cannot open port {port}: {reason}")]
+    Open {
+        /// What was asked for.
+        port: String,
+        /// What the system says.
+        reason: String,
+    },
+}
+
+fn present_ports(present: &[String]) -> String {
+    match present {
+        [] => "no serial port is present at all: is the board plugged in?".into(),
+        ports => format!("present are: {}", ports.join(", ")),
+    }
+}
+
+/// A conversation with a board failed.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// The port could not be opened.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The port broke off: unplugged, or the program behind it ended.
+    #[error("port {port} went away while {during}; plug the board in again and check its cable ({source})")]
+    Gone {
+        /// The port.
+        port: String,
+        /// What was being done.
+        during: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// No answer came in time, however often it was asked.
+    #[error(
+        "no answer from {port} while {during}: asked {attempts} times within {waited:?}{}",
+        silence_hint(*bad_frames, *bytes)
+    )]
+    Silent {
+        /// The port.
+        port: String,
+        /// What was being done.
+        during: String,
+        /// How often it was asked.
+        attempts: u32,
+        /// How long it took altogether.
+        waited: Duration,
+        /// Broken frames that came instead.
+        bad_frames: u64,
+        /// Bytes that came instead.
+        bytes: u64,
+    },
+    /// Board and host share no protocol version.
+    #[error(
+        "the board speaks protocol {board_min} to {board_current}, this program {host_min} to {host_current}; {}",
+        if board_min > host_current { "use a newer farnear" } else { "flash the firmware that belongs to this farnear (`cargo xtask firmware`)" }
+    )]
+    Version {
+        /// Oldest version of the board.
+        board_min: u8,
+        /// Newest version of the board.
+        board_current: u8,
+        /// Oldest version of this program.
+        host_min: u8,
+        /// Newest version of this program.
+        host_current: u8,
+    },
+    /// Same protocol number, other message table: one of the two is a development build.
+    #[error(
+        "board (firmware {firmware}) and this program (farnear {host}) both say protocol {version}, but their message tables \
+         differ (schema key {board_key:016x} against {host_key:016x}); flash the firmware built from the same sources"
+    )]
+    Schema {
+        /// The version both claim.
+        version: u8,
+        /// Firmware version of the board.
+        firmware: String,
+        /// Version of this program.
+        host: &'static str,
+        /// The board's key.
+        board_key: u64,
+        /// This program's key.
+        host_key: u64,
+    },
+    /// The answer is none that fits the request.
+    #[error("the board's answer while {during} makes no sense: {answer}")]
+    Nonsense {
+        /// What was being done.
+        during: String,
+        /// What came.
+        answer: String,
+    },
+    /// The board refused; nothing has changed.
+    #[error("the board refused {during}: {}", refusal_text(error))]
+    Refused {
+        /// What was being done.
+        during: String,
+        /// The board's reason.
+        error: RequestError,
+    },
+    /// The board started anew in mid-session.
+    #[error(
+        "the board was reset while {during} (boot {was} became {now}{}); positions are unknown until it is homed again",
+        cause.map(|cause| format!(", cause: {}", cause_name(cause))).unwrap_or_default()
+    )]
+    Reset {
+        /// What was being done.
+        during: String,
+        /// Boot number of the session.
+        was: u32,
+        /// Boot number now.
+        now: u32,
+        /// Why, as far as the board said.
+        cause: Option<ResetCause>,
+    },
+    /// Long work ended early.
+    #[error("{during} failed{}: {}", axis.map(|axis| format!(" on the {}", axis_name(axis))).unwrap_or_default(), failure_text(*reason))]
+    Failed {
+        /// What was being done.
+        during: String,
+        /// The axis concerned.
+        axis: Option<Axis>,
+        /// The board's reason.
+        reason: Failure,
+    },
+    /// The work took longer than it possibly should; the board was told to stop.
+    #[error("{during} did not end within {allowed:?}; the rig was told to stop")]
+    Overdue {
+        /// What was being done.
+        during: String,
+        /// What was allowed.
+        allowed: Duration,
+    },
+    /// Events were lost and the board no longer remembers them.
+    #[error("events {from} to {to} of the board were lost while {during} and it no longer remembers them")]
+    EventsLost {
+        /// What was being done.
+        during: String,
+        /// First one missing.
+        from: u32,
+        /// Last one missing.
+        to: u32,
+    },
+    /// The board says that it is not working on the request, yet no event said how it ended.
+    #[error("the board is no longer {during}, but never said how it ended")]
+    NoEnd {
+        /// What was being done.
+        during: String,
+    },
+    /// The user interrupted; the board was told to stop.
+    #[error("interrupted while {during}; the rig was stopped")]
+    Interrupted {
+        /// What was being done.
+        during: String,
+    },
+}
+
+fn silence_hint(bad_frames: u64, bytes: u64) -> String {
+    match (bad_frames, bytes) {
+        (_, 0) => "; nothing at all came: is it the right port, and is the board powered?".into(),
+        (0, bytes) => format!("; {bytes} bytes came, but no frame: is it the right port?"),
+        (frames, bytes) => {
+            format!(
+                "; {bytes} bytes with {frames} broken frames came: is it the right port, is the line disturbed?"
+            )
+        }
+    }
+}

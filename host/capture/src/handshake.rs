@@ -1,0 +1,74 @@
+//! Hello: who is there, and which protocol version both speak.
+
+use std::time::Duration;
+
+use farnear_protocol::frame::{Kind, Packet};
+use farnear_protocol::message::{Hello, SCHEMA_KEY};
+use farnear_protocol::{PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response};
+
+use crate::error::ClientError;
+use crate::link::Link;
+use crate::timing::Timing;
+
+/// How often hello is asked, the wait doubling each time from [`Timing::REAL`]'s: 3 s altogether. The board
+/// may still be starting, and whether it is an emulated one is not known yet.
+const ATTEMPTS: u32 = 6;
+const DURING: &str = "asking the board who it is";
+
+/// Cleans the line, asks who is there and agrees on a version.
+pub(crate) fn shake_hands(link: &mut Link) -> Result<(Hello, u8), ClientError> {
+    link.drain(DURING)?;
+    let waits: Vec<Duration> = (0..ATTEMPTS).map(|attempt| Timing::REAL.reply * (1 << attempt)).collect();
+    // Events of this boot are not lost by being passed over here: the status that follows tells where their
+    // numbers stand.
+    let (_, packet) = link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(()))?;
+    let hello = read_answer(&packet)?;
+    let version = agree(&hello)?;
+    Ok((hello, version))
+}
+
+fn read_answer(packet: &Packet) -> Result<Hello, ClientError> {
+    let nonsense = |answer: String| ClientError::Nonsense { during: DURING.into(), answer };
+    let unreadable = || {
+        nonsense(format!(
+            "{} bytes in protocol {} that this farnear cannot read; flash the firmware built from the same sources",
+            packet.body.len(),
+            packet.header.version
+        ))
+    };
+    if packet.header.kind == Kind::Error {
+        return Err(match packet.message() {
+            Some(RequestError::Version { min, current }) => version_error(min, current),
+            Some(error) => ClientError::Refused { during: DURING.into(), error },
+            None => unreadable(),
+        });
+    }
+    match packet.message() {
+        Some(Response::Hello(hello)) => Ok(hello),
+        Some(other) => Err(nonsense(format!("{other:?}"))),
+        None => Err(unreadable()),
+    }
+}
+
+/// The version to talk in: the newest that both know. The schema key is that of the board's newest version,
+/// so it can be compared where that is this program's too.
+fn agree(hello: &Hello) -> Result<u8, ClientError> {
+    let version = hello.protocol_current.min(PROTOCOL_CURRENT);
+    if version < hello.protocol_min || version < PROTOCOL_MIN {
+        return Err(version_error(hello.protocol_min, hello.protocol_current));
+    }
+    if hello.protocol_current == PROTOCOL_CURRENT && hello.schema_key != SCHEMA_KEY {
+        return Err(ClientError::Schema {
+            version,
+            firmware: hello.firmware.as_str().into(),
+            host: env!("CARGO_PKG_VERSION"),
+            board_key: hello.schema_key,
+            host_key: SCHEMA_KEY,
+        });
+    }
+    Ok(version)
+}
+
+fn version_error(board_min: u8, board_current: u8) -> ClientError {
+    ClientError::Version { board_min, board_current, host_min: PROTOCOL_MIN, host_current: PROTOCOL_CURRENT }
+}

@@ -1,0 +1,148 @@
+//! One question, one answer: frames over a [`Transport`], sent again until answered.
+//!
+//! Knows no session: which boot and version a request carries, and what an event means, is the caller's.
+
+use std::io::{self, ErrorKind};
+use std::time::{Duration, Instant};
+
+use farnear_protocol::Request;
+use farnear_protocol::frame::{Decoder, Header, Kind, Packet, encode};
+
+use crate::error::ClientError;
+use crate::transport::Transport;
+
+/// Silence on the line that tells that nothing older is still under way.
+const QUIET: Duration = Duration::from_millis(5);
+/// Longest time to wait for that silence.
+const QUIET_AT_MOST: Duration = Duration::from_millis(500);
+/// Shortest time allowed for writing a frame.
+const SEND_AT_LEAST: Duration = Duration::from_millis(20);
+
+/// A transport with framing, request ids and retries.
+pub(crate) struct Link {
+    transport: Box<dyn Transport>,
+    port: String,
+    decoder: Decoder,
+    buffer: [u8; 512],
+    /// Bytes of `buffer` that were received and not decoded yet.
+    unread: std::ops::Range<usize>,
+    next_id: u32,
+    bytes: u64,
+    bad_frames: u64,
+}
+
+impl Link {
+    pub(crate) fn new(transport: Box<dyn Transport>, port: &str) -> Self {
+        Self {
+            transport,
+            port: port.into(),
+            decoder: Decoder::new(),
+            buffer: [0; 512],
+            unread: 0..0,
+            next_id: 1,
+            bytes: 0,
+            bad_frames: 0,
+        }
+    }
+
+    pub(crate) fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// Sends a request at most `waits.len()` times, the same bytes each time, and gives its id and the frame
+    /// that answers it. Events that come meanwhile go to `on_event`.
+    pub(crate) fn ask(
+        &mut self,
+        (version, boot): (u8, u32),
+        request: &Request,
+        waits: &[Duration],
+        during: &str,
+        on_event: &mut dyn FnMut(&Packet) -> Result<(), ClientError>,
+    ) -> Result<(u32, Packet), ClientError> {
+        let id = self.next_id;
+        self.next_id = self.next_id.wrapping_add(1).max(1);
+        let header = Header { version, kind: Kind::Request, id, boot };
+        let frame = encode(header, request).ok_or_else(|| ClientError::Nonsense {
+            during: during.into(),
+            answer: "the request does not fit a frame".into(),
+        })?;
+        let begin = Instant::now();
+        let (bytes, bad_frames) = (self.bytes, self.bad_frames);
+        for (attempt, wait) in waits.iter().enumerate() {
+            if attempt > 0 {
+                self.send(&[0], *wait, during)?; // ends what the line has made of the last attempt
+            }
+            self.send(&frame, *wait, during)?;
+            let until = Instant::now() + *wait;
+            while let Some(packet) = self.receive(until, during)? {
+                match packet.header.kind {
+                    Kind::Response | Kind::Error if packet.header.id == id => return Ok((id, packet)),
+                    Kind::Event => on_event(&packet)?,
+                    // The late answer to an earlier attempt.
+                    Kind::Response | Kind::Error | Kind::Request => {}
+                }
+            }
+        }
+        Err(ClientError::Silent {
+            port: self.port.clone(),
+            during: during.into(),
+            attempts: waits.len() as u32,
+            waited: begin.elapsed(),
+            bad_frames: self.bad_frames - bad_frames,
+            bytes: self.bytes - bytes,
+        })
+    }
+
+    /// The next good frame, if one comes before `until`.
+    pub(crate) fn receive(&mut self, until: Instant, during: &str) -> Result<Option<Packet>, ClientError> {
+        loop {
+            for at in self.unread.by_ref() {
+                match self.decoder.push(self.buffer[at]) {
+                    Some(Ok(packet)) => return Ok(Some(packet)),
+                    Some(Err(_)) => self.bad_frames += 1,
+                    None => {}
+                }
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            match self.transport.receive(&mut self.buffer, left) {
+                Ok(count) => {
+                    self.bytes += count as u64;
+                    self.unread = 0..count;
+                }
+                Err(source) => return Err(self.gone(source, during)),
+            }
+        }
+    }
+
+    /// Reads until the line is silent, so that no answer meant for an earlier program is taken for ours, and
+    /// ends the half frame that such a program may have left at the board.
+    pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
+        self.transport.discard_input().map_err(|source| self.gone(source, during))?;
+        let until = Instant::now() + QUIET_AT_MOST;
+        while Instant::now() < until {
+            match self.transport.receive(&mut self.buffer, QUIET) {
+                Ok(0) => break,
+                Ok(_) => {}
+                Err(source) => return Err(self.gone(source, during)),
+            }
+        }
+        self.unread = 0..0;
+        self.decoder = Decoder::new();
+        self.send(&[0], SEND_AT_LEAST, during)
+    }
+
+    fn send(&mut self, bytes: &[u8], wait: Duration, during: &str) -> Result<(), ClientError> {
+        match self.transport.send(bytes, wait.max(SEND_AT_LEAST)) {
+            // Nobody takes the bytes; the missing answer will tell.
+            Err(error) if error.kind() == ErrorKind::TimedOut => Ok(()),
+            result => result.map_err(|source| self.gone(source, during)),
+        }
+    }
+
+    fn gone(&self, source: io::Error, during: &str) -> ClientError {
+        ClientError::Gone { port: self.port.clone(), during: during.into(), source }
+    }
+}

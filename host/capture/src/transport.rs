@@ -1,0 +1,148 @@
+//! What carries bytes to the board: the trait [`Transport`] and its serial-port implementation.
+//!
+//! Every operation takes the longest time it may wait; none blocks for ever.
+
+use std::io::{self, Read, Write};
+use std::time::{Duration, Instant};
+
+use serialport::{ClearBuffer, SerialPort};
+
+use crate::error::PortError;
+
+/// Speed of the board's UART behind the ST-LINK virtual COM port, in baud. A pseudo-terminal ignores it.
+pub const BAUD: u32 = 2_000_000;
+
+/// A byte pipe to a board.
+pub trait Transport: Send {
+    /// Reads what is there, at most `buffer.len()` bytes, waiting at most `wait` for the first. `Ok(0)` means
+    /// that nothing came in time; an error means that the pipe is gone.
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
+
+    /// Writes all bytes, taking at most `wait`.
+    fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()>;
+
+    /// Throws away what has arrived and was not read.
+    fn discard_input(&mut self) -> io::Result<()>;
+}
+
+/// A serial port, held exclusively: a second program that opens it gets [`PortError::Busy`].
+pub struct SerialTransport {
+    port: Box<dyn SerialPort>,
+}
+
+impl SerialTransport {
+    /// Opens the port at [`BAUD`], 8 data bits, no parity, no flow control.
+    pub fn open(path: &str) -> Result<Self, PortError> {
+        refuse_what_is_no_port(path)?;
+        let port = serialport::new(path, BAUD)
+            .timeout(Duration::from_millis(50))
+            .open()
+            .map_err(|error| explain(path, error))?;
+        Ok(Self { port })
+    }
+}
+
+/// A file that is no character device is not worth an ioctl's riddle ("Not a typewriter").
+#[cfg(unix)]
+fn refuse_what_is_no_port(path: &str) -> Result<(), PortError> {
+    use std::os::unix::fs::FileTypeExt;
+    match std::fs::metadata(path) {
+        Ok(found) if !found.file_type().is_char_device() => Err(PortError::NoPort { port: path.into() }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(absent(path)),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn refuse_what_is_no_port(_: &str) -> Result<(), PortError> {
+    Ok(())
+}
+
+fn absent(path: &str) -> PortError {
+    let ports = serialport::available_ports().unwrap_or_default();
+    PortError::Absent { port: path.into(), present: ports.into_iter().map(|port| port.port_name).collect() }
+}
+
+fn explain(path: &str, error: serialport::Error) -> PortError {
+    use serialport::ErrorKind;
+    match error.kind() {
+        ErrorKind::Io(io::ErrorKind::NotFound) => absent(path),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => PortError::Denied { port: path.into() },
+        // The crate gives this kind both when another program holds the port and when there is none.
+        ErrorKind::NoDevice if std::path::Path::new(path).exists() => PortError::Busy { port: path.into() },
+        ErrorKind::NoDevice => absent(path),
+        _ => PortError::Open { port: path.into(), reason: error.to_string() },
+    }
+}
+
+impl Transport for SerialTransport {
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        self.port.set_timeout(wait.max(Duration::from_millis(1)))?;
+        match self.port.read(buffer) {
+            // Readable, yet without bytes: the other side has hung up.
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(count) => Ok(count),
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
+                Ok(0)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
+        let until = Instant::now() + wait;
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            self.port.set_timeout(left)?;
+            match self.port.write(rest) {
+                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+                Ok(count) => rest = &rest[count..],
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    fn discard_input(&mut self) -> io::Result<()> {
+        Ok(self.port.clear(ClearBuffer::Input)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_absent_port_is_named() {
+        let error = SerialTransport::open("/dev/farnear-no-such-port").err().unwrap();
+        assert!(matches!(error, PortError::Absent { .. }), "{error:?}");
+        assert!(error.to_string().contains("/dev/farnear-no-such-port"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_plain_file_is_no_port() {
+        let error = SerialTransport::open(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")).err().unwrap();
+        assert!(matches!(error, PortError::NoPort { .. }), "{error:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_port_that_is_held_is_busy_and_one_that_hangs_up_is_gone() {
+        let (master, slave) = serialport::TTYPort::pair().unwrap();
+        let path = slave.name().unwrap();
+        let mut first = SerialTransport::open(&path).unwrap();
+        let error = SerialTransport::open(&path).err().unwrap();
+        assert!(matches!(error, PortError::Busy { .. }), "{error:?}");
+
+        let mut buffer = [0; 8];
+        assert_eq!(first.receive(&mut buffer, Duration::from_millis(5)).unwrap(), 0);
+        drop(master);
+        assert!(first.receive(&mut buffer, Duration::from_millis(5)).is_err());
+    }
+}

@@ -1,0 +1,401 @@
+//! A scripted board at the other end of an in-memory line, with the faults a line and a board can have.
+//!
+//! It keeps the protocol's promises (an id acts once, events are numbered and can be read again), so that what
+//! the client makes of a fault is seen, not what the peer makes of it. Work ends at once.
+
+// Each test binary uses its own part.
+#![allow(dead_code)]
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use farnear_capture::Transport;
+use farnear_protocol::frame::{Decoder, Header, Kind, Packet, encode};
+use farnear_protocol::message::{
+    Axis, AxisStatus, Capabilities, EventKind, Failure, Hello, Limits, LinkCounters, PositionState,
+    ResetCause, SCHEMA_KEY, Shot, ShotRecord, Status,
+};
+use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
+use farnear_protocol::{Event, Request, RequestError, Response};
+use serde::Serialize;
+
+/// What is wrong with the line or the board.
+#[derive(Default, Clone)]
+pub struct Faults {
+    /// So many requests are lost on their way to the board.
+    pub lose_requests: u32,
+    /// So many answers are lost on their way back.
+    pub lose_answers: u32,
+    /// Every answer comes twice.
+    pub duplicate_answers: bool,
+    /// Events with these numbers are lost.
+    pub lose_events: Vec<u32>,
+    /// These bytes come before every frame of the board.
+    pub garbage: Vec<u8>,
+    /// The board resets instead of carrying out this kind of request.
+    pub reset_at_move: bool,
+    /// Whether the reset announces itself with a `Started` event.
+    pub silent_reset: bool,
+    /// The line breaks at the first request of this kind.
+    pub gone_at_program: bool,
+    /// Work is taken on and never ends.
+    pub never_ends: bool,
+    /// The board forgets events at once.
+    pub forgetful: bool,
+    /// The board works, ends, and says nothing.
+    pub end_unsaid: bool,
+    /// Work ends with this.
+    pub fails_with: Option<Failure>,
+    /// The board refuses every version but this.
+    pub other_version: Option<u8>,
+}
+
+pub struct Board {
+    pub hello: Hello,
+    pub faults: Faults,
+    pub time: u64,
+    pub coarse: Nanometres,
+    pub fine: Nanometres,
+    pub homed: bool,
+    /// Homings, moves and programs that were carried out.
+    pub acts: u32,
+    pub stops: u32,
+    pub program: Vec<Option<Shot>>,
+    pub events: Vec<Event>,
+    pub triggers: u32,
+    active: Option<u32>,
+    remembered: BTreeMap<u32, (Kind, Vec<u8>)>,
+    decoder: Decoder,
+    out: VecDeque<u8>,
+    gone: bool,
+}
+
+/// The host's end of the line.
+#[derive(Clone)]
+pub struct Peer(Arc<Mutex<Board>>);
+
+impl Peer {
+    pub fn new(faults: Faults) -> Self {
+        let limits = Limits {
+            datum: Nanometres(47_000_000),
+            coarse_min: Nanometres(0),
+            coarse_max: Nanometres(13_000_000),
+            coarse_step_pm: 156_250,
+            fine_min: Nanometres(0),
+            fine_max: Nanometres(200_000),
+            shots_max: 16,
+            exposure_min: Micros(10),
+            exposure_max: Micros(1_000_000),
+        };
+        let hello = Hello {
+            protocol_min: 1,
+            protocol_current: 1,
+            schema_key: SCHEMA_KEY,
+            board: "scripted".try_into().unwrap(),
+            firmware: "0.0.1".try_into().unwrap(),
+            unique_id: *b"twelve bytes",
+            boot: 7,
+            reset_cause: ResetCause::PowerOn,
+            emulated: false,
+            capabilities: Capabilities { sensor_coarse: true, sensor_fine: true, strobe: true },
+            limits,
+        };
+        let started = Event { time: BoardMicros(0), kind: EventKind::Started { cause: ResetCause::PowerOn } };
+        Self(Arc::new(Mutex::new(Board {
+            hello,
+            faults,
+            time: 1000,
+            coarse: Nanometres(123),
+            fine: Nanometres(0),
+            homed: false,
+            acts: 0,
+            stops: 0,
+            program: vec![None; 16],
+            events: vec![started],
+            triggers: 0,
+            active: None,
+            remembered: BTreeMap::new(),
+            decoder: Decoder::new(),
+            out: VecDeque::new(),
+            gone: false,
+        })))
+    }
+
+    pub fn board(&self) -> MutexGuard<'_, Board> {
+        self.0.lock().unwrap()
+    }
+}
+
+impl Transport for Peer {
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        let mut board = self.board();
+        if board.gone {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        if board.out.is_empty() {
+            drop(board);
+            std::thread::sleep(wait);
+            return Ok(0);
+        }
+        let count = board.out.len().min(buffer.len());
+        for (slot, byte) in buffer.iter_mut().zip(board.out.drain(..count)) {
+            *slot = byte;
+        }
+        Ok(count)
+    }
+
+    fn send(&mut self, bytes: &[u8], _: Duration) -> io::Result<()> {
+        let mut board = self.board();
+        if board.gone {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        for byte in bytes {
+            if let Some(Ok(packet)) = board.decoder.push(*byte) {
+                board.receive(&packet);
+            }
+        }
+        Ok(())
+    }
+
+    fn discard_input(&mut self) -> io::Result<()> {
+        self.board().out.clear();
+        Ok(())
+    }
+}
+
+impl Board {
+    fn put<T: Serialize>(&mut self, kind: Kind, id: u32, message: &T) {
+        let header = Header { version: 1, kind, id, boot: self.hello.boot };
+        let frame = encode(header, message).unwrap();
+        let garbage = self.faults.garbage.clone();
+        self.out.extend(garbage);
+        self.out.extend(frame.iter());
+    }
+
+    /// Something that another program left on the line.
+    pub fn put_stale(&mut self, id: u32, response: &Response) {
+        self.put(Kind::Response, id, response);
+    }
+
+    pub fn event(&mut self, kind: EventKind) {
+        self.time += 100;
+        let event = Event { time: BoardMicros(self.time), kind };
+        let number = self.events.len() as u32;
+        self.events.push(event.clone());
+        if !self.faults.lose_events.contains(&number) {
+            self.put(Kind::Event, number, &event);
+        }
+    }
+
+    fn answer(&mut self, id: u32, answer: Result<Response, RequestError>) {
+        let (kind, frame) = match &answer {
+            Ok(response) => (Kind::Response, postcard_frame(self.hello.boot, Kind::Response, id, response)),
+            Err(error) => (Kind::Error, postcard_frame(self.hello.boot, Kind::Error, id, error)),
+        };
+        self.remembered.insert(id, (kind, frame));
+        self.resend(id);
+    }
+
+    fn resend(&mut self, id: u32) {
+        if self.faults.lose_answers > 0 {
+            self.faults.lose_answers -= 1;
+            return;
+        }
+        let (_, frame) = self.remembered[&id].clone();
+        for _ in 0..1 + u8::from(self.faults.duplicate_answers) {
+            let garbage = self.faults.garbage.clone();
+            self.out.extend(garbage);
+            self.out.extend(frame.iter());
+        }
+    }
+
+    fn receive(&mut self, packet: &Packet) {
+        if self.faults.lose_requests > 0 {
+            self.faults.lose_requests -= 1;
+            return;
+        }
+        let id = packet.header.id;
+        if let Some(version) = self.faults.other_version {
+            let error = RequestError::Version { min: version, current: version };
+            return self.put(Kind::Error, id, &error);
+        }
+        let request: Request = packet.message().unwrap();
+        if request == Request::Hello {
+            self.remembered.clear();
+            return self.answer(id, Ok(Response::Hello(self.hello.clone())));
+        }
+        if packet.header.boot != self.hello.boot {
+            let error = RequestError::Boot { current: self.hello.boot };
+            return self.put(Kind::Error, id, &error);
+        }
+        if self.remembered.contains_key(&id) {
+            return self.resend(id);
+        }
+        self.carry_out(id, request);
+    }
+
+    fn carry_out(&mut self, id: u32, request: Request) {
+        match request {
+            Request::Hello => {}
+            Request::Status => {
+                let status = self.status();
+                self.answer(id, Ok(Response::Status(status)));
+            }
+            Request::ReadEvent { number } => {
+                let next = self.events.len() as u32;
+                let answer = match self.events.get(number as usize) {
+                    Some(event) if !self.faults.forgetful => Ok(Response::Event(event.clone())),
+                    _ => Err(RequestError::EventGone { oldest: next, next }),
+                };
+                self.answer(id, answer);
+            }
+            Request::Stop => {
+                self.stops += 1;
+                self.answer(id, Ok(Response::Accepted));
+                if let Some(request) = self.active.take() {
+                    self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
+                }
+            }
+            Request::LoadShot { index, shot } => {
+                self.program[usize::from(index)] = Some(shot);
+                self.answer(id, Ok(Response::Accepted));
+            }
+            Request::Reboot => {
+                self.answer(id, Ok(Response::Accepted));
+                self.reset(ResetCause::Software);
+            }
+            Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. } => {
+                self.work(id, request)
+            }
+        }
+    }
+
+    fn work(&mut self, id: u32, request: Request) {
+        if let Request::Move { axis: axis @ Axis::SensorCoarse, target } = request {
+            let Limits { coarse_min: min, coarse_max: max, .. } = self.hello.limits;
+            if !self.homed {
+                return self.answer(id, Err(RequestError::NotHomed { axis, state: PositionState::Unknown }));
+            }
+            if target < min || target > max {
+                return self.answer(id, Err(RequestError::OutOfRange { axis, asked: target, min, max }));
+            }
+        }
+        if self.faults.reset_at_move {
+            return self.reset(ResetCause::Watchdog);
+        }
+        if self.faults.gone_at_program && matches!(request, Request::RunProgram { .. }) {
+            self.answer(id, Ok(Response::Accepted));
+            self.gone = true;
+            return;
+        }
+        self.acts += 1;
+        self.answer(id, Ok(Response::Accepted));
+        if self.faults.never_ends {
+            self.active = Some(id);
+            return;
+        }
+        if self.faults.end_unsaid {
+            return;
+        }
+        if let Some(reason) = self.faults.fails_with {
+            return self.event(EventKind::Failed { request: id, axis: Some(Axis::SensorCoarse), reason });
+        }
+        match request {
+            Request::Home { axis } => {
+                self.homed = true;
+                self.coarse = Nanometres(0);
+                self.event(EventKind::Homed { request: id, axis, shift: Nanometres(0) });
+            }
+            Request::Move { axis, target } => {
+                self.place(axis, target);
+                let measured = self.measured(axis);
+                self.event(EventKind::MoveDone { request: id, axis, asked: target, measured });
+            }
+            _ => self.run(id),
+        }
+    }
+
+    fn run(&mut self, id: u32) {
+        let shots: Vec<Shot> = self.program.iter().map_while(|shot| *shot).collect();
+        let mut exposures = 0;
+        for (index, shot) in shots.iter().enumerate() {
+            self.place(shot.axis, shot.target);
+            for repeat in 0..shot.repeat {
+                self.time += 20_000;
+                self.triggers += 1;
+                exposures += 1;
+                let trigger = BoardMicros(self.time);
+                let strobe_start = BoardMicros(self.time + 20);
+                let record = ShotRecord {
+                    index: index as u8,
+                    repeat,
+                    trigger_number: self.triggers - 1,
+                    axis: shot.axis,
+                    asked: shot.target,
+                    coarse: self.coarse,
+                    fine: self.fine,
+                    settle: Micros(9_000),
+                    trigger,
+                    strobe_start,
+                    strobe_end: BoardMicros(strobe_start.0 + u64::from(shot.exposure.0)),
+                    exposure: shot.exposure,
+                };
+                self.event(EventKind::ShotDone { request: id, shot: record });
+            }
+        }
+        self.event(EventKind::ProgramDone { request: id, exposures });
+    }
+
+    /// The coarse axis lands where a screw lands: near the place asked for.
+    fn place(&mut self, axis: Axis, target: Nanometres) {
+        match axis {
+            Axis::SensorCoarse => self.coarse = Nanometres(target.0 + 375),
+            Axis::SensorFine => self.fine = Nanometres(target.0 - 2),
+        }
+    }
+
+    fn measured(&self, axis: Axis) -> Nanometres {
+        match axis {
+            Axis::SensorCoarse => self.coarse,
+            Axis::SensorFine => self.fine,
+        }
+    }
+
+    pub fn reset(&mut self, cause: ResetCause) {
+        self.hello.boot += 1;
+        self.hello.reset_cause = cause;
+        self.homed = false;
+        self.active = None;
+        self.remembered.clear();
+        self.events.clear();
+        self.faults.reset_at_move = false;
+        if self.faults.silent_reset {
+            self.events.push(Event { time: BoardMicros(0), kind: EventKind::Started { cause } });
+        } else {
+            self.event(EventKind::Started { cause });
+        }
+    }
+
+    fn status(&self) -> Status {
+        let axis = |state, position| AxisStatus { state, asked: position, measured: position, moving: false };
+        let coarse = if self.homed { PositionState::Homed } else { PositionState::Unknown };
+        Status {
+            time: BoardMicros(self.time),
+            coarse: axis(coarse, self.coarse),
+            fine: axis(PositionState::Homed, self.fine),
+            home_switch: false,
+            far_switch: false,
+            active: self.active,
+            next_event: self.events.len() as u32,
+            triggers: self.triggers,
+            steps: 0,
+            link: LinkCounters::default(),
+        }
+    }
+}
+
+fn postcard_frame<T: Serialize>(boot: u32, kind: Kind, id: u32, message: &T) -> Vec<u8> {
+    encode(Header { version: 1, kind, id, boot }, message).unwrap().to_vec()
+}
