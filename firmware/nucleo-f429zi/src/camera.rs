@@ -1,0 +1,192 @@
+//! The camera's trigger and its exposure-active signal (strobe), both on TIM2, which counts board microseconds.
+//!
+//! Trigger: channel 3, PB10. Both edges are compare matches, so they come at their microsecond whatever the
+//! program does; the interrupt only prepares the next. Strobe: channel 4, PB11, captured by the hardware.
+
+use core::cell::RefCell;
+
+use critical_section::Mutex;
+use embassy_stm32::{
+    Peri,
+    gpio::{AfType, Flex, OutputType, Pull},
+    interrupt,
+    interrupt::{Interrupt, Priority},
+    pac::{self, timer::vals},
+    peripherals::{PB10, PB11, TIM2},
+    rcc,
+    timer::{Ch3, simple_pwm::PwmPin},
+};
+use farnear_protocol::{BoardMicros, Micros};
+use farnear_rig::io::ExposureEdges;
+
+use crate::{
+    clock::{self, APB1_TIMER_HZ},
+    registers,
+};
+
+/// Channel 3 and 4 in the register arrays, which start at 0.
+const TRIGGER: usize = 2;
+const STROBE: usize = 3;
+/// Alternate function of TIM2 on PB11 (DS9405, table 12).
+const STROBE_FUNCTION: u8 = 1;
+/// From the order to the rising edge: long enough to set the compare match up.
+const LEAD_US: u32 = 10;
+/// An edge this close would be missed by the comparator.
+const MARGIN_US: u32 = 1;
+
+/// The edges of one exposure as TIM2 stamps them.
+#[derive(Clone, Copy)]
+struct Exposure {
+    length_us: u32,
+    rising: u32,
+    pulse_ended: bool,
+    strobe_start: Option<u32>,
+    strobe_end: Option<u32>,
+}
+
+static EXPOSURE: Mutex<RefCell<Option<Exposure>>> = Mutex::new(RefCell::new(None));
+
+fn drive(mode: vals::Ocm) {
+    pac::TIM2.ccmr_output(1).modify(|w| w.set_ocm(TRIGGER - 2, mode));
+}
+
+fn capture_rising(rising: bool) {
+    pac::TIM2.ccer().modify(|w| w.set_ccp(STROBE, !rising));
+}
+
+#[interrupt]
+fn TIM2() {
+    let timer = pac::TIM2;
+    let flags = timer.sr().read();
+    critical_section::with(|cs| {
+        let mut exposure = EXPOSURE.borrow_ref_mut(cs);
+        if flags.ccif(TRIGGER) {
+            // Flags are cleared by writing 0; ones leave the others alone.
+            timer.sr().write(|w| {
+                w.0 = u32::MAX;
+                w.set_ccif(TRIGGER, false);
+            });
+            trigger_edge(exposure.as_mut());
+        }
+        if flags.ccif(STROBE) {
+            let stamp = timer.ccr(STROBE).read(); // clears the flag
+            strobe_edge(exposure.as_mut(), stamp);
+        }
+    });
+}
+
+/// The trigger has risen: prepare its fall. Or it has fallen: done.
+fn trigger_edge(exposure: Option<&mut Exposure>) {
+    let timer = pac::TIM2;
+    let Some(exposure) = exposure else { return };
+    if timer.ccmr_output(1).read().ocm(TRIGGER - 2) == vals::Ocm::ACTIVE_ON_MATCH {
+        let fall = exposure.rising.wrapping_add(exposure.length_us);
+        timer.ccr(TRIGGER).write_value(fall);
+        drive(vals::Ocm::INACTIVE_ON_MATCH);
+        if (fall.wrapping_sub(timer.cnt().read()) as i32) > MARGIN_US as i32 {
+            return;
+        }
+        // Too late for the comparator (this handler was held up for the whole exposure): end it now.
+        drive(vals::Ocm::FORCE_INACTIVE);
+    }
+    timer.dier().modify(|w| w.set_ccie(TRIGGER, false));
+    exposure.pulse_ended = true;
+}
+
+fn strobe_edge(exposure: Option<&mut Exposure>, stamp: u32) {
+    let Some(exposure) = exposure else { return };
+    if exposure.strobe_start.is_none() {
+        exposure.strobe_start = Some(stamp);
+        capture_rising(false);
+    } else if exposure.strobe_end.is_none() {
+        exposure.strobe_end = Some(stamp);
+        capture_rising(true);
+    }
+}
+
+/// Trigger output and strobe input.
+pub struct CameraPort {
+    _trigger: PwmPin<'static, TIM2, Ch3>,
+    _strobe: Flex<'static>,
+}
+
+impl CameraPort {
+    /// Sets TIM2 to the board's time and both pins up; the trigger is low.
+    pub fn new(
+        _timer: Peri<'static, TIM2>,
+        trigger: Peri<'static, PB10>,
+        strobe: Peri<'static, PB11>,
+    ) -> Self {
+        rcc::enable_and_reset::<TIM2>();
+        let timer = pac::TIM2;
+        timer.psc().write_value((APB1_TIMER_HZ / 1_000_000 - 1) as u16);
+        timer.arr().write_value(u32::MAX);
+        timer.cr1().write(|w| w.set_urs(vals::Urs::COUNTER_ONLY));
+        timer.egr().write(|w| w.set_ug(true));
+        timer.ccmr_output(1).modify(|w| w.set_ocm(TRIGGER - 2, vals::Ocm::FORCE_INACTIVE));
+        timer.ccmr_input(1).modify(|w| {
+            w.set_ccs(STROBE - 2, vals::CcmrInputCcs::TI4);
+            // 4 samples of the 84 MHz clock: keeps out spikes below 48 ns.
+            w.set_icf(STROBE - 2, vals::FilterValue::FCK_INT_N4);
+        });
+        timer.ccer().write(|w| {
+            w.set_cce(TRIGGER, true);
+            w.set_cce(STROBE, true);
+        });
+        timer.sr().write(|w| w.0 = 0);
+        timer.dier().write(|w| w.set_ccie(STROBE, true));
+        let trigger = PwmPin::new(trigger, OutputType::PushPull);
+        let mut pin = Flex::new(strobe);
+        pin.set_as_af_unchecked(STROBE_FUNCTION, AfType::input(Pull::Down));
+        // The same crystal drives TIM5 and TIM2: set alike once, they stay within a microsecond.
+        critical_section::with(|_| {
+            timer.cnt().write_value(clock::now().0 as u32);
+            timer.cr1().modify(|w| w.set_cen(true));
+        });
+        registers::enable_interrupt(Interrupt::TIM2, Priority::P1);
+        Self { _trigger: trigger, _strobe: pin }
+    }
+
+    /// Gives a trigger pulse of this length in a few microseconds and captures what the camera answers.
+    pub fn expose(&mut self, length: Micros) {
+        let timer = pac::TIM2;
+        critical_section::with(|cs| {
+            capture_rising(true);
+            let rising = timer.cnt().read().wrapping_add(LEAD_US);
+            *EXPOSURE.borrow_ref_mut(cs) = Some(Exposure {
+                length_us: length.0,
+                rising,
+                pulse_ended: false,
+                strobe_start: None,
+                strobe_end: None,
+            });
+            timer.ccr(TRIGGER).write_value(rising);
+            drive(vals::Ocm::ACTIVE_ON_MATCH);
+            timer.sr().write(|w| {
+                w.0 = u32::MAX;
+                w.set_ccif(TRIGGER, false);
+                w.set_ccif(STROBE, false);
+            });
+            timer.dier().modify(|w| w.set_ccie(TRIGGER, true));
+        });
+    }
+
+    /// The edges of the last exposure, once, when all are known.
+    pub fn take_edges(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
+        critical_section::with(|cs| {
+            let mut exposure = EXPOSURE.borrow_ref_mut(cs);
+            let edges = exposure.as_ref().and_then(|exposure| {
+                exposure.pulse_ended.then_some(())?;
+                Some(ExposureEdges {
+                    trigger: clock::extend(exposure.rising, now),
+                    strobe_start: clock::extend(exposure.strobe_start?, now),
+                    strobe_end: clock::extend(exposure.strobe_end?, now),
+                })
+            });
+            if edges.is_some() {
+                *exposure = None;
+            }
+            edges
+        })
+    }
+}
