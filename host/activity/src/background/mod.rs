@@ -1,0 +1,10 @@
+//! What moves in a video: a background model per pixel.
+//!
+//! An adaptive Gaussian mixture whose number of components adapts, after Z. Zivkovic, "Improved adaptive Gaussian
+//! mixture model for background subtraction", ICPR 2004, and Z. Zivkovic and F. van der Heijden, "Efficient
+//! adaptive density estimation per image pixel for the task of background subtraction", Pattern Recognition
+//! Letters 27 (2006), 773-780.
+
+mod settings;
+
+pub use settings::{Settings, SettingsError, ShadowSettings};

@@ -1,0 +1,208 @@
+//! How well shadow was taken off silhouettes, counted in pixels against a ground truth.
+//!
+//! The three figures of Li 2014 (tables 8.1 and 8.2) and of Sanin, Sanderson and Lovell, "Shadow detection: a
+//! survey and comparative evaluation of recent methods", Pattern Recognition 45 (2012), 1684-1695:
+//!
+//! | figure | counts |
+//! |---|---|
+//! | shadow removed, % | shadow pixels that the removal took off, of all shadow pixels (Li's table 8.1; the survey's detection rate) |
+//! | wrongly removed, % | subject pixels that the removal took off, of all subject pixels (Li's table 8.2; 100 minus the survey's discrimination rate) |
+//! | intersection over union, % | of what is left and the true subject |
+//!
+//! Cost: one pass over the pixels of a frame.
+
+use ndarray::{ArrayView2, Zip};
+
+/// What the ground truth says of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Truth {
+    /// Neither subject nor shadow.
+    Background,
+    /// Shadow cast by the subject.
+    Shadow,
+    /// The subject.
+    Subject,
+    /// Not judged: outside the region of interest, or too blurred to tell.
+    Ignored,
+}
+
+impl Truth {
+    /// Reads the grey values of the ChangeDetection.net ground truth: 0 static, 50 shadow, 85 outside the region
+    /// of interest, 170 unknown, 255 moving. 127, the shadow value of many background models, is read as
+    /// shadow too. `None` for any other value.
+    #[must_use]
+    pub fn from_grey(value: u8) -> Option<Self> {
+        match value {
+            0 => Some(Self::Background),
+            50 | 127 => Some(Self::Shadow),
+            85 | 170 => Some(Self::Ignored),
+            255 => Some(Self::Subject),
+            _ => None,
+        }
+    }
+}
+
+/// The arrays of one frame differ in shape.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the {what} is {}x{} pixels but the ground truth is {}x{}; they must be the same frame", .found.1, .found.0, .expected.1, .expected.0)]
+pub struct ShapeError {
+    /// Which array is off.
+    pub what: &'static str,
+    /// Its shape (height, width).
+    pub found: (usize, usize),
+    /// The ground truth's shape (height, width).
+    pub expected: (usize, usize),
+}
+
+/// Pixel counts over any number of frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShadowScore {
+    /// Shadow pixels of the ground truth (of those in the mask before removal, where that is given).
+    pub shadow_pixels: u64,
+    /// Those of them that are gone.
+    pub shadow_removed: u64,
+    /// Subject pixels of the ground truth (of those in the mask before removal, where that is given).
+    pub subject_pixels: u64,
+    /// Those of them that are gone.
+    pub subject_removed: u64,
+    /// Pixels both in the mask after removal and in the true subject.
+    pub intersection: u64,
+    /// Pixels in the mask after removal or in the true subject.
+    pub union: u64,
+}
+
+impl ShadowScore {
+    /// Adds one frame: `before` and `after` are the masks before and after the removal, all of shape (height,
+    /// width). Without `before` every pixel of true shadow or subject counts as having been there, so what the
+    /// background model missed is counted as removed.
+    ///
+    /// # Errors
+    /// [`ShapeError`] where the shapes differ.
+    pub fn add(
+        &mut self,
+        before: Option<ArrayView2<'_, bool>>,
+        after: ArrayView2<'_, bool>,
+        truth: ArrayView2<'_, Truth>,
+    ) -> Result<(), ShapeError> {
+        let expected = truth.dim();
+        if after.dim() != expected {
+            return Err(ShapeError { what: "mask after the removal", found: after.dim(), expected });
+        }
+        match before {
+            Some(before) if before.dim() != expected => {
+                return Err(ShapeError { what: "mask before the removal", found: before.dim(), expected });
+            }
+            Some(before) => Zip::from(before)
+                .and(after)
+                .and(truth)
+                .for_each(|&before, &after, &truth| self.count(before, after, truth)),
+            None => Zip::from(after).and(truth).for_each(|&after, &truth| self.count(true, after, truth)),
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, before: bool, after: bool, truth: Truth) {
+        match truth {
+            Truth::Ignored => return,
+            Truth::Shadow if before => {
+                self.shadow_pixels += 1;
+                self.shadow_removed += u64::from(!after);
+            }
+            Truth::Subject if before => {
+                self.subject_pixels += 1;
+                self.subject_removed += u64::from(!after);
+            }
+            _ => {}
+        }
+        self.intersection += u64::from(after && truth == Truth::Subject);
+        self.union += u64::from(after || truth == Truth::Subject);
+    }
+
+    /// Shadow removed in per cent of the shadow there was; `None` where there was none.
+    #[must_use]
+    pub fn removed_percent(&self) -> Option<f64> {
+        percent(self.shadow_removed, self.shadow_pixels)
+    }
+
+    /// Subject wrongly removed in per cent of the subject there was; `None` where there was none.
+    #[must_use]
+    pub fn wrongly_removed_percent(&self) -> Option<f64> {
+        percent(self.subject_removed, self.subject_pixels)
+    }
+
+    /// Discrimination rate in per cent (Sanin et al. 2012, section 4): subject pixels that were kept.
+    #[must_use]
+    pub fn discrimination_percent(&self) -> Option<f64> {
+        self.wrongly_removed_percent().map(|wrong| 100.0 - wrong)
+    }
+
+    /// Intersection over union of what is left and the true subject, in per cent; `None` where both are empty.
+    #[must_use]
+    pub fn iou_percent(&self) -> Option<f64> {
+        percent(self.intersection, self.union)
+    }
+}
+
+fn percent(part: u64, whole: u64) -> Option<f64> {
+    (whole > 0).then(|| 100.0 * part as f64 / whole as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, arr2};
+
+    const B: Truth = Truth::Background;
+    const S: Truth = Truth::Shadow;
+    const P: Truth = Truth::Subject;
+    const X: Truth = Truth::Ignored;
+
+    #[test]
+    fn counts_by_hand() {
+        let truth = arr2(&[[P, P, P, P], [S, S, S, B], [X, X, B, S]]);
+        let before = arr2(&[[true, true, true, false], [true, true, true, true], [true, true, false, false]]);
+        let after =
+            arr2(&[[true, true, false, false], [false, true, false, true], [true, false, false, false]]);
+        let mut score = ShadowScore::default();
+        score.add(Some(before.view()), after.view(), truth.view()).unwrap();
+        // Of the three shadow pixels that were in the mask two went, of the three subject pixels one went.
+        assert_eq!((score.shadow_removed, score.shadow_pixels), (2, 3));
+        assert_eq!((score.subject_removed, score.subject_pixels), (1, 3));
+        // Left: 2 subject, 1 shadow, 1 background; the true subject has 4.
+        assert_eq!((score.intersection, score.union), (2, 6));
+        assert!((score.iou_percent().unwrap() - 100.0 / 3.0).abs() < 1e-12);
+
+        let mut whole = ShadowScore::default();
+        whole.add(None, after.view(), truth.view()).unwrap();
+        assert_eq!((whole.shadow_removed, whole.shadow_pixels), (3, 4));
+        assert_eq!((whole.subject_removed, whole.subject_pixels), (2, 4));
+    }
+
+    #[test]
+    fn nothing_to_count_is_not_nought_per_cent() {
+        let mut score = ShadowScore::default();
+        score
+            .add(None, Array2::from_elem((2, 2), false).view(), Array2::from_elem((2, 2), B).view())
+            .unwrap();
+        assert_eq!(score.removed_percent(), None);
+        assert_eq!(score.discrimination_percent(), None);
+        assert_eq!(score.iou_percent(), None);
+    }
+
+    #[test]
+    fn another_shape_is_an_error_that_names_both() {
+        let mut score = ShadowScore::default();
+        let error =
+            score.add(None, Array2::from_elem((2, 3), false).view(), Array2::from_elem((4, 5), B).view());
+        let text = error.unwrap_err().to_string();
+        assert!(text.contains("3x2") && text.contains("5x4"), "{text}");
+    }
+
+    #[test]
+    fn grey_values_of_the_ground_truth() {
+        assert_eq!(Truth::from_grey(50), Some(S));
+        assert_eq!(Truth::from_grey(85), Some(X));
+        assert_eq!(Truth::from_grey(255), Some(P));
+        assert_eq!(Truth::from_grey(33), None);
+    }
+}
