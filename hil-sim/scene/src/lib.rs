@@ -1,1 +1,64 @@
 //! What a camera would see: scenes, textures, lens, point spread functions, exposure and noise.
+//!
+//! This crate is the rig's eye when there is no camera, and the ground truth when there is one to be
+//! judged. It is written from the physics and shares no formula with the depth estimation it feeds:
+//! point spread functions live in space and are integrated over texture cells and pixels, so that a
+//! mistake in an optical transfer function elsewhere shows as a wrong depth instead of cancelling.
+//!
+//! # The model
+//!
+//! 1. **Surface.** A height field over the image ([`scene`]), painted with a texture at two samples
+//!    per pixel ([`texture`]); a sample is a square cell of half a pixel with constant radiance.
+//! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind
+//!    the lens, a sensor at `s` sees it blurred with radius `|s - w| D / 2F`, and moving the sensor does not
+//!    change the magnification.
+//! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its own blur radius, integrated over the cell and over the pixel
+//!    ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
+//! 4. **Exposure.** Electrons, shot noise, read noise, full well, quantisation ([`camera`]).
+//!
+//! [`render()`] makes one exposure; [`Renderer`] keeps the texture for many. Everything is a function of its
+//! arguments and the seed: no clock, no thread count, no CPU feature enters.
+//!
+//! ```
+//! use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, render, truth};
+//!
+//! let optics = OpticsFile::parse("
+//!     [lens]
+//!     focal_length_mm = 50.0
+//!     aperture_mm = 12.8
+//!     [sensor]
+//!     pixel_um = 7.4
+//!     [focus]
+//!     far_mm = 933.0
+//!     max_blur_px = 2.703
+//! ")?;
+//! let lens = Lens::from_optics(&optics)?;
+//! let scene: Scene = "plane:900".parse()?;
+//! let psf: Psf = "gaussian:k=0.4578".parse()?;
+//! let camera = Camera::new(64, 48, Noise::EightBit);
+//! let far = render(&scene, &lens, &psf, lens.sensor_far_mm, &camera, 1, 0)?;
+//! assert_eq!(far.dim(), (48, 64));
+//! assert_eq!(truth(&scene, &lens, &camera)[[24, 32]], 900.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod blur;
+pub mod camera;
+mod fourier;
+pub mod kernel;
+pub mod lens;
+pub mod optics;
+pub mod psf;
+mod quadrature;
+mod render;
+pub mod scene;
+mod scene_text;
+pub mod texture;
+
+pub use camera::{Camera, CameraError, Noise};
+pub use lens::{EllipticalDistortion, Lens, LensError};
+pub use optics::{OpticsError, OpticsFile};
+pub use psf::{Psf, PsfError};
+pub use render::{RenderError, Renderer, render, render_f32, truth};
+pub use scene::{HeightMap, Scene, SceneError, Shape};
+pub use texture::Texture;

@@ -1,0 +1,220 @@
+//! PSFs integrated over texture cells and pixels: the weights with which the scene reaches the sensor.
+//!
+//! A texture cell is a square of half a pixel with constant radiance. Lengths here are in cells. The mean of
+//! the blurred scene over a cell-sized square at the offset `d` from a cell of radiance 1 is
+//! `V(d) = integral psf(x) tri(x - d_x) tri(y - d_y) dx dy`, where `tri(t) = max(0, 1 - |t|)` is the overlap of two
+//! squares; a pixel is the mean of its four cells. So the weights are exact for the stated model: no sampling of
+//! the PSF enters.
+//!
+//! * Pill-box: the inner integral over y is a polynomial in the height of the disc, the outer one over x is split at
+//!   every kink and, with `x = R sin t`, integrated by Gauss-Legendre to rounding.
+//! * Gaussian: closed form in the error function.
+//! * Generalised Gaussian: Gauss-Legendre over the smooth parts; near the centre, where `f` has a cusp for `p < 2`, as a
+//!   mixture of discs, `f(r) = integral of -f'(R) [r < R] dR`.
+//!
+//! Tails beyond `exp(-12)` of the peak are cut and the kernel is normalised to 1.
+//! Cost: 10 us (pill-box, 2.7 px) to 1 ms (generalised) a kernel, growing with the square of the radius.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+use crate::psf::{Profile, Psf};
+use crate::quadrature::integrate;
+
+/// Texture cells along a pixel's side.
+pub const CELLS_PER_PIXEL: usize = 2;
+
+/// Exponent at which the tails of Gaussians are cut.
+const TAIL_EXPONENT: f64 = 12.0;
+/// Below this blur radius in cells the PSF is a point: its kernel differs from the point's by less than 1e-6.
+const POINT_RADIUS: f64 = 1e-6;
+
+/// Weights `V(d)` for the offsets -radius..=radius in both directions, in cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellKernel {
+    /// Largest offset, cells.
+    pub radius: usize,
+    /// Row-major square of `2 radius + 1` offsets; sums to 1.
+    pub weights: Vec<f64>,
+}
+
+impl CellKernel {
+    /// The kernel of `psf` at the blur radius `blur_px` (0 or more, px).
+    #[must_use]
+    pub fn new(psf: &Psf, blur_px: f64) -> Self {
+        let blur = blur_px * CELLS_PER_PIXEL as f64;
+        if blur < POINT_RADIUS {
+            return Self { radius: 0, weights: vec![1.0] };
+        }
+        let reach = Self::reach(psf, blur_px);
+        match *psf {
+            Psf::PillBox => Self::from_octant(reach, |x, y| disc_weight(x as f64, y as f64, blur)),
+            Psf::Gaussian { k } => {
+                let line: Vec<f64> = (0..=reach).map(|d| gaussian_line_weight(d as f64, k * blur)).collect();
+                Self::from_octant(reach, |x, y| line[x] * line[y])
+            }
+            Psf::Generalised { p, k } => {
+                let profile = Profile { p, sigma: k * blur };
+                Self::from_octant(reach, |x, y| profile_weight(x as f64, y as f64, profile))
+            }
+        }
+    }
+
+    /// Largest offset of the kernel of `psf` at the blur radius `blur_px`, cells.
+    #[must_use]
+    pub fn reach(psf: &Psf, blur_px: f64) -> usize {
+        let blur = blur_px * CELLS_PER_PIXEL as f64;
+        if blur < POINT_RADIUS {
+            return 0;
+        }
+        let extent = match *psf {
+            Psf::PillBox => blur,
+            Psf::Gaussian { k } => Profile { p: 2.0, sigma: k * blur }.radius_at(TAIL_EXPONENT),
+            Psf::Generalised { p, k } => Profile { p, sigma: k * blur }.radius_at(TAIL_EXPONENT),
+        };
+        // A triangle of half-width 1 at the offset d sees the PSF if d - 1 < extent.
+        (extent + 1.0).ceil() as usize - 1
+    }
+
+    /// Fills the square from the eighth with `0 <= y <= x`: every PSF here is a function of the distance.
+    fn from_octant(radius: usize, weight: impl Fn(usize, usize) -> f64) -> Self {
+        let side = 2 * radius + 1;
+        let mut weights = vec![0.0; side * side];
+        for x in 0..=radius {
+            for y in 0..=x {
+                let value = weight(x, y);
+                for (column, row) in [(x, y), (y, x)] {
+                    for column in [radius - column, radius + column] {
+                        for row in [radius - row, radius + row] {
+                            weights[row * side + column] = value;
+                        }
+                    }
+                }
+            }
+        }
+        let total: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= total);
+        Self { radius, weights }
+    }
+
+    /// Weight at an offset in cells, 0 outside.
+    #[must_use]
+    pub fn at(&self, row: isize, column: isize) -> f64 {
+        let radius = self.radius as isize;
+        if row.abs() > radius || column.abs() > radius {
+            return 0.0;
+        }
+        let side = 2 * radius + 1;
+        self.weights[((row + radius) * side + column + radius) as usize]
+    }
+
+    /// Weight of a cell on a pixel whose first cell is `row`, `column` cells further down and right.
+    #[must_use]
+    pub fn on_pixel(&self, row: isize, column: isize) -> f64 {
+        0.25 * (self.at(row, column)
+            + self.at(row + 1, column)
+            + self.at(row, column + 1)
+            + self.at(row + 1, column + 1))
+    }
+}
+
+fn triangle(t: f64) -> f64 {
+    (1.0 - t.abs()).max(0.0)
+}
+
+/// Integral of the triangle up to `t`.
+fn triangle_integral(t: f64) -> f64 {
+    if t <= 0.0 { 0.5 * (1.0 + t).max(0.0).powi(2) } else { 1.0 - 0.5 * (1.0 - t).max(0.0).powi(2) }
+}
+
+/// Integral of the product of triangles at `(x, y)` over the disc of radius `radius` around the origin.
+fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
+    let nearest = (x.abs() - 1.0).max(0.0).hypot((y.abs() - 1.0).max(0.0));
+    if nearest >= radius {
+        return 0.0;
+    }
+    if (x.abs() + 1.0).hypot(y.abs() + 1.0) <= radius {
+        return 1.0;
+    }
+    let angle = |position: f64| libm::asin((position / radius).clamp(-1.0, 1.0));
+    let (start, end) = (angle(x - 1.0), angle(x + 1.0));
+    let mut kinks = vec![start, end, angle(x).clamp(start, end)];
+    for edge in [y - 1.0, y, y + 1.0] {
+        if edge.abs() < radius {
+            let crossing = angle((radius * radius - edge * edge).sqrt());
+            kinks.extend([crossing, -crossing].map(|kink| kink.clamp(start, end)));
+        }
+    }
+    kinks.sort_by(f64::total_cmp);
+    let column = |t: f64| {
+        let height = radius * libm::cos(t);
+        let inside = triangle_integral(height - y) - triangle_integral(-height - y);
+        triangle(radius * libm::sin(t) - x) * inside * height
+    };
+    kinks
+        .windows(2)
+        .filter(|piece| piece[1] > piece[0])
+        .map(|piece| integrate(piece[0], piece[1], column))
+        .sum()
+}
+
+/// Integral of the triangle at `d` under a Gaussian of standard deviation `sigma` on the line.
+fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
+    // Second integral of the Gaussian; the triangle is a second difference.
+    let second = |t: f64| {
+        let z = t / sigma;
+        0.5 * t * libm::erf(z * FRAC_1_SQRT_2) + sigma * libm::exp(-0.5 * z * z) / (2.0 * PI).sqrt()
+    };
+    second(d + 1.0) - 2.0 * second(d) + second(d - 1.0)
+}
+
+/// Integral of the product of triangles at `(x, y)` under a generalised Gaussian.
+fn profile_weight(x: f64, y: f64, profile: Profile) -> f64 {
+    // Scale on which the profile changes: the flanks of a large p are steeper than sigma.
+    let smooth = profile.sigma / profile.p.max(1.0) > 0.8;
+    if smooth && (x > 1.0 || y > 1.0) {
+        let peak = profile.peak();
+        let density = |r2: f64| {
+            peak * libm::exp(-libm::pow(r2 / (profile.sigma * profile.sigma), 0.5 * profile.p) / profile.p)
+        };
+        let mut sum = 0.0;
+        for (x_low, y_low) in [(x - 1.0, y - 1.0), (x, y - 1.0), (x - 1.0, y), (x, y)] {
+            sum += integrate(x_low, x_low + 1.0, |u| {
+                triangle(u - x) * integrate(y_low, y_low + 1.0, |v| triangle(v - y) * density(u * u + v * v))
+            });
+        }
+        return sum;
+    }
+    mixture_weight(x, y, profile)
+}
+
+/// The same as a mixture of discs: discs that hold the whole support sum to `f` at its far corner.
+fn mixture_weight(x: f64, y: f64, profile: Profile) -> f64 {
+    let nearest = (x - 1.0).max(0.0).hypot((y - 1.0).max(0.0));
+    let farthest = (x + 1.0).hypot(y + 1.0);
+    let cut = profile.radius_at(30.0);
+    let mut radii = vec![nearest, farthest];
+    // Panels: where the disc meets corners and edges of the support, and where the profile bends.
+    for u in [x - 1.0, x, x + 1.0] {
+        for v in [y - 1.0, y, y + 1.0] {
+            radii.extend([u.hypot(v), u.abs(), v.abs()]);
+        }
+    }
+    radii.extend(
+        [1e-5, 1e-3, 0.02, 0.1, 0.3, 0.7, 1.2, 2.0, 3.0, 5.0, 8.0, 12.0, 18.0].map(|e| profile.radius_at(e)),
+    );
+    radii.retain(|&radius| radius >= nearest && radius <= farthest.min(cut));
+    radii.push(farthest.min(cut).max(nearest));
+    radii.sort_by(f64::total_cmp);
+    let banded: f64 = radii
+        .windows(2)
+        .filter(|panel| panel[1] > panel[0])
+        .map(|panel| {
+            integrate(panel[0], panel[1], |radius| {
+                let fall = profile.density(radius) * libm::pow(radius / profile.sigma, profile.p - 1.0)
+                    / profile.sigma;
+                fall * disc_weight(x, y, radius)
+            })
+        })
+        .sum();
+    banded + profile.density(farthest)
+}

@@ -1,0 +1,298 @@
+//! `optics.toml`: the lens, the pixel and the two focus settings of a rig.
+//!
+//! Lengths are in mm except the pixel pitch (um) and the largest blur (px). The near focus and the largest
+//! blur follow from each other (Li 2014, eq. 4.3): between far and near focus the sensor moves by twice the
+//! f-number times the blur radius that each setting gives on the other one's plane.
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::lens::image_distance_mm;
+use crate::psf::{Psf, PsfError};
+
+/// Largest relative disagreement of a given `max_blur_px` with the one that `near_mm` implies.
+const AGREEMENT: f64 = 0.02;
+
+/// The contents of `optics.toml`, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpticsFile {
+    /// Focal length, mm.
+    pub focal_length_mm: f64,
+    /// Diameter of the aperture, mm.
+    pub aperture_mm: f64,
+    /// Pixel pitch, um.
+    pub pixel_um: f64,
+    /// Object distance in focus at the far setting, mm.
+    pub far_mm: f64,
+    /// Object distance in focus at the near setting, mm.
+    pub near_mm: f64,
+    /// Blur radius of either focused plane at the other setting, px.
+    pub max_blur_px: f64,
+    /// The PSF of `[psf]`, if the file has one.
+    pub psf: Option<Psf>,
+}
+
+/// Why an `optics.toml` was refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum OpticsError {
+    /// Not TOML, or a key is missing, unknown or of the wrong type.
+    #[error("optics: {0}")]
+    Syntax(String),
+    /// A length that must be a finite number above zero is not.
+    #[error("optics: {key} = {value}, expected a finite number above 0")]
+    NotPositive {
+        /// Key in the file.
+        key: &'static str,
+        /// What the file says.
+        value: f64,
+    },
+    /// Neither or both of `aperture_mm` and `f_number`.
+    #[error("optics: [lens] needs exactly one of aperture_mm and f_number, found {found}")]
+    Aperture {
+        /// `neither` or `both`.
+        found: &'static str,
+    },
+    /// An object inside the focal length has no image.
+    #[error(
+        "optics: {key} = {distance_mm} mm is not beyond the focal length of {focal_length_mm} mm, so it has no \
+         image; give the distance from the lens"
+    )]
+    InsideFocalLength {
+        /// Key in the file.
+        key: &'static str,
+        /// The object distance, mm.
+        distance_mm: f64,
+        /// The focal length, mm.
+        focal_length_mm: f64,
+    },
+    /// Near focus is not nearer than far focus.
+    #[error("optics: near_mm = {near_mm} is not below far_mm = {far_mm}; are the two swapped?")]
+    NearBeyondFar {
+        /// Near focus, mm.
+        near_mm: f64,
+        /// Far focus, mm.
+        far_mm: f64,
+    },
+    /// Neither `max_blur_px` nor `near_mm`.
+    #[error("optics: [focus] needs max_blur_px or near_mm beside far_mm")]
+    NoRange,
+    /// `max_blur_px` and `near_mm` contradict each other.
+    #[error(
+        "optics: max_blur_px = {given_px} and near_mm = {near_mm} disagree by more than 2 %: that near focus gives \
+         max_blur_px = {implied_px:.4}, that blur gives near_mm = {implied_near_mm:.3}"
+    )]
+    Disagreement {
+        /// `max_blur_px` in the file.
+        given_px: f64,
+        /// `near_mm` in the file.
+        near_mm: f64,
+        /// The blur that `near_mm` implies, px.
+        implied_px: f64,
+        /// The near focus that `max_blur_px` implies, mm.
+        implied_near_mm: f64,
+    },
+    /// `[psf]` is not a PSF.
+    #[error("optics: [psf]: {0}")]
+    Psf(#[from] PsfError),
+}
+
+impl OpticsFile {
+    /// Reads and checks the text of an `optics.toml`. Where both `near_mm` and `max_blur_px` are given,
+    /// `near_mm` is kept and the blur computed from it.
+    ///
+    /// # Errors
+    /// [`OpticsError`] names the key, its value and what was expected.
+    pub fn parse(text: &str) -> Result<Self, OpticsError> {
+        let raw: RawFile =
+            toml::from_str(text).map_err(|error| OpticsError::Syntax(error.to_string().trim_end().into()))?;
+        let focal_length_mm = positive("lens.focal_length_mm", raw.lens.focal_length_mm)?;
+        let aperture_mm = match (raw.lens.aperture_mm, raw.lens.f_number) {
+            (Some(aperture_mm), None) => positive("lens.aperture_mm", aperture_mm)?,
+            (None, Some(f_number)) => focal_length_mm / positive("lens.f_number", f_number)?,
+            (None, None) => return Err(OpticsError::Aperture { found: "neither" }),
+            (Some(_), Some(_)) => return Err(OpticsError::Aperture { found: "both" }),
+        };
+        let pixel_um = positive("sensor.pixel_um", raw.sensor.pixel_um)?;
+        let far_mm = positive("focus.far_mm", raw.focus.far_mm)?;
+        beyond_focal_length("focus.far_mm", far_mm, focal_length_mm)?;
+
+        let sensor_far_mm = image_distance_mm(focal_length_mm, far_mm);
+        let travel_per_blur_mm = 2.0 * (focal_length_mm / aperture_mm) * pixel_um * 1e-3;
+        let near_of = |blur_px: f64| {
+            let sensor_near_mm = sensor_far_mm + travel_per_blur_mm * blur_px;
+            1.0 / (1.0 / focal_length_mm - 1.0 / sensor_near_mm)
+        };
+        let (near_mm, max_blur_px) = match (raw.focus.near_mm, raw.focus.max_blur_px) {
+            (None, None) => return Err(OpticsError::NoRange),
+            (None, Some(blur_px)) => {
+                let blur_px = positive("focus.max_blur_px", blur_px)?;
+                (near_of(blur_px), blur_px)
+            }
+            (Some(near_mm), given_px) => {
+                positive("focus.near_mm", near_mm)?;
+                beyond_focal_length("focus.near_mm", near_mm, focal_length_mm)?;
+                if near_mm >= far_mm {
+                    return Err(OpticsError::NearBeyondFar { near_mm, far_mm });
+                }
+                let implied_px =
+                    (image_distance_mm(focal_length_mm, near_mm) - sensor_far_mm) / travel_per_blur_mm;
+                if let Some(given_px) = given_px {
+                    positive("focus.max_blur_px", given_px)?;
+                    if (given_px - implied_px).abs() > AGREEMENT * implied_px {
+                        let implied_near_mm = near_of(given_px);
+                        return Err(OpticsError::Disagreement {
+                            given_px,
+                            near_mm,
+                            implied_px,
+                            implied_near_mm,
+                        });
+                    }
+                }
+                (near_mm, implied_px)
+            }
+        };
+        let psf = raw.psf.map(|psf| Psf::from_parts(&psf.model, psf.p, psf.k)).transpose()?;
+        Ok(Self { focal_length_mm, aperture_mm, pixel_um, far_mm, near_mm, max_blur_px, psf })
+    }
+}
+
+fn positive(key: &'static str, value: f64) -> Result<f64, OpticsError> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(OpticsError::NotPositive { key, value }) }
+}
+
+fn beyond_focal_length(key: &'static str, distance_mm: f64, focal_length_mm: f64) -> Result<(), OpticsError> {
+    if distance_mm > focal_length_mm {
+        Ok(())
+    } else {
+        Err(OpticsError::InsideFocalLength { key, distance_mm, focal_length_mm })
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFile {
+    lens: RawLens,
+    sensor: RawSensor,
+    focus: RawFocus,
+    psf: Option<RawPsf>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawLens {
+    focal_length_mm: f64,
+    aperture_mm: Option<f64>,
+    f_number: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSensor {
+    pixel_um: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFocus {
+    far_mm: f64,
+    near_mm: Option<f64>,
+    max_blur_px: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPsf {
+    model: String,
+    p: Option<f64>,
+    k: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn file(lens: &str, focus: &str) -> String {
+        format!("[lens]\nfocal_length_mm = 50.0\n{lens}\n[sensor]\npixel_um = 7.4\n[focus]\n{focus}\n")
+    }
+
+    #[test]
+    fn f_number_and_aperture_say_the_same() {
+        let by_aperture =
+            OpticsFile::parse(&file("aperture_mm = 12.8", "far_mm = 933.0\nmax_blur_px = 2.703"));
+        let by_number = OpticsFile::parse(&file("f_number = 3.90625", "far_mm = 933.0\nmax_blur_px = 2.703"));
+        assert_eq!(by_aperture, by_number);
+    }
+
+    #[test]
+    fn near_and_blur_follow_from_each_other() {
+        let near =
+            OpticsFile::parse(&file("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 886.81")).unwrap();
+        assert!((near.max_blur_px - 2.703).abs() < 1e-3, "{}", near.max_blur_px);
+        let back = format!("far_mm = 933.0\nmax_blur_px = {}", near.max_blur_px);
+        let blur = OpticsFile::parse(&file("aperture_mm = 12.8", &back)).unwrap();
+        assert!((blur.near_mm - 886.81).abs() < 1e-9);
+    }
+
+    #[test]
+    fn watanabe_and_nayars_pair_agrees_with_its_own_blur() {
+        let text = "[lens]\nfocal_length_mm = 25.0\nf_number = 8.3\n[sensor]\npixel_um = 13.04\n\
+                    [focus]\nfar_mm = 869.0\nnear_mm = 529.0\nmax_blur_px = 2.307\n[psf]\nmodel = \"pillbox\"";
+        let optics = OpticsFile::parse(text).unwrap();
+        assert!((optics.max_blur_px - 2.307).abs() < 1e-3, "{}", optics.max_blur_px);
+        assert_eq!(optics.psf, Some(Psf::PillBox));
+    }
+
+    #[test]
+    fn contradiction_names_the_value_that_would_agree() {
+        let error = OpticsFile::parse(&file(
+            "aperture_mm = 12.8",
+            "far_mm = 933.0\nnear_mm = 886.81\nmax_blur_px = 2.4",
+        ))
+        .unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("2.703"), "{text}");
+        assert!(text.contains("891."), "{text}");
+    }
+
+    #[test]
+    fn senseless_optics_are_refused_by_name() {
+        let cases = [
+            ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 940.0", "swapped"),
+            ("f_number = 0.0", "far_mm = 933.0\nmax_blur_px = 2.7", "lens.f_number = 0"),
+            ("aperture_mm = -1.0", "far_mm = 933.0\nmax_blur_px = 2.7", "lens.aperture_mm = -1"),
+            ("aperture_mm = 12.8", "far_mm = 50.0\nmax_blur_px = 2.7", "focal length of 50"),
+            ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 12.0", "focus.near_mm = 12"),
+            ("aperture_mm = 12.8", "far_mm = nan\nmax_blur_px = 2.7", "focus.far_mm = NaN"),
+            ("aperture_mm = 12.8", "far_mm = 933.0", "max_blur_px or near_mm"),
+            ("", "far_mm = 933.0\nmax_blur_px = 2.7", "found neither"),
+            ("aperture_mm = 12.8\nf_number = 4.0", "far_mm = 933.0\nmax_blur_px = 2.7", "found both"),
+            ("aperture = 12.8", "far_mm = 933.0\nmax_blur_px = 2.7", "unknown field `aperture`"),
+        ];
+        for (lens, focus, expected) in cases {
+            let text = OpticsFile::parse(&file(lens, focus)).unwrap_err().to_string();
+            assert!(text.contains(expected), "{text:?} should contain {expected:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_answered(text in "\\PC*") {
+            let _ = OpticsFile::parse(&text);
+        }
+
+        #[test]
+        fn any_numbers_give_a_sensible_range_or_an_error(
+            focal in -10.0..200.0f64, number in -1.0..30.0f64, pixel in -1.0..30.0f64,
+            far in -10.0..5000.0f64, blur in -1.0..10.0f64,
+        ) {
+            let text = format!(
+                "[lens]\nfocal_length_mm = {focal:?}\nf_number = {number:?}\n[sensor]\npixel_um = {pixel:?}\n\
+                 [focus]\nfar_mm = {far:?}\nmax_blur_px = {blur:?}"
+            );
+            if let Ok(optics) = OpticsFile::parse(&text) {
+                prop_assert!(optics.near_mm > optics.focal_length_mm && optics.near_mm < optics.far_mm);
+            }
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! One exposure of a scene: texture, depth, blur and noise put together.
+
+use ndarray::Array2;
+use thiserror::Error;
+
+use crate::blur::{Blur, Cells, kernel_reach_px};
+use crate::camera::{Camera, CameraError};
+use crate::kernel::CELLS_PER_PIXEL;
+use crate::lens::{Lens, LensError};
+use crate::psf::Psf;
+use crate::scene::{Scene, Shape, sample_map};
+
+/// Largest blur radius that is rendered, px: memory grows with its square.
+const MAX_BLUR_PX: f64 = 600.0;
+/// Pixels beyond each border for which the renderer keeps the surface; more is computed when needed.
+const KEPT_MARGIN_PX: usize = 8;
+
+/// Why nothing was rendered.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RenderError {
+    /// The camera makes no sense.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The lens makes no image of the scene.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// The sensor is at an impossible place.
+    #[error("sensor at {sensor_distance_mm} mm from the lens, expected a finite distance above 0")]
+    Sensor {
+        /// The sensor distance, mm.
+        sensor_distance_mm: f64,
+    },
+    /// The blur is beyond all use.
+    #[error(
+        "the sensor at {sensor_distance_mm} mm blurs the scene over a radius of {blur_px:.0} px, at most {limit_px} px is \
+         rendered; focus lies between {far_mm:.3} and {near_mm:.3} mm"
+    )]
+    Blur {
+        /// The sensor distance, mm.
+        sensor_distance_mm: f64,
+        /// The blur radius, px.
+        blur_px: f64,
+        /// The limit, px.
+        limit_px: f64,
+        /// Sensor distance of far focus, mm.
+        far_mm: f64,
+        /// Sensor distance of near focus, mm.
+        near_mm: f64,
+    },
+}
+
+/// Renders one exposure: codes of shape (height, width), 0 to [`Noise::max_code`](crate::Noise::max_code).
+///
+/// `sensor_distance_mm` is the distance of the sensor from the lens. The texture depends on `seed`, the noise on
+/// `seed` and `exposure_number`. To render many exposures of a scene keep a [`Renderer`].
+///
+/// # Errors
+/// [`RenderError`] where lens, scene, camera or position make no image.
+pub fn render(
+    scene: &Scene,
+    lens: &Lens,
+    psf: &Psf,
+    sensor_distance_mm: f64,
+    camera: &Camera,
+    seed: u64,
+    exposure_number: u32,
+) -> Result<Array2<u16>, RenderError> {
+    Renderer::new(scene, lens, psf, camera, seed)?.expose(sensor_distance_mm, exposure_number)
+}
+
+/// Renders the light of an exposure without noise, quantisation and full well: shape (height, width), as a fraction of the
+/// full well ([`Camera::exposure_level`] on average).
+///
+/// # Errors
+/// As [`render`].
+pub fn render_f32(
+    scene: &Scene,
+    lens: &Lens,
+    psf: &Psf,
+    sensor_distance_mm: f64,
+    camera: &Camera,
+    seed: u64,
+) -> Result<Array2<f32>, RenderError> {
+    let level = camera.exposure_level as f32;
+    Ok(Renderer::new(scene, lens, psf, camera, seed)?.radiance(sensor_distance_mm)? * level)
+}
+
+/// The depth of the surface at each pixel's centre, mm, shape (height, width).
+#[must_use]
+pub fn truth(scene: &Scene, lens: &Lens, camera: &Camera) -> Array2<f32> {
+    Array2::from_shape_fn((camera.height_px, camera.width_px), |(row, column)| {
+        scene.depth_mm(lens, camera, column as f64 + 0.5, row as f64 + 0.5) as f32
+    })
+}
+
+/// A scene before a camera, with its texture made: one exposure after the other at any sensor position.
+#[derive(Debug, Clone)]
+pub struct Renderer {
+    scene: Scene,
+    lens: Lens,
+    psf: Psf,
+    camera: Camera,
+    seed: u64,
+    texture: Array2<f32>,
+    surface: Surface,
+}
+
+/// Image distance of the surface beyond the far setting's sensor distance, mm.
+#[derive(Debug, Clone)]
+enum Surface {
+    Plane(f64),
+    /// One value per cell of the image and [`KEPT_MARGIN_PX`] around it.
+    Field(Array2<f32>),
+}
+
+impl Renderer {
+    /// Makes the texture and checks that the lens images every place of the scene.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn new(
+        scene: &Scene,
+        lens: &Lens,
+        psf: &Psf,
+        camera: &Camera,
+        seed: u64,
+    ) -> Result<Self, RenderError> {
+        camera.check()?;
+        let texture = match &scene.shape {
+            Shape::HeightMap(map) if map.texture().is_some() => Array2::zeros((0, 0)),
+            _ => scene.texture.synthesise(camera.width_px, camera.height_px, scene.contrast, seed),
+        };
+        let surface = match scene.shape {
+            Shape::Plane { depth_mm } if lens.distortion.is_none() => {
+                Surface::Plane(lens.image_distance_mm(depth_mm)? - lens.sensor_far_mm)
+            }
+            _ => Surface::Field(image_field(scene, lens, camera, KEPT_MARGIN_PX)?),
+        };
+        Ok(Self {
+            scene: scene.clone(),
+            lens: lens.clone(),
+            psf: *psf,
+            camera: camera.clone(),
+            seed,
+            texture,
+            surface,
+        })
+    }
+
+    /// One exposure with the sensor at `sensor_distance_mm`: codes of shape (height, width).
+    ///
+    /// # Errors
+    /// [`RenderError::Sensor`] and [`RenderError::Blur`] for positions that make no image.
+    pub fn expose(&self, sensor_distance_mm: f64, exposure_number: u32) -> Result<Array2<u16>, RenderError> {
+        let radiance = self.radiance(sensor_distance_mm)?;
+        Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
+    }
+
+    /// The mean radiance on each pixel, shape (height, width); the scene's mean is 1.
+    ///
+    /// # Errors
+    /// As [`Renderer::expose`].
+    pub fn radiance(&self, sensor_distance_mm: f64) -> Result<Array2<f32>, RenderError> {
+        if !(sensor_distance_mm.is_finite() && sensor_distance_mm > 0.0) {
+            return Err(RenderError::Sensor { sensor_distance_mm });
+        }
+        let blur_px = |offset_mm: f64| {
+            self.lens.signed_blur_px(sensor_distance_mm - self.lens.sensor_far_mm, offset_mm) as f32
+        };
+        let widest_px = match &self.surface {
+            Surface::Plane(offset_mm) => blur_px(*offset_mm).abs(),
+            Surface::Field(field) => {
+                field.iter().map(|&offset_mm| blur_px(f64::from(offset_mm)).abs()).fold(0.0, f32::max)
+            }
+        };
+        if f64::from(widest_px) > MAX_BLUR_PX {
+            return Err(RenderError::Blur {
+                sensor_distance_mm,
+                blur_px: widest_px.into(),
+                limit_px: MAX_BLUR_PX,
+                far_mm: self.lens.sensor_far_mm,
+                near_mm: self.lens.sensor_near_mm,
+            });
+        }
+        let margin_px = kernel_reach_px(&self.psf, widest_px).max(1);
+        let blur_px = match &self.surface {
+            Surface::Plane(offset_mm) => Blur::Uniform(blur_px(*offset_mm)),
+            Surface::Field(kept) => {
+                let field = if margin_px <= KEPT_MARGIN_PX {
+                    let skip = (KEPT_MARGIN_PX - margin_px) * CELLS_PER_PIXEL;
+                    let (rows, columns) = kept.dim();
+                    kept.slice(ndarray::s![skip..rows - skip, skip..columns - skip]).to_owned()
+                } else {
+                    image_field(&self.scene, &self.lens, &self.camera, margin_px)?
+                };
+                Blur::Varying(field.mapv_into(|offset_mm| blur_px(f64::from(offset_mm))))
+            }
+        };
+        Ok(Cells { margin_px, radiance: self.cell_radiance(margin_px), blur_px }.blurred(&self.psf))
+    }
+
+    /// Radiance of the cells of the image and `margin_px` around it.
+    fn cell_radiance(&self, margin_px: usize) -> Array2<f32> {
+        let size = cell_grid(&self.camera, margin_px);
+        if let Shape::HeightMap(map) = &self.scene.shape
+            && let Some(texture) = map.texture()
+        {
+            return Array2::from_shape_fn(size, |cell| {
+                let (x_px, y_px) = cell_centre_px(cell, margin_px);
+                sample_map(texture, x_px / self.camera.width_px as f64, y_px / self.camera.height_px as f64)
+                    as f32
+            });
+        }
+        let (height, width) = self.texture.dim();
+        let margin = (margin_px * CELLS_PER_PIXEL) as isize;
+        Array2::from_shape_fn(size, |(row, column)| {
+            let wrap =
+                |index: usize, period: usize| (index as isize - margin).rem_euclid(period as isize) as usize;
+            self.texture[[wrap(row, height), wrap(column, width)]]
+        })
+    }
+}
+
+/// Rows and columns of cells of the image and `margin_px` around it.
+fn cell_grid(camera: &Camera, margin_px: usize) -> (usize, usize) {
+    let cells = |pixels: usize| (pixels + 2 * margin_px) * CELLS_PER_PIXEL;
+    (cells(camera.height_px), cells(camera.width_px))
+}
+
+/// Image position of a cell's centre.
+fn cell_centre_px((row, column): (usize, usize), margin_px: usize) -> (f64, f64) {
+    let position = |index: usize| (index as f64 + 0.5) / CELLS_PER_PIXEL as f64 - margin_px as f64;
+    (position(column), position(row))
+}
+
+/// Image distance of each cell beyond the far setting's sensor distance, mm.
+fn image_field(
+    scene: &Scene,
+    lens: &Lens,
+    camera: &Camera,
+    margin_px: usize,
+) -> Result<Array2<f32>, LensError> {
+    let mut field = Array2::zeros(cell_grid(camera, margin_px));
+    for (cell, offset_mm) in field.indexed_iter_mut() {
+        let (x_px, y_px) = cell_centre_px(cell, margin_px);
+        let image_mm = lens.image_distance_mm(scene.depth_mm(lens, camera, x_px, y_px))?;
+        let (x, y) = (x_px / camera.width_px as f64, y_px / camera.height_px as f64);
+        *offset_mm = (lens.distorted_image_distance_mm(image_mm, x, y) - lens.sensor_far_mm) as f32;
+    }
+    Ok(field)
+}
