@@ -1,0 +1,283 @@
+//! The camera file: how the camera stands and what is known of the subject, as TOML.
+//!
+//! ```toml
+//! [camera]
+//! height_m = 0.8             # lens above the ground
+//! azimuth_deg = 140.0        # viewing direction, anticlockwise from north
+//! pitch_deg = 0.0            # optional: downwards positive
+//! focal_length_mm = 4.0
+//! pixel_um = 6.0
+//! width_px = 640             # optional: 640
+//! height_px = 480            # optional: 480
+//! principal_point_px = [319.5, 239.5]   # optional: the middle
+//!
+//! [subject]                  # optional, these are the defaults
+//! height_m = 1.75
+//! head_width_m = 0.17
+//!
+//! [standard_deviations]      # optional, these are the defaults
+//! day = 0.3
+//! time_h = 0.05
+//! latitude_deg = 0.05
+//! longitude_deg = 0.05
+//! subject_height_m = 0.07
+//! camera_height_m = 0.05
+//! azimuth_deg = 2.0
+//! head_width_m = 0.012
+//! head_width_px = 0.5
+//! image_distance_um = 20.0
+//! ```
+
+use serde::{Deserialize, Serialize};
+
+/// How the camera stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Lens above the ground.
+    pub height_m: f64,
+    /// Viewing direction, anticlockwise from north (Li 2014, eq. 8.12).
+    pub azimuth_deg: f64,
+    /// Viewing direction below the horizontal.
+    #[serde(default)]
+    pub pitch_deg: f64,
+    /// Focal length; far subjects make it the image distance v as well.
+    pub focal_length_mm: f64,
+    /// Pixel pitch.
+    pub pixel_um: f64,
+    /// Image width.
+    #[serde(default = "default_width")]
+    pub width_px: usize,
+    /// Image height.
+    #[serde(default = "default_height")]
+    pub height_px: usize,
+    /// Where the optical axis meets the image; the middle unless given.
+    #[serde(default)]
+    pub principal_point_px: Option<[f64; 2]>,
+}
+
+fn default_width() -> usize {
+    640
+}
+fn default_height() -> usize {
+    480
+}
+
+/// What is known of the subject beforehand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SubjectPrior {
+    /// Mean stature H.
+    pub height_m: f64,
+    /// Mean width of a head w.
+    pub head_width_m: f64,
+}
+
+impl Default for SubjectPrior {
+    fn default() -> Self {
+        Self { height_m: 1.75, head_width_m: 0.17 }
+    }
+}
+
+/// Standard deviations of everything that goes in (Li 2014, eq. 8.23 to 8.37).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StandardDeviations {
+    /// Day of the year, days.
+    pub day: f64,
+    /// Time of day, hours.
+    pub time_h: f64,
+    /// Latitude, degrees.
+    pub latitude_deg: f64,
+    /// Longitude, degrees.
+    pub longitude_deg: f64,
+    /// Stature, metres.
+    pub subject_height_m: f64,
+    /// Camera height, metres.
+    pub camera_height_m: f64,
+    /// Camera azimuth, degrees.
+    pub azimuth_deg: f64,
+    /// Head width in the world, metres.
+    pub head_width_m: f64,
+    /// Head width in the image, pixels.
+    pub head_width_px: f64,
+    /// Image distance v, micrometres.
+    pub image_distance_um: f64,
+}
+
+impl Default for StandardDeviations {
+    fn default() -> Self {
+        Self {
+            day: 0.3,
+            time_h: 0.05,
+            latitude_deg: 0.05,
+            longitude_deg: 0.05,
+            subject_height_m: 0.07,
+            camera_height_m: 0.05,
+            azimuth_deg: 2.0,
+            head_width_m: 0.012,
+            head_width_px: 0.5,
+            image_distance_um: 20.0,
+        }
+    }
+}
+
+/// A whole camera file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraFile {
+    /// How the camera stands.
+    pub camera: Camera,
+    /// What is known of the subject.
+    #[serde(default)]
+    pub subject: SubjectPrior,
+    /// How sure all that is.
+    #[serde(default)]
+    pub standard_deviations: StandardDeviations,
+}
+
+/// What is wrong with a camera file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// Not the TOML that is expected.
+    #[error("camera file: {0}")]
+    Syntax(String),
+    /// A number outside its range.
+    #[error("camera file: {name} = {value} is not {expected}")]
+    Range {
+        /// The key.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it should be.
+        expected: &'static str,
+    },
+}
+
+impl CameraFile {
+    /// Reads and checks a camera file.
+    ///
+    /// # Errors
+    /// TOML errors, unknown keys, and numbers out of range, each by name.
+    pub fn parse(text: &str) -> Result<Self, CameraError> {
+        let file: Self = toml::from_str(text).map_err(|error| CameraError::Syntax(error.to_string()))?;
+        file.check()?;
+        Ok(file)
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first number out of range, by name.
+    pub fn check(&self) -> Result<(), CameraError> {
+        let c = &self.camera;
+        let within = |name, value: f64, low: f64, high: f64, expected| {
+            if value > low && value < high {
+                Ok(())
+            } else {
+                Err(CameraError::Range { name, value, expected })
+            }
+        };
+        within("camera.height_m", c.height_m, 0.0, 1000.0, "above 0 and below 1000 m")?;
+        within("camera.azimuth_deg", c.azimuth_deg, -720.5, 720.5, "an angle in degrees")?;
+        within("camera.pitch_deg", c.pitch_deg, -80.0, 80.0, "between -80 and 80 deg (downwards positive)")?;
+        within("camera.focal_length_mm", c.focal_length_mm, 0.0, 1e4, "a focal length in mm")?;
+        within("camera.pixel_um", c.pixel_um, 0.0, 1e3, "a pixel pitch in um")?;
+        within("camera.width_px", c.width_px as f64, 0.0, 1e5, "an image width in pixels")?;
+        within("camera.height_px", c.height_px as f64, 0.0, 1e5, "an image height in pixels")?;
+        within("subject.height_m", self.subject.height_m, 0.2, 3.0, "a stature in metres")?;
+        within("subject.head_width_m", self.subject.head_width_m, 0.02, 1.0, "a head's width in metres")?;
+        let s = &self.standard_deviations;
+        for (name, value) in [
+            ("standard_deviations.day", s.day),
+            ("standard_deviations.time_h", s.time_h),
+            ("standard_deviations.latitude_deg", s.latitude_deg),
+            ("standard_deviations.longitude_deg", s.longitude_deg),
+            ("standard_deviations.subject_height_m", s.subject_height_m),
+            ("standard_deviations.camera_height_m", s.camera_height_m),
+            ("standard_deviations.azimuth_deg", s.azimuth_deg),
+            ("standard_deviations.head_width_m", s.head_width_m),
+            ("standard_deviations.head_width_px", s.head_width_px),
+            ("standard_deviations.image_distance_um", s.image_distance_um),
+        ] {
+            within(name, value, -f64::MIN_POSITIVE, 1e6, "zero or positive")?;
+        }
+        Ok(())
+    }
+}
+
+impl Camera {
+    /// Focal length in pixels.
+    pub fn focal_px(&self) -> f64 {
+        1e3 * self.focal_length_mm / self.pixel_um
+    }
+
+    /// Where the optical axis meets the image.
+    pub fn principal_point(&self) -> [f64; 2] {
+        self.principal_point_px
+            .unwrap_or([0.5 * (self.width_px as f64 - 1.0), 0.5 * (self.height_px as f64 - 1.0)])
+    }
+
+    /// Distance along the optical axis of a world point (metres; x right, y forward, z up, origin on the ground under the lens).
+    pub fn depth_m(&self, point: [f64; 3]) -> f64 {
+        let (s, c) = self.pitch_deg.to_radians().sin_cos();
+        point[1] * c + (self.height_m - point[2]) * s
+    }
+
+    /// Pixel position of a world point, `None` behind or beside the lens (nearer than 1 cm along the axis).
+    pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
+        let depth = self.depth_m(point);
+        if depth.is_nan() || depth <= 0.01 {
+            return None;
+        }
+        let (s, c) = self.pitch_deg.to_radians().sin_cos();
+        let down = -point[1] * s + (self.height_m - point[2]) * c;
+        let [cx, cy] = self.principal_point();
+        Some([cx + self.focal_px() * point[0] / depth, cy + self.focal_px() * down / depth])
+    }
+
+    /// The ground point seen at a pixel, `[x, y]` in metres, `None` at or above the horizon.
+    pub fn ground_point(&self, pixel: [f64; 2]) -> Option<[f64; 2]> {
+        let [cx, cy] = self.principal_point();
+        let (right, down) = ((pixel[0] - cx) / self.focal_px(), (pixel[1] - cy) / self.focal_px());
+        let (s, c) = self.pitch_deg.to_radians().sin_cos();
+        let fall = s + down * c;
+        if fall.is_nan() || fall <= 1e-6 {
+            return None;
+        }
+        let scale = self.height_m / fall;
+        Some([scale * right, scale * (c - down * s)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str =
+        "[camera]\nheight_m = 0.8\nazimuth_deg = 140.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+
+    #[test]
+    fn a_short_file_takes_the_defaults_and_bad_ones_name_the_key() {
+        let file = CameraFile::parse(TEXT).expect("valid");
+        assert_eq!((file.camera.width_px, file.subject.height_m), (640, 1.75));
+        assert!((file.camera.focal_px() - 666.67).abs() < 0.01);
+        let bad = CameraFile::parse(&TEXT.replace("0.8", "-0.8")).expect_err("negative height");
+        assert!(bad.to_string().contains("camera.height_m = -0.8"), "{bad}");
+        assert!(CameraFile::parse(&format!("{TEXT}hight = 3\n")).is_err());
+        assert!(CameraFile::parse(&TEXT.replace("4.0", "nan")).is_err());
+    }
+
+    #[test]
+    fn ground_points_project_back_to_themselves_with_pitch() {
+        let mut camera = CameraFile::parse(TEXT).expect("valid").camera;
+        for pitch_deg in [0.0, 12.0, -3.0] {
+            camera.pitch_deg = pitch_deg;
+            let pixel = camera.project([0.7, 6.0, 0.0]).expect("in front");
+            let back = camera.ground_point(pixel).expect("below the horizon");
+            assert!((back[0] - 0.7).abs() < 1e-9 && (back[1] - 6.0).abs() < 1e-9, "{back:?}");
+        }
+        assert_eq!(camera.project([0.0, -1.0, 0.0]), None);
+        assert_eq!(camera.ground_point([0.0, -4000.0]), None);
+    }
+}

@@ -1,0 +1,225 @@
+//! From the sun to the shadow on the ground (Li 2014, eq. 8.1 and 8.9 to 8.13) and in the image (8.14 to 8.20).
+//!
+//! Put right against the printed form: the shadow's lateral image component takes the subject's lateral offset X0 into account,
+//! `m_x = v ((X0 + r_x) / (u + r_y) - X0 / u)` (8.18 forgets it), angles come from `atan2`, and with a pitched camera the two
+//! ground points are projected as they are.
+
+use super::camera::{Camera, CameraFile};
+use crate::sun::SunPosition;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+/// Below this the shadow is many body lengths and every angle of it unsure.
+pub const LOWEST_SUN_DEG: f64 = 3.0;
+
+/// Why no shadow could be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShadowError {
+    /// The sun is down or too low.
+    #[error(
+        "the sun stands at {elevation_deg:.2} deg: no usable shadow below {LOWEST_SUN_DEG} deg; check time, latitude and longitude"
+    )]
+    SunTooLow {
+        /// Elevation found.
+        elevation_deg: f64,
+    },
+    /// The mask holds nothing.
+    #[error("the mask is empty: there is no subject to remove a shadow from")]
+    EmptyMask,
+    /// The mask's shape is not the camera's.
+    #[error(
+        "the mask has {mask_height} x {mask_width} pixels, the camera file {camera_height} x {camera_width}"
+    )]
+    Shape {
+        /// Rows of the mask.
+        mask_height: usize,
+        /// Columns of the mask.
+        mask_width: usize,
+        /// Rows by the camera file.
+        camera_height: usize,
+        /// Columns by the camera file.
+        camera_width: usize,
+    },
+    /// The subject does not stand before the camera.
+    #[error("the subject's distance of {distance_m} m is not one that the camera can see")]
+    Distance {
+        /// Distance found.
+        distance_m: f64,
+    },
+}
+
+/// A shadow on the ground in the camera's frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GroundShadow {
+    /// To the camera's right, metres.
+    pub rx_m: f64,
+    /// Along the viewing direction (positive = away from the camera), metres.
+    pub ry_m: f64,
+    /// Length, metres.
+    pub length_m: f64,
+}
+
+/// Where the subject stands.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Subject {
+    /// Distance u from the lens along the ground.
+    pub distance_m: f64,
+    /// Offset X0 to the right of the optical axis.
+    pub offset_m: f64,
+    /// Stature H.
+    pub height_m: f64,
+}
+
+/// A shadow in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ImageShadow {
+    /// Where the feet stand, pixels.
+    pub foot_px: [f64; 2],
+    /// Where the shadow of the head falls, pixels.
+    pub tip_px: [f64; 2],
+    /// Tip minus foot, pixels: the thesis' (m_x, m_y).
+    pub m_px: [f64; 2],
+    /// Direction of the shadow, radians from +x towards +y (down): eq. 8.20's eta by atan2.
+    pub eta_rad: f64,
+    /// Angle by which the silhouette (mirrored when m_x <= 0) is turned so that the bisector of body and shadow points
+    /// down: `3 pi / 4 - eta / 2`, in [pi/2, pi].
+    pub beta_rad: f64,
+    /// Whether m_x <= 0, so that the silhouette is mirrored before it is turned.
+    pub mirrored: bool,
+    /// Stature in the image, pixels (8.14).
+    pub height_px: f64,
+    /// Whether the shadow left the image towards the camera and was shortened (8.19).
+    pub shortened: bool,
+}
+
+/// The shadow of a person of `height_m` on level ground.
+///
+/// # Errors
+/// A sun below [`LOWEST_SUN_DEG`].
+pub fn on_ground(sun: SunPosition, height_m: f64, camera: &Camera) -> Result<GroundShadow, ShadowError> {
+    if sun.elevation_deg.is_nan() || sun.elevation_deg < LOWEST_SUN_DEG {
+        return Err(ShadowError::SunTooLow { elevation_deg: sun.elevation_deg });
+    }
+    let length_m = height_m / sun.elevation_deg.to_radians().tan();
+    // Angle from east, anticlockwise: the shadow points away from the sun (8.9), the frame turns with the camera (8.13).
+    let direction = (270.0 - sun.azimuth_deg - camera.azimuth_deg).to_radians();
+    Ok(GroundShadow { rx_m: length_m * direction.cos(), ry_m: length_m * direction.sin(), length_m })
+}
+
+/// Projects foot and tip into the image.
+///
+/// # Errors
+/// A subject that is not in front of the lens.
+pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Result<ImageShadow, ShadowError> {
+    let out_of_sight = ShadowError::Distance { distance_m: subject.distance_m };
+    let foot = [subject.offset_m, subject.distance_m, 0.0];
+    let foot_px = camera.project(foot).ok_or(out_of_sight.clone())?;
+    let head_px = camera.project([foot[0], foot[1], subject.height_m]).ok_or(out_of_sight)?;
+    // The lowest row of the image shows the ground at the near limit; a tip beyond it is drawn in along the shadow, which
+    // keeps its direction on the ground (8.19).
+    let near_m = camera
+        .ground_point([camera.principal_point()[0], camera.height_px as f64 - 1.0])
+        .map_or(0.1 * subject.distance_m, |ground| ground[1].min(0.9 * subject.distance_m));
+    let (mut fraction, mut shortened) = (1.0, false);
+    if subject.distance_m + shadow.ry_m < near_m {
+        fraction = (near_m - subject.distance_m) / shadow.ry_m;
+        shortened = true;
+    }
+    let tip = [foot[0] + fraction * shadow.rx_m, foot[1] + fraction * shadow.ry_m, 0.0];
+    let tip_px = camera.project(tip).ok_or(ShadowError::Distance { distance_m: tip[1] })?;
+    let m_px = [tip_px[0] - foot_px[0], tip_px[1] - foot_px[1]];
+    let mirrored = m_px[0] <= 0.0;
+    Ok(ImageShadow {
+        foot_px,
+        tip_px,
+        m_px,
+        eta_rad: m_px[1].atan2(m_px[0]),
+        beta_rad: rotation_angle(m_px),
+        mirrored,
+        height_px: foot_px[1] - head_px[1],
+        shortened,
+    })
+}
+
+/// The thesis' rotation angle beta (8.20) of a shadow (m_x, m_y), mirrored to the right first: in [pi/2, pi].
+pub fn rotation_angle(m_px: [f64; 2]) -> f64 {
+    let eta = m_px[1].atan2(m_px[0].abs());
+    (3.0 * FRAC_PI_4 - 0.5 * eta).clamp(FRAC_PI_2, 2.0 * FRAC_PI_2)
+}
+
+/// Distance by the width of the head in the image (8.17): `u = w v / w_i`.
+pub fn distance_from_head_m(file: &CameraFile, head_width_px: f64) -> f64 {
+    file.subject.head_width_m * file.camera.focal_px() / head_width_px
+}
+
+/// Distance by the row of the top of the head: a level view of stature H from height Hc shows the head `f (H - Hc) / u` above
+/// the horizon. `None` when camera and head are at nearly one height, where that says nothing.
+pub fn distance_from_head_row_m(file: &CameraFile, top_row_px: f64) -> Option<f64> {
+    let camera = &file.camera;
+    let above_m = file.subject.height_m - camera.height_m;
+    let up = (camera.principal_point()[1] - top_row_px) / camera.focal_px();
+    let (s, c) = camera.pitch_deg.to_radians().sin_cos();
+    // Slope of the ray through that row above the horizontal.
+    let slope = (up * c - s) / (c + up * s);
+    let distance_m = above_m / slope;
+    (above_m.abs() > 0.25 && distance_m.is_finite() && distance_m > 0.5).then_some(distance_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(azimuth_deg: f64) -> Camera {
+        CameraFile::parse(&format!(
+            "[camera]\nheight_m = 1.5\nazimuth_deg = {azimuth_deg}\nfocal_length_mm = 4.0\npixel_um = 6.0\n"
+        ))
+        .expect("valid")
+        .camera
+    }
+
+    #[test]
+    fn shadows_point_away_from_the_sun() {
+        // Sun in the south-west, camera looking north: the shadow falls to the right and away (Li 2014, fig. 8.1).
+        let sun = SunPosition { elevation_deg: 45.0, azimuth_deg: 225.0 };
+        let shadow = on_ground(sun, 2.0, &camera(0.0)).expect("sun is up");
+        assert!((shadow.length_m - 2.0).abs() < 1e-12);
+        assert!((shadow.rx_m - 2_f64.sqrt()).abs() < 1e-9 && (shadow.ry_m - 2_f64.sqrt()).abs() < 1e-9);
+        // Turned 90 deg anticlockwise the camera looks west: north-east is behind it, to the right.
+        let turned = on_ground(sun, 2.0, &camera(90.0)).expect("sun is up");
+        assert!((turned.rx_m - 2_f64.sqrt()).abs() < 1e-9 && (turned.ry_m + 2_f64.sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_level_camera_agrees_with_the_closed_form_with_lateral_offset() {
+        let (camera, shadow) = (camera(0.0), GroundShadow { rx_m: 1.1, ry_m: -0.8, length_m: 1.36 });
+        let subject = Subject { distance_m: 6.0, offset_m: 0.9, height_m: 1.7 };
+        let image = in_image(shadow, subject, &camera).expect("visible");
+        let v = camera.focal_px();
+        let mx = v * ((0.9 + 1.1) / (6.0 - 0.8) - 0.9 / 6.0);
+        let my = 1.5 * v * (1.0 / (6.0 - 0.8) - 1.0 / 6.0);
+        assert!((image.m_px[0] - mx).abs() < 1e-9 && (image.m_px[1] - my).abs() < 1e-9);
+        let eta = (-1.5 * -0.8_f64).atan2(6.0 * 1.1 - 0.9 * -0.8);
+        assert!((image.eta_rad - eta).abs() < 1e-12);
+        assert!((image.height_px - v * 1.7 / 6.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_low_sun_is_refused_and_a_shadow_behind_the_camera_shortened() {
+        let low = SunPosition { elevation_deg: 1.0, azimuth_deg: 90.0 };
+        assert!(matches!(on_ground(low, 1.75, &camera(0.0)), Err(ShadowError::SunTooLow { .. })));
+        let long = GroundShadow { rx_m: 1.0, ry_m: -9.0, length_m: 9.06 };
+        let subject = Subject { distance_m: 6.0, offset_m: 0.0, height_m: 1.75 };
+        let image = in_image(long, subject, &camera(0.0)).expect("visible");
+        assert!(image.shortened && image.tip_px[1] <= 480.0 && image.m_px[1] > 0.0);
+    }
+
+    #[test]
+    fn the_head_tells_the_distance() {
+        let text = "[camera]\nheight_m = 0.8\nazimuth_deg = 0.0\npitch_deg = 5.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        let file = CameraFile::parse(text).expect("valid");
+        let top = file.camera.project([0.0, 7.0, 1.75]).expect("visible");
+        let found = distance_from_head_row_m(&file, top[1]).expect("not at eye height");
+        assert!((found - 7.0).abs() < 1e-9, "{found}");
+        assert!((distance_from_head_m(&file, 0.17 * file.camera.focal_px() / 5.0) - 5.0).abs() < 1e-12);
+    }
+}
