@@ -1,0 +1,240 @@
+//! How near a depth map comes to the truth.
+//!
+//! Only pixels count that lie `border_px` inside the map, that the mask allows, that have a finite depth in both maps
+//! and, if asked, that lie more than `away_from_edges_px` from a step of the true depth. Depths in mm, NaN = no value.
+//!
+//! Cost: O(pixels); O(pixels x distance) with `away_from_edges_px` (separable running maxima would be faster, but this
+//! is not on any hot path).
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+/// A true depth difference between neighbours above this part of the whole range of the truth is a step.
+const STEP: f32 = 0.02;
+
+/// Why two maps cannot be compared.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CompareError {
+    /// The maps or the mask differ in size.
+    #[error(
+        "{what} is {found_width}x{found_height}, the depth map {width}x{height}: they must have one size"
+    )]
+    Size {
+        /// What differs.
+        what: &'static str,
+        /// Width of the depth map.
+        width: usize,
+        /// Height of the depth map.
+        height: usize,
+        /// Width found.
+        found_width: usize,
+        /// Height found.
+        found_height: usize,
+    },
+    /// No pixel is left to compare.
+    #[error("no pixel to compare: border, mask, edges and missing values leave none of {0}")]
+    NothingToCompare(usize),
+}
+
+/// Which pixels count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct CompareSettings {
+    /// Width of the rim that does not count, px.
+    pub border_px: usize,
+    /// Distance in px (row and column distance) that a pixel must exceed to a step of the true depth.
+    pub away_from_edges_px: Option<usize>,
+}
+
+/// Errors of a depth map: estimated minus true depth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Root-mean-square error, mm.
+    pub rmse_mm: f64,
+    /// Mean absolute error, mm.
+    pub mae_mm: f64,
+    /// 95th percentile of the absolute error, mm.
+    pub p95_mm: f64,
+    /// Mean error, mm; positive = too far.
+    pub bias_mm: f64,
+    /// Root-mean-square of the error relative to the true depth, percent.
+    pub rmse_percent_of_depth: f64,
+    /// Number of pixels compared.
+    pub pixels: usize,
+    /// Part of the pixels that counted by border, mask and edges but had no depth.
+    pub missing_fraction: f64,
+}
+
+/// Compares `depth` with `truth`, both (height, width) in mm; `mask`, where given, allows the pixels that are true.
+///
+/// # Errors
+/// [`CompareError`] if sizes differ or no pixel is left.
+pub fn compare(
+    depth: ArrayView2<f32>,
+    truth: ArrayView2<f32>,
+    mask: Option<ArrayView2<bool>>,
+    settings: &CompareSettings,
+) -> Result<Comparison, CompareError> {
+    let (height, width) = depth.dim();
+    let size = |what, (found_height, found_width)| {
+        if (found_height, found_width) == (height, width) {
+            Ok(())
+        } else {
+            Err(CompareError::Size { what, width, height, found_width, found_height })
+        }
+    };
+    size("truth", truth.dim())?;
+    if let Some(mask) = mask {
+        size("mask", mask.dim())?;
+    }
+    let near_edge = settings.away_from_edges_px.map(|distance| near_steps(truth, distance));
+    let border = settings.border_px;
+    let [mut errors, mut relative] = [const { Vec::new() }; 2];
+    let mut asked = 0_usize;
+    for ((y, x), &truth_mm) in truth.indexed_iter() {
+        let inside = y >= border && x >= border && y + border < height && x + border < width;
+        let allowed = mask.is_none_or(|m| m[(y, x)]) && near_edge.as_ref().is_none_or(|e| !e[(y, x)]);
+        if !(inside && allowed && truth_mm.is_finite()) {
+            continue;
+        }
+        asked += 1;
+        let depth_mm = depth[(y, x)];
+        if depth_mm.is_finite() {
+            let error = f64::from(depth_mm) - f64::from(truth_mm);
+            errors.push(error);
+            relative.push(error / f64::from(truth_mm));
+        }
+    }
+    summarise(errors, &relative, asked).ok_or(CompareError::NothingToCompare(height * width))
+}
+
+fn summarise(mut errors: Vec<f64>, relative: &[f64], asked: usize) -> Option<Comparison> {
+    if errors.is_empty() {
+        return None;
+    }
+    let n = errors.len() as f64;
+    let mean = |f: fn(f64) -> f64, v: &[f64]| v.iter().map(|e| f(*e)).sum::<f64>() / v.len() as f64;
+    let square = |e: f64| e * e;
+    let rmse_mm = mean(square, &errors).sqrt();
+    let bias_mm = mean(|e| e, &errors);
+    errors.iter_mut().for_each(|e| *e = e.abs());
+    let rank = ((0.95 * n).ceil() as usize).clamp(1, errors.len()) - 1;
+    let (_, p95_mm, _) = errors.select_nth_unstable_by(rank, f64::total_cmp);
+    let p95_mm = *p95_mm;
+    Some(Comparison {
+        rmse_mm,
+        mae_mm: mean(|e| e, &errors),
+        p95_mm,
+        bias_mm,
+        rmse_percent_of_depth: 100.0 * mean(square, relative).sqrt(),
+        pixels: errors.len(),
+        missing_fraction: 1.0 - n / asked as f64,
+    })
+}
+
+/// Marks the pixels that lie within `distance` rows and columns of a step of the true depth, or of a hole in it.
+///
+/// A step is a difference between neighbours of more than 2 % of the whole range of the truth, and no less than four
+/// times the median difference, so that a slant, a cone or a sphere has none.
+pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
+    let (height, width) = truth.dim();
+    let finite = || truth.iter().copied().filter(|t| t.is_finite());
+    let range = finite().fold(f32::MIN, f32::max) - finite().fold(f32::MAX, f32::min);
+    let neighbours = |(y, x): (usize, usize)| {
+        [(y, x + 1), (y + 1, x)].into_iter().filter(move |(y, x)| *y < height && *x < width)
+    };
+    let difference = |a: (usize, usize), b: (usize, usize)| (truth[a] - truth[b]).abs();
+    let mut slopes: Vec<f32> = truth
+        .indexed_iter()
+        .flat_map(|(at, _)| neighbours(at).map(move |next| difference(at, next)))
+        .filter(|d| d.is_finite())
+        .collect();
+    let middle = slopes.len() / 2;
+    let usual =
+        if slopes.is_empty() { 0.0 } else { *slopes.select_nth_unstable_by(middle, f32::total_cmp).1 };
+    let threshold = (STEP * range).max(4.0 * usual);
+    let mut steps = Array2::from_elem((height, width), false);
+    for (at, _) in truth.indexed_iter() {
+        for next in neighbours(at) {
+            let step = difference(at, next);
+            // A hole beside a value gives NaN and counts as a step; hole beside hole as well, which harms nothing.
+            if step.is_nan() || step > threshold {
+                steps[at] = true;
+                steps[next] = true;
+            }
+        }
+    }
+    dilate_square(&steps, distance)
+}
+
+/// Spreads true values by `distance` rows and columns.
+pub(crate) fn dilate_square(mask: &Array2<bool>, distance: usize) -> Array2<bool> {
+    dilate(&dilate(mask, distance, true), distance, false)
+}
+
+/// Spreads true values by `distance` along rows or columns.
+fn dilate(mask: &Array2<bool>, distance: usize, along_rows: bool) -> Array2<bool> {
+    let (height, width) = mask.dim();
+    let mut wider = Array2::from_elem((height, width), false);
+    for ((y, x), _) in mask.indexed_iter().filter(|(_, set)| **set) {
+        let [at, end] = if along_rows { [x, width] } else { [y, height] };
+        for i in at.saturating_sub(distance)..(at + distance + 1).min(end) {
+            wider[if along_rows { (y, i) } else { (i, x) }] = true;
+        }
+    }
+    wider
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn figures_of_a_worked_example() {
+        let truth = array![[100.0, 100.0, 200.0, 200.0]];
+        let depth = array![[101.0, 99.0, 203.0, f32::NAN]];
+        let c = compare(depth.view(), truth.view(), None, &CompareSettings::default()).unwrap();
+        assert!((c.rmse_mm - (11.0_f64 / 3.0).sqrt()).abs() < 1e-9);
+        assert!((c.mae_mm - 5.0 / 3.0).abs() < 1e-9 && (c.bias_mm - 1.0).abs() < 1e-9 && c.p95_mm == 3.0);
+        let relative = ((1e-4 + 1e-4 + 0.015_f64.powi(2)) / 3.0).sqrt();
+        assert!((c.rmse_percent_of_depth - 100.0 * relative).abs() < 1e-9);
+        assert!(c.pixels == 3 && (c.missing_fraction - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn border_mask_and_edges_restrict_what_counts() {
+        let truth = Array2::from_shape_fn((40, 60), |(_, x)| if x < 30 { 900.0 } else { 910.0 });
+        // Wrong by 5 mm within 4 px of the step and on the rim.
+        let depth = Array2::from_shape_fn((40, 60), |(y, x)| {
+            let rim = y < 2 || x < 2 || y >= 38 || x >= 58;
+            truth[(y, x)] + if rim || x.abs_diff(30) <= 4 { 5.0 } else { 1.0 }
+        });
+        let rmse = |border_px, away_from_edges_px| {
+            let settings = CompareSettings { border_px, away_from_edges_px };
+            compare(depth.view(), truth.view(), None, &settings).unwrap().rmse_mm
+        };
+        assert!(rmse(0, None) > 2.0 && rmse(2, None) > 1.5);
+        assert!((rmse(2, Some(8)) - 1.0).abs() < 1e-6);
+        let mask = Array2::from_shape_fn((40, 60), |(y, x)| (5..20).contains(&x) && (5..20).contains(&y));
+        let c = compare(depth.view(), truth.view(), Some(mask.view()), &CompareSettings::default()).unwrap();
+        assert!(c.pixels == 225 && (c.rmse_mm - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_slant_and_a_plane_have_no_steps() {
+        let slant = Array2::from_shape_fn((30, 30), |(_, x)| 900.0 + x as f32);
+        assert!(near_steps(slant.view(), 8).iter().all(|s| !s));
+        let plane = Array2::from_elem((30, 30), 900.0);
+        assert!(near_steps(plane.view(), 8).iter().all(|s| !s));
+    }
+
+    #[test]
+    fn maps_that_cannot_be_compared_say_why() {
+        let [a, b] = [Array2::<f32>::zeros((3, 4)), Array2::<f32>::zeros((4, 3))];
+        let error = compare(a.view(), b.view(), None, &CompareSettings::default()).unwrap_err();
+        assert_eq!(error.to_string(), "truth is 3x4, the depth map 4x3: they must have one size");
+        let empty = Array2::from_elem((3, 4), f32::NAN);
+        let error = compare(empty.view(), a.view(), None, &CompareSettings::default()).unwrap_err();
+        assert_eq!(error, CompareError::NothingToCompare(12));
+    }
+}

@@ -1,0 +1,31 @@
+//! Linear least squares of the operator design: at most a few thousand equations in at most 63 unknowns.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::DesignError;
+
+/// Singular values below this part of the largest count as zero, so that a kernel with more taps than the grid can
+/// tell apart gets the smallest solution rather than a wild one.
+const RELATIVE_RANK: f64 = 1e-12;
+
+/// The `x` that minimises `|matrix x - rhs|^2`, by a QR decomposition and a singular value decomposition of `R`.
+///
+/// # Errors
+/// [`DesignError::Singular`] if the decomposition does not converge or the solution is not finite.
+pub fn solve(matrix: DMatrix<f64>, rhs: DVector<f64>) -> Result<DVector<f64>, DesignError> {
+    let unknowns = matrix.ncols();
+    let qr = matrix.qr();
+    let mut projected = rhs;
+    qr.q_tr_mul(&mut projected);
+    let svd =
+        qr.unpack_r().try_svd(true, true, f64::EPSILON, 10_000).ok_or(DesignError::Singular { unknowns })?;
+    let largest = svd.singular_values.max();
+    let solution = svd
+        .solve(&projected.rows(0, unknowns).into_owned(), RELATIVE_RANK * largest)
+        .map_err(|_| DesignError::Singular { unknowns })?;
+    if solution.iter().all(|x| x.is_finite()) {
+        Ok(solution)
+    } else {
+        Err(DesignError::Singular { unknowns })
+    }
+}
