@@ -1,21 +1,94 @@
-//! The rig as a whole: link and control tick.
+//! The rig as a whole: what a request starts, what runs, how it ends.
+//!
+//! One piece of long work at a time (the protocol's `active`). Work that fails or is stopped stays active until
+//! nothing moves any more, and then ends with its one terminal event.
 
-use farnear_protocol::BoardMicros;
-use farnear_protocol::frame::Encoded;
-use heapless::Vec;
+use farnear_protocol::frame::{self, Encoded, Kind};
+use farnear_protocol::message::{
+    Axis, Capabilities, EventKind, Failure, Hello, Limits, PositionState, Request, RequestError, Response,
+    SCHEMA_KEY, Shot, ShotFault, Status,
+};
+use farnear_protocol::{BoardMicros, Nanometres, PROTOCOL_CURRENT, PROTOCOL_MIN};
+use heapless::{String, Vec};
 
+use crate::camera::Camera;
+use crate::events::Events;
+use crate::home::Homing;
 use crate::identity::Identity;
 use crate::io::{Inputs, Outputs};
+use crate::program::{Run, SHOTS_MAX, Shots};
+use crate::session::{Incoming, Session};
+use crate::settings::{COARSE_STEP_PM, Settings};
+use crate::stage::{Positioning, Stage, limits, since};
+
+/// Long work.
+#[derive(Clone, Debug)]
+enum Work {
+    Home(Homing),
+    Move {
+        axis: Axis,
+        target: Nanometres,
+        positioning: Positioning,
+    },
+    Program(Run),
+    /// Ends with this once nothing moves.
+    Ending {
+        axis: Option<Axis>,
+        reason: Failure,
+    },
+}
+
+/// Long work and the request that began it.
+#[derive(Clone, Debug)]
+struct Active {
+    request: u32,
+    work: Work,
+}
+
+/// A reboot that was asked for.
+#[derive(Clone, Copy, Debug)]
+struct Reboot {
+    request: u32,
+    asked: BoardMicros,
+    /// Since when nothing moves and nothing waits to be sent.
+    quiet_since: Option<BoardMicros>,
+}
 
 /// Everything the board does, without its hardware.
+#[derive(Clone, Debug)]
 pub struct Rig {
     identity: Identity,
+    settings: Settings,
+    stage: Stage,
+    camera: Camera,
+    shots: Shots,
+    active: Option<Active>,
+    events: Events,
+    session: Session,
+    reboot: Option<Reboot>,
 }
 
 impl Rig {
-    /// A rig that has just been reset, at `now`.
-    pub const fn new(identity: Identity, _now: BoardMicros) -> Self {
-        Self { identity }
+    /// The rig of `docs/rig.md`, just reset, at `now`.
+    pub fn new(identity: Identity, now: BoardMicros) -> Self {
+        Self::with_settings(identity, Settings::DEFAULT, now)
+    }
+
+    /// A rig with other numbers.
+    pub fn with_settings(identity: Identity, settings: Settings, now: BoardMicros) -> Self {
+        let mut events = Events::new();
+        events.push(now, EventKind::Started { cause: identity.reset_cause });
+        Self {
+            identity,
+            settings,
+            stage: Stage::new(&settings),
+            camera: Camera::new(settings.camera),
+            shots: Shots::new(),
+            active: None,
+            events,
+            session: Session::new(identity.boot),
+            reboot: None,
+        }
     }
 
     /// Who it is.
@@ -23,24 +96,287 @@ impl Rig {
         &self.identity
     }
 
-    /// Takes one byte from the link.
-    pub fn receive(&mut self, _byte: u8, _now: BoardMicros) {}
-
-    /// The next frame for the link; the binary calls it until it gives `None`.
-    pub fn transmit(&mut self) -> Option<Encoded> {
-        None
+    /// Takes one byte from the link. At the end of a request the request is carried out or begun, and its answer
+    /// waits in [`Self::transmit`].
+    pub fn receive(&mut self, byte: u8, now: BoardMicros) {
+        if let Some(incoming) = self.session.receive(byte) {
+            let answer = self.carry_out(&incoming, now);
+            self.session.answer(incoming, &answer);
+        }
     }
 
-    /// One control tick; call it [`crate::io::TICK_HZ`] times a second.
-    pub fn tick(&mut self, _inputs: &Inputs) -> Outputs {
-        Outputs {
+    /// The next frame for the link, answers before events; call it until it gives `None`.
+    pub fn transmit(&mut self) -> Option<Encoded> {
+        if let Some(answer) = self.session.send() {
+            return Some(answer);
+        }
+        let (number, event) = self.events.send()?;
+        frame::encode(self.session.header(Kind::Event, number), event)
+    }
+
+    /// One control tick; call it [`crate::io::TICK_HZ`] times a second and carry its outputs out at once.
+    pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
+        let now = inputs.now;
+        self.stage.sense(inputs);
+        self.camera.sense(inputs.exposure, now);
+        self.advance(now);
+        let mut outputs = Outputs {
             piezo_dac: 0,
             enable: false,
             direction_away: false,
             abort_steps: false,
             segments: Vec::new(),
-            trigger: None,
-            reset: false,
+            trigger: self.camera.take_order(),
+            reset: self.reset_is_due(now),
+        };
+        self.stage.act(inputs, &mut outputs);
+        outputs
+    }
+
+    fn carry_out(&mut self, incoming: &Incoming, now: BoardMicros) -> Result<Response, RequestError> {
+        let id = incoming.id;
+        match &incoming.request {
+            Request::Hello => Ok(Response::Hello(self.hello())),
+            Request::Status => Ok(Response::Status(self.status(now))),
+            Request::ReadEvent { number } => self.read_event(*number),
+            Request::Stop => {
+                self.end_early(None, Failure::Stopped);
+                Ok(Response::Accepted)
+            }
+            Request::Reboot => {
+                self.end_early(None, Failure::Stopped);
+                self.reboot.get_or_insert(Reboot { request: id, asked: now, quiet_since: None });
+                Ok(Response::Accepted)
+            }
+            Request::Home { axis } => self.home(*axis, id),
+            Request::Move { axis, target } => self.go(*axis, *target, id, now),
+            Request::LoadShot { index, shot } => self.load_shot(*index, shot),
+            Request::RunProgram { shots } => self.run_program(*shots, id, now),
         }
     }
+
+    fn home(&mut self, axis: Axis, request: u32) -> Result<Response, RequestError> {
+        self.must_be_free()?;
+        if axis != Axis::SensorCoarse {
+            return Err(RequestError::CannotHome { axis });
+        }
+        let homing = Homing::start(&mut self.stage.coarse, &self.settings.coarse, self.stage.home_switch);
+        self.active = Some(Active { request, work: Work::Home(homing) });
+        Ok(Response::Accepted)
+    }
+
+    fn go(
+        &mut self,
+        axis: Axis,
+        target: Nanometres,
+        request: u32,
+        now: BoardMicros,
+    ) -> Result<Response, RequestError> {
+        self.must_be_inside(axis, target)?;
+        self.must_be_homed(axis)?;
+        self.must_be_free()?;
+        let settled = Positioning::plain(&self.settings, axis);
+        let work = match Positioning::start(&mut self.stage, &self.settings, (axis, target), settled, now) {
+            Ok(positioning) => Work::Move { axis, target, positioning },
+            Err(reason) => Work::Ending { axis: Some(axis), reason },
+        };
+        self.active = Some(Active { request, work });
+        Ok(Response::Accepted)
+    }
+
+    fn load_shot(&mut self, index: u8, shot: &Shot) -> Result<Response, RequestError> {
+        if let Some(Active { request, work: Work::Program(_) }) = self.active {
+            return Err(RequestError::Busy { request });
+        }
+        self.must_be_inside(shot.axis, shot.target)?;
+        self.shots
+            .load(index, *shot, &self.settings)
+            .map_err(|reason| RequestError::Shot { index, reason })?;
+        Ok(Response::Accepted)
+    }
+
+    fn run_program(&mut self, count: u8, request: u32, now: BoardMicros) -> Result<Response, RequestError> {
+        self.must_be_free()?;
+        if usize::from(count) > SHOTS_MAX {
+            return Err(RequestError::Shot { index: count, reason: ShotFault::Index });
+        }
+        for index in 0..count {
+            let missing = RequestError::Shot { index, reason: ShotFault::Missing };
+            let axis = self.shots.get(index).ok_or(missing)?.axis;
+            self.must_be_homed(axis)?;
+        }
+        let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
+            return Err(RequestError::Shot { index: 0, reason: ShotFault::Index });
+        };
+        let work = match Run::start(count, first, &mut self.stage, &self.settings, now) {
+            Ok(run) => Work::Program(run),
+            Err(reason) => Work::Ending { axis: Some(first.axis), reason },
+        };
+        self.active = Some(Active { request, work });
+        Ok(Response::Accepted)
+    }
+
+    fn read_event(&self, number: u32) -> Result<Response, RequestError> {
+        match self.events.get(number) {
+            Some(event) => Ok(Response::Event(event.clone())),
+            None => {
+                Err(RequestError::EventGone { oldest: self.events.oldest(), next: self.events.next_number() })
+            }
+        }
+    }
+
+    fn must_be_free(&self) -> Result<(), RequestError> {
+        let reboot = self.reboot.map(|reboot| reboot.request);
+        match self.active.as_ref().map(|active| active.request).or(reboot) {
+            Some(request) => Err(RequestError::Busy { request }),
+            None => Ok(()),
+        }
+    }
+
+    fn must_be_homed(&self, axis: Axis) -> Result<(), RequestError> {
+        match self.stage.state(axis) {
+            PositionState::Homed => Ok(()),
+            state => Err(RequestError::NotHomed { axis, state }),
+        }
+    }
+
+    fn must_be_inside(&self, axis: Axis, asked: Nanometres) -> Result<(), RequestError> {
+        let (min, max) = limits(&self.settings, axis);
+        if (min..=max).contains(&asked) {
+            Ok(())
+        } else {
+            Err(RequestError::OutOfRange { axis, asked, min, max })
+        }
+    }
+
+    /// Takes the active work one tick further.
+    fn advance(&mut self, now: BoardMicros) {
+        let Some(Active { request, work }) = &mut self.active else { return };
+        let request = *request;
+        match work {
+            Work::Home(homing) => {
+                let axis = Axis::SensorCoarse;
+                let home_switch = self.stage.home_switch;
+                match homing.tick(&mut self.stage.coarse, &self.settings.coarse, home_switch) {
+                    None => {}
+                    Some(Ok(shift)) => self.finish(now, EventKind::Homed { request, axis, shift }),
+                    Some(Err(reason)) => self.end_early(Some(axis), reason),
+                }
+            }
+            Work::Move { axis, target, positioning } => {
+                let (axis, asked) = (*axis, *target);
+                match positioning.tick(&mut self.stage, now) {
+                    None => {}
+                    Some(Ok(_)) => {
+                        let measured = self.stage.measured(axis);
+                        self.finish(now, EventKind::MoveDone { request, axis, asked, measured });
+                    }
+                    Some(Err(reason)) => self.end_early(Some(axis), reason),
+                }
+            }
+            Work::Program(run) => {
+                let axis = run.axis();
+                let progress = run.tick(&self.shots, &mut self.stage, &mut self.camera, &self.settings, now);
+                if let Some(shot) = progress.taken {
+                    self.events.push(now, EventKind::ShotDone { request, shot });
+                }
+                match progress.end {
+                    None => {}
+                    Some(Ok(exposures)) => self.finish(now, EventKind::ProgramDone { request, exposures }),
+                    Some(Err(Failure::NoStrobe)) => self.end_early(None, Failure::NoStrobe),
+                    Some(Err(reason)) => self.end_early(Some(axis), reason),
+                }
+            }
+            Work::Ending { .. } => {}
+        }
+        if let Some(Active { work: Work::Ending { axis, reason }, .. }) = &self.active
+            && self.stage.is_still()
+        {
+            // A fault on the way to the stop tells more than the stop.
+            let fault = self.stage.coarse.take_fault();
+            let axis = if fault.is_some() { Some(Axis::SensorCoarse) } else { *axis };
+            let reason = fault.unwrap_or(*reason);
+            self.finish(now, EventKind::Failed { request, axis, reason });
+        }
+    }
+
+    fn finish(&mut self, now: BoardMicros, terminal: EventKind) {
+        self.active = None;
+        self.events.push(now, terminal);
+    }
+
+    /// Stops what moves; the active work ends with `reason` once it stands. Does nothing where nothing is active.
+    fn end_early(&mut self, axis: Option<Axis>, reason: Failure) {
+        if let Some(active) = &mut self.active
+            && !matches!(active.work, Work::Ending { .. })
+        {
+            self.stage.stop();
+            active.work = Work::Ending { axis, reason };
+        }
+    }
+
+    /// Everything was said and nothing moves, or that took too long.
+    fn reset_is_due(&mut self, now: BoardMicros) -> bool {
+        let quiet = self.active.is_none() && self.session.all_sent() && self.events.all_sent();
+        let link = &self.settings.link;
+        let Some(reboot) = &mut self.reboot else { return false };
+        if !quiet {
+            reboot.quiet_since = None;
+            return since(reboot.asked, now) > link.reset_deadline;
+        }
+        let quiet_since = *reboot.quiet_since.get_or_insert(now);
+        since(quiet_since, now) >= link.reset_drain
+    }
+
+    fn hello(&self) -> Hello {
+        Hello {
+            protocol_min: PROTOCOL_MIN,
+            protocol_current: PROTOCOL_CURRENT,
+            schema_key: SCHEMA_KEY,
+            board: cut(self.identity.board),
+            firmware: cut(self.identity.firmware),
+            unique_id: self.identity.unique_id,
+            boot: self.identity.boot,
+            reset_cause: self.identity.reset_cause,
+            emulated: self.identity.emulated,
+            capabilities: Capabilities { sensor_coarse: true, sensor_fine: true, strobe: true },
+            limits: Limits {
+                datum: self.settings.datum,
+                coarse_min: self.settings.coarse.min,
+                coarse_max: self.settings.coarse.max,
+                coarse_step_pm: COARSE_STEP_PM,
+                fine_min: self.settings.fine.min,
+                fine_max: self.settings.fine.max,
+                shots_max: SHOTS_MAX as u8,
+                exposure_min: self.settings.camera.exposure_min,
+                exposure_max: self.settings.camera.exposure_max,
+            },
+        }
+    }
+
+    fn status(&self, now: BoardMicros) -> Status {
+        Status {
+            time: now,
+            coarse: self.stage.status(Axis::SensorCoarse),
+            fine: self.stage.status(Axis::SensorFine),
+            home_switch: self.stage.home_switch,
+            far_switch: self.stage.far_switch,
+            active: self.active.as_ref().map(|active| active.request),
+            next_event: self.events.next_number(),
+            triggers: self.camera.triggers(),
+            steps: self.stage.coarse.total_pulses(),
+            link: self.session.counters(),
+        }
+    }
+}
+
+/// As much of a text as fits.
+fn cut<const N: usize>(text: &str) -> String<N> {
+    let mut out = String::new();
+    for character in text.chars() {
+        if out.push(character).is_err() {
+            break;
+        }
+    }
+    out
 }

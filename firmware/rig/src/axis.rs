@@ -1,0 +1,331 @@
+//! The coarse axis: feeds the step timer, counts, and watches encoder, switches and driver.
+//!
+//! The position is what the timer counted, in pulses; the encoder is compared with it all the time. A reported
+//! count may lag by up to the running segment (a 1 ms segment at full speed is 40 pulses), so the encoder must lie
+//! between the counted pulses and the end of the running segment, give or take [`CoarseSettings::following`].
+//!
+//! Two ways to stop: [`Axis::stop`] brakes along the ramp; a fault aborts, which takes at most 1 ms. Either way
+//! the pulses are counted, so the position is known after it. A motion is over when the timer is idle.
+
+use farnear_protocol::Nanometres;
+use farnear_protocol::message::{Failure, PositionState};
+use heapless::Deque;
+
+use crate::io::{Inputs, Outputs, Segment, StepperState, TICK_US};
+use crate::ramp::{Ramp, RampLimits};
+use crate::settings::CoarseSettings;
+use crate::steps;
+
+/// Segments that may be under way at once: those that wait in the board and the one that runs.
+const OUTSTANDING: usize = 8;
+
+/// What the home switch means during a motion.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum HomeSwitch {
+    /// Closed away from position 0 is a fault.
+    Watched,
+    /// Homing looks at it.
+    Sought,
+}
+
+/// Where a motion is.
+#[derive(Clone, Debug)]
+enum Motion {
+    Still,
+    /// Driver and direction are set up; pulses follow after these ticks.
+    Preparing {
+        ramp: Ramp,
+        ticks: u32,
+    },
+    Stepping {
+        ramp: Ramp,
+        quiet_ticks: u32,
+    },
+    /// Everything was thrown away; waits for the running segment to end.
+    Aborting,
+}
+
+/// The coarse axis.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    settings: CoarseSettings,
+    state: PositionState,
+    motion: Motion,
+    away: bool,
+    home_switch: HomeSwitch,
+    enabled: bool,
+    /// Position in counted pulses; from the reset's position until homed.
+    position: i32,
+    /// Encoder reading at position 0.
+    encoder_zero: i32,
+    encoder: i32,
+    pulses: Option<u32>,
+    total_pulses: u64,
+    /// Pulses of the segments under way, oldest first, and how many of the oldest are counted already.
+    outstanding: Deque<u16, OUTSTANDING>,
+    counted_of_oldest: u32,
+    target: Nanometres,
+    fault: Option<Failure>,
+}
+
+impl Axis {
+    pub(crate) const fn new(settings: CoarseSettings) -> Self {
+        Self {
+            settings,
+            state: PositionState::Unknown,
+            motion: Motion::Still,
+            away: true,
+            home_switch: HomeSwitch::Watched,
+            enabled: false,
+            position: 0,
+            encoder_zero: 0,
+            encoder: 0,
+            pulses: None,
+            total_pulses: 0,
+            outstanding: Deque::new(),
+            counted_of_oldest: 0,
+            target: Nanometres(0),
+            fault: None,
+        }
+    }
+
+    /// What is known of the position.
+    pub(crate) const fn state(&self) -> PositionState {
+        self.state
+    }
+
+    /// Position in pulses, as counted.
+    pub(crate) const fn position(&self) -> i32 {
+        self.position
+    }
+
+    /// Position as the encoder sees it.
+    pub(crate) const fn measured(&self) -> Nanometres {
+        steps::encoder_to_nanometres(self.encoder.wrapping_sub(self.encoder_zero))
+    }
+
+    /// Where it was last sent.
+    pub(crate) const fn target(&self) -> Nanometres {
+        self.target
+    }
+
+    /// Pulses given since the reset.
+    pub(crate) const fn total_pulses(&self) -> u64 {
+        self.total_pulses
+    }
+
+    /// Whether no pulse comes any more.
+    pub(crate) const fn is_still(&self) -> bool {
+        matches!(self.motion, Motion::Still)
+    }
+
+    /// Why the last motion ended early; given once.
+    pub(crate) const fn take_fault(&mut self) -> Option<Failure> {
+        self.fault.take()
+    }
+
+    /// Goes to a position at the speed of moves. The caller has checked limits and state.
+    pub(crate) fn go(&mut self, target: Nanometres) {
+        self.target = target;
+        self.go_steps(steps::to_steps(target), self.settings.speed, HomeSwitch::Watched);
+    }
+
+    /// Goes to a pulse at a speed. Nothing happens while it moves.
+    pub(crate) fn go_steps(&mut self, target: i32, speed: u32, home_switch: HomeSwitch) {
+        if !self.is_still() {
+            return;
+        }
+        self.fault = None;
+        self.counted_of_oldest = 0;
+        self.home_switch = home_switch;
+        let way = target.wrapping_sub(self.position);
+        if way == 0 {
+            return;
+        }
+        self.away = way > 0;
+        let limits = RampLimits {
+            start_speed: self.settings.start_speed,
+            speed,
+            acceleration: self.settings.acceleration,
+        };
+        // One tick at least, so that DIR is stable before STEP.
+        let ticks = if self.enabled { 1 } else { self.settings.enable_delay.0 / TICK_US + 1 };
+        self.enabled = true;
+        self.motion = Motion::Preparing { ramp: Ramp::new(way.unsigned_abs(), limits), ticks };
+    }
+
+    /// Brakes along the ramp.
+    pub(crate) fn stop(&mut self) {
+        match &mut self.motion {
+            Motion::Preparing { .. } => self.motion = Motion::Still,
+            Motion::Stepping { ramp, .. } => ramp.stop(),
+            Motion::Still | Motion::Aborting => {}
+        }
+    }
+
+    /// Believes the encoder: homing begins from a position that steps and encoder do not agree on.
+    pub(crate) const fn follow_encoder(&mut self) {
+        self.position = steps::to_steps(self.measured());
+    }
+
+    /// Makes `zero` (in pulses of the present count) position 0 and the position known; gives how far the
+    /// encoder's zero moved. The axis stands still.
+    pub(crate) const fn set_home(&mut self, zero: i32) -> Nanometres {
+        self.position = self.position.wrapping_sub(zero);
+        let expected = steps::to_encoder(steps::to_nanometres(self.position));
+        let new_zero = self.encoder.wrapping_sub(expected);
+        let shift = steps::encoder_to_nanometres(new_zero.wrapping_sub(self.encoder_zero));
+        self.encoder_zero = new_zero;
+        self.state = PositionState::Homed;
+        self.target = Nanometres(0);
+        shift
+    }
+
+    /// Reads the board; finds faults.
+    pub(crate) fn sense(&mut self, inputs: &Inputs) {
+        self.encoder = inputs.encoder_coarse_counts;
+        let progressed = self.count(&inputs.stepper);
+        if matches!(self.motion, Motion::Aborting) {
+            if inputs.stepper.idle {
+                self.settle_accounts();
+            }
+            return;
+        }
+        if let Some(fault) = self.find_fault(inputs, progressed) {
+            self.abort(fault);
+        } else if self.has_ended(&inputs.stepper) {
+            self.motion = Motion::Still;
+            self.counted_of_oldest = 0;
+        }
+    }
+
+    /// Orders the board; feeds the timer.
+    pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut Outputs) {
+        outputs.enable = self.enabled;
+        outputs.direction_away = self.away;
+        match &mut self.motion {
+            Motion::Still => {}
+            Motion::Aborting => outputs.abort_steps = true,
+            Motion::Preparing { ramp, ticks } => {
+                *ticks = ticks.saturating_sub(1);
+                if *ticks == 0 {
+                    self.motion = Motion::Stepping { ramp: ramp.clone(), quiet_ticks: 0 };
+                }
+            }
+            Motion::Stepping { ramp, .. } => {
+                for _ in 0..stepper.room {
+                    if outputs.segments.is_full() || self.outstanding.is_full() {
+                        break;
+                    }
+                    let Some(segment) = ramp.next() else { break };
+                    feed(&mut self.outstanding, outputs, segment);
+                }
+            }
+        }
+    }
+
+    /// Takes the timer's count over; gives whether it moved on.
+    fn count(&mut self, stepper: &StepperState) -> bool {
+        let new = stepper.pulses.wrapping_sub(self.pulses.unwrap_or(stepper.pulses));
+        self.pulses = Some(stepper.pulses);
+        self.total_pulses += u64::from(new);
+        let way = new as i32; // between two ticks there are a few pulses
+        self.position = self.position.wrapping_add(if self.away { way } else { -way });
+        self.counted_of_oldest = self.counted_of_oldest.saturating_add(new);
+        while let Some(oldest) = self.outstanding.front().copied()
+            && self.counted_of_oldest >= u32::from(oldest)
+        {
+            self.counted_of_oldest -= u32::from(oldest);
+            self.outstanding.pop_front();
+        }
+        new > 0
+    }
+
+    /// Whether all was planned, played and counted.
+    fn has_ended(&self, stepper: &StepperState) -> bool {
+        matches!(&self.motion, Motion::Stepping { ramp, .. } if ramp.remaining() == 0)
+            && self.outstanding.is_empty()
+            && stepper.idle
+    }
+
+    fn find_fault(&mut self, inputs: &Inputs, progressed: bool) -> Option<Failure> {
+        if let Some(error) = self.following_error() {
+            return Some(Failure::Following { error });
+        }
+        if inputs.driver_fault && self.enabled && !matches!(self.motion, Motion::Preparing { .. }) {
+            return Some(Failure::DriverFault);
+        }
+        let waiting = !self.outstanding.is_empty();
+        match &mut self.motion {
+            Motion::Stepping { ramp, quiet_ticks } => {
+                *quiet_ticks = if progressed || !waiting { 0 } else { *quiet_ticks + 1 };
+                // Dry too early, silent too long, or more or fewer pulses than ordered.
+                let silent = *quiet_ticks * TICK_US > self.settings.pulse_deadline.0;
+                let short = inputs.stepper.idle && (waiting || (ramp.has_begun() && ramp.remaining() > 0));
+                let over = !waiting && self.counted_of_oldest > 0;
+                if inputs.stepper.underrun || silent || short || over {
+                    return Some(Failure::StepUnderrun);
+                }
+            }
+            Motion::Still | Motion::Aborting => return None,
+            Motion::Preparing { .. } => {}
+        }
+        if self.away && inputs.far_switch {
+            return Some(Failure::FarSwitch);
+        }
+        let outside = self.position > steps::to_steps(self.settings.home_zone);
+        (inputs.home_switch && outside && self.home_switch == HomeSwitch::Watched)
+            .then_some(Failure::HomeSwitch)
+    }
+
+    /// How far the encoder is from where the pulses may have brought the motor, where that is too far. Without
+    /// current nothing holds the motor, so before the first motion nothing is compared.
+    fn following_error(&self) -> Option<Nanometres> {
+        if !self.enabled {
+            return None;
+        }
+        let running =
+            self.outstanding.front().map_or(0, |pulses| u32::from(*pulses) - self.counted_of_oldest) as i32;
+        let ahead = self.position.wrapping_add(if self.away { running } else { -running });
+        let (low, high) = (self.position.min(ahead), self.position.max(ahead));
+        let measured = self.measured().0;
+        let nearest = measured.clamp(steps::to_nanometres(low).0, steps::to_nanometres(high).0);
+        let error = nearest.saturating_sub(measured);
+        (error.saturating_abs() > self.settings.following.0).then_some(Nanometres(error))
+    }
+
+    /// Throws the motion away. Where steps and encoder may disagree from now on, the position is lost.
+    fn abort(&mut self, fault: Failure) {
+        let loses = matches!(fault, Failure::Following { .. } | Failure::DriverFault | Failure::StepUnderrun);
+        if loses && self.state == PositionState::Homed {
+            self.state = PositionState::Lost;
+        }
+        // A driver in distress gets no current; a motor that was blocked stays where it is and is believed.
+        self.enabled = !matches!(fault, Failure::DriverFault) && self.enabled;
+        self.fault = Some(fault);
+        self.motion = match self.motion {
+            Motion::Still | Motion::Preparing { .. } => Motion::Still,
+            Motion::Stepping { .. } | Motion::Aborting => Motion::Aborting,
+        };
+        if self.is_still() {
+            self.settle_accounts();
+        }
+    }
+
+    /// After an abort: nothing is under way, and what was lost is what the encoder says.
+    fn settle_accounts(&mut self) {
+        self.motion = Motion::Still;
+        self.outstanding.clear();
+        self.counted_of_oldest = 0;
+        if self.state != PositionState::Homed {
+            self.follow_encoder();
+        }
+    }
+}
+
+/// Hands a segment over and remembers it. There is room in both: the caller has looked.
+fn feed(outstanding: &mut Deque<u16, OUTSTANDING>, outputs: &mut Outputs, segment: Segment) {
+    if outputs.segments.push(segment).is_ok() {
+        let _ = outstanding.push_back(segment.pulses);
+    }
+}

@@ -1,0 +1,99 @@
+//! Homing: finds the switch fast, then exactly.
+//!
+//! 1. Search: towards the switch at some speed, braking when it closes. Left out where it is closed already.
+//! 2. Leave: away until it opens, then a little further.
+//! 3. Approach: a pulse a millisecond until it closes again; that pulse becomes position 0.
+//! 4. Return: back to position 0 over the few pulses of braking.
+//!
+//! The exact approach always comes from the same side at the same speed, so that the switch's hysteresis and its
+//! delay cancel; what is left is its own repeatability.
+
+use farnear_protocol::Nanometres;
+use farnear_protocol::message::{Failure, PositionState};
+
+use crate::axis::{Axis, HomeSwitch};
+use crate::settings::CoarseSettings;
+use crate::steps;
+
+/// Where homing is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Phase {
+    Search,
+    Leave,
+    Clear,
+    Approach,
+    Return { shift: Nanometres },
+}
+
+/// A homing under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Homing {
+    phase: Phase,
+    /// Whether the switch did in this phase what the phase waits for, and at which pulse.
+    edge: Option<i32>,
+    /// Whether the position was ever known, so that the shift says something.
+    known_before: bool,
+}
+
+impl Homing {
+    /// Begins; the axis stands still.
+    pub(crate) fn start(axis: &mut Axis, settings: &CoarseSettings, home_switch: bool) -> Self {
+        let known_before = axis.state() != PositionState::Unknown;
+        if axis.state() != PositionState::Homed {
+            axis.follow_encoder();
+        }
+        let mut homing = Self { phase: Phase::Search, edge: None, known_before };
+        homing.enter(if home_switch { Phase::Leave } else { Phase::Search }, axis, settings);
+        homing
+    }
+
+    /// Goes on; gives the shift of position 0 at the end.
+    pub(crate) fn tick(
+        &mut self,
+        axis: &mut Axis,
+        settings: &CoarseSettings,
+        home_switch: bool,
+    ) -> Option<Result<Nanometres, Failure>> {
+        let awaited = match self.phase {
+            Phase::Search | Phase::Approach => home_switch,
+            Phase::Leave => !home_switch,
+            Phase::Clear | Phase::Return { .. } => false,
+        };
+        if awaited && self.edge.is_none() {
+            self.edge = Some(axis.position());
+            axis.stop();
+        }
+        if !axis.is_still() {
+            return None;
+        }
+        if let Some(fault) = axis.take_fault() {
+            return Some(Err(fault));
+        }
+        let next = match (self.phase, self.edge) {
+            (Phase::Search, Some(_)) => Phase::Leave,
+            (Phase::Leave, Some(_)) => Phase::Clear,
+            (Phase::Clear, _) => Phase::Approach,
+            (Phase::Approach, Some(zero)) => {
+                let shift = axis.set_home(zero);
+                Phase::Return { shift: if self.known_before { shift } else { Nanometres(0) } }
+            }
+            (Phase::Return { shift }, _) => return Some(Ok(shift)),
+            (Phase::Leave, None) => return Some(Err(Failure::HomeSwitchStuck)),
+            (Phase::Search | Phase::Approach, None) => return Some(Err(Failure::HomeSwitchNotFound)),
+        };
+        self.enter(next, axis, settings);
+        None
+    }
+
+    fn enter(&mut self, phase: Phase, axis: &mut Axis, settings: &CoarseSettings) {
+        (self.phase, self.edge) = (phase, None);
+        let (way, speed) = match phase {
+            Phase::Search => (-steps::to_steps(settings.home_search), settings.home_search_speed),
+            Phase::Leave => (steps::to_steps(settings.home_leave), settings.home_leave_speed),
+            Phase::Clear => (steps::to_steps(settings.home_clearance), settings.home_leave_speed),
+            Phase::Approach => (-steps::to_steps(settings.home_approach), settings.home_approach_speed),
+            Phase::Return { .. } => (axis.position().wrapping_neg(), settings.home_approach_speed),
+        };
+        axis.go_steps(axis.position().wrapping_add(way), speed, HomeSwitch::Sought);
+    }
+}
