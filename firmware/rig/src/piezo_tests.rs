@@ -130,11 +130,8 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
             step(&mut piezo, &mut plant, 20_000);
             for target in [176_270, 20_000, 176_270, 20_000] {
                 let (ticks, overshoot) = step(&mut piezo, &mut plant, target);
-                    "{part:?} to {target}: {} us, overshoot {overshoot:.0} nm",
-                    ticks as u32 * TICK_US
-                );
                 assert!(ticks as u32 * TICK_US <= 15_000, "{part:?}: {ticks} ticks to {target}");
-                // The command is shaped, so what is left over is small against the step.
+                // The command is shaped, so what swings is small against the step.
                 assert!(overshoot < 0.04 * 156_270.0, "{part:?}: {overshoot} nm beyond {target}");
             }
         }
