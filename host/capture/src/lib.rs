@@ -3,6 +3,8 @@
 //! Talks to the rig and takes pictures with it; blocking, no async runtime.
 //!
 //! - [`transport`], [`client`], [`work`]: the serial port, a session on it, and long work with its end.
+//! - [`camera`], [`image_file`], [`aside`]: images, their files, and files that are whole or not there.
+//! - [`plan`], [`pair`], [`record`]: where the axes go for a pair, taking it, and the folder it is kept in.
 //! - [`timing`]: how long the host waits, and why.
 //! - [`error`], [`describe`]: what can go wrong, in words.
 //!
@@ -15,11 +17,17 @@
 //! # Ok::<(), farnear_capture::ClientError>(())
 //! ```
 
+pub mod aside;
+pub mod camera;
 pub mod client;
 pub mod describe;
 pub mod error;
 mod handshake;
+pub mod image_file;
 mod link;
+pub mod pair;
+pub mod plan;
+pub mod record;
 pub mod timing;
 pub mod transport;
 pub mod work;

@@ -134,7 +134,7 @@ impl Client {
         }
         let id = self.expect_accepted(request, during)?;
         let allowed = self.timing().allowance(work);
-        let until = Instant::now() + allowed;
+        let mut until = Instant::now() + allowed;
         let mut poll = Instant::now() + self.timing().poll;
         loop {
             if self.interrupted() {
@@ -154,11 +154,16 @@ impl Client {
                     Ending::Failed(axis, reason) => {
                         return Err(ClientError::Failed { during: during.into(), axis, reason });
                     }
-                    Ending::NotYet(kind) if on_event(&kind).is_err() => {
-                        self.stop()?;
-                        return Err(ClientError::Interrupted { during: during.into() });
+                    Ending::NotYet(kind) => {
+                        let begin = Instant::now();
+                        if on_event(&kind).is_err() {
+                            self.stop()?;
+                            return Err(ClientError::Interrupted { during: during.into() });
+                        }
+                        // Time that the caller took, for fetching an image say, is not the board's.
+                        until += begin.elapsed();
+                        poll += begin.elapsed();
                     }
-                    Ending::NotYet(_) => {}
                 }
             } else if Instant::now() >= poll {
                 poll = Instant::now() + self.timing().poll;

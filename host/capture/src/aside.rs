@@ -1,0 +1,186 @@
+//! Files that are there whole or not at all: written aside, then renamed.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A result could not be put in place.
+#[derive(Debug, thiserror::Error)]
+pub enum AsideError {
+    /// There is something at the place already.
+    #[error("{} exists already and is not empty; name another folder or remove it", path.display())]
+    Exists {
+        /// The place.
+        path: PathBuf,
+    },
+    /// The system refuses.
+    #[error("cannot write {}: {source}", path.display())]
+    Io {
+        /// The place.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl AsideError {
+    fn at(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
+        move |source| Self::Io { path: path.into(), source }
+    }
+}
+
+/// A folder that becomes visible under its name only when all its files are written. Dropped before, it leaves
+/// nothing behind.
+#[derive(Debug)]
+pub struct Aside {
+    folder: PathBuf,
+    target: PathBuf,
+}
+
+impl Aside {
+    /// Begins a new folder. Its parents are made where they are missing.
+    ///
+    /// # Errors
+    /// [`AsideError::Exists`] where something but an empty folder has the name already.
+    pub fn new_folder(target: &Path) -> Result<Self, AsideError> {
+        let target: PathBuf = target.components().collect(); // without a slash at its end
+        if occupied(&target) {
+            return Err(AsideError::Exists { path: target });
+        }
+        let parent = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent.to_path_buf(),
+            _ => PathBuf::from("."),
+        };
+        fs::create_dir_all(&parent).map_err(AsideError::at(&parent))?;
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        Self::begin(parent.join(partial_name(&name)), target)
+    }
+
+    /// Begins a set of files that go into a folder together, which is made where it is missing. Files of the
+    /// same names are replaced, others stay.
+    pub fn into_folder(target: &Path) -> Result<Self, AsideError> {
+        fs::create_dir_all(target).map_err(AsideError::at(target))?;
+        Self::begin(target.join(partial_name("files")), target.into())
+    }
+
+    fn begin(folder: PathBuf, target: PathBuf) -> Result<Self, AsideError> {
+        fs::create_dir(&folder).map_err(AsideError::at(&folder))?;
+        Ok(Self { folder, target })
+    }
+
+    /// Where a file is to be written for the time being.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Writes a file.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), AsideError> {
+        let path = self.path(name);
+        fs::write(&path, bytes).map_err(AsideError::at(&self.target.join(name)))
+    }
+
+    /// Puts everything in place: a new folder with one rename, a set of files with one rename each.
+    pub fn finish(self) -> Result<(), AsideError> {
+        let into_folder = self.folder.parent() == Some(self.target.as_path());
+        if !into_folder {
+            if occupied(&self.target) {
+                return Err(AsideError::Exists { path: self.target.clone() });
+            }
+            if self.target.is_dir() {
+                fs::remove_dir(&self.target).map_err(AsideError::at(&self.target))?;
+            }
+            return fs::rename(&self.folder, &self.target).map_err(AsideError::at(&self.target));
+        }
+        for entry in fs::read_dir(&self.folder).map_err(AsideError::at(&self.folder))? {
+            let entry = entry.map_err(AsideError::at(&self.folder))?;
+            let place = self.target.join(entry.file_name());
+            fs::rename(entry.path(), &place).map_err(AsideError::at(&place))?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        // After `finish` of a new folder there is nothing left to remove, which is as good.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// Writes one file aside and renames it into place.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), AsideError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let aside = path.with_file_name(partial_name(&name));
+    let written = fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, path));
+    written.map_err(|source| {
+        let _ = fs::remove_file(&aside);
+        AsideError::Io { path: path.into(), source }
+    })
+}
+
+/// Hidden, and another name for each process, so that two that write the same result do not mix.
+fn partial_name(name: &str) -> String {
+    format!(".{name}.partial-{}", std::process::id())
+}
+
+fn occupied(path: &Path) -> bool {
+    match fs::read_dir(path) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(_) => path.exists(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_folder_appears_whole_or_not_at_all() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("deep/er/");
+        let aside = Aside::new_folder(&target).unwrap();
+        aside.write("a", b"1").unwrap();
+        assert!(!target.exists());
+        drop(aside);
+        assert_eq!(names(&root.path().join("deep")), Vec::<String>::new());
+
+        let aside = Aside::new_folder(&target).unwrap();
+        aside.write("a", b"1").unwrap();
+        aside.finish().unwrap();
+        assert_eq!(names(&target), ["a"]);
+        assert!(matches!(Aside::new_folder(&target), Err(AsideError::Exists { .. })));
+    }
+
+    #[test]
+    fn an_empty_folder_is_filled() {
+        let root = tempfile::tempdir().unwrap();
+        let aside = Aside::new_folder(root.path()).unwrap();
+        aside.write("a", b"1").unwrap();
+        aside.finish().unwrap();
+        assert_eq!(names(root.path()), ["a"]);
+    }
+
+    #[test]
+    fn files_join_a_folder_together() {
+        let root = tempfile::tempdir().unwrap();
+        fs::write(root.path().join("old"), b"0").unwrap();
+        fs::write(root.path().join("b"), b"0").unwrap();
+        let aside = Aside::into_folder(root.path()).unwrap();
+        aside.write("b", b"1").unwrap();
+        assert_eq!(fs::read(root.path().join("b")).unwrap(), b"0");
+        aside.finish().unwrap();
+        assert_eq!(names(root.path()), ["b", "old"]);
+        assert_eq!(fs::read(root.path().join("b")).unwrap(), b"1");
+        write_file(&root.path().join("b"), b"2").unwrap();
+        assert_eq!(names(root.path()), ["b", "old"]);
+    }
+}

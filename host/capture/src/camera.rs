@@ -1,0 +1,97 @@
+//! Cameras: what gives an image for a trigger of the board. One file per kind.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use farnear_protocol::message::ShotRecord;
+use ndarray::Array2;
+
+pub mod folder;
+pub mod sim;
+
+pub use folder::FolderCamera;
+pub use sim::SimCamera;
+
+/// One exposure as the camera delivers it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Image {
+    /// Shape (height, width); values lie in 0..2^bits.
+    pub pixels: Array2<u16>,
+    /// Bits that carry the picture, 8 to 16.
+    pub bits: u8,
+}
+
+/// Something that takes an image at each trigger.
+pub trait Camera {
+    /// What it is, for a capture's record: the same for each camera of the kind, without address or path.
+    fn kind(&self) -> &'static str;
+
+    /// Makes ready for triggers: images from before do not count.
+    fn arm(&mut self) -> Result<(), CameraError>;
+
+    /// The image of this exposure, waiting at most `wait` for it. Called once for each exposure, in order.
+    fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
+}
+
+/// A camera did not deliver.
+#[derive(Debug, thiserror::Error)]
+pub enum CameraError {
+    /// No camera answers at the address.
+    #[error("no camera at {address}: {reason}; is `farnear-sim` running, and is this its `camera` address?")]
+    Connect {
+        /// The address.
+        address: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// The connection broke off.
+    #[error("the camera at {address} went away: {reason}")]
+    Gone {
+        /// The address.
+        address: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// What came is no image.
+    #[error("the camera at {address} sends no images: {reason}")]
+    Nonsense {
+        /// The address.
+        address: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Nothing came in time.
+    #[error("the camera gave no image of exposure {trigger_number} within {waited:?} ({camera})")]
+    Late {
+        /// The camera.
+        camera: String,
+        /// Which exposure.
+        trigger_number: u32,
+        /// How long was waited.
+        waited: Duration,
+    },
+    /// The image of this exposure was passed over.
+    #[error("the camera skipped exposure {wanted}: it sent the image of exposure {came}")]
+    Skipped {
+        /// Which exposure was due.
+        wanted: u32,
+        /// Which one came.
+        came: u32,
+    },
+    /// The folder cannot be looked into.
+    #[error("cannot look into the camera's folder {}: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// An image file that appeared cannot be used.
+    #[error("{} cannot be used: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}

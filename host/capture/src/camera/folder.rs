@@ -1,0 +1,109 @@
+//! A folder as a camera: whatever takes the pictures (a maker's program, `gphoto2 --capture-tethered`, a phone
+//! that synchronises) puts an image file into it for each trigger.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+use farnear_protocol::message::ShotRecord;
+
+use super::{Camera, CameraError, Image};
+use crate::image_file::{GreyImage, Samples, decode_grey};
+
+const POLL: Duration = Duration::from_millis(20);
+/// A file that does not change for this long and still is no image will not become one.
+const QUIET: Duration = Duration::from_secs(2);
+const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
+
+/// Images that appear in a folder, in the order in which they were written.
+#[derive(Debug)]
+pub struct FolderCamera {
+    folder: PathBuf,
+    used: BTreeSet<PathBuf>,
+}
+
+impl FolderCamera {
+    /// Watches a folder, which must exist.
+    pub fn watch(folder: &Path) -> Result<Self, CameraError> {
+        let mut camera = Self { folder: folder.into(), used: BTreeSet::new() };
+        camera.arm()?;
+        Ok(camera)
+    }
+
+    /// Image files that were not used yet, oldest first; those written within the same tick of the file
+    /// system's clock by name.
+    fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
+        let failed = |source| CameraError::Folder { folder: self.folder.clone(), source };
+        let mut fresh = Vec::new();
+        for entry in fs::read_dir(&self.folder).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            let ending =
+                path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
+            if self.used.contains(&path) || !ENDINGS.contains(&ending.as_str()) {
+                continue;
+            }
+            // A file that is renamed away in between is no image any more.
+            if let Ok(written) = fs::metadata(&path).and_then(|data| data.modified()) {
+                fresh.push((written, path));
+            }
+        }
+        fresh.sort();
+        Ok(fresh)
+    }
+}
+
+impl Camera for FolderCamera {
+    fn kind(&self) -> &'static str {
+        "folder"
+    }
+
+    fn arm(&mut self) -> Result<(), CameraError> {
+        let fresh = self.fresh()?;
+        self.used.extend(fresh.into_iter().map(|(_, path)| path));
+        Ok(())
+    }
+
+    fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
+        let until = Instant::now() + wait;
+        let mut before: Option<(PathBuf, Vec<u8>, Instant)> = None;
+        loop {
+            if let Some((_, path)) = self.fresh()?.into_iter().next() {
+                let bytes = fs::read(&path).unwrap_or_default();
+                match &before {
+                    // The same bytes twice: it is no longer being written (half a JPEG would decode, too).
+                    Some((same, content, since)) if *same == path && *content == bytes => {
+                        match decode_grey(&bytes) {
+                            Ok(picture) => {
+                                self.used.insert(path.clone());
+                                return to_image(picture)
+                                    .map_err(|reason| CameraError::File { path, reason });
+                            }
+                            Err(reason) if since.elapsed() > QUIET => {
+                                return Err(CameraError::File { path, reason });
+                            }
+                            Err(_) => {}
+                        }
+                    }
+                    _ => before = Some((path, bytes, Instant::now())),
+                }
+            }
+            if Instant::now() >= until {
+                return Err(CameraError::Late {
+                    camera: format!("folder {}", self.folder.display()),
+                    trigger_number: shot.trigger_number,
+                    waited: wait,
+                });
+            }
+            std::thread::sleep(POLL);
+        }
+    }
+}
+
+fn to_image(picture: GreyImage) -> Result<Image, String> {
+    let Samples::Integer(bits) = picture.samples else {
+        return Err("a camera's image has integer pixels, this one has float".into());
+    };
+    let full_scale = f32::from(((1u32 << bits) - 1) as u16);
+    Ok(Image { pixels: picture.pixels.mapv(|value| (value * full_scale).round() as u16), bits })
+}

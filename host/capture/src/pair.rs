@@ -1,0 +1,181 @@
+//! Taking a pair: home where needed, bring the coarse stage near, expose far and near by piezo.
+
+use std::time::Duration;
+
+use farnear_protocol::message::{Axis, PositionState, Shot, ShotRecord};
+use farnear_protocol::units::{Micros, Nanometres};
+
+use crate::camera::{Camera, CameraError, Image};
+use crate::client::Client;
+use crate::describe::{state_name, um};
+use crate::error::ClientError;
+use crate::plan::{PlanError, SensorPair, approach_for, coarse_for, fine_for};
+use crate::work::Moved;
+
+/// How the exposures are taken.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Exposures {
+    /// Length of each.
+    pub exposure: Micros,
+    /// How near to its target the piezo has to be...
+    pub settle_window: Nanometres,
+    /// ...and for how long, before the trigger.
+    pub settle_dwell: Micros,
+    /// Longest wait for an image once the board has told of its exposure.
+    pub image_wait: Duration,
+}
+
+impl Default for Exposures {
+    fn default() -> Self {
+        Self {
+            exposure: Micros(5_000),
+            // 50 nm of sensor travel are 0.0006 of the working range in alpha: 0.02 mm of depth at most.
+            settle_window: Nanometres(50),
+            settle_dwell: Micros(2_000),
+            image_wait: Duration::from_secs(30),
+        }
+    }
+}
+
+/// One image and how it was taken.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Taken {
+    /// The picture.
+    pub image: Image,
+    /// Sensor distance that the optics ask for, in mm.
+    pub sensor_asked_mm: f64,
+    /// Sensor distance by encoder and gauge at the trigger, in mm.
+    pub sensor_measured_mm: f64,
+    /// What the board measured.
+    pub record: ShotRecord,
+}
+
+/// A far- and a near-focused image.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Pair {
+    /// Focused on the far plane.
+    pub far: Taken,
+    /// Focused on the near plane.
+    pub near: Taken,
+    /// The coarse stage during both.
+    pub coarse: Moved,
+}
+
+impl Pair {
+    /// Board time from the start of the far move to the end of the near exposure, less the two exposures, in us.
+    pub fn moving_us(&self) -> u64 {
+        let (far, near) = (&self.far.record, &self.near.record);
+        let begin = far.trigger.0.saturating_sub(u64::from(far.settle.0));
+        let whole = near.strobe_end.0.saturating_sub(begin);
+        whole.saturating_sub(u64::from(far.exposure.0) + u64::from(near.exposure.0))
+    }
+}
+
+/// A pair could not be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// The board, or the way to it.
+    #[error(transparent)]
+    Board(#[from] ClientError),
+    /// The rig does not reach that far.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The two images do not belong together.
+    #[error(
+        "the far image has {far_width}x{far_height} pixels of {far_bits} bits, the near one {near_width}x{near_height} of {near_bits}"
+    )]
+    Unlike {
+        /// Width of the far image.
+        far_width: usize,
+        /// Height of the far image.
+        far_height: usize,
+        /// Bits of the far image.
+        far_bits: u8,
+        /// Width of the near image.
+        near_width: usize,
+        /// Height of the near image.
+        near_height: usize,
+        /// Bits of the near image.
+        near_bits: u8,
+    },
+    /// The board ended the program with another number of exposures than two.
+    #[error("the board told of {told} exposures where two were asked for")]
+    Count {
+        /// How many.
+        told: usize,
+    },
+}
+
+/// Takes a pair. `say` is told in words what is being done.
+pub fn capture_pair(
+    client: &mut Client,
+    camera: &mut dyn Camera,
+    sensor: &SensorPair,
+    exposures: &Exposures,
+    say: &mut dyn FnMut(&str),
+) -> Result<Pair, CaptureError> {
+    let limits = client.hello().limits;
+    let target = coarse_for(sensor, &limits)?;
+    let coarse = bring_coarse_to(client, target, say)?;
+    let fine_far = fine_for(sensor.far_mm, coarse.measured, &limits)?;
+    let fine_near = fine_for(sensor.near_mm, coarse.measured, &limits)?;
+    let shot = |target| Shot {
+        axis: Axis::SensorFine,
+        target,
+        exposure: exposures.exposure,
+        settle_window: exposures.settle_window,
+        settle_dwell: exposures.settle_dwell,
+        repeat: 1,
+    };
+    say(&format!("exposing far (piezo at {:.3} um) and near ({:.3} um)", um(fine_far), um(fine_near)));
+    camera.arm()?;
+    let mut asked = [sensor.far_mm, sensor.near_mm].into_iter();
+    let mut taken = Vec::new();
+    client.run_program(&[shot(fine_far), shot(fine_near)], |record| -> Result<(), CaptureError> {
+        let image = camera.image(record, exposures.image_wait)?;
+        if let Some(sensor_asked_mm) = asked.next() {
+            let measured = i64::from(limits.datum.0) + i64::from(record.coarse.0) + i64::from(record.fine.0);
+            let sensor_measured_mm = measured as f64 / 1e6;
+            taken.push(Taken { image, sensor_asked_mm, sensor_measured_mm, record: *record });
+        }
+        Ok(())
+    })?;
+    let told = taken.len();
+    let Ok([far, near]) = <[Taken; 2]>::try_from(taken) else { return Err(CaptureError::Count { told }) };
+    if far.image.pixels.dim() != near.image.pixels.dim() || far.image.bits != near.image.bits {
+        let ((far_height, far_width), (near_height, near_width)) =
+            (far.image.pixels.dim(), near.image.pixels.dim());
+        let (far_bits, near_bits) = (far.image.bits, near.image.bits);
+        return Err(CaptureError::Unlike {
+            far_width,
+            far_height,
+            far_bits,
+            near_width,
+            near_height,
+            near_bits,
+        });
+    }
+    Ok(Pair { far, near, coarse })
+}
+
+/// Homes the coarse stage unless it is homed, and moves it, from the home side, to `target`.
+fn bring_coarse_to(
+    client: &mut Client,
+    target: Nanometres,
+    say: &mut dyn FnMut(&str),
+) -> Result<Moved, ClientError> {
+    let state = client.status()?.coarse.state;
+    if state != PositionState::Homed {
+        say(&format!("homing the stage (its position is {})", state_name(state)));
+        client.home(Axis::SensorCoarse)?;
+    }
+    let limits = client.hello().limits;
+    if let Some(before) = approach_for(target, &client.status()?, &limits) {
+        client.move_to(Axis::SensorCoarse, before)?;
+    }
+    say(&format!("moving the coarse stage to {:.3} um", um(target)));
+    client.move_to(Axis::SensorCoarse, target)
+}

@@ -1,0 +1,247 @@
+//! A capture folder: `far.png`, `near.png` and `capture.toml`, which says how they came about.
+//!
+//! The folder appears whole or not at all. From an emulated rig it holds no clock time, port or random number:
+//! the same scene and seed give the same bytes.
+
+use std::path::Path;
+
+use farnear_protocol::message::{Hello, SCHEMA_KEY};
+use serde::{Deserialize, Serialize};
+
+use crate::aside::{Aside, AsideError};
+use crate::client::Client;
+use crate::describe::{cause_name, um};
+use crate::image_file::{ImageError, encode_png};
+use crate::pair::{Pair, Taken};
+
+/// Name of the record in a capture folder.
+pub const CAPTURE_FILE: &str = "capture.toml";
+/// Version of the record's layout.
+const FORMAT: u32 = 1;
+
+/// The content of `capture.toml`.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub struct CaptureRecord {
+    /// Version of this layout.
+    pub format: u32,
+    /// The program that wrote it.
+    pub made_by: String,
+    /// When, by the host's clock (RFC 3339); only from real hardware.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    /// Datum and coarse stage.
+    pub stage: StageRecord,
+    /// The two exposures, far first.
+    pub exposure: Vec<ExposureRecord>,
+    /// The camera.
+    pub camera: CameraRecord,
+    /// The board.
+    pub board: BoardRecord,
+    /// What was simulated, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulation: Option<SimulationRecord>,
+    /// The optics file, as it was given.
+    pub optics: toml::Table,
+}
+
+/// Where the stage stood.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub struct StageRecord {
+    /// Sensor distance at coarse 0 and fine 0.
+    pub datum_mm: f64,
+    /// Where the coarse stage was sent.
+    pub coarse_asked_um: f64,
+    /// Where its encoder said it came to.
+    pub coarse_measured_um: f64,
+    /// Board time for both settled moves and both images, without the exposures.
+    pub moving_us: u64,
+}
+
+/// One exposure. Times are the board's, since its reset.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub struct ExposureRecord {
+    /// The image file.
+    pub image: String,
+    /// Sensor distance the optics ask for.
+    pub sensor_asked_mm: f64,
+    /// Sensor distance by encoder and gauge.
+    pub sensor_measured_mm: f64,
+    /// Where the piezo was sent.
+    pub fine_asked_um: f64,
+    /// Where its gauge said it was.
+    pub fine_measured_um: f64,
+    /// Where the coarse stage's encoder said it was.
+    pub coarse_measured_um: f64,
+    /// From the start of the move until it was settled.
+    pub settle_us: u32,
+    /// Length of the exposure.
+    pub exposure_us: u32,
+    /// Running number of the trigger.
+    pub trigger_number: u32,
+    /// The trigger.
+    pub trigger_us: u64,
+    /// Start of the exposure, as the camera reported it.
+    pub strobe_start_us: u64,
+    /// Its end.
+    pub strobe_end_us: u64,
+}
+
+/// The camera and its images.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub struct CameraRecord {
+    /// `sim`, `folder`, ...
+    pub kind: String,
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Bits of the camera; 9 to 15 are shifted up to 16 in the files.
+    pub bits: u8,
+}
+
+/// The board.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub struct BoardRecord {
+    /// Its name.
+    pub name: String,
+    /// Its firmware's version.
+    pub firmware: String,
+    /// The protocol version that was spoken.
+    pub protocol: u8,
+    /// Key of the message table.
+    pub schema_key: String,
+    /// The chip's unique id.
+    pub unique_id: String,
+    /// Number of the boot.
+    pub boot: u32,
+    /// Why it was reset last.
+    pub reset_cause: String,
+    /// Whether it was emulated.
+    pub emulated: bool,
+}
+
+/// What `farnear-sim` was told.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
+pub struct SimulationRecord {
+    /// The scene.
+    pub scene: String,
+    /// The point spread function.
+    pub psf: String,
+    /// The noise.
+    pub noise: String,
+    /// The seed.
+    pub seed: u64,
+}
+
+/// What the record says beside what the pair and the board tell.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Circumstances {
+    /// The program that captures, with its version.
+    pub made_by: String,
+    /// When; only for real hardware.
+    pub time: Option<String>,
+    /// [`crate::camera::Camera::kind`].
+    pub camera: &'static str,
+    /// What was simulated.
+    pub simulation: Option<SimulationRecord>,
+    /// The optics file.
+    pub optics: toml::Table,
+}
+
+/// A capture folder could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The folder or a file in it.
+    #[error(transparent)]
+    Aside(#[from] AsideError),
+    /// An image.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The record cannot be put into TOML.
+    #[error("cannot write the capture's record: {0}")]
+    Toml(#[from] toml::ser::Error),
+    /// The record is not readable.
+    #[error("{path}: {reason}")]
+    Read {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// The record of a pair.
+pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> CaptureRecord {
+    let hello: &Hello = client.hello();
+    let (height, width) = pair.far.image.pixels.dim();
+    CaptureRecord {
+        format: FORMAT,
+        made_by: circumstances.made_by,
+        time: circumstances.time,
+        stage: StageRecord {
+            datum_mm: um(hello.limits.datum) / 1000.0,
+            coarse_asked_um: um(pair.coarse.asked),
+            coarse_measured_um: um(pair.coarse.measured),
+            moving_us: pair.moving_us(),
+        },
+        exposure: vec![exposure_record("far.png", &pair.far), exposure_record("near.png", &pair.near)],
+        camera: CameraRecord { kind: circumstances.camera.into(), width, height, bits: pair.far.image.bits },
+        board: BoardRecord {
+            name: hello.board.as_str().into(),
+            firmware: hello.firmware.as_str().into(),
+            protocol: client.protocol(),
+            schema_key: format!("{SCHEMA_KEY:016x}"),
+            unique_id: hello.unique_id.iter().map(|byte| format!("{byte:02x}")).collect(),
+            boot: hello.boot,
+            reset_cause: cause_name(hello.reset_cause).into(),
+            emulated: hello.emulated,
+        },
+        simulation: circumstances.simulation,
+        optics: circumstances.optics,
+    }
+}
+
+fn exposure_record(name: &str, taken: &Taken) -> ExposureRecord {
+    let record = &taken.record;
+    ExposureRecord {
+        image: name.into(),
+        sensor_asked_mm: taken.sensor_asked_mm,
+        sensor_measured_mm: taken.sensor_measured_mm,
+        fine_asked_um: um(record.asked),
+        fine_measured_um: um(record.fine),
+        coarse_measured_um: um(record.coarse),
+        settle_us: record.settle.0,
+        exposure_us: record.exposure.0,
+        trigger_number: record.trigger_number,
+        trigger_us: record.trigger.0,
+        strobe_start_us: record.strobe_start.0,
+        strobe_end_us: record.strobe_end.0,
+    }
+}
+
+/// Begins a capture folder; call it before the rig moves, so that a folder that cannot be written is known.
+pub fn begin_folder(folder: &Path) -> Result<Aside, RecordError> {
+    Ok(Aside::new_folder(folder)?)
+}
+
+/// Writes pair and record into the folder and puts it in place.
+pub fn finish_folder(aside: Aside, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
+    for (name, image) in [("far.png", &pair.far.image), ("near.png", &pair.near.image)] {
+        let png = encode_png(image.pixels.view(), image.bits)
+            .map_err(|reason| ImageError::Write { path: aside.path(name), reason })?;
+        aside.write(name, &png)?;
+    }
+    aside.write(CAPTURE_FILE, toml::to_string(record)?.as_bytes())?;
+    Ok(aside.finish()?)
+}
+
+/// Reads the record of a capture folder; `None` where the folder has none.
+pub fn read_record(folder: &Path) -> Result<Option<CaptureRecord>, RecordError> {
+    let path = folder.join(CAPTURE_FILE);
+    let failed = |reason: String| RecordError::Read { path: path.display().to_string(), reason };
+    match std::fs::read_to_string(&path) {
+        Ok(text) => Ok(Some(toml::from_str(&text).map_err(|error| failed(error.to_string()))?)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(failed(error.to_string())),
+    }
+}
