@@ -5,6 +5,9 @@
 //! adaptive density estimation per image pixel for the task of background subtraction", Pattern Recognition
 //! Letters 27 (2006), 773-780.
 
+mod kernel;
+mod model;
 mod settings;
 
+pub use model::{BackgroundError, BackgroundModel, Frame, Label};
 pub use settings::{Settings, SettingsError, ShadowSettings};

@@ -1,0 +1,366 @@
+//! The mixture update of one frame, several pixels at a time with whatever vectors the processor has (chosen when
+//! the program runs, `pulp`; on a processor without AVX2 or NEON one pixel at a time).
+//!
+//! The recursive equations of Zivkovic 2004 (equations 4 to 6 with the prior of 14) and Zivkovic and van der
+//! Heijden 2006 (equations 4 to 9), for isotropic components; o is 1 for the component that owns the sample:
+//!
+//! ```text
+//! weight   += rate (o - weight) - rate c_T       discarded at 0, then normalised to sum 1
+//! mean     += o (rate / weight) (x - mean)
+//! variance += o (rate / weight) (|x - mean|^2 - variance)
+//! ```
+//!
+//! The owner is the heaviest component within `component_threshold`. Components stay sorted by weight, which takes
+//! one pass of neighbour exchanges because at most one of them has grown.
+//!
+//! # Layout
+//! Pixels come in tiles of [`TILE`]; a tile of one component holds weight, variance and the means of its channels,
+//! each for 16 pixels. Tiles of the same component lie side by side, and each tile knows how many components any of
+//! its pixels uses, so memory that holds nothing is never touched.
+//!
+//! # Cost
+//! Linear in pixels times components in use; about 10 floating-point operations per component and channel, one
+//! division per component.
+
+use std::array::from_fn;
+
+use pulp::{Simd, WithSimd};
+
+use super::Settings;
+
+/// Pixels per tile: the widest vector of f32 (AVX-512).
+pub const TILE: usize = 16;
+
+/// Fields of a component before its channel means.
+const WEIGHT: usize = 0;
+const VARIANCE: usize = 1;
+const MEAN: usize = 2;
+
+/// Label codes as the kernel writes them.
+pub const BACKGROUND: u8 = 0;
+pub const SHADOW: u8 = 1;
+pub const FOREGROUND: u8 = 2;
+
+/// Values of one component of one tile.
+pub const fn component_len(channels: usize) -> usize {
+    (MEAN + channels) * TILE
+}
+
+/// Where the means of a channel begin in a component of a tile.
+pub const fn mean_offset(channel: usize) -> usize {
+    (MEAN + channel) * TILE
+}
+
+/// Values of a whole model.
+pub const fn state_len(tiles: usize, components: usize, channels: usize) -> usize {
+    tiles * components * component_len(channels)
+}
+
+/// One frame's update of all tiles.
+pub struct Update<'a, const CHANNELS: usize> {
+    pub settings: &'a Settings,
+    /// Learning rate of this frame, 0 (nothing is learnt) to 1.
+    pub rate: f32,
+    /// The model, [`state_len`] long.
+    pub state: &'a mut [f32],
+    /// Components in use by any pixel of each tile.
+    pub used: &'a mut [u8],
+    /// Interleaved samples, row by row.
+    pub pixels: &'a [u8],
+    /// One code per pixel.
+    pub labels: &'a mut [u8],
+}
+
+impl<const CHANNELS: usize> WithSimd for Update<'_, CHANNELS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let tiles = self.used.len();
+        let stride = tiles * component_len(CHANNELS);
+        let constants = Constants::new(simd, self.settings, self.rate);
+        let tile_pixels = self.pixels.chunks(TILE * CHANNELS).zip(self.labels.chunks_mut(TILE));
+        for (tile, (pixels, labels)) in tile_pixels.enumerate() {
+            let samples = planes::<CHANNELS>(pixels);
+            let mut codes = [0.0_f32; TILE];
+            let first = tile * component_len(CHANNELS);
+            let mut tile_used = 0;
+            for part in 0..TILE / S::F32_LANES {
+                let lanes = part * S::F32_LANES;
+                let mut mixture =
+                    Mixture::<S, CHANNELS> { simd, state: &mut *self.state, first: first + lanes, stride };
+                let x = from_fn(|channel| load(simd, &samples[channel][lanes..]));
+                let (used, code) = mixture.observe(&constants, usize::from(self.used[tile]), x);
+                store(simd, &mut codes[lanes..], code);
+                tile_used = tile_used.max(used);
+            }
+            self.used[tile] = tile_used as u8;
+            for (label, code) in labels.iter_mut().zip(codes) {
+                *label = code as u8;
+            }
+        }
+    }
+}
+
+/// Splits up to [`TILE`] interleaved pixels into planes; missing pixels repeat the first.
+#[inline(always)]
+fn planes<const CHANNELS: usize>(pixels: &[u8]) -> [[f32; TILE]; CHANNELS] {
+    let mut out = [[0.0; TILE]; CHANNELS];
+    let whole = pixels.len() / CHANNELS;
+    for (channel, plane) in out.iter_mut().enumerate() {
+        for (i, sample) in plane.iter_mut().enumerate() {
+            // The first test is the same for all pixels of a full tile and leaves the loop.
+            let from = if whole == TILE || i < whole { i } else { 0 };
+            *sample = f32::from(pixels[from * CHANNELS + channel]);
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn load<S: Simd>(_: S, values: &[f32]) -> S::f32s {
+    S::as_simd_f32s(values).0[0]
+}
+
+#[inline(always)]
+fn store<S: Simd>(_: S, values: &mut [f32], value: S::f32s) {
+    S::as_mut_simd_f32s(values).0[0] = value;
+}
+
+#[inline(always)]
+fn any<S: Simd>(simd: S, mask: S::m32s) -> bool {
+    simd.first_true_m32s(mask) < S::F32_LANES
+}
+
+struct Constants<S: Simd> {
+    components: usize,
+    rate: S::f32s,
+    keep: S::f32s,
+    prior: S::f32s,
+    background_threshold: S::f32s,
+    component_threshold: S::f32s,
+    background_share: S::f32s,
+    initial_variance: S::f32s,
+    min_variance: S::f32s,
+    max_variance: S::f32s,
+    darkest: Option<S::f32s>,
+    zero: S::f32s,
+    one: S::f32s,
+}
+
+impl<S: Simd> Constants<S> {
+    #[inline(always)]
+    fn new(simd: S, settings: &Settings, rate: f32) -> Self {
+        let splat = |value| simd.splat_f32s(value);
+        Self {
+            components: settings.max_components,
+            rate: splat(rate),
+            keep: splat(1.0 - rate),
+            prior: splat(rate * settings.complexity_prior),
+            background_threshold: splat(settings.background_threshold),
+            component_threshold: splat(settings.component_threshold),
+            background_share: splat(settings.background_share),
+            initial_variance: splat(settings.initial_variance),
+            min_variance: splat(settings.min_variance),
+            max_variance: splat(settings.max_variance),
+            darkest: settings.shadow.map(|shadow| splat(shadow.darkest)),
+            zero: splat(0.0),
+            one: splat(1.0),
+        }
+    }
+}
+
+/// The mixtures of one vector of neighbouring pixels.
+struct Mixture<'a, S: Simd, const CHANNELS: usize> {
+    simd: S,
+    state: &'a mut [f32],
+    /// Where the first component's weights of these pixels lie.
+    first: usize,
+    /// From one component to the next.
+    stride: usize,
+}
+
+impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
+    #[inline(always)]
+    fn get(&self, component: usize, field: usize) -> S::f32s {
+        load(self.simd, &self.state[self.first + component * self.stride + field * TILE..])
+    }
+
+    #[inline(always)]
+    fn set(&mut self, component: usize, field: usize, value: S::f32s) {
+        store(self.simd, &mut self.state[self.first + component * self.stride + field * TILE..], value);
+    }
+
+    #[inline(always)]
+    fn means(&self, component: usize) -> [S::f32s; CHANNELS] {
+        from_fn(|channel| self.get(component, MEAN + channel))
+    }
+
+    /// Takes in one sample per pixel; answers how many components are in use now and each pixel's label code.
+    #[inline(always)]
+    fn observe(&mut self, c: &Constants<S>, used: usize, x: [S::f32s; CHANNELS]) -> (usize, S::f32s) {
+        let simd = self.simd;
+        let mut total = c.zero;
+        let mut owned = simd.less_than_f32s(c.one, c.zero);
+        let mut background = owned;
+        for component in 0..used {
+            let weight = self.get(component, WEIGHT);
+            let variance = self.get(component, VARIANCE);
+            let mean = self.means(component);
+            let offset: [S::f32s; CHANNELS] = from_fn(|i| simd.sub_f32s(x[i], mean[i]));
+            let distance = squared_norm(simd, c.zero, offset);
+
+            let candidate = simd.and_m32s(simd.not_m32s(owned), simd.greater_than_f32s(weight, c.zero));
+            let common = simd.less_than_f32s(total, c.background_share);
+            let within = |threshold| simd.less_than_f32s(distance, simd.mul_f32s(threshold, variance));
+            let explains = simd.and_m32s(common, within(c.background_threshold));
+            background = simd.or_m32s(background, simd.and_m32s(candidate, explains));
+            let owner = simd.and_m32s(candidate, within(c.component_threshold));
+
+            let reward = simd.sub_f32s(simd.select_f32s(owner, c.rate, c.zero), c.prior);
+            let weight = simd.max_f32s(simd.mul_add_f32s(weight, c.keep, reward), c.zero);
+            // A pixel without this component must not gain one, and a lone young component weighs less than the rate.
+            let step = simd.min_f32s(simd.div_f32s(c.rate, simd.max_f32s(weight, c.rate)), c.one);
+            let step = simd.select_f32s(owner, step, c.zero);
+            for i in 0..CHANNELS {
+                self.set(component, MEAN + i, simd.mul_add_f32s(step, offset[i], mean[i]));
+            }
+            let spread = simd.mul_add_f32s(step, simd.sub_f32s(distance, variance), variance);
+            let spread = simd.min_f32s(simd.max_f32s(spread, c.min_variance), c.max_variance);
+            self.set(component, VARIANCE, simd.select_f32s(owner, spread, variance));
+            self.set(component, WEIGHT, weight);
+            total = simd.add_f32s(total, weight);
+            owned = simd.or_m32s(owned, owner);
+        }
+        let orphan = simd.not_m32s(owned);
+        let mut used = used;
+        if any(simd, orphan) {
+            (used, total) = self.found(c, used, orphan, total, x);
+        }
+        self.normalise_and_sort(c, used, total);
+        while used > 1 && !any(simd, simd.greater_than_f32s(self.get(used - 1, WEIGHT), c.zero)) {
+            used -= 1;
+        }
+
+        let mut code = simd.splat_f32s(f32::from(BACKGROUND));
+        let foreground = simd.not_m32s(background);
+        if any(simd, foreground) {
+            code = simd.select_f32s(foreground, simd.splat_f32s(f32::from(FOREGROUND)), code);
+            if let Some(darkest) = c.darkest {
+                let shadow = simd.and_m32s(foreground, self.shadow(c, darkest, used, x));
+                code = simd.select_f32s(shadow, simd.splat_f32s(f32::from(SHADOW)), code);
+            }
+        }
+        (used, code)
+    }
+
+    /// Founds a component for each orphan sample: in the first empty place, else in place of the lightest.
+    /// Answers components in use and the total weight.
+    #[inline(always)]
+    fn found(
+        &mut self,
+        c: &Constants<S>,
+        used: usize,
+        orphan: S::m32s,
+        total: S::f32s,
+        x: [S::f32s; CHANNELS],
+    ) -> (usize, S::f32s) {
+        let simd = self.simd;
+        let places = (used + 1).min(c.components);
+        let mut homeless = orphan;
+        let mut total = total;
+        for component in 0..places {
+            let weight = self.get(component, WEIGHT);
+            let empty = simd.less_than_or_equal_f32s(weight, c.zero);
+            let here = if component + 1 == c.components { homeless } else { simd.and_m32s(homeless, empty) };
+            if !any(simd, here) {
+                continue;
+            }
+            // A model that is not learning (rate 0) still needs a first component to exist, hence the tiny floor.
+            let young = simd.max_f32s(c.rate, simd.splat_f32s(f32::MIN_POSITIVE));
+            let gain = simd.select_f32s(here, simd.sub_f32s(young, weight), c.zero);
+            total = simd.add_f32s(total, gain);
+            self.set(component, WEIGHT, simd.select_f32s(here, young, weight));
+            let variance = self.get(component, VARIANCE);
+            self.set(component, VARIANCE, simd.select_f32s(here, c.initial_variance, variance));
+            let mean = self.means(component);
+            for i in 0..CHANNELS {
+                self.set(component, MEAN + i, simd.select_f32s(here, x[i], mean[i]));
+            }
+            homeless = simd.and_m32s(homeless, simd.not_m32s(here));
+        }
+        (places, total)
+    }
+
+    #[inline(always)]
+    fn normalise_and_sort(&mut self, c: &Constants<S>, used: usize, total: S::f32s) {
+        let simd = self.simd;
+        let scale = simd.div_f32s(c.one, total);
+        for component in 0..used {
+            let weight = self.get(component, WEIGHT);
+            self.set(component, WEIGHT, simd.mul_f32s(weight, scale));
+        }
+        for lower in (1..used).rev() {
+            let upper = lower - 1;
+            let exchange = simd.greater_than_f32s(self.get(lower, WEIGHT), self.get(upper, WEIGHT));
+            if !any(simd, exchange) {
+                continue;
+            }
+            for field in 0..MEAN + CHANNELS {
+                let (above, below) = (self.get(upper, field), self.get(lower, field));
+                self.set(upper, field, simd.select_f32s(exchange, below, above));
+                self.set(lower, field, simd.select_f32s(exchange, above, below));
+            }
+        }
+    }
+
+    /// Which samples are a darker copy of a background component: with a the sample's brightness in proportion to
+    /// the mean (its projection on the mean's line), darkest <= a <= 1 and the rest |a mean - x|^2 within
+    /// background_threshold a^2 variance. The brightness and chromaticity distortion test that Prati et al.
+    /// (PAMI 25, 2003, 918-923) compare as "statistical non-parametric".
+    #[inline(always)]
+    fn shadow(&self, c: &Constants<S>, darkest: S::f32s, used: usize, x: [S::f32s; CHANNELS]) -> S::m32s {
+        let simd = self.simd;
+        let mut total = c.zero;
+        let mut found = simd.less_than_f32s(c.one, c.zero);
+        for component in 0..used {
+            let weight = self.get(component, WEIGHT);
+            let mean = self.means(component);
+            let common = simd.and_m32s(
+                simd.less_than_or_equal_f32s(total, c.background_share),
+                simd.greater_than_f32s(weight, c.zero),
+            );
+            let mut along = c.zero;
+            for i in 0..CHANNELS {
+                along = simd.mul_add_f32s(x[i], mean[i], along);
+            }
+            let length = squared_norm(simd, c.zero, mean);
+            let ratio = simd.div_f32s(along, length);
+            let rest: [S::f32s; CHANNELS] = from_fn(|i| simd.sub_f32s(simd.mul_f32s(ratio, mean[i]), x[i]));
+            let limit = simd.mul_f32s(simd.mul_f32s(ratio, ratio), self.get(component, VARIANCE));
+            let limit = simd.mul_f32s(limit, c.background_threshold);
+            let darker = simd.and_m32s(
+                simd.less_than_or_equal_f32s(along, length),
+                simd.greater_than_or_equal_f32s(along, simd.mul_f32s(darkest, length)),
+            );
+            // A black mean makes the ratio NaN, which no comparison admits.
+            let same_colour = simd.less_than_f32s(squared_norm(simd, c.zero, rest), limit);
+            found = simd.or_m32s(found, simd.and_m32s(common, simd.and_m32s(darker, same_colour)));
+            total = simd.add_f32s(total, weight);
+        }
+        found
+    }
+}
+
+#[inline(always)]
+fn squared_norm<S: Simd, const CHANNELS: usize>(
+    simd: S,
+    zero: S::f32s,
+    values: [S::f32s; CHANNELS],
+) -> S::f32s {
+    let mut sum = zero;
+    for value in values {
+        sum = simd.mul_add_f32s(value, value, sum);
+    }
+    sum
+}
