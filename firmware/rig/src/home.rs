@@ -18,6 +18,7 @@ use crate::steps;
 /// Where homing is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
+    Begin,
     Search,
     Leave,
     Clear,
@@ -36,18 +37,12 @@ pub(crate) struct Homing {
 }
 
 impl Homing {
-    /// Begins; the axis stands still.
-    pub(crate) fn start(axis: &mut Axis, settings: &CoarseSettings, home_switch: bool) -> Self {
-        let known_before = axis.state() != PositionState::Unknown;
-        if axis.state() != PositionState::Homed {
-            axis.follow_encoder();
-        }
-        let mut homing = Self { phase: Phase::Search, edge: None, known_before };
-        homing.enter(if home_switch { Phase::Leave } else { Phase::Search }, axis, settings);
-        homing
+    /// Begins with the next tick, when the switch was read.
+    pub(crate) const fn new() -> Self {
+        Self { phase: Phase::Begin, edge: None, known_before: false }
     }
 
-    /// Goes on; gives the shift of position 0 at the end.
+    /// Goes on while the axis has no fault; gives the shift of position 0 at the end.
     pub(crate) fn tick(
         &mut self,
         axis: &mut Axis,
@@ -57,7 +52,7 @@ impl Homing {
         let awaited = match self.phase {
             Phase::Search | Phase::Approach => home_switch,
             Phase::Leave => !home_switch,
-            Phase::Clear | Phase::Return { .. } => false,
+            Phase::Begin | Phase::Clear | Phase::Return { .. } => false,
         };
         if awaited && self.edge.is_none() {
             self.edge = Some(axis.position());
@@ -66,10 +61,14 @@ impl Homing {
         if !axis.is_still() {
             return None;
         }
-        if let Some(fault) = axis.take_fault() {
-            return Some(Err(fault));
-        }
         let next = match (self.phase, self.edge) {
+            (Phase::Begin, _) => {
+                self.known_before = axis.state() != PositionState::Unknown;
+                if axis.state() != PositionState::Homed {
+                    axis.follow_encoder();
+                }
+                if home_switch { Phase::Leave } else { Phase::Search }
+            }
             (Phase::Search, Some(_)) => Phase::Leave,
             (Phase::Leave, Some(_)) => Phase::Clear,
             (Phase::Clear, _) => Phase::Approach,
@@ -88,6 +87,7 @@ impl Homing {
     fn enter(&mut self, phase: Phase, axis: &mut Axis, settings: &CoarseSettings) {
         (self.phase, self.edge) = (phase, None);
         let (way, speed) = match phase {
+            Phase::Begin => (0, settings.home_approach_speed),
             Phase::Search => (-steps::to_steps(settings.home_search), settings.home_search_speed),
             Phase::Leave => (steps::to_steps(settings.home_leave), settings.home_leave_speed),
             Phase::Clear => (steps::to_steps(settings.home_clearance), settings.home_leave_speed),

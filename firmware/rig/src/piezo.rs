@@ -12,7 +12,6 @@
 //! multiplications a tick.
 
 use farnear_protocol::Nanometres;
-use farnear_protocol::message::Failure;
 
 use crate::gains::{GAIN_BITS, Gains};
 use crate::io::{DAC_CODE_MAX, DAC_FULL_SCALE_NM, GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_US};
@@ -42,6 +41,8 @@ struct Loop {
 pub(crate) struct Piezo {
     settings: FineSettings,
     control: Option<Loop>,
+    /// A move was ordered: close the loop as soon as the gauge says where it is.
+    closing: bool,
     target: Nanometres,
     /// Command in nm in 2^-10, as the DAC plays it.
     command: i32,
@@ -55,6 +56,7 @@ impl Piezo {
         Self {
             settings,
             control: None,
+            closing: false,
             target: Nanometres(0),
             command: 0,
             code: 0,
@@ -85,30 +87,31 @@ impl Piezo {
 
     /// Whether the shaped set-point has reached the target.
     pub(crate) fn arrived(&self) -> bool {
-        self.control.as_ref().is_none_or(|control| control.shaper.arrived(&self.settings.gains.shaper))
+        let shaper = &self.settings.gains.shaper;
+        !self.closing && self.control.as_ref().is_none_or(|control| control.shaper.arrived(shaper))
     }
 
-    /// Goes to `target`, closing the loop where it is open. Fails while the gauge does.
-    pub(crate) fn go(&mut self, target: Nanometres) -> Result<(), Failure> {
-        if self.gauge_failed() {
-            return Err(Failure::Gauge);
-        }
+    /// Goes to `target`, closing the loop where it is open.
+    pub(crate) const fn go(&mut self, target: Nanometres) {
         self.target = target;
-        if self.control.is_none() {
-            let here = fixed(self.measured);
-            self.control = Some(Loop {
-                shaper: Shaper::at(here),
-                model: [here, 0],
-                // Standing still: what is not explained by the command is disturbance, so nothing jumps.
-                state: [here, 0, here.saturating_sub(self.command), 0],
-                reference_before: here,
-            });
-        }
-        Ok(())
+        self.closing = self.control.is_none();
+    }
+
+    /// Closes the loop without a jump: standing still, and what the command does not explain is disturbance.
+    fn close(&mut self) {
+        let here = fixed(self.measured);
+        self.control = Some(Loop {
+            shaper: Shaper::at(here),
+            model: [here, 0],
+            state: [here, 0, here.saturating_sub(self.command), 0],
+            reference_before: here,
+        });
+        self.closing = false;
     }
 
     /// Stays where the gauge says it is now.
     pub(crate) fn hold(&mut self) {
+        self.closing = false;
         if self.control.is_some() && !self.arrived() {
             self.target = Nanometres(self.measured.0.clamp(self.settings.min.0, self.settings.max.0));
         }
@@ -119,12 +122,15 @@ impl Piezo {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
             if self.gauge_failed() {
-                self.control = None;
+                (self.control, self.closing) = (None, false);
             }
             return;
         };
         self.gauge_missing_ticks = 0;
         self.measured = Nanometres(code as i32 - GAUGE_CODE_ZERO as i32);
+        if self.closing {
+            return self.close();
+        }
         if let Some(control) = &mut self.control {
             let surprise = fixed(self.measured).saturating_sub(control.state[0]);
             for (state, gain) in control.state.iter_mut().zip(self.settings.gains.observer) {

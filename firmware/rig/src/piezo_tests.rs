@@ -94,7 +94,7 @@ impl Plant {
 /// Moves, and gives the ticks after which the plant itself stays within 50 nm, and its worst overshoot in nm.
 fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
     let up = f64::from(target) > plant.position;
-    piezo.go(Nanometres(target)).expect("the gauge works");
+    piezo.go(Nanometres(target));
     let (mut settled, mut overshoot) = (0, 0f64);
     for tick in 0..500 {
         let gauge = plant.gauge();
@@ -162,7 +162,7 @@ fn a_dead_gauge_opens_the_loop_and_holds_the_command() {
         }
         assert!(piezo.gauge_failed());
         assert!(piezo.act().abs_diff(held) < 20, "{} after {held}", piezo.act());
-        assert_eq!(piezo.go(Nanometres(20_000)), Err(Failure::Gauge));
+        piezo.go(Nanometres(20_000));
     }
     // It comes back: the next move begins without a jump.
     let gauge = plant.gauge();
@@ -189,7 +189,7 @@ fn holding_a_moving_piezo_ends_the_move() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(NOMINAL, 1);
     step(&mut piezo, &mut plant, 20_000);
-    assert_eq!(piezo.go(Nanometres(170_000)), Ok(()));
+    piezo.go(Nanometres(170_000));
     for _ in 0..13 {
         let gauge = plant.gauge();
         piezo.sense(gauge);
@@ -210,7 +210,7 @@ fn any_gauge_keeps_the_loop_in_bounds() {
         let wild = (random >> 40) as u32 & GAUGE_CODE_MAX;
         piezo.sense(Some(wild.clamp(1, GAUGE_CODE_MAX - 1)));
         if tick % 100 == 0 {
-            let _ = piezo.go(Nanometres((random >> 33) as i32 % 200_000));
+            piezo.go(Nanometres((random >> 33) as i32 % 200_000));
         }
         piezo.act(); // overflow checks are on
     }

@@ -92,17 +92,17 @@ impl Run {
         stage: &mut Stage,
         settings: &Settings,
         now: BoardMicros,
-    ) -> Result<Self, Failure> {
-        Ok(Self {
+    ) -> Self {
+        Self {
             shots: count,
             index: 0,
             shot: first,
             repeat: 0,
             exposures: 0,
-            positioning: approach(&first, stage, settings, now)?,
+            positioning: approach(&first, stage, settings, now),
             settle: None,
             phase: Phase::Positioning,
-        })
+        }
     }
 
     /// The axis that the present shot moves.
@@ -140,7 +140,7 @@ impl Run {
                     let record = self.record(number, coarse, fine, &edges);
                     self.exposures = self.exposures.saturating_add(1);
                     self.phase = Phase::Positioning;
-                    Progress { taken: Some(record), end: self.next(shots, stage, settings, now) }
+                    Progress { taken: Some(record), end: self.next(shots, stage, settings, now).map(Ok) }
                 }
             },
         }
@@ -153,23 +153,18 @@ impl Run {
         stage: &mut Stage,
         settings: &Settings,
         now: BoardMicros,
-    ) -> Option<Result<u16, Failure>> {
+    ) -> Option<u16> {
         self.repeat += 1; // at most the shot's repeat, which fits
         if self.repeat < self.shot.repeat {
             return None;
         }
         (self.repeat, self.index, self.settle) = (0, self.index + 1, None);
         let Some(shot) = shots.get(self.index).filter(|_| self.index < self.shots) else {
-            return Some(Ok(self.exposures));
+            return Some(self.exposures);
         };
         self.shot = *shot;
-        match approach(shot, stage, settings, now) {
-            Ok(positioning) => {
-                self.positioning = positioning;
-                None
-            }
-            Err(failure) => Some(Err(failure)),
-        }
+        self.positioning = approach(shot, stage, settings, now);
+        None
     }
 
     fn record(&self, number: u32, coarse: Nanometres, fine: Nanometres, edges: &ExposureEdges) -> ShotRecord {
@@ -190,12 +185,7 @@ impl Run {
     }
 }
 
-fn approach(
-    shot: &Shot,
-    stage: &mut Stage,
-    settings: &Settings,
-    now: BoardMicros,
-) -> Result<Positioning, Failure> {
+fn approach(shot: &Shot, stage: &mut Stage, settings: &Settings, now: BoardMicros) -> Positioning {
     let settled = (shot.settle_window, shot.settle_dwell);
     Positioning::start(stage, settings, (shot.axis, shot.target), settled, now)
 }

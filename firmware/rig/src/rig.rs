@@ -160,8 +160,7 @@ impl Rig {
         if axis != Axis::SensorCoarse {
             return Err(RequestError::CannotHome { axis });
         }
-        let homing = Homing::start(&mut self.stage.coarse, &self.settings.coarse, self.stage.home_switch);
-        self.active = Some(Active { request, work: Work::Home(homing) });
+        self.active = Some(Active { request, work: Work::Home(Homing::new()) });
         Ok(Response::Accepted)
     }
 
@@ -176,11 +175,8 @@ impl Rig {
         self.must_be_homed(axis)?;
         self.must_be_free()?;
         let settled = Positioning::plain(&self.settings, axis);
-        let work = match Positioning::start(&mut self.stage, &self.settings, (axis, target), settled, now) {
-            Ok(positioning) => Work::Move { axis, target, positioning },
-            Err(reason) => Work::Ending { axis: Some(axis), reason },
-        };
-        self.active = Some(Active { request, work });
+        let positioning = Positioning::start(&mut self.stage, &self.settings, (axis, target), settled, now);
+        self.active = Some(Active { request, work: Work::Move { axis, target, positioning } });
         Ok(Response::Accepted)
     }
 
@@ -208,11 +204,8 @@ impl Rig {
         let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
             return Err(RequestError::Shot { index: 0, reason: ShotFault::Index });
         };
-        let work = match Run::start(count, first, &mut self.stage, &self.settings, now) {
-            Ok(run) => Work::Program(run),
-            Err(reason) => Work::Ending { axis: Some(first.axis), reason },
-        };
-        self.active = Some(Active { request, work });
+        let run = Run::start(count, first, &mut self.stage, &self.settings, now);
+        self.active = Some(Active { request, work: Work::Program(run) });
         Ok(Response::Accepted)
     }
 
@@ -251,6 +244,13 @@ impl Rig {
 
     /// Takes the active work one tick further.
     fn advance(&mut self, now: BoardMicros) {
+        // Whatever runs: a coarse axis that was pushed, stalled or met a switch ends it. Without work nobody is
+        // told but whoever asks for the status.
+        if self.stage.is_still()
+            && let Some(reason) = self.stage.coarse.take_fault()
+        {
+            self.end_early(Some(Axis::SensorCoarse), reason);
+        }
         let Some(Active { request, work }) = &mut self.active else { return };
         let request = *request;
         match work {
@@ -265,7 +265,7 @@ impl Rig {
             }
             Work::Move { axis, target, positioning } => {
                 let (axis, asked) = (*axis, *target);
-                match positioning.tick(&mut self.stage, now) {
+                match positioning.tick(&self.stage, now) {
                     None => {}
                     Some(Ok(_)) => {
                         let measured = self.stage.measured(axis);
@@ -287,16 +287,11 @@ impl Rig {
                     Some(Err(reason)) => self.end_early(Some(axis), reason),
                 }
             }
+            Work::Ending { axis, reason } if self.stage.is_still() => {
+                let (axis, reason) = (*axis, *reason);
+                self.finish(now, EventKind::Failed { request, axis, reason });
+            }
             Work::Ending { .. } => {}
-        }
-        if let Some(Active { work: Work::Ending { axis, reason }, .. }) = &self.active
-            && self.stage.is_still()
-        {
-            // A fault on the way to the stop tells more than the stop.
-            let fault = self.stage.coarse.take_fault();
-            let axis = if fault.is_some() { Some(Axis::SensorCoarse) } else { *axis };
-            let reason = fault.unwrap_or(*reason);
-            self.finish(now, EventKind::Failed { request, axis, reason });
         }
     }
 
@@ -305,14 +300,16 @@ impl Rig {
         self.events.push(now, terminal);
     }
 
-    /// Stops what moves; the active work ends with `reason` once it stands. Does nothing where nothing is active.
+    /// Stops what moves; the active work ends with `reason` once it stands. A fault on the way there tells more
+    /// than the stop, so it takes its place. Does nothing where nothing is active.
     fn end_early(&mut self, axis: Option<Axis>, reason: Failure) {
-        if let Some(active) = &mut self.active
-            && !matches!(active.work, Work::Ending { .. })
-        {
+        let Some(active) = &mut self.active else { return };
+        if !matches!(active.work, Work::Ending { .. }) {
             self.stage.stop();
-            active.work = Work::Ending { axis, reason };
+        } else if reason == Failure::Stopped {
+            return;
         }
+        active.work = Work::Ending { axis, reason };
     }
 
     /// Everything was said and nothing moves, or that took too long.

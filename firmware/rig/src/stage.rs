@@ -107,19 +107,19 @@ impl Positioning {
         (axis, target): (AxisName, Nanometres),
         (window, dwell): (Nanometres, Micros),
         now: BoardMicros,
-    ) -> Result<Self, Failure> {
+    ) -> Self {
         let (deadline, waiting_since) = match axis {
             AxisName::SensorCoarse => {
                 stage.coarse.go(target);
                 (settings.coarse.settle_deadline, None)
             }
             AxisName::SensorFine => {
-                stage.fine.go(target)?;
+                stage.fine.go(target);
                 (settings.fine.settle_deadline, Some(now))
             }
         };
         let patience = Micros(deadline.0.saturating_add(dwell.0));
-        Ok(Self { axis, target, settle: Settle::new(window, dwell), started: now, waiting_since, patience })
+        Self { axis, target, settle: Settle::new(window, dwell), started: now, waiting_since, patience }
     }
 
     /// To the settle window of a plain move.
@@ -130,16 +130,13 @@ impl Positioning {
         }
     }
 
-    /// Goes on; gives the time from the start once the position is settled. May be asked again while it stays.
-    pub(crate) fn tick(&mut self, stage: &mut Stage, now: BoardMicros) -> Option<Result<Micros, Failure>> {
+    /// Goes on while the coarse axis has no fault; gives the time from the start once the position is settled. May be asked again while it stays.
+    pub(crate) fn tick(&mut self, stage: &Stage, now: BoardMicros) -> Option<Result<Micros, Failure>> {
         let error = Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0));
         let at_rest = match self.axis {
             AxisName::SensorCoarse => {
                 if !stage.coarse.is_still() {
                     return None;
-                }
-                if let Some(fault) = stage.coarse.take_fault() {
-                    return Some(Err(fault));
                 }
                 true
             }

@@ -1,0 +1,201 @@
+//! A rig on the bench: the behaviour under test, a small model of its hardware, and a host's end of the link.
+//!
+//! The hardware model is as simple as the tests allow (a resonant piezo without hysteresis, a stiff screw); the
+//! emulated board's plant is the thorough one.
+#![allow(dead_code)] // each test file uses its part
+
+pub mod hardware;
+
+use farnear_protocol::frame::{self, Decoder, Header, Kind, Packet};
+use farnear_protocol::message::{Event, EventKind, Hello, ResetCause, Status};
+use farnear_protocol::{BoardMicros, PROTOCOL_CURRENT, Request, RequestError, Response};
+use farnear_rig::io::{Outputs, TICK_US};
+use farnear_rig::{Identity, Rig};
+use hardware::Hardware;
+
+/// Boot number of the bench.
+pub const BOOT: u32 = 7;
+
+/// What a request was answered.
+pub type Answer = Result<Response, RequestError>;
+
+/// The rig, its hardware and its host.
+pub struct Bench {
+    pub rig: Rig,
+    pub hardware: Hardware,
+    pub now: u64,
+    pub next_id: u32,
+    decoder: Decoder,
+    /// Answers in the order they came.
+    pub answers: Vec<(u32, Answer)>,
+    /// Events in the order they came.
+    pub events: Vec<(u32, Event)>,
+    /// When the rig asked for its reset.
+    pub reset_at: Option<u64>,
+    /// Frames are left in the rig while this is set.
+    pub deaf: bool,
+}
+
+impl Bench {
+    /// A stage that stands at `position_um` from its home switch.
+    pub fn new(position_um: f64) -> Self {
+        let identity = Identity {
+            board: "bench",
+            firmware: "0.1.0",
+            unique_id: [3; 12],
+            boot: BOOT,
+            reset_cause: ResetCause::Pin,
+            emulated: true,
+        };
+        Self {
+            rig: Rig::new(identity, BoardMicros(0)),
+            hardware: Hardware::new(position_um),
+            now: 0,
+            next_id: 100,
+            decoder: Decoder::new(),
+            answers: Vec::new(),
+            events: Vec::new(),
+            reset_at: None,
+            deaf: false,
+        }
+    }
+
+    /// Homed and ready.
+    pub fn homed() -> Self {
+        let mut bench = Self::new(800.0);
+        let id = bench.accepted(&Request::Home { axis: farnear_protocol::message::Axis::SensorCoarse });
+        let end = bench.end_of(id);
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
+        bench
+    }
+
+    /// One control tick.
+    pub fn tick(&mut self) -> Outputs {
+        let inputs = self.hardware.inputs(BoardMicros(self.now));
+        let outputs = self.rig.tick(&inputs);
+        self.hardware.run(&outputs, self.now);
+        if outputs.reset {
+            self.reset_at.get_or_insert(self.now);
+        }
+        self.now += u64::from(TICK_US);
+        if !self.deaf {
+            self.collect();
+        }
+        outputs
+    }
+
+    /// Many control ticks.
+    pub fn run_ms(&mut self, ms: u64) {
+        for _ in 0..ms * 1_000 / u64::from(TICK_US) {
+            self.tick();
+        }
+    }
+
+    /// Takes what the rig has to say.
+    pub fn collect(&mut self) {
+        while let Some(frame) = self.rig.transmit() {
+            for byte in frame {
+                match self.decoder.push(byte) {
+                    None => {}
+                    Some(packet) => {
+                        let packet = packet.expect("the rig sends whole frames");
+                        self.take(&packet);
+                    }
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, packet: &Packet) {
+        let id = packet.header.id;
+        assert_eq!((packet.header.version, packet.header.boot), (PROTOCOL_CURRENT, BOOT));
+        match packet.header.kind {
+            Kind::Response => self.answers.push((id, Ok(packet.message().expect("a response")))),
+            Kind::Error => self.answers.push((id, Err(packet.message().expect("an error")))),
+            Kind::Event => self.events.push((id, packet.message().expect("an event"))),
+            Kind::Request => panic!("the rig asks nothing"),
+        }
+    }
+
+    /// Puts bytes on the line.
+    pub fn send_bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.rig.receive(*byte, BoardMicros(self.now));
+        }
+    }
+
+    /// Sends a request under an id, as it is made for `boot`.
+    pub fn send_as(&mut self, id: u32, boot: u32, request: &Request) {
+        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
+        let frame = frame::encode(header, request).expect("every request fits");
+        self.send_bytes(&frame);
+    }
+
+    /// Asks, and gives the id and the answer.
+    pub fn ask(&mut self, request: &Request) -> (u32, Answer) {
+        let id = self.next_id;
+        self.next_id += 1;
+        (id, self.ask_as(id, BOOT, request))
+    }
+
+    /// Asks under an id.
+    pub fn ask_as(&mut self, id: u32, boot: u32, request: &Request) -> Answer {
+        let before = self.answers.len();
+        self.send_as(id, boot, request);
+        self.tick();
+        let (of, answer) = self.answers.get(before).cloned().expect("an answer within a tick");
+        assert_eq!(of, id);
+        answer
+    }
+
+    /// Asks for something that must be accepted; gives its id.
+    pub fn accepted(&mut self, request: &Request) -> u32 {
+        let (id, answer) = self.ask(request);
+        assert_eq!(answer, Ok(Response::Accepted), "{request:?}");
+        id
+    }
+
+    /// The status.
+    pub fn status(&mut self) -> Status {
+        match self.ask(&Request::Status).1 {
+            Ok(Response::Status(status)) => status,
+            other => panic!("no status: {other:?}"),
+        }
+    }
+
+    /// A hello that opens a session.
+    pub fn hello(&mut self) -> Hello {
+        match self.ask(&Request::Hello).1 {
+            Ok(Response::Hello(hello)) => hello,
+            other => panic!("no hello: {other:?}"),
+        }
+    }
+
+    /// Ticks until long work has ended; gives its terminal event.
+    pub fn end_of(&mut self, id: u32) -> EventKind {
+        for _ in 0..30 * 5_000 {
+            if let Some(end) = self.events.iter().map(|(_, event)| &event.kind).find(|kind| ends(kind, id)) {
+                return end.clone();
+            }
+            self.tick();
+        }
+        panic!("request {id} did not end within 30 s; events: {:?}", self.events);
+    }
+
+    /// Asks for long work and waits for its end.
+    pub fn work(&mut self, request: &Request) -> EventKind {
+        let id = self.accepted(request);
+        self.end_of(id)
+    }
+}
+
+/// Whether an event is the terminal event of a request.
+pub fn ends(kind: &EventKind, id: u32) -> bool {
+    match kind {
+        EventKind::Homed { request, .. }
+        | EventKind::MoveDone { request, .. }
+        | EventKind::ProgramDone { request, .. }
+        | EventKind::Failed { request, .. } => *request == id,
+        EventKind::Started { .. } | EventKind::ShotDone { .. } => false,
+    }
+}
