@@ -218,3 +218,121 @@ fn mixture_weight(x: f64, y: f64, profile: Profile) -> f64 {
         .sum();
     banded + profile.density(farthest)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const PSFS: [&str; 5] = [
+        "pillbox",
+        "gaussian:k=0.4578",
+        "generalised:p=1.8,k=0.4802",
+        "generalised:p=0.7,k=0.2",
+        "generalised:p=8,k=0.7",
+    ];
+
+    #[test]
+    fn weights_sum_to_one_before_normalisation() {
+        // Triangles at all cells sum to 1 everywhere, so the weights sum to the PSF's integral.
+        for radius in [0.01f64, 0.3, 1.0, 5.4, 23.0] {
+            let reach = (radius + 1.0).ceil() as i32;
+            let offsets =
+                || (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (f64::from(x), f64::from(y))));
+            let disc: f64 =
+                offsets().map(|(x, y)| disc_weight(x, y, radius)).sum::<f64>() / (PI * radius * radius);
+            assert!((disc - 1.0).abs() < 1e-11, "disc of {radius}: {disc}");
+        }
+        for (p, sigma) in
+            [(1.8, 0.05), (1.8, 0.7), (1.8, 2.6), (0.7, 0.5), (0.7, 3.0), (8.0, 0.4), (8.0, 9.0)]
+        {
+            let profile = Profile { p, sigma };
+            let reach = profile.radius_at(26.0).ceil() as i32 + 1;
+            let sum: f64 = (-reach..=reach)
+                .flat_map(|x| (-reach..=reach).map(move |y| (f64::from(x).abs(), f64::from(y).abs())))
+                .map(|(x, y)| profile_weight(x.max(y), x.min(y), profile))
+                .sum();
+            assert!((sum - 1.0).abs() < 1e-6, "p {p} sigma {sigma}: {sum}");
+        }
+        for sigma in [0.02, 0.5, 2.5] {
+            let sum: f64 = (-40..=40).map(|d| gaussian_line_weight(f64::from(d), sigma)).sum();
+            assert!((sum - 1.0).abs() < 1e-12, "sigma {sigma}: {sum}");
+        }
+    }
+
+    #[test]
+    fn pixel_weights_agree_with_monte_carlo() {
+        // A point of the cell goes where the PSF throws it; the share that lands on each pixel is its weight.
+        const THROWS: u32 = 2_000_000;
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for (radius_px, cell) in [(2.703, 0.0), (0.8, 0.5), (0.2, 0.0)] {
+            let kernel = CellKernel::new(&Psf::PillBox, radius_px);
+            let mut hits = std::collections::BTreeMap::new();
+            for _ in 0..THROWS {
+                // Uniform on the disc by rejection, so that no formula of the kernel is used.
+                let (x, y) = loop {
+                    let (x, y): (f64, f64) = (random.random_range(-1.0..1.0), random.random_range(-1.0..1.0));
+                    if x * x + y * y <= 1.0 {
+                        break (x * radius_px, y * radius_px);
+                    }
+                };
+                let (u, v): (f64, f64) = (random.random_range(0.0..0.5), random.random_range(0.0..0.5));
+                let pixel = ((x + u + cell).floor() as isize, (y + v + cell).floor() as isize);
+                *hits.entry(pixel).or_insert(0u32) += 1;
+            }
+            let first_cell = if cell > 0.0 { 1 } else { 0 };
+            for row in -4..=4 {
+                for column in -4..=4 {
+                    let share = f64::from(*hits.get(&(row, column)).unwrap_or(&0)) / f64::from(THROWS);
+                    // A pixel gathers the mean of its cells: four cells' weights to a pixel make up 1.
+                    let weight = 4.0 * kernel.on_pixel(2 * row - first_cell, 2 * column - first_cell);
+                    let deviation = (weight.max(1e-7) / f64::from(THROWS)).sqrt();
+                    assert!(
+                        (share - weight).abs() < 5.0 * deviation,
+                        "{radius_px} {row} {column}: {share} {weight}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_mixture_of_discs_agrees_with_direct_quadrature_and_the_closed_gaussian() {
+        let sigma = 2.4;
+        let profile = Profile { p: 2.0, sigma };
+        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (3.0, 1.0), (6.0, 5.0)] {
+            let closed = gaussian_line_weight(x, sigma) * gaussian_line_weight(y, sigma);
+            assert!((mixture_weight(x, y, profile) - closed).abs() < 1e-9, "{x} {y}");
+            assert!((profile_weight(x, y, profile) - closed).abs() < 1e-9, "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn second_moment_is_the_psfs_plus_that_of_two_cells() {
+        // Two unit squares have 1/6 in each direction; sampling at cells adds a ripple that fades with the blur.
+        for text in PSFS {
+            let psf: Psf = text.parse().unwrap();
+            let (blur_px, cells) = (2.703, CELLS_PER_PIXEL as f64);
+            let kernel = CellKernel::new(&psf, blur_px);
+            let reach = kernel.radius as isize;
+            let moment: f64 = (-reach..=reach)
+                .flat_map(|row| (-reach..=reach).map(move |column| (row, column)))
+                .map(|(row, column)| kernel.at(row, column) * (row * row + column * column) as f64)
+                .sum();
+            let expected = psf.second_moment(blur_px) * cells * cells + 2.0 / 6.0;
+            // The cut tail holds 1e-5 of a Gaussian, but 4e-4 of the long tails of p = 0.7, far out.
+            let tolerance = if text.contains("p=0.7") { 1e-2 } else { 2e-3 };
+            assert!((moment / expected - 1.0).abs() < tolerance, "{text}: {moment} {expected}");
+        }
+    }
+
+    #[test]
+    fn no_blur_is_a_point_and_tiny_blur_is_close_to_it() {
+        for text in PSFS {
+            let psf: Psf = text.parse().unwrap();
+            assert_eq!(CellKernel::new(&psf, 0.0), CellKernel { radius: 0, weights: vec![1.0] });
+            assert!(CellKernel::new(&psf, 1e-4).at(0, 0) > 0.998, "{text}");
+        }
+    }
+}

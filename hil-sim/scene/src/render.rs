@@ -7,8 +7,10 @@ use crate::blur::{Blur, Cells, kernel_reach_px};
 use crate::camera::{Camera, CameraError};
 use crate::kernel::CELLS_PER_PIXEL;
 use crate::lens::{Lens, LensError};
+use crate::maps::Picture;
 use crate::psf::Psf;
-use crate::scene::{Scene, Shape, sample_map};
+use crate::scene::{Scene, Shape};
+use crate::texture::{Spectrum, Texture};
 
 /// Largest blur radius that is rendered, px: memory grows with its square.
 const MAX_BLUR_PX: f64 = 600.0;
@@ -101,8 +103,16 @@ pub struct Renderer {
     psf: Psf,
     camera: Camera,
     seed: u64,
-    texture: Array2<f32>,
+    texture: Paint,
     surface: Surface,
+}
+
+/// What the surface is painted with.
+#[derive(Debug, Clone)]
+enum Paint {
+    /// One period of a random texture, in cells.
+    Random(Array2<f32>),
+    Picture(Picture),
 }
 
 /// Image distance of the surface beyond the far setting's sensor distance, mm.
@@ -126,9 +136,12 @@ impl Renderer {
         seed: u64,
     ) -> Result<Self, RenderError> {
         camera.check()?;
-        let texture = match &scene.shape {
-            Shape::HeightMap(map) if map.texture().is_some() => Array2::zeros((0, 0)),
-            _ => scene.texture.synthesise(camera.width_px, camera.height_px, scene.contrast, seed),
+        let random =
+            |spectrum: Spectrum| spectrum.synthesise(camera.width_px, camera.height_px, scene.contrast, seed);
+        let texture = match &scene.texture {
+            Texture::Sand => Paint::Random(random(Spectrum::Sand)),
+            Texture::Fractal => Paint::Random(random(Spectrum::Fractal)),
+            Texture::Picture(picture) => Paint::Picture(picture.clone()),
         };
         let surface = match scene.shape {
             Shape::Plane { depth_mm } if lens.distortion.is_none() => {
@@ -202,22 +215,21 @@ impl Renderer {
     /// Radiance of the cells of the image and `margin_px` around it.
     fn cell_radiance(&self, margin_px: usize) -> Array2<f32> {
         let size = cell_grid(&self.camera, margin_px);
-        if let Shape::HeightMap(map) = &self.scene.shape
-            && let Some(texture) = map.texture()
-        {
-            return Array2::from_shape_fn(size, |cell| {
+        match &self.texture {
+            Paint::Random(period) => {
+                let (height, width) = period.dim();
+                let margin = (margin_px * CELLS_PER_PIXEL) as isize;
+                let wrap = |index: usize, period: usize| {
+                    (index as isize - margin).rem_euclid(period as isize) as usize
+                };
+                Array2::from_shape_fn(size, |(row, column)| period[[wrap(row, height), wrap(column, width)]])
+            }
+            Paint::Picture(picture) => Array2::from_shape_fn(size, |cell| {
                 let (x_px, y_px) = cell_centre_px(cell, margin_px);
-                sample_map(texture, x_px / self.camera.width_px as f64, y_px / self.camera.height_px as f64)
-                    as f32
-            });
+                let (x, y) = (x_px / self.camera.width_px as f64, y_px / self.camera.height_px as f64);
+                picture.radiance(x, y) as f32
+            }),
         }
-        let (height, width) = self.texture.dim();
-        let margin = (margin_px * CELLS_PER_PIXEL) as isize;
-        Array2::from_shape_fn(size, |(row, column)| {
-            let wrap =
-                |index: usize, period: usize| (index as isize - margin).rem_euclid(period as isize) as usize;
-            self.texture[[wrap(row, height), wrap(column, width)]]
-        })
     }
 }
 

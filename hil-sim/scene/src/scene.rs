@@ -4,11 +4,11 @@
 //! its depth, and the height field lives in image coordinates (px, the centre of the first pixel at 0.5, 0.5). Named
 //! shapes span the lens's working range exactly, far focus to near focus; outside the image they go on.
 
-use ndarray::Array2;
 use thiserror::Error;
 
 use crate::camera::Camera;
 use crate::lens::Lens;
+use crate::maps::HeightMap;
 use crate::texture::Texture;
 
 /// A surface with its paint. Text form as in [`Scene::from_str`](std::str::FromStr).
@@ -16,9 +16,9 @@ use crate::texture::Texture;
 pub struct Scene {
     /// Where the surface lies.
     pub shape: Shape,
-    /// What it is painted with, unless the height map brings its own texture.
+    /// What it is painted with.
     pub texture: Texture,
-    /// Standard deviation of the texture, the mean being 1.
+    /// Standard deviation of a random texture, the mean being 1; a picture has its own.
     pub contrast: f64,
 }
 
@@ -42,15 +42,8 @@ pub enum Shape {
     Cone,
     /// A cap of 60 degrees half-angle of a ball, stretched along the axis to span the range; as wide as the cone.
     Sphere,
-    /// A height field from a file.
-    HeightMap(Box<HeightMap>),
-}
-
-/// A height field and, if it has one, its own texture; both are stretched over the image.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HeightMap {
-    depth_mm: Array2<f32>,
-    texture: Option<Array2<f32>>,
+    /// A height field given as an array, stretched over the image.
+    HeightMap(HeightMap),
 }
 
 /// Why a scene was refused.
@@ -89,6 +82,20 @@ pub enum SceneError {
         /// Columns.
         width: usize,
     },
+    /// A picture without any light.
+    #[error("scene: the texture map is black")]
+    Black,
+    /// A scene file that is not TOML or has a wrong key.
+    #[error("scene file: {0}")]
+    Syntax(String),
+    /// A scene file and the maps given with it do not fit.
+    #[error("scene file: {what} map {found}")]
+    Maps {
+        /// `depth` or `texture`.
+        what: &'static str,
+        /// What is wrong.
+        found: &'static str,
+    },
     /// A value of a map that is not finite, or not above 0.
     #[error("scene: the {what} map holds {value} at row {row}, column {column}, expected {expected}")]
     MapValue {
@@ -103,80 +110,6 @@ pub enum SceneError {
         /// What it has to be.
         expected: &'static str,
     },
-}
-
-impl HeightMap {
-    /// A surface from its depths in mm (rows from the top) and, if given, its radiance (0 or more in any unit;
-    /// it is scaled to a mean of 1). Both may have any size.
-    ///
-    /// # Errors
-    /// [`SceneError::Empty`] and [`SceneError::MapValue`] name what no surface can have.
-    pub fn new(depth_mm: Array2<f32>, texture: Option<Array2<f32>>) -> Result<Self, SceneError> {
-        check_map("depth", &depth_mm, "a finite depth in mm above 0", |value| value > 0.0)?;
-        let texture = match texture {
-            None => None,
-            Some(mut texture) => {
-                check_map("texture", &texture, "a finite radiance of 0 or more", |value| value >= 0.0)?;
-                let mean = texture.iter().map(|&value| f64::from(value)).sum::<f64>() / texture.len() as f64;
-                if mean <= 0.0 {
-                    let expected = "some light somewhere";
-                    return Err(SceneError::MapValue {
-                        what: "texture",
-                        value: 0.0,
-                        row: 0,
-                        column: 0,
-                        expected,
-                    });
-                }
-                texture.mapv_inplace(|value| (f64::from(value) / mean) as f32);
-                Some(texture)
-            }
-        };
-        Ok(Self { depth_mm, texture })
-    }
-
-    /// The map's own texture, mean 1.
-    pub(crate) fn texture(&self) -> Option<&Array2<f32>> {
-        self.texture.as_ref()
-    }
-}
-
-fn check_map(
-    what: &'static str,
-    map: &Array2<f32>,
-    expected: &'static str,
-    good: impl Fn(f32) -> bool,
-) -> Result<(), SceneError> {
-    let (height, width) = map.dim();
-    if map.is_empty() {
-        return Err(SceneError::Empty { what, height, width });
-    }
-    match map.indexed_iter().find(|&(_, &value)| !(value.is_finite() && good(value))) {
-        None => Ok(()),
-        Some(((row, column), &value)) => Err(SceneError::MapValue { what, value, row, column, expected }),
-    }
-}
-
-/// `map` stretched over an image, at the relative position `x`, `y` (0..1 over the image; mirrored outside), bilinear
-/// between the centres of its pixels.
-pub(crate) fn sample_map(map: &Array2<f32>, x: f64, y: f64) -> f64 {
-    let (height, width) = map.dim();
-    let taps = |position: f64, size: usize| {
-        let position = position * size as f64 - 0.5;
-        let low = position.floor();
-        let index = |i: f64| {
-            // Mirror about the outer edges: ... 1 0 | 0 1 2 ... n-1 | n-1 n-2 ...
-            let folded = (i as i64).rem_euclid(2 * size as i64) as usize;
-            if folded < size { folded } else { 2 * size - 1 - folded }
-        };
-        (index(low), index(low + 1.0), position - low)
-    };
-    let (left, right, fx) = taps(x, width);
-    let (top, bottom, fy) = taps(y, height);
-    let at = |row: usize, column: usize| f64::from(map[[row, column]]);
-    let upper = at(top, left) + fx * (at(top, right) - at(top, left));
-    let lower = at(bottom, left) + fx * (at(bottom, right) - at(bottom, left));
-    upper + fy * (lower - upper)
 }
 
 impl Scene {
@@ -209,7 +142,7 @@ impl Scene {
                 let height = (1.0 - (rho * rim_radius).powi(2)).sqrt();
                 far + (near - far) * (height - rim_height) / (1.0 - rim_height)
             }
-            Shape::HeightMap(map) => sample_map(&map.depth_mm, x_px / width, y_px / height),
+            Shape::HeightMap(map) => map.depth_mm(x_px / width, y_px / height),
         }
     }
 }

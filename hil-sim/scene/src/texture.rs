@@ -16,19 +16,22 @@ use rustfft::num_complex::Complex32;
 
 use crate::fourier::{Fourier2, good_size};
 use crate::kernel::CELLS_PER_PIXEL;
+use crate::maps::Picture;
 
 /// Pixels by which the period exceeds the image.
 const MARGIN_PX: usize = 64;
-/// Radiance is clipped to this distance from the mean of 1.
-const CLIP: f32 = 0.8;
+/// Radiance is clipped to this range around the mean of 1.
+const CLIP: (f32, f32) = (0.2, 1.8);
 
-/// Kind of random texture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What a surface is painted with.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Texture {
     /// White noise blurred by a Gaussian of SD 0.5 px, plus 1/f noise (0.954 and 0.3 of the standard deviation).
     Sand,
     /// Amplitude 1/f, flat below one cycle per 64 px.
     Fractal,
+    /// A picture given as an array, stretched over the image and mirrored beyond it.
+    Picture(Picture),
 }
 
 impl fmt::Display for Texture {
@@ -36,6 +39,7 @@ impl fmt::Display for Texture {
         f.write_str(match self {
             Self::Sand => "sand",
             Self::Fractal => "fractal",
+            Self::Picture(_) => "picture",
         })
     }
 }
@@ -51,7 +55,14 @@ fn grain_amplitude(f: f32) -> f32 {
     libm::expf(-0.5 * z * z)
 }
 
-impl Texture {
+/// Spectrum of a random texture: amplitude at a frequency in cycles per px.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Spectrum {
+    Sand,
+    Fractal,
+}
+
+impl Spectrum {
     /// One period of the texture in cells (half pixels) for an image of this size.
     pub(crate) fn synthesise(
         self,
@@ -79,7 +90,7 @@ impl Texture {
         let scale = contrast / variance.sqrt();
         Array2::from_shape_fn((height, width), |(row, column)| {
             let deviation = (f64::from(field[row * width + column].re) - mean) * scale;
-            1.0 + (deviation as f32).clamp(-CLIP, CLIP)
+            (1.0 + deviation as f32).clamp(CLIP.0, CLIP.1)
         })
     }
 
@@ -112,5 +123,61 @@ impl Texture {
                 sum
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean power of the field per band of frequency (cycles per px), along the rows.
+    fn row_power(field: &Array2<f32>, frequency: f64) -> f64 {
+        let (height, width) = field.dim();
+        let index = (frequency * width as f64 / CELLS_PER_PIXEL as f64).round();
+        let mut power = 0.0;
+        for row in field.rows() {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (column, value) in row.iter().enumerate() {
+                let phase = std::f64::consts::TAU * index * column as f64 / width as f64;
+                re += f64::from(value - 1.0) * phase.cos();
+                im += f64::from(value - 1.0) * phase.sin();
+            }
+            power += (re * re + im * im) / (height * width) as f64;
+        }
+        power
+    }
+
+    #[test]
+    fn mean_and_contrast_are_as_stated() {
+        for spectrum in [Spectrum::Sand, Spectrum::Fractal] {
+            let field = spectrum.synthesise(320, 240, 0.2, 4);
+            assert!((field.mean().unwrap() - 1.0).abs() < 1e-4);
+            // Clipping at four standard deviations takes 1e-4 of it.
+            assert!((field.std(0.0) / 0.2 - 1.0).abs() < 1e-3, "{}", field.std(0.0));
+            assert!(field.iter().all(|value| (0.2..=1.8).contains(value)));
+        }
+        assert!(Spectrum::Sand.synthesise(64, 64, 0.6, 4).iter().any(|&value| value == CLIP.0));
+        assert!(Spectrum::Sand.synthesise(64, 64, 0.0, 4).iter().all(|&value| value == 1.0));
+    }
+
+    #[test]
+    fn sand_is_fine_grain_and_fractal_is_coarse() {
+        let sand = Spectrum::Sand.synthesise(320, 240, 0.2, 4);
+        // Blurred white noise falls by exp(-(2 pi f 0.5)^2) in power: by 10.2 from 0.2 to 0.52 cycles per px, a sum over
+        // one direction; the 1/f part matters below. A band of 608 rows has a standard error of 4 %.
+        let ratio = row_power(&sand, 0.2) / row_power(&sand, 0.52);
+        let expected = (std::f64::consts::PI.powi(2) * (0.52f64.powi(2) - 0.2f64.powi(2))).exp();
+        assert!((ratio / expected - 1.0).abs() < 0.35, "{ratio} {expected}");
+        let fractal = Spectrum::Fractal.synthesise(320, 240, 0.2, 4);
+        // Amplitude 1/f in the plane is power f^-1 along a line: 8 for a ratio of 8, with the plane's limit taking some.
+        let ratio = row_power(&fractal, 0.05) / row_power(&fractal, 0.4);
+        assert!((8.0..14.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn a_seed_is_a_texture() {
+        let field = |seed| Spectrum::Sand.synthesise(40, 30, 0.2, seed);
+        assert_eq!(field(1), field(1));
+        assert_ne!(field(1), field(2));
     }
 }
