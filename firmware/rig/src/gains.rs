@@ -161,3 +161,82 @@ const fn fixed(gain: f64) -> i32 {
     let scaled = gain * (1i64 << GAIN_BITS) as f64;
     (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    const GAINS: Gains = Settings::DEFAULT.fine.gains;
+
+    fn real(gain: i32) -> f64 {
+        f64::from(gain) / f64::from(1 << GAIN_BITS)
+    }
+
+    #[test]
+    fn the_shaper_has_a_zero_at_the_resonance() {
+        // The zero-vibration condition written with sines and cosines instead of matrices (Singer and Seering,
+        // eq. 7): sum of w_i exp(zeta omega t_i) exp(j omega_d t_i) = 0.
+        let omega = core::f64::consts::TAU * 200.0;
+        let (grow, swing) = (0.03 * omega, omega * (1.0f64 - 0.03 * 0.03).sqrt());
+        let shaper = GAINS.shaper;
+        let taps = [(0, shaper.now), (shaper.half, shaper.early), (shaper.half + 1, shaper.late)];
+        let (mut cosine, mut sine) = (0.0, 0.0);
+        for (ticks, weight) in taps {
+            let t = ticks as f64 * 200e-6;
+            cosine += real(weight) * (grow * t).exp() * (swing * t).cos();
+            sine += real(weight) * (grow * t).exp() * (swing * t).sin();
+        }
+        assert!(cosine.abs() < 1e-6 && sine.abs() < 1e-6, "{cosine} {sine}");
+        assert!(taps.iter().all(|(_, weight)| *weight > 0));
+        assert_eq!(taps.iter().map(|(_, weight)| weight).sum::<i32>(), 1 << GAIN_BITS);
+    }
+
+    #[test]
+    fn the_model_rings_at_its_resonance_and_has_gain_one() {
+        let [[a, b], [c, d]] = GAINS.transition.map(|row| row.map(real));
+        // Trace and determinant of a sampled pair of poles in closed form.
+        let (omega, t) = (core::f64::consts::TAU * 200.0, 200e-6);
+        let fade = (-0.03 * omega * t).exp();
+        assert!((a + d - 2.0 * fade * (omega * t * (1.0f64 - 0.03 * 0.03).sqrt()).cos()).abs() < 1e-6);
+        assert!((a * d - b * c - fade * fade).abs() < 1e-6);
+        // At rest under a constant command of 1: p = 1, w = 0.
+        for (row, from_position, rest) in [(0, a, 1.0), (1, c, 0.0)] {
+            let next = from_position + real(GAINS.input[row]) + real(GAINS.input_before[row]);
+            assert!((next - rest).abs() < 1e-6, "{next}");
+        }
+    }
+
+    #[test]
+    fn feedback_puts_the_poles_where_they_were_asked() {
+        let model = GAINS.transition.map(|row| row.map(real));
+        let input = [0, 1].map(|i| real(GAINS.input[i]) + real(GAINS.input_before[i]));
+        let gain = GAINS.feedback.map(real);
+        let closed = [0, 1].map(|i| [0, 1].map(|j| model[i][j] - input[i] * gain[j]));
+        // 200 Hz, critically damped: a double pole at exp(-omega t).
+        let pole = (-core::f64::consts::TAU * 200.0 * 200e-6).exp();
+        assert!((closed[0][0] + closed[1][1] - 2.0 * pole).abs() < 1e-5);
+        assert!((closed[0][0] * closed[1][1] - closed[0][1] * closed[1][0] - pole * pole).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_observer_forgets_a_wrong_start() {
+        // Errors of the observer follow A (I - L C); started anywhere they die within 40 ticks (the poles are at
+        // exp(-2 pi 500 / 5000) = 0.53, four times).
+        let a = GAINS.transition.map(|row| row.map(real));
+        let b = [0, 1].map(|i| real(GAINS.input[i]) + real(GAINS.input_before[i]));
+        let mut error = [1.0, 1.0, 1.0, 1.0];
+        for _ in 0..40 {
+            let surprise = error[0];
+            let corrected: [f64; 4] = core::array::from_fn(|i| error[i] - real(GAINS.observer[i]) * surprise);
+            let [p, w, d, drift] = corrected;
+            error = [
+                a[0][0] * p + a[0][1] * w + b[0] * d,
+                a[1][0] * p + a[1][1] * w + b[1] * d,
+                d + drift,
+                drift,
+            ];
+        }
+        assert!(error.iter().all(|e| e.abs() < 1e-4), "{error:?}");
+    }
+}

@@ -1,4 +1,5 @@
-//! The loop against a model of the piezo: second-order resonance, hysteresis, creep, gauge noise, latency.
+//! The loop against a model of the piezo: amplifier, second-order resonance, hysteresis, creep, gauge noise,
+//! latency.
 
 use super::*;
 use crate::settings::Settings;
@@ -24,6 +25,8 @@ struct Plant {
     plays: [(f64, f64); 6],
     /// Creep: first-order lags a decade apart, in nm.
     crept: [f64; 5],
+    /// The amplifier's output, in nm.
+    drive: f64,
     position: f64,
     velocity: f64,
     code: u16,
@@ -32,14 +35,18 @@ struct Plant {
 
 impl Plant {
     const DAMPING: f64 = 0.03;
+    /// First-order lag of the amplifier: 5 kHz.
+    const AMPLIFIER_S: f64 = 32e-6;
     const STROKE: f64 = 200e3;
     const NOISE: f64 = 3.0;
 
     fn new(part: Part, seed: u64) -> Self {
         Self {
             part,
-            plays: core::array::from_fn(|i| (Self::STROKE * (i as f64 + 0.5) / 12.0, 0.0)),
+            // After a descent from the top each play hangs at its upper edge: that corner of the loop is 0.
+            plays: core::array::from_fn(|i| [Self::STROKE * (i as f64 + 0.5) / 12.0; 2].into()),
             crept: [0.0; 5],
+            drive: 0.0,
             position: 0.0,
             velocity: 0.0,
             code: 0,
@@ -68,16 +75,18 @@ impl Plant {
 
     fn run(&mut self, steps: usize) {
         let command = f64::from(self.code) / 65_535.0 * Self::STROKE;
-        let mut played = 0.0;
-        for (half_width, held) in &mut self.plays {
-            *held = held.clamp(command - *half_width, command + *half_width);
-            played += *held / 6.0;
-        }
-        // Half a stroke's mean half width is a quarter of the stroke: this share makes the loop as wide as said.
-        let share = 2.0 * self.part.hysteresis;
-        let free = command + share * (played - command);
+        // Six plays of weight w widen the loop by the sum of 2 w r = 6 w * stroke / 2.
+        let weight = self.part.hysteresis / 3.0;
+        let h = 10e-6;
         for _ in 0..steps {
-            let h = 10e-6;
+            self.drive += (command - self.drive) * (1.0 - (-h / Self::AMPLIFIER_S).exp());
+            let mut free = self.drive;
+            for (half_width, held) in &mut self.plays {
+                *held = held.clamp(self.drive - *half_width, self.drive + *half_width);
+                // Plays reach stroke - 2 r at the top; the linear share makes up for it.
+                let linear = (1.0 - 2.0 * *half_width / Self::STROKE) * self.drive;
+                free += weight * (*held - *half_width - linear);
+            }
             let mut target = free;
             for (decade, crept) in self.crept.iter_mut().enumerate() {
                 *crept += (free - *crept) * h / (1e-3 * 10f64.powi(decade as i32));
@@ -113,8 +122,8 @@ fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
 fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
     let parts = [
         NOMINAL,
-        Part { latency_us: 0, ..NOMINAL },
-        Part { latency_us: 60, ..NOMINAL },
+        Part { latency_us: 10, ..NOMINAL },
+        Part { latency_us: 80, ..NOMINAL },
         Part { resonance_hz: 190.0, ..NOMINAL },
         Part { resonance_hz: 210.0, ..NOMINAL },
         Part { hysteresis: 0.12, ..NOMINAL },
@@ -142,7 +151,7 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
 fn both_ends_of_the_range_are_reached_and_held() {
     let fine = Settings::DEFAULT.fine;
     let mut piezo = Piezo::new(fine);
-    let mut plant = Plant::new(Part { hysteresis: 0.03, ..NOMINAL }, 5);
+    let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 5);
     for target in [fine.max.0, fine.min.0, fine.max.0] {
         let (ticks, _) = step(&mut piezo, &mut plant, target);
         assert!(ticks < 150, "{ticks} ticks to {target}");

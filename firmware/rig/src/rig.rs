@@ -68,6 +68,9 @@ pub struct Rig {
     reboot: Option<Reboot>,
 }
 
+/// What the rig may take of a board's memory.
+const _: () = assert!(size_of::<Rig>() <= 16 * 1024);
+
 impl Rig {
     /// The rig of `docs/rig.md`, just reset, at `now`.
     pub fn new(identity: Identity, now: BoardMicros) -> Self {

@@ -166,8 +166,9 @@ impl Settings {
                 resonance_hz: 200.0,
                 damping: 0.03,
                 tick_s: TICK_US as f64 * 1e-6,
-                // The converter's reading, the control law and the DAC's frame; 0 to 60 us all do.
-                latency_s: 40e-6,
+                // The gauge's conversion, the control law and the DAC's frame (40 us), and the amplifier's lag
+                // (5 kHz, 32 us). 10 to 80 us besides the amplifier all do.
+                latency_s: 80e-6,
                 // As fast as the resonance itself, so that the command stays small, and without overshoot.
                 feedback: Poles { hz: 200.0, damping: 1.0 },
                 // Learns the offset of 12 % hysteresis within 5 ms, lives with 5 % error in the resonance, and
