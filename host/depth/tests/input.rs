@@ -1,0 +1,156 @@
+//! What input is refused, what is marked as invalid, and what must not matter.
+
+mod common;
+
+use common::{Texture, rig};
+use farnear_depth::operators::{Operators, Request, design};
+use farnear_depth::optics::Optics;
+use farnear_depth::run::{DepthMap, RunError, Settings, Warning, depth_from_pair};
+use ndarray::{Array2, s};
+
+const ALPHA: f64 = 0.4;
+
+struct Bench {
+    optics: Optics,
+    operators: Operators,
+    pair: [Array2<f32>; 2],
+}
+
+impl Bench {
+    fn new(side_px: usize) -> Self {
+        let optics = rig("gaussian:k=0.4578");
+        let operators = Operators::for_optics(&optics).unwrap();
+        let pair = Texture::sand(side_px, 7).pair(optics.psf(), optics.max_blur_px(), ALPHA);
+        Self { optics, operators, pair }
+    }
+
+    fn run(&self, far: &Array2<f32>, near: &Array2<f32>) -> Result<DepthMap, RunError> {
+        depth_from_pair(far.view(), near.view(), &self.operators, &self.optics, &Settings::default())
+    }
+}
+
+#[test]
+fn pairs_that_cannot_be_processed_are_refused_with_the_values() {
+    let bench = Bench::new(32);
+    let [far, near] = &bench.pair;
+    let error = bench.run(far, &near.slice(s![..30, ..]).to_owned()).unwrap_err();
+    assert!(error.to_string().contains("32x32") && error.to_string().contains("32x30"), "{error}");
+    let [small_far, small_near] = bench.pair.each_ref().map(|i| i.slice(s![..15, ..]).to_owned());
+    assert_eq!(bench.run(&small_far, &small_near).unwrap_err(), RunError::TooSmall { width: 32, height: 15 });
+    let constant = Array2::from_elem(far.dim(), 255.0);
+    assert_eq!(bench.run(far, &constant).unwrap_err(), RunError::Constant { which: "near", value: 255.0 });
+    assert_eq!(bench.run(&(far * f32::NAN), near).unwrap_err(), RunError::NothingFinite);
+    for settings in [
+        Settings { smoothing_px: 4, ..Settings::default() },
+        Settings { smoothing_px: 101, ..Settings::default() },
+        Settings { median_px: 9, ..Settings::default() },
+    ] {
+        let error =
+            depth_from_pair(far.view(), near.view(), &bench.operators, &bench.optics, &settings).unwrap_err();
+        assert!(matches!(error, RunError::Window { .. }), "{error}");
+    }
+}
+
+#[test]
+fn operators_for_another_blur_or_psf_are_noticed() {
+    let bench = Bench::new(32);
+    let [far, near] = &bench.pair;
+    let request = Request { max_blur_px: 2.0, ..*bench.operators.request() };
+    let operators = design(&request).unwrap();
+    let error = depth_from_pair(far.view(), near.view(), &operators, &bench.optics, &Settings::default())
+        .unwrap_err();
+    assert!(matches!(error, RunError::BlurMismatch { .. }), "{error}");
+    let optics = rig("pillbox");
+    let map =
+        depth_from_pair(far.view(), near.view(), &bench.operators, &optics, &Settings::default()).unwrap();
+    assert!(matches!(map.warnings[..], [Warning::PsfMismatch { .. }]), "{:?}", map.warnings);
+}
+
+#[test]
+fn the_smallest_image_gives_a_depth() {
+    let bench = Bench::new(16);
+    let [far, near] = &bench.pair;
+    let map = bench.run(far, near).unwrap();
+    let truth = bench.optics.depth_mm(ALPHA) as f32;
+    // The middle only: the image repeats at its borders, the run time reflects them.
+    for depth in map.depth_mm.slice(s![6..10, 6..10]) {
+        assert!((depth - truth).abs() < 8.0, "{depth} for {truth}");
+    }
+}
+
+#[test]
+fn a_common_gain_and_offset_do_not_matter() {
+    let bench = Bench::new(64);
+    let [far, near] = &bench.pair;
+    let plain = bench.run(far, near).unwrap();
+    for (gain, offset) in [(255.0, 0.0), (65_535.0, 100.0), (1e-12, 0.0), (1e12, 0.0)] {
+        let [far, near] = bench.pair.each_ref().map(|i| i.mapv(|v| v * gain + offset));
+        let map = bench.run(&far, &near).unwrap();
+        for (a, b) in plain.depth_mm.iter().zip(&map.depth_mm) {
+            // Rounding of the input alone: 2^-24 of values whose texture is a few hundredths of them.
+            assert!((a - b).abs() < 0.02, "{a} {b} at gain {gain}");
+        }
+        for (a, b) in plain.confidence.iter().zip(&map.confidence) {
+            assert!((a - b).abs() < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn depth_around_an_invalid_pixel_is_no_value_and_no_confidence() {
+    let bench = Bench::new(64);
+    let [mut far, near] = bench.pair.clone();
+    let clean = bench.run(&far, &near).unwrap();
+    far[(30, 20)] = f32::NAN;
+    far[(5, 60)] = f32::INFINITY;
+    let map = bench.run(&far, &near).unwrap();
+    assert!(matches!(map.warnings[..], [Warning::NotFinite { pixels: 2 }]), "{:?}", map.warnings);
+    // Two 7x7 kernels and a 7x7 window reach 9 px; the median one more.
+    for ((y, x), depth) in map.depth_mm.indexed_iter() {
+        let distance = |(py, px): (usize, usize)| y.abs_diff(py).max(x.abs_diff(px));
+        let nearest = distance((30, 20)).min(distance((5, 60)));
+        assert_eq!(depth.is_nan(), nearest <= 9, "({x}, {y})");
+        assert_eq!(depth.is_nan(), map.confidence[(y, x)] == 0.0);
+        if nearest > 10 {
+            assert!((depth - clean.depth_mm[(y, x)]).abs() < 0.02);
+        }
+    }
+}
+
+#[test]
+fn saturated_patches_have_no_depth() {
+    let bench = Bench::new(64);
+    let [mut far, mut near] = bench.pair.clone();
+    for image in [&mut far, &mut near] {
+        image.slice_mut(s![20..32, 20..32]).fill(3.0);
+    }
+    let map = bench.run(&far, &near).unwrap();
+    assert!(matches!(map.warnings[..], [Warning::Saturated { .. }]), "{:?}", map.warnings);
+    assert!(map.depth_mm.slice(s![20..32, 20..32]).iter().all(|d| d.is_nan()));
+    assert!(map.confidence.slice(s![20..32, 20..32]).iter().all(|c| *c == 0.0));
+    assert!(map.depth_mm[(50, 50)].is_finite());
+}
+
+#[test]
+fn a_textureless_patch_has_no_confidence_and_counts_as_low_texture() {
+    let bench = Bench::new(96);
+    let [far, near] = bench.pair.each_ref().map(|i| {
+        let mut image = i.clone();
+        image.slice_mut(s![20..60, 20..60]).fill(1.0);
+        image
+    });
+    let map = bench.run(&far, &near).unwrap();
+    // The patch without the reach of 9 px around it: 22 x 22 px.
+    assert!(map.confidence.slice(s![29..51, 29..51]).iter().all(|c| *c < 1e-3));
+    assert!(
+        map.depth_mm.slice(s![29..51, 29..51]).iter().all(|d| d.is_nan()),
+        "a textureless pixel has no depth"
+    );
+    let whole = (96 * 96) as f64;
+    assert!(
+        (400.0 / whole..1_600.0 / whole).contains(&map.low_texture_fraction),
+        "{}",
+        map.low_texture_fraction
+    );
+    assert!(map.confidence[(80, 80)] > 0.5);
+}
