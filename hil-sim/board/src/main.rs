@@ -1,3 +1,135 @@
-//! The emulated board running the real firmware inside a simulated rig.
+//! `farnear-sim`: the emulated rig for any client.
 
-fn main() {}
+use std::{
+    fs::File,
+    io::Write,
+    os::{fd::AsFd, unix::fs::FileTypeExt},
+    path::PathBuf,
+    process::ExitCode,
+};
+
+use anyhow::{Context, Result};
+use clap::{Args, Parser, Subcommand};
+use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene};
+use farnear_sim::{Pace, RigConfig, eye::Eye, faults::Faults, run::ServedRig};
+
+/// The lens of Li 2014, chapter 4: 933 to 887 mm through 50 mm at f/3.9.
+const OPTICS: &str = "
+[lens]
+focal_length_mm = 50.0
+aperture_mm = 12.8
+[sensor]
+pixel_um = 7.4
+[focus]
+far_mm = 933.0
+max_blur_px = 2.703
+";
+/// Size of the camera's image.
+const SIZE_PX: (usize, usize) = (640, 480);
+
+/// The farnear rig without hardware: the real firmware on an emulated board.
+#[derive(Parser)]
+#[command(version)]
+struct Program {
+    #[command(subcommand)]
+    job: Job,
+}
+
+#[derive(Subcommand)]
+enum Job {
+    /// Start the rig; prints one line of JSON with its serial port and its camera's address, and runs until
+    /// it is interrupted or, where its standard input is a pipe, until that is closed.
+    #[command(after_help = "Example:\n  \
+        farnear-sim run --scene staircase --psf gaussian:k=0.4578 --noise 8bit --seed 1\n  \
+        {\"port\": \"/dev/pts/3\", \"camera\": \"127.0.0.1:40123\"}")]
+    Run(Run),
+}
+
+#[derive(Args)]
+struct Run {
+    /// What stands before the camera: plane:MM, staircase, slant, cone or sphere.
+    #[arg(long, default_value = "staircase")]
+    scene: Scene,
+    /// The lens' blur: pillbox, gaussian:k=K or generalised:p=P,k=K.
+    #[arg(long, default_value = "gaussian:k=0.4578")]
+    psf: Psf,
+    /// optics.toml of the rig; without it a 50 mm lens with its far focus at 933 mm.
+    #[arg(long, value_name = "FILE")]
+    optics: Option<PathBuf>,
+    /// The camera's noise and bits: none, 8bit or 12bit.
+    #[arg(long, default_value = "8bit")]
+    noise: Noise,
+    /// Decides everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The firmware; without it the one that lies beside this program.
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
+    /// TOML file with faults of the line: bit_error_rate, garbage, unplug_after_ms.
+    #[arg(long, value_name = "FILE")]
+    faults: Option<PathBuf>,
+    /// Let the board's time follow the wall clock, for a person who watches; without it time passes only while
+    /// the board owes an answer or an event, and a run repeats to the byte.
+    #[arg(long)]
+    paced: bool,
+    /// Write what the mechanics really did to this CSV file.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let Job::Run(run) = Program::parse().job;
+    match serve(&run) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("farnear-sim: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn serve(run: &Run) -> Result<()> {
+    let optics = match &run.optics {
+        Some(path) => {
+            let text =
+                std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+            OpticsFile::parse(&text).with_context(|| path.display().to_string())?
+        }
+        None => OpticsFile::parse(OPTICS)?,
+    };
+    let lens = Lens::from_optics(&optics)?;
+    let camera = Camera::new(SIZE_PX.0, SIZE_PX.1, run.noise);
+    let eye = Eye::new(&run.scene, &lens, &run.psf, camera, run.seed)?;
+    let config = RigConfig {
+        firmware: run.firmware.clone(),
+        seed: run.seed,
+        faults: run.faults.as_deref().map(Faults::read).transpose()?.unwrap_or_default(),
+        pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
+        trace: run.trace.clone(),
+    };
+    let rig = ServedRig::start(&config, eye)?;
+    ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
+    let stop = rig.stopper();
+    if stdin_is_a_pipe() {
+        std::thread::spawn(move || {
+            // Whatever is written to it is of no interest; its end is.
+            let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+            stop();
+        });
+    }
+    let mut stdout = std::io::stdout();
+    writeln!(stdout, "{{\"port\": \"{}\", \"camera\": \"{}\"}}", rig.port, rig.camera)?;
+    stdout.flush()?;
+    rig.wait()?;
+    Ok(())
+}
+
+/// Whether somebody holds the other end of the standard input (a terminal or /dev/null has no such end).
+fn stdin_is_a_pipe() -> bool {
+    let stdin = std::io::stdin();
+    let Ok(handle) = stdin.as_fd().try_clone_to_owned() else { return false };
+    File::from(handle).metadata().is_ok_and(|data| {
+        let kind = data.file_type();
+        kind.is_fifo() || kind.is_socket()
+    })
+}

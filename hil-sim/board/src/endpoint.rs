@@ -1,0 +1,163 @@
+//! The camera endpoint: loopback TCP that hands out frames and takes control messages.
+//!
+//! One client at a time; a new one takes the place of the old one. Frames without a client wait, the newest
+//! [`WAITING`] of them; each frame is handed out once.
+
+use std::{
+    collections::VecDeque,
+    io::{Read, Write},
+    net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream},
+    sync::{Arc, Condvar, Mutex, PoisonError, mpsc::Receiver},
+    thread,
+};
+
+use farnear_protocol::camera::Control;
+
+use crate::error::SimError;
+
+/// Frames that wait for a client.
+const WAITING: usize = 32;
+/// Longest control message: far more than any has.
+const CONTROL_MAX: u32 = 64;
+
+#[derive(Default)]
+struct State {
+    frames: VecDeque<Vec<u8>>,
+    client: Option<TcpStream>,
+}
+
+type Shared = Arc<(Mutex<State>, Condvar)>;
+
+fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, State> {
+    shared.0.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Opens the endpoint on a free port: `frames` go to the client, its control messages to `control`.
+///
+/// # Errors
+/// [`SimError::Io`] where loopback has no port or no thread can be started.
+pub fn open(
+    frames: Receiver<Vec<u8>>,
+    control: impl Fn(Control) + Send + Clone + 'static,
+) -> Result<SocketAddr, SimError> {
+    let io = |what: &str| {
+        let what = what.to_string();
+        move |source| SimError::Io { what, source }
+    };
+    let listener =
+        TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(io("cannot open the camera endpoint"))?;
+    let address = listener.local_addr().map_err(io("cannot open the camera endpoint"))?;
+    let shared = Shared::default();
+    let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
+        thread::Builder::new().name(name.into()).spawn(work).map_err(io("cannot start a thread"))
+    };
+    let state = shared.clone();
+    spawn("camera clients", Box::new(move || accept(&listener, &state, &control)))?;
+    let state = shared.clone();
+    spawn("camera frames", Box::new(move || keep(frames, &state)))?;
+    spawn("camera sender", Box::new(move || send(&shared)))?;
+    Ok(address)
+}
+
+fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) + Send + Clone + 'static)) {
+    for stream in listener.incoming() {
+        let Ok(stream) = stream else { continue };
+        let (Ok(reader), Ok(())) = (stream.try_clone(), stream.set_nodelay(true)) else { continue };
+        let control = control.clone();
+        // Without a thread to listen to it, the client still gets its frames.
+        let _ = thread::Builder::new().name("camera control".into()).spawn(move || listen(reader, &control));
+        if let Some(old) = lock(shared).client.replace(stream) {
+            let _ = old.shutdown(Shutdown::Both); // it may have gone already
+        }
+        shared.1.notify_all();
+    }
+}
+
+/// Reads control messages until the client goes or says something that is none.
+fn listen(mut reader: TcpStream, control: &impl Fn(Control)) {
+    let mut length = [0; 4];
+    while reader.read_exact(&mut length).is_ok() {
+        let length = u32::from_le_bytes(length);
+        if length > CONTROL_MAX {
+            eprintln!(
+                "camera endpoint: a control message of {length} bytes, at most {CONTROL_MAX} are expected"
+            );
+            let _ = reader.shutdown(Shutdown::Both);
+            return;
+        }
+        let mut body = vec![0; length as usize];
+        if reader.read_exact(&mut body).is_err() {
+            return;
+        }
+        match postcard::from_bytes(&body) {
+            Ok(message) => control(message),
+            Err(error) => eprintln!("camera endpoint: a control message that is none: {error}"),
+        }
+    }
+}
+
+fn keep(frames: Receiver<Vec<u8>>, shared: &Shared) {
+    for frame in frames {
+        let mut state = lock(shared);
+        if state.frames.len() == WAITING {
+            state.frames.pop_front();
+        }
+        state.frames.push_back(frame);
+        shared.1.notify_all();
+    }
+}
+
+fn send(shared: &Shared) {
+    loop {
+        let mut state = lock(shared);
+        while state.frames.is_empty() || state.client.is_none() {
+            state = shared.1.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        let frame = state.frames.pop_front();
+        let client = state.client.as_ref().and_then(|client| client.try_clone().ok());
+        drop(state);
+        let (Some(frame), Some(mut client)) = (frame, client) else { continue };
+        if client.write_all(&frame).is_err() {
+            // That client has gone; the frame waits for the next, unless that one is here already.
+            let mut state = lock(shared);
+            state.frames.push_front(frame);
+            let gone = client.peer_addr().ok();
+            if state.client.as_ref().is_some_and(|current| current.peer_addr().ok() == gone) {
+                state.client = None;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[test]
+    fn frames_wait_for_a_client_and_control_comes_back() {
+        let (frames, receiver) = mpsc::channel();
+        let (heard, hear) = mpsc::channel();
+        let address = open(receiver, move |message| heard.send(message).expect("heard")).expect("loopback");
+        frames.send(vec![1, 2, 3]).expect("open");
+        let mut client = TcpStream::connect(address).expect("loopback");
+        frames.send(vec![4]).expect("open");
+        let mut bytes = [0; 4];
+        client.read_exact(&mut bytes).expect("both frames");
+        assert_eq!(bytes, [1, 2, 3, 4]);
+
+        let mut body = [0; 16];
+        let body = postcard::to_slice(&Control::AdvanceMicros(1234), &mut body).expect("fits");
+        client.write_all(&(body.len() as u32).to_le_bytes()).expect("open");
+        client.write_all(body).expect("open");
+        assert_eq!(hear.recv(), Ok(Control::AdvanceMicros(1234)));
+
+        // A second client takes over.
+        let mut second = TcpStream::connect(address).expect("loopback");
+        assert_eq!(client.read(&mut bytes).expect("closed in order"), 0);
+        frames.send(vec![9]).expect("open");
+        second.read_exact(&mut bytes[..1]).expect("the frame");
+        assert_eq!(bytes[0], 9);
+    }
+}

@@ -1,0 +1,211 @@
+//! When virtual time may pass.
+//!
+//! In lockstep it runs only while the board owes something: an answer to a request, the terminal event of a move,
+//! a homing or a program, or its first event after a reset. Otherwise it stands still, however long the host
+//! takes, so a run repeats to the byte. All of it is decided from the frames that cross the line; a request that
+//! is lost on the way is given up after a while of virtual time, and the host asks again.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use farnear_protocol::{
+    Event, EventKind, Request, Response,
+    frame::{Decoder, Kind, Packet},
+};
+
+/// A request without an answer after this long was lost on the line (the board answers within milliseconds).
+const ANSWER_NS: u64 = 60_000_000;
+/// Work without a terminal event after this long will never end: the longest exposure program is far shorter.
+const WORK_NS: u64 = 600_000_000_000;
+/// A reset without the started event after this long: the firmware does not run.
+pub const BOOT_NS: u64 = 2_000_000_000;
+/// Ended requests that are remembered, more than the board remembers answers.
+const ENDED: usize = 256;
+
+/// What the board owes.
+#[derive(Debug, Default)]
+pub struct Lockstep {
+    to_board: Decoder,
+    from_board: Decoder,
+    /// Requests without an answer: what was asked, and until when it is waited for.
+    asked: BTreeMap<u32, (Work, u64)>,
+    /// Accepted long work: until when its end is waited for.
+    running: BTreeMap<u32, u64>,
+    /// Requests whose work has ended; a repeated answer to one of them starts nothing.
+    ended: VecDeque<u32>,
+    /// The board is starting: until when its first event is waited for.
+    starting: Option<u64>,
+    boots: BTreeSet<u32>,
+}
+
+/// What an accepted request leaves under way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Work {
+    /// Nothing: the answer is all.
+    Done,
+    /// Something that ends with a terminal event.
+    Long,
+    /// A reset.
+    Reset,
+}
+
+impl Lockstep {
+    /// A board that has just got power.
+    pub fn new() -> Self {
+        Self { starting: Some(BOOT_NS), ..Self::default() }
+    }
+
+    /// Bytes leave for the board.
+    pub fn sent(&mut self, bytes: &[u8], now_ns: u64) {
+        for byte in bytes {
+            let Some(Ok(packet)) = self.to_board.push(*byte) else { continue };
+            if packet.header.kind == Kind::Request {
+                let work = match packet.message::<Request>() {
+                    Some(Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. }) => {
+                        Work::Long
+                    }
+                    Some(Request::Reboot) => Work::Reset,
+                    _ => Work::Done,
+                };
+                self.asked.insert(packet.header.id, (work, now_ns + ANSWER_NS));
+            }
+        }
+    }
+
+    /// Bytes have come from the board.
+    pub fn received(&mut self, bytes: &[u8], now_ns: u64) {
+        for byte in bytes {
+            if let Some(Ok(packet)) = self.from_board.push(*byte) {
+                self.packet(&packet, now_ns);
+            }
+        }
+    }
+
+    fn packet(&mut self, packet: &Packet, now_ns: u64) {
+        let id = packet.header.id;
+        match packet.header.kind {
+            Kind::Response => {
+                let work = self.asked.remove(&id).map(|(work, _)| work);
+                match packet.message::<Response>() {
+                    // A session begins, and with it the request ids.
+                    Some(Response::Hello(_)) => self.ended.clear(),
+                    Some(Response::Accepted) if work == Some(Work::Long) && !self.ended.contains(&id) => {
+                        self.running.insert(id, now_ns + WORK_NS);
+                    }
+                    Some(Response::Accepted) if work == Some(Work::Reset) => self.reset(now_ns),
+                    _ => {}
+                }
+            }
+            Kind::Error => {
+                self.asked.remove(&id);
+            }
+            Kind::Event => {
+                if let Some(event) = packet.message::<Event>() {
+                    self.event(&event, packet.header.boot);
+                }
+            }
+            Kind::Request => {}
+        }
+    }
+
+    fn event(&mut self, event: &Event, boot: u32) {
+        let ended = match event.kind {
+            EventKind::Started { .. } => {
+                // Only a new boot ends the wait: the old one's first event may be asked for again.
+                if self.boots.insert(boot) {
+                    self.starting = None;
+                    self.running.clear();
+                }
+                return;
+            }
+            EventKind::ShotDone { .. } => return,
+            EventKind::Homed { request, .. }
+            | EventKind::MoveDone { request, .. }
+            | EventKind::ProgramDone { request, .. }
+            | EventKind::Failed { request, .. } => request,
+        };
+        self.running.remove(&ended);
+        if self.ended.len() == ENDED {
+            self.ended.pop_front();
+        }
+        self.ended.push_back(ended);
+    }
+
+    /// The board is being reset, by whatever.
+    pub fn reset(&mut self, now_ns: u64) {
+        self.running.clear();
+        self.asked.clear();
+        self.starting = Some(now_ns + BOOT_NS);
+    }
+
+    /// Whether the board owes something at this moment.
+    pub fn is_busy(&mut self, now_ns: u64) -> bool {
+        self.asked.retain(|_, (_, until)| *until > now_ns);
+        self.running.retain(|_, until| *until > now_ns);
+        self.starting = self.starting.filter(|until| *until > now_ns);
+        !self.asked.is_empty() || !self.running.is_empty() || self.starting.is_some()
+    }
+
+    /// Whether the board has ever said that it started.
+    pub fn has_started(&self) -> bool {
+        !self.boots.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_protocol::{
+        BoardMicros, Nanometres,
+        frame::{Header, encode},
+        message::{Axis, ResetCause},
+    };
+
+    use super::*;
+
+    fn frame<T: serde::Serialize>(kind: Kind, id: u32, message: &T) -> Vec<u8> {
+        encode(Header { version: 1, kind, id, boot: 1 }, message).expect("fits").to_vec()
+    }
+
+    fn event(kind: EventKind) -> Vec<u8> {
+        frame(Kind::Event, 0, &Event { time: BoardMicros(0), kind })
+    }
+
+    fn started() -> Lockstep {
+        let mut lockstep = Lockstep::new();
+        assert!(lockstep.is_busy(0));
+        lockstep.received(&event(EventKind::Started { cause: ResetCause::PowerOn }), 1);
+        assert!(!lockstep.is_busy(1));
+        lockstep
+    }
+
+    #[test]
+    fn a_move_keeps_time_running_until_its_end_and_its_repeat_does_not() {
+        let mut lockstep = started();
+        let asked = Nanometres(5);
+        let request = frame(Kind::Request, 7, &Request::Move { axis: Axis::SensorFine, target: asked });
+        let accepted = frame(Kind::Response, 7, &Response::Accepted);
+        lockstep.sent(&request, 10);
+        assert!(lockstep.is_busy(11));
+        lockstep.received(&accepted, 12);
+        assert!(lockstep.is_busy(13) && lockstep.is_busy(ANSWER_NS * 2));
+        let done = EventKind::MoveDone { request: 7, axis: Axis::SensorFine, asked, measured: asked };
+        lockstep.received(&event(done), 14);
+        assert!(!lockstep.is_busy(15));
+        lockstep.sent(&request, 20);
+        lockstep.received(&accepted, 21);
+        assert!(!lockstep.is_busy(22));
+    }
+
+    #[test]
+    fn a_lost_request_is_given_up() {
+        let mut lockstep = started();
+        lockstep.sent(&frame(Kind::Request, 1, &Request::Status), 0);
+        assert!(lockstep.is_busy(ANSWER_NS - 1) && !lockstep.is_busy(ANSWER_NS));
+    }
+
+    #[test]
+    fn garbage_owes_nothing() {
+        let mut lockstep = started();
+        lockstep.sent(&[1, 2, 3, 0, 255, 0], 0);
+        assert!(!lockstep.is_busy(1));
+    }
+}

@@ -1,0 +1,112 @@
+//! The serial port that clients open: a pty.
+//!
+//! Bytes from the client travel on in whole frames, so that a frame reaches the board as one, however the
+//! operating system cut it.
+
+use std::{
+    io::{ErrorKind, Read, Write},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc::Receiver,
+    },
+    thread,
+    time::Duration,
+};
+
+use farnear_protocol::frame::FRAME_MAX;
+use serialport::{SerialPort, TTYPort};
+
+use crate::error::SimError;
+
+/// How long a read waits before it looks whether the port has been unplugged.
+const LOOK: Duration = Duration::from_millis(20);
+/// A client that reads nothing for this long loses bytes, as on a real serial line.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Opens a pty; gives its name. Bytes of `to_client` go out; whole frames that come in go to `from_client`,
+/// which says whether it still wants them. When `to_client` ends, the port goes away.
+///
+/// # Errors
+/// [`SimError::Port`] where there is no pty, [`SimError::Io`] where no thread can be started.
+pub fn open(
+    to_client: Receiver<Vec<u8>>,
+    from_client: impl Fn(Vec<u8>) -> bool + Send + 'static,
+) -> Result<String, SimError> {
+    let (mut writer, slave) = TTYPort::pair()?;
+    let name = slave.name().unwrap_or_default();
+    let mut reader = writer.try_clone_native()?;
+    reader.set_timeout(LOOK)?;
+    writer.set_timeout(PATIENCE)?;
+    let unplugged = Arc::new(AtomicBool::new(false));
+    let seen = unplugged.clone();
+    let no_thread = |source| SimError::Io { what: "cannot start the port's thread".into(), source };
+    thread::Builder::new()
+        .name("port out".into())
+        .spawn(move || {
+            for bytes in to_client {
+                // Nobody reads: the bytes are lost.
+                let _ = writer.write_all(&bytes);
+            }
+            unplugged.store(true, Ordering::Relaxed);
+            // Kept open till here, so that a client may come and go.
+            drop(slave);
+        })
+        .map_err(no_thread)?;
+    thread::Builder::new()
+        .name("port in".into())
+        .spawn(move || read(&mut reader, &seen, &from_client))
+        .map_err(no_thread)?;
+    Ok(name)
+}
+
+fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Vec<u8>) -> bool) {
+    let mut cutter = FrameCutter::default();
+    let mut bytes = [0; 4096];
+    while !unplugged.load(Ordering::Relaxed) {
+        match port.read(&mut bytes) {
+            Ok(count) => {
+                for frame in cutter.cut(&bytes[..count]) {
+                    if !from_client(frame) {
+                        return;
+                    }
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+            Err(_) => thread::sleep(LOOK),
+        }
+    }
+}
+
+/// Cuts a stream of bytes into frames, delimiter included, and garbage into pieces.
+#[derive(Debug, Default)]
+pub struct FrameCutter(Vec<u8>);
+
+impl FrameCutter {
+    /// The whole frames that these bytes complete.
+    pub fn cut(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
+        let mut frames = Vec::new();
+        for byte in bytes {
+            self.0.push(*byte);
+            // What is longer than a frame is none and need not wait for its end.
+            if *byte == 0 || self.0.len() >= FRAME_MAX {
+                frames.push(std::mem::take(&mut self.0));
+            }
+        }
+        frames
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_stay_whole_and_garbage_passes() {
+        let mut cutter = FrameCutter::default();
+        assert!(cutter.cut(&[1, 2]).is_empty());
+        assert_eq!(cutter.cut(&[3, 0, 4, 0, 5]), [vec![1, 2, 3, 0], vec![4, 0]]);
+        let long = cutter.cut(&[7; FRAME_MAX]);
+        assert_eq!((long.len(), long[0].len()), (1, FRAME_MAX));
+    }
+}

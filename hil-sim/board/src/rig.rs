@@ -1,0 +1,220 @@
+//! The emulated rig in this process: the firmware on its board, the plant around it, and the time they run in.
+//!
+//! The emulator runs on a thread of its own and is asked through a channel; what a call asks for has happened
+//! when it returns. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] let time pass; in [`Pace::Lockstep`]
+//! and [`Pace::Realtime`] it also passes by itself.
+
+use std::{
+    path::PathBuf,
+    sync::mpsc::{self, Receiver, Sender},
+    thread::JoinHandle,
+};
+
+use farnear_protocol::frame::{Decoder, Packet};
+use rigless::{
+    emulator::{Start, run},
+    image::Image,
+    session::Session,
+    time::VirtualNanos,
+};
+
+use crate::{
+    board::RigBoard,
+    camera::Camera,
+    chips::SharedPlant,
+    driver::{Command, Driver, Hands, Pace, Report},
+    error::SimError,
+    faults::Faults,
+    firmware,
+    lockstep::BOOT_NS,
+    plant::Plant,
+    serial::Line,
+    trace::Trace,
+    wiring::{Shot, Wiring},
+};
+
+/// What an emulated rig is made of.
+#[derive(Clone, Debug)]
+pub struct RigConfig {
+    /// The firmware's ELF; `None` looks beside the program and the tests ([`firmware::find`]).
+    pub firmware: Option<PathBuf>,
+    /// Decides everything random: the mechanics' errors, noise, jitter, the unique id, the line's faults.
+    pub seed: u64,
+    /// Faults of the line.
+    pub faults: Faults,
+    /// How time passes.
+    pub pace: Pace,
+    /// Where to write what the plant really did, as CSV.
+    pub trace: Option<PathBuf>,
+}
+
+impl Default for RigConfig {
+    /// Seed 1, no faults, time only when told.
+    fn default() -> Self {
+        Self { firmware: None, seed: 1, faults: Faults::default(), pace: Pace::Told, trace: None }
+    }
+}
+
+/// Where bytes and exposures go that come out of the rig.
+pub struct Outlets {
+    /// Bytes for the host, as the line delivers them; dropped when the port goes away.
+    pub bytes: Option<Sender<Vec<u8>>>,
+    /// Exposures, when they end.
+    pub shots: Sender<Shot>,
+}
+
+/// A running emulated rig; ends when dropped.
+pub struct EmulatedRig {
+    commands: Sender<Command>,
+    thread: Option<JoinHandle<Result<(), SimError>>>,
+    bytes: Receiver<Vec<u8>>,
+    shots: Receiver<Shot>,
+    decoder: Decoder,
+}
+
+impl EmulatedRig {
+    /// Builds the rig and lets the firmware start, up to its first idle moment.
+    ///
+    /// # Errors
+    /// [`SimError`] where there is no firmware, it does not start, or a file cannot be written.
+    pub fn new(config: &RigConfig) -> Result<Self, SimError> {
+        let (bytes_out, bytes) = mpsc::channel();
+        let (shots_out, shots) = mpsc::channel();
+        let (commands, thread) = launch(config, Outlets { bytes: Some(bytes_out), shots: shots_out })?;
+        Ok(Self { commands, thread: Some(thread), bytes, shots, decoder: Decoder::new() })
+    }
+
+    /// Puts bytes on the line to the board; they travel when time passes.
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), SimError> {
+        self.commands.send(Command::Bytes(bytes.to_vec())).map_err(|_| SimError::Stopped)
+    }
+
+    /// Lets this much virtual time pass.
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`], also where the emulation failed on the way.
+    pub fn advance_us(&mut self, micros: u64) -> Result<Report, SimError> {
+        self.ask(|done| Command::Advance { nanos: micros * 1000, done })
+    }
+
+    /// Lets time pass until the board owes nothing more: no answer, no terminal event.
+    ///
+    /// # Errors
+    /// As [`EmulatedRig::advance_us`].
+    pub fn settle(&mut self) -> Result<Report, SimError> {
+        self.ask(|done| Command::Settle { done })
+    }
+
+    /// The plant and the wires as they are now.
+    ///
+    /// # Errors
+    /// As [`EmulatedRig::advance_us`].
+    pub fn report(&mut self) -> Result<Report, SimError> {
+        self.advance_us(0)
+    }
+
+    /// Reaches into the rig: breaks something, presses the reset button.
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn reach_in(
+        &mut self,
+        work: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static,
+    ) -> Result<(), SimError> {
+        self.commands.send(Command::ReachIn(Box::new(work))).map_err(|_| SimError::Stopped)
+    }
+
+    fn ask(&mut self, command: impl FnOnce(Sender<Report>) -> Command) -> Result<Report, SimError> {
+        let (done, wait) = mpsc::channel();
+        self.commands.send(command(done)).map_err(|_| SimError::Stopped)?;
+        wait.recv().map_err(|_| SimError::Stopped)
+    }
+
+    /// Bytes that have come from the board.
+    pub fn take_bytes(&mut self) -> Vec<u8> {
+        self.bytes.try_iter().flatten().collect()
+    }
+
+    /// Good frames that have come from the board; bad ones are dropped.
+    pub fn take_frames(&mut self) -> Vec<Packet> {
+        let bytes = self.take_bytes();
+        bytes.into_iter().filter_map(|byte| self.decoder.push(byte)?.ok()).collect()
+    }
+
+    /// Exposures that have ended.
+    pub fn take_shots(&mut self) -> Vec<Shot> {
+        self.shots.try_iter().collect()
+    }
+
+    /// Ends the rig.
+    ///
+    /// # Errors
+    /// What ended it before, if something did.
+    pub fn stop(mut self) -> Result<(), SimError> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<(), SimError> {
+        // It may have ended already.
+        let _ = self.commands.send(Command::End);
+        let Some(thread) = self.thread.take() else { return Ok(()) };
+        thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))
+    }
+}
+
+impl Drop for EmulatedRig {
+    fn drop(&mut self) {
+        // Whoever wants to know calls `stop`.
+        let _ = self.end();
+    }
+}
+
+/// A rig's thread and the way to command it.
+type Launched = (Sender<Command>, JoinHandle<Result<(), SimError>>);
+
+/// Starts the rig's thread, with the board started to its first idle moment.
+///
+/// # Errors
+/// As [`EmulatedRig::new`].
+pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError> {
+    let path = firmware::find(config.firmware.as_deref())?;
+    let unusable = |reason: String| SimError::Firmware { path: path.clone(), reason };
+    let image = Image::read(&path, None).map_err(|error| unusable(error.to_string()))?;
+    let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
+
+    let plant = SharedPlant::new(Plant::new(config.seed).into());
+    let line = Line::default();
+    let mut board = RigBoard::new(&plant, line.clone(), config.seed).map_err(|error| emulator(&error))?;
+    let wiring = Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip);
+    let trace = config.trace.as_deref().map(Trace::create).transpose()?;
+    let (commands, receiver) = mpsc::channel();
+    let driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);
+    let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
+
+    let thread = std::thread::Builder::new()
+        .name("emulator".into())
+        .spawn(move || {
+            let images = [image];
+            match run(session, &Start::new(&images), driver) {
+                Ok(finished) => finished.driver.finish(),
+                Err(error) => Err(SimError::Emulator(error.to_string())),
+            }
+        })
+        .map_err(|source| SimError::Io { what: "cannot start the emulator's thread".into(), source })?;
+
+    let (done, wait) = mpsc::channel();
+    let started =
+        commands.send(Command::Settle { done }).is_ok() && wait.recv().is_ok_and(|report| report.started);
+    if started {
+        return Ok((commands, thread));
+    }
+    let _ = commands.send(Command::End); // it may have ended already
+    match thread.join() {
+        Ok(Err(SimError::Emulator(reason))) => Err(SimError::Firmware { path, reason }),
+        Ok(Err(error)) => Err(error),
+        _ => Err(SimError::NotStarted { path, millis: BOOT_NS / 1_000_000 }),
+    }
+}

@@ -1,0 +1,68 @@
+//! The program: an emulated rig behind a pty and a camera endpoint.
+
+use std::{
+    net::SocketAddr,
+    sync::mpsc::{self, Sender},
+    thread::JoinHandle,
+};
+
+use farnear_protocol::camera::Control;
+
+use crate::{
+    driver::Command,
+    endpoint,
+    error::SimError,
+    eye::Eye,
+    port,
+    rig::{Outlets, RigConfig, launch},
+};
+
+/// A rig that clients can open.
+pub struct ServedRig {
+    /// Name of the pty.
+    pub port: String,
+    /// Address of the camera endpoint.
+    pub camera: SocketAddr,
+    commands: Sender<Command>,
+    thread: JoinHandle<Result<(), SimError>>,
+}
+
+impl ServedRig {
+    /// Starts the rig and opens its two doors.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn start(config: &RigConfig, eye: Eye) -> Result<Self, SimError> {
+        let (bytes_out, bytes) = mpsc::channel();
+        let (shots_out, shots) = mpsc::channel();
+        let (commands, thread) = launch(config, Outlets { bytes: Some(bytes_out), shots: shots_out })?;
+        let (frames_out, frames) = mpsc::channel();
+        eye.watch(shots, frames_out)?;
+        let control = commands.clone();
+        let camera = endpoint::open(frames, move |Control::AdvanceMicros(micros)| {
+            // Nobody waits for the end; requests that follow find the time passed.
+            let (done, _) = mpsc::channel();
+            let nanos = micros.saturating_mul(1000);
+            let _ = control.send(Command::Advance { nanos, done }); // the rig may have ended
+        })?;
+        let to_board = commands.clone();
+        let port = port::open(bytes, move |frame| to_board.send(Command::Bytes(frame)).is_ok())?;
+        Ok(Self { port, camera, commands, thread })
+    }
+
+    /// A way to end the rig from elsewhere.
+    pub fn stopper(&self) -> impl Fn() + Send + 'static {
+        let commands = self.commands.clone();
+        move || {
+            let _ = commands.send(Command::End); // it may have ended already
+        }
+    }
+
+    /// Waits until the rig has ended.
+    ///
+    /// # Errors
+    /// What ended it, if it was not asked to.
+    pub fn wait(self) -> Result<(), SimError> {
+        self.thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))
+    }
+}

@@ -1,0 +1,143 @@
+//! A host that speaks the protocol to the rig in this process.
+#![allow(dead_code)] // each test program uses its part
+
+use farnear_protocol::{
+    Event, EventKind, Nanometres, Request, RequestError, Response,
+    frame::{Header, Kind, Packet, encode},
+    message::{Axis, Hello},
+};
+use farnear_sim::{EmulatedRig, Report, RigConfig};
+
+/// A rig and a host that keeps count of its requests.
+pub struct Bench {
+    pub rig: EmulatedRig,
+    pub hello: Hello,
+    next: u32,
+    pub events: Vec<Event>,
+}
+
+pub type Answer = Result<Response, RequestError>;
+
+/// The frame of a request.
+pub fn request_frame(id: u32, boot: u32, request: &Request) -> Vec<u8> {
+    encode(Header { version: 1, kind: Kind::Request, id, boot }, request).expect("requests fit").to_vec()
+}
+
+/// The answer that a frame carries, if it is one.
+pub fn answer_in(packet: &Packet) -> Option<(u32, Answer)> {
+    let answer = match packet.header.kind {
+        Kind::Response => Ok(packet.message().expect("a response of this version")),
+        Kind::Error => Err(packet.message().expect("an error of this version")),
+        _ => return None,
+    };
+    Some((packet.header.id, answer))
+}
+
+impl Bench {
+    /// A rig with this seed that has said hello.
+    pub fn new(seed: u64) -> Self {
+        Self::with(&RigConfig { seed, ..RigConfig::default() })
+    }
+
+    pub fn with(config: &RigConfig) -> Self {
+        let rig = EmulatedRig::new(config).unwrap_or_else(|error| panic!("{error}"));
+        let hello = Hello {
+            protocol_min: 0,
+            protocol_current: 0,
+            schema_key: 0,
+            board: heapless::String::new(),
+            firmware: heapless::String::new(),
+            unique_id: [0; 12],
+            boot: 0,
+            reset_cause: farnear_protocol::message::ResetCause::Unknown,
+            emulated: false,
+            capabilities: farnear_protocol::message::Capabilities {
+                sensor_coarse: false,
+                sensor_fine: false,
+                strobe: false,
+            },
+            limits: farnear_protocol::message::Limits {
+                datum: Nanometres(0),
+                coarse_min: Nanometres(0),
+                coarse_max: Nanometres(0),
+                coarse_step_pm: 0,
+                fine_min: Nanometres(0),
+                fine_max: Nanometres(0),
+                shots_max: 0,
+                exposure_min: farnear_protocol::Micros(0),
+                exposure_max: farnear_protocol::Micros(0),
+            },
+        };
+        let mut bench = Self { rig, hello, next: 0, events: Vec::new() };
+        bench.say_hello();
+        bench
+    }
+
+    /// Says hello; from now on requests carry the board's boot number.
+    pub fn say_hello(&mut self) {
+        self.hello.boot = 0;
+        match self.ask(&Request::Hello) {
+            Ok(Response::Hello(hello)) => self.hello = hello,
+            other => panic!("no hello but {other:?}"),
+        }
+    }
+
+    /// Sends a request and gives its id, without letting time pass.
+    pub fn send(&mut self, request: &Request) -> u32 {
+        self.next += 1;
+        let frame = request_frame(self.next, self.hello.boot, request);
+        self.rig.send(&frame).expect("the rig runs");
+        self.next
+    }
+
+    /// The answers that have come; events are kept in [`Bench::events`].
+    pub fn answers(&mut self) -> Vec<(u32, Answer)> {
+        let mut answers = Vec::new();
+        for packet in self.rig.take_frames() {
+            match answer_in(&packet) {
+                Some(answer) => answers.push(answer),
+                None => self.events.push(packet.message().expect("an event of this version")),
+            }
+        }
+        answers
+    }
+
+    /// Sends a request, lets time pass in steps of 100 us until it is answered, and gives the answer.
+    pub fn ask(&mut self, request: &Request) -> Answer {
+        let id = self.send(request);
+        for _ in 0..500 {
+            self.rig.advance_us(100).expect("the rig runs");
+            if let Some((_, answer)) = self.answers().into_iter().find(|(answered, _)| *answered == id) {
+                return answer;
+            }
+        }
+        panic!("no answer to {request:?} within 50 ms");
+    }
+
+    /// Asks for something long and lets it end; gives the terminal event.
+    pub fn carry_out(&mut self, request: &Request) -> EventKind {
+        assert_eq!(self.ask(request), Ok(Response::Accepted), "{request:?}");
+        self.settle()
+    }
+
+    /// Lets the board come to rest; gives the last event.
+    pub fn settle(&mut self) -> EventKind {
+        self.rig.settle().expect("the rig runs");
+        self.answers();
+        self.events.last().expect("a terminal event").kind.clone()
+    }
+
+    /// Homes the coarse axis.
+    pub fn home(&mut self) {
+        let end = self.carry_out(&Request::Home { axis: Axis::SensorCoarse });
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
+    }
+
+    pub fn move_to(&mut self, axis: Axis, target: Nanometres) -> EventKind {
+        self.carry_out(&Request::Move { axis, target })
+    }
+
+    pub fn report(&mut self) -> Report {
+        self.rig.report().expect("the rig runs")
+    }
+}
