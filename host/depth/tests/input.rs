@@ -1,5 +1,7 @@
 //! What input is refused, what is marked as invalid, and what must not matter.
 
+#![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
+
 mod common;
 
 use common::{Texture, rig};

@@ -1,5 +1,7 @@
 //! Accuracy on textured planes with operators that match the PSF.
 
+#![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
+
 mod common;
 
 use common::{Texture, eight_bit, rig};

@@ -2,7 +2,7 @@
 //!
 //! A square texture with two samples per pixel (white noise blurred by a Gaussian of SD 0.5 px plus 30 % of 1/f noise,
 //! mean 1, contrast 0.2) is multiplied by the OTF and by the pixel's own, then sampled at the pixels.
-#![allow(dead_code)] // Each test file uses its part.
+#![allow(dead_code, clippy::unwrap_used)] // Each test file uses its part; helpers of tests may fail like tests.
 
 use std::f64::consts::PI;
 
