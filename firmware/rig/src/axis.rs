@@ -42,7 +42,9 @@ enum Motion {
         quiet_ticks: u32,
     },
     /// Everything was thrown away; waits for the running segment to end.
-    Aborting,
+    Aborting {
+        ticks: u32,
+    },
 }
 
 /// The coarse axis.
@@ -159,7 +161,7 @@ impl Axis {
         match &mut self.motion {
             Motion::Preparing { .. } => self.motion = Motion::Still,
             Motion::Stepping { ramp, .. } => ramp.stop(),
-            Motion::Still | Motion::Aborting => {}
+            Motion::Still | Motion::Aborting { .. } => {}
         }
     }
 
@@ -185,8 +187,15 @@ impl Axis {
     pub(crate) fn sense(&mut self, inputs: &Inputs) {
         self.encoder = inputs.encoder_coarse_counts;
         let progressed = self.count(&inputs.stepper);
-        if matches!(self.motion, Motion::Aborting) {
-            if inputs.stepper.idle {
+        if let Motion::Aborting { ticks } = &mut self.motion {
+            *ticks += 1;
+            let late = *ticks * TICK_US > self.settings.pulse_deadline.0;
+            if late && !inputs.stepper.idle {
+                // A timer that does not end its segment cannot be trusted to stop: without current nothing moves.
+                self.enabled = false;
+                self.lose();
+            }
+            if late || inputs.stepper.idle {
                 self.settle_accounts();
             }
             return;
@@ -205,7 +214,7 @@ impl Axis {
         outputs.direction_away = self.away;
         match &mut self.motion {
             Motion::Still => {}
-            Motion::Aborting => outputs.abort_steps = true,
+            Motion::Aborting { .. } => outputs.abort_steps = true,
             Motion::Preparing { ramp, ticks } => {
                 *ticks = ticks.saturating_sub(1);
                 if *ticks == 0 {
@@ -267,7 +276,7 @@ impl Axis {
                     return Some(Failure::StepUnderrun);
                 }
             }
-            Motion::Still | Motion::Aborting => return None,
+            Motion::Still | Motion::Aborting { .. } => return None,
             Motion::Preparing { .. } => {}
         }
         if self.away && inputs.far_switch {
@@ -297,18 +306,25 @@ impl Axis {
     /// Throws the motion away. Where steps and encoder may disagree from now on, the position is lost.
     fn abort(&mut self, fault: Failure) {
         let loses = matches!(fault, Failure::Following { .. } | Failure::DriverFault | Failure::StepUnderrun);
-        if loses && self.state == PositionState::Homed {
-            self.state = PositionState::Lost;
+        if loses {
+            self.lose();
         }
         // A driver in distress gets no current; a motor that was blocked stays where it is and is believed.
         self.enabled = !matches!(fault, Failure::DriverFault) && self.enabled;
         self.fault = Some(fault);
         self.motion = match self.motion {
             Motion::Still | Motion::Preparing { .. } => Motion::Still,
-            Motion::Stepping { .. } | Motion::Aborting => Motion::Aborting,
+            Motion::Stepping { .. } | Motion::Aborting { .. } => Motion::Aborting { ticks: 0 },
         };
         if self.is_still() {
             self.settle_accounts();
+        }
+    }
+
+    /// Steps and encoder can no longer be trusted to agree.
+    const fn lose(&mut self) {
+        if matches!(self.state, PositionState::Homed) {
+            self.state = PositionState::Lost;
         }
     }
 

@@ -148,6 +148,24 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
 }
 
 #[test]
+fn holding_turns_3_nm_of_gauge_noise_into_less_than_10_nm_of_motion() {
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 1);
+    step(&mut piezo, &mut plant, 100_000);
+    let (mut squares, mut worst) = (0.0, 0f64);
+    for _ in 0..10_000 {
+        let gauge = plant.gauge();
+        piezo.sense(gauge);
+        plant.tick(piezo.act());
+        let error = plant.position - 100e3;
+        squares += error * error;
+        worst = worst.max(error.abs());
+    }
+    let rms = (squares / 10_000.0).sqrt();
+    assert!(rms < 10.0 && worst < 50.0, "{rms} nm RMS, {worst} nm at worst");
+}
+
+#[test]
 fn both_ends_of_the_range_are_reached_and_held() {
     let fine = Settings::DEFAULT.fine;
     let mut piezo = Piezo::new(fine);

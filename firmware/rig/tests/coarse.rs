@@ -203,11 +203,15 @@ fn a_step_timer_that_fails_is_named() {
         let id = bench.accepted(&go(9_000_000));
         bench.run_ms(300);
         bench.hardware.faults = faults;
-        bench.run_ms(20);
-        bench.hardware.faults.timer_dead = false; // so that it can stand still
         assert_eq!(failure(&bench.end_of(id)), Failure::StepUnderrun, "{faults:?}");
         assert_eq!(bench.status().coarse.state, PositionState::Lost);
+        let outputs = bench.tick();
+        assert_eq!(
+            outputs.enable, !faults.timer_dead,
+            "a timer that never stops gets no current to move with"
+        );
         bench.hardware.faults = Faults::default();
+        bench.run_ms(5);
         assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
     }
 }
