@@ -1,0 +1,218 @@
+//! The image's size, its normalised coordinates, its division into regions, and what can be wrong.
+
+use core::{fmt, ops::Range};
+
+use super::REGIONS;
+
+/// Width and height of the depth maps that a correction is for, in pixels.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Frame {
+    width: u16,
+    height: u16,
+}
+
+impl Frame {
+    /// The smallest width and height: with two pixels a region there is a centre to blend from.
+    pub const SMALLEST: u16 = 2 * REGIONS as u16;
+    /// The largest width and height: the coordinate of the last of 8192 columns is still good to 4e-6.
+    pub const LARGEST: u16 = 8192;
+
+    /// A frame of `width` by `height` pixels.
+    ///
+    /// # Errors
+    /// [`Error::FrameSize`] outside [`Self::SMALLEST`] to [`Self::LARGEST`].
+    pub fn new(width: u16, height: u16) -> Result<Self, Error> {
+        let fits = |length| (Self::SMALLEST..=Self::LARGEST).contains(&length);
+        if fits(width) && fits(height) {
+            Ok(Self { width, height })
+        } else {
+            Err(Error::FrameSize { width, height })
+        }
+    }
+
+    /// Columns.
+    pub fn width(self) -> u16 {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(self) -> u16 {
+        self.height
+    }
+
+    pub(super) fn columns(self) -> Axis {
+        Axis { length: self.width }
+    }
+
+    pub(super) fn rows(self) -> Axis {
+        Axis { length: self.height }
+    }
+
+    pub(super) fn check_row(self, row: u16, pixels: usize) -> Result<(), Error> {
+        if row >= self.height {
+            return Err(Error::NoSuchRow { row, height: self.height });
+        }
+        if pixels != usize::from(self.width) {
+            return Err(Error::RowLength { pixels, width: self.width });
+        }
+        Ok(())
+    }
+}
+
+/// One direction of the image.
+#[derive(Clone, Copy)]
+pub(super) struct Axis {
+    length: u16,
+}
+
+impl Axis {
+    /// Normalised coordinate of a pixel, Q1.31: -1 at the first, +1 (less a few units) at the last.
+    pub(super) fn coordinate(self, index: u16) -> i32 {
+        i32::MIN.wrapping_add(i32::from(index).wrapping_mul(self.coordinate_step()))
+    }
+
+    /// The step of [`Self::coordinate`] from a pixel to the next, rounded down so that +1 is never passed.
+    pub(super) fn coordinate_step(self) -> i32 {
+        // A frame has at least 6 pixels a side; the maximum only shows the compiler that nothing divides by 0.
+        (u32::MAX / u32::from(self.length - 1).max(1)) as i32
+    }
+
+    /// The pixels of a region; the three tile the axis.
+    pub(super) fn region(self, region: usize) -> Range<u16> {
+        let start = |region: usize| (usize::from(self.length) * region / REGIONS) as u16;
+        start(region)..start(region + 1)
+    }
+
+    pub(super) fn region_of(self, index: u16) -> usize {
+        (1..REGIONS).take_while(|&region| index >= self.region(region).start).count()
+    }
+
+    /// The four bands of a blend, in order: before the first region's centre, between centres, after the last.
+    pub(super) fn bands(self) -> [Band; REGIONS + 1] {
+        // Twice the centre of a region, so that it is whole: first plus last pixel.
+        let centres: [i64; REGIONS] = core::array::from_fn(|region| {
+            let pixels = self.region(region);
+            i64::from(pixels.start) + i64::from(pixels.end) - 1
+        });
+        core::array::from_fn(|band| {
+            let (before, after) = (band.saturating_sub(1), band.min(REGIONS - 1));
+            let boundary = |centre: i64| centre.unsigned_abs().div_ceil(2) as u16;
+            let start = if band == 0 { 0 } else { boundary(centres[before]) };
+            let end = if band == REGIONS { self.length } else { boundary(centres[after]) };
+            let weights = if before == after {
+                Weights { first: 0, step: 0 }
+            } else {
+                // A frame has at least 6 pixels a side, so centres lie apart.
+                let span = (centres[after] - centres[before]).max(1);
+                let into = 2 * i64::from(start) - centres[before];
+                Weights { first: ((into << 31) / span) as i32, step: ((2_i64 << 31) / span) as i32 }
+            };
+            Band { pixels: start..end, before, after, weights }
+        })
+    }
+}
+
+/// A part of an axis on which the same two regions mix.
+#[derive(Clone, Debug)]
+pub(super) struct Band {
+    /// Which pixels.
+    pub(super) pixels: Range<u16>,
+    /// The region that weighs all at the band's start...
+    pub(super) before: usize,
+    /// ...and the one that does at its end; the same in the outer bands.
+    pub(super) after: usize,
+    weights: Weights,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Weights {
+    first: i32,
+    step: i32,
+}
+
+impl Band {
+    /// Whether only one region acts here.
+    pub(super) fn is_outer(&self) -> bool {
+        self.before == self.after
+    }
+
+    /// The weight of region `after` at a pixel of the band, Q1.31; 0 in the outer bands.
+    pub(super) fn weight(&self, index: u16) -> i32 {
+        self.weights.first + i32::from(index - self.pixels.start) * self.weights.step
+    }
+}
+
+/// Why a correction cannot be set up or a row cannot be corrected.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum Error {
+    /// The working range has no extent.
+    EmptyRange {
+        /// One end, mm.
+        one_end_mm: f32,
+        /// The other end, mm.
+        other_end_mm: f32,
+    },
+    /// A coefficient does not fit Q2.29.
+    CoefficientTooLarge {
+        /// The coefficient.
+        value: f64,
+    },
+    /// The frame is smaller than [`Frame::SMALLEST`] or larger than [`Frame::LARGEST`].
+    FrameSize {
+        /// Columns.
+        width: u16,
+        /// Rows.
+        height: u16,
+    },
+    /// The table handed in is too short.
+    TableTooSmall {
+        /// Words given.
+        given: usize,
+        /// Words needed.
+        needed: usize,
+    },
+    /// There is no such row.
+    NoSuchRow {
+        /// The row asked for.
+        row: u16,
+        /// Rows there are.
+        height: u16,
+    },
+    /// The row has another length than the correction's frame.
+    RowLength {
+        /// Pixels given.
+        pixels: usize,
+        /// Pixels a row of the frame has.
+        width: u16,
+    },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::EmptyRange { one_end_mm, other_end_mm } => {
+                write!(f, "the working range {one_end_mm} to {other_end_mm} mm has no finite extent")
+            }
+            Self::CoefficientTooLarge { value } => {
+                write!(
+                    f,
+                    "the coefficient {value} is not below 4 in magnitude; fit on a wider spread of samples"
+                )
+            }
+            Self::FrameSize { width, height } => {
+                let (least, most) = (Frame::SMALLEST, Frame::LARGEST);
+                write!(f, "a frame of {width} x {height} pixels; each side must be {least} to {most}")
+            }
+            Self::TableTooSmall { given, needed } => {
+                write!(f, "a table of {given} words where {needed} are needed")
+            }
+            Self::NoSuchRow { row, height } => write!(f, "row {row} of a frame with {height} rows"),
+            Self::RowLength { pixels, width } => {
+                write!(f, "a row of {pixels} pixels for a correction made for {width}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Error {}

@@ -1,0 +1,82 @@
+//! One polynomial with all twenty terms of third order in x, y and U for the whole image.
+//!
+//! Seamless, and with the cross terms that ten terms lack (a bowl whose depth changes with `U` is `U x^2`). Once a
+//! row is chosen, what multiplies each power of `U` is a polynomial in x with fixed coefficients, evaluated by
+//! Horner's rule beside the one in `U`: seven products a pixel.
+
+use super::{
+    Coefficient, Error, Frame,
+    format::{CONSTANT_BITS, CUBIC_BITS, HALF_UNIT, LINEAR_BITS, SQUARE_BITS, multiply, narrow, step},
+    row::{Factors, polynomial},
+};
+
+/// Terms of the full polynomial, in this order:
+/// 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U, yU, xyU, y^2 U, U^2, xU^2, yU^2, U^3.
+pub const FULL_TERMS: usize = 20;
+
+/// The coefficients, in the order of [`FULL_TERMS`].
+pub type FullCoefficients = [Coefficient; FULL_TERMS];
+
+/// The correction with one set of twenty coefficients.
+#[derive(Debug)]
+pub struct Full<'t> {
+    coefficients: FullCoefficients,
+    frame: Frame,
+    /// Per column: x, the terms in x and U alone (divided by U), the terms in x alone.
+    table: &'t mut [i32],
+}
+
+impl<'t> Full<'t> {
+    /// How many words of table a frame needs.
+    pub const fn table_words(width: u16) -> usize {
+        3 * width as usize
+    }
+
+    /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
+    ///
+    /// # Errors
+    /// [`Error::TableTooSmall`].
+    pub fn new(coefficients: FullCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
+        let (given, needed) = (table.len(), Self::table_words(frame.width()));
+        let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
+        let (entries, _) = table.as_chunks_mut::<3>();
+        for (column, entry) in (0..frame.width()).zip(entries) {
+            let x = frame.columns().coordinate(column);
+            let linear = horner_in(x, [10, 11, 12].map(|term| coefficients[term]));
+            let constant = horner_in(x, [0, 1, 2, 3].map(|term| coefficients[term]));
+            *entry = [x, narrow(linear, LINEAR_BITS), narrow(constant, CONSTANT_BITS) + HALF_UNIT];
+        }
+        Ok(Self { coefficients, frame, table })
+    }
+
+    /// Corrects row `row` in place; rows may come in any order.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
+        self.frame.check_row(row, depths.len())?;
+        let y = self.frame.rows().coordinate(row);
+        polynomial(depths, self.table.as_chunks().0, &along_row(&self.coefficients, y));
+        Ok(())
+    }
+}
+
+/// A polynomial in x with the coefficients in the order of rising powers, Q.29, below 16.
+fn horner_in<const N: usize>(x: i32, terms: [Coefficient; N]) -> i64 {
+    terms.iter().rev().fold(0, |sum, term| term.wide() + multiply(sum, x))
+}
+
+/// What multiplies the powers of `U` along the row at `y`, as polynomials in x, without what the table has.
+fn along_row(coefficients: &FullCoefficients, y: i32) -> Factors<1, 2, 2, 3> {
+    let cubic = |term: usize| coefficients[term].at(CUBIC_BITS);
+    let square = |term: usize, rest| step(coefficients[term].at(SQUARE_BITS), rest, y);
+    let linear = |term: usize, rest| step(coefficients[term].at(LINEAR_BITS), rest, y);
+    // A last factor y of its own.
+    let by_y = |rest| step(0, rest, y);
+    Factors {
+        cubic: [cubic(19)],
+        square: [square(16, cubic(18)), cubic(17)],
+        linear: [by_y(square(13, cubic(15))), by_y(cubic(14))],
+        constant: [by_y(linear(4, square(7, cubic(9)))), by_y(square(5, cubic(8))), by_y(cubic(6))],
+    }
+}
