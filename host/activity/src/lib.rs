@@ -8,9 +8,14 @@
 //! | [`sun`] | where the sun is (PSA+, Astronomical Almanac, the thesis' form, NREL SPA) |
 //! | [`shadow`] | where a person's shadow falls in the image, how sure that is, and cutting it off |
 //!
+//! | [`embedding`] | centroid distance, Isomap and landmark Isomap, PCA, the RBF map |
+//! | [`silhouette`] | silhouettes from bodies in space |
+//! | [`synthetic`] | seeded people and scenes |
+//!
 //! Masks are `Array2<bool>` of shape (height, width), row 0 at the top.
 
 pub mod background;
+pub mod embedding;
 pub mod mask;
 pub mod shadow;
 pub mod shadow_detectors;

@@ -5,3 +5,4 @@
 pub mod capsule;
 pub mod pixels;
 pub mod raster;
+pub mod view;

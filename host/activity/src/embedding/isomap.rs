@@ -1,0 +1,195 @@
+//! Isomap (Tenenbaum, de Silva, Langford, Science 290, 2000): geodesic distances laid out by classical scaling.
+//!
+//! `B = -1/2 J D^2 J` of the squared path lengths D^2, coordinates are the leading eigenvectors times the square roots of their
+//! eigenvalues. With K = N - 1 every pair is an edge and the result is PCA's exactly; the thesis used that, so it is offered
+//! ([`Neighbourhood::Nearest`] with N - 1) but a small K is what makes it Isomap. O(N^2 (d + K)) time, 12 N^2 bytes.
+
+use super::geodesic::all_pairs;
+use super::neighbours::{Graph, Neighbourhood};
+use super::{EmbeddingError, check, spectral};
+use ndarray::{Array2, ArrayView2, Axis};
+use rayon::prelude::*;
+
+/// A gallery laid out in few dimensions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Isomap {
+    /// One row per sample, one column per dimension.
+    pub coordinates: Array2<f32>,
+    /// The eigenvalues of the dimensions, falling.
+    pub eigenvalues: Vec<f64>,
+    /// Path lengths between all samples.
+    pub geodesics: Array2<f32>,
+}
+
+/// Lays out `samples` (N x d) in `dimensions` dimensions.
+///
+/// # Errors
+/// Too few or non-finite samples, a neighbour graph that falls apart (its parts are named), fewer positive eigenvalues than dimensions.
+pub fn isomap(
+    samples: ArrayView2<f32>,
+    neighbourhood: Neighbourhood,
+    dimensions: usize,
+) -> Result<Isomap, EmbeddingError> {
+    check(samples, dimensions + 2)?;
+    let graph = Graph::new(samples, neighbourhood)?;
+    graph.connected(neighbourhood)?;
+    let geodesics = all_pairs(&graph);
+    let (coordinates, eigenvalues) = classical_scaling(&geodesics, dimensions)?;
+    Ok(Isomap { coordinates, eigenvalues, geodesics })
+}
+
+/// Classical multidimensional scaling of a symmetric matrix of distances.
+pub(super) fn classical_scaling(
+    distances: &Array2<f32>,
+    dimensions: usize,
+) -> Result<(Array2<f32>, Vec<f64>), EmbeddingError> {
+    let n = distances.nrows();
+    let centred = double_centred(distances);
+    let (values, vectors) = spectral::leading(&centred, n, dimensions);
+    if values.len() < dimensions {
+        return Err(EmbeddingError::TooFewDimensions { found: values.len(), asked: dimensions });
+    }
+    let coordinates =
+        Array2::from_shape_fn((n, dimensions), |(i, k)| (vectors[k][i] * values[k].sqrt()) as f32);
+    Ok((coordinates, values))
+}
+
+/// `-1/2 J D^2 J`, row-major.
+fn double_centred(distances: &Array2<f32>) -> Vec<f64> {
+    let n = distances.nrows();
+    let mut centred = vec![0.0_f64; n * n];
+    let means: Vec<f64> = centred
+        .par_chunks_mut(n)
+        .enumerate()
+        .map(|(i, out)| {
+            let mut sum = 0.0;
+            for (out, &d) in out.iter_mut().zip(distances.row(i)) {
+                let squared = f64::from(d) * f64::from(d);
+                *out = squared;
+                sum += squared;
+            }
+            sum / n as f64
+        })
+        .collect();
+    let mean = means.iter().sum::<f64>() / n as f64;
+    centred.par_chunks_mut(n).zip(&means).for_each(|(row, row_mean)| {
+        for (value, column_mean) in row.iter_mut().zip(&means) {
+            *value = -0.5 * (*value - row_mean - column_mean + mean);
+        }
+    });
+    centred
+}
+
+impl Isomap {
+    /// Residual variance `1 - R^2` between path lengths and distances in the first 1, 2, ... dimensions: where the curve stops
+    /// falling, the data have no more dimensions. O(N^2 D).
+    pub fn residual_variance(&self) -> Vec<f64> {
+        let n = self.coordinates.nrows();
+        let mut squared = Array2::<f32>::zeros((n, n));
+        let mut curve = Vec::new();
+        for column in self.coordinates.axis_iter(Axis(1)) {
+            squared.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(i, mut row)| {
+                for (value, other) in row.iter_mut().zip(column) {
+                    *value += (column[i] - other).powi(2);
+                }
+            });
+            curve.push(1.0 - squared_correlation(&squared, &self.geodesics));
+        }
+        curve
+    }
+}
+
+/// Squared Pearson correlation of `sqrt(squared)` and `distances`.
+fn squared_correlation(squared: &Array2<f32>, distances: &Array2<f32>) -> f64 {
+    let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (&square, &distance) in squared.iter().zip(distances) {
+        let (x, y) = (f64::from(square).sqrt(), f64::from(distance));
+        n += 1.0;
+        sx += x;
+        sy += y;
+        sxx += x * x;
+        syy += y * y;
+        sxy += x * y;
+    }
+    let covariance = sxy - sx * sy / n;
+    let variances = (sxx - sx * sx / n) * (syy - sy * sy / n);
+    if variances > 0.0 { covariance * covariance / variances } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pca::Pca;
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// Points of a Swiss roll and their true (unrolled) coordinates.
+    fn swiss_roll(n: usize) -> (Array2<f32>, Vec<[f64; 2]>) {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let flat: Vec<[f64; 2]> =
+            (0..n).map(|_| [rng.random_range(4.0..14.0), rng.random_range(0.0..20.0)]).collect();
+        let rolled = Array2::from_shape_fn((n, 3), |(i, k)| {
+            let [t, height] = flat[i];
+            [t * t.cos(), height, t * t.sin()][k] as f32
+        });
+        // Arc length of the spiral r = t.
+        let arc = |t: f64| 0.5 * (t * (1.0 + t * t).sqrt() + t.asinh());
+        (rolled, flat.into_iter().map(|[t, height]| [arc(t), height]).collect())
+    }
+
+    #[test]
+    fn a_swiss_roll_is_unrolled() {
+        let (rolled, flat) = swiss_roll(700);
+        let found = isomap(rolled.view(), Neighbourhood::Nearest(9), 2).expect("connected");
+        // Distances of the layout follow the unrolled sheet's.
+        let (mut a, mut b) = (Array2::<f32>::zeros((700, 700)), Array2::<f32>::zeros((700, 700)));
+        for i in 0..700 {
+            for j in 0..700 {
+                let d = &found.coordinates.row(i) - &found.coordinates.row(j);
+                a[[i, j]] = d.dot(&d);
+                b[[i, j]] = (flat[i][0] - flat[j][0]).hypot(flat[i][1] - flat[j][1]) as f32;
+            }
+        }
+        assert!(squared_correlation(&a, &b) > 0.99);
+        let curve = found.residual_variance();
+        assert!(curve[1] < 0.02 && curve[0] > curve[1], "{curve:?}");
+        let pca =
+            Pca::fit(rolled.view(), 2).expect("enough samples").transform(rolled.view()).expect("same width");
+        let spread = |c: &Array2<f32>| c.column(0).iter().fold(0.0_f32, |m, v| m.max(v.abs()));
+        assert!(spread(&found.coordinates) > 2.0 * spread(&pca), "PCA cannot unroll it");
+    }
+
+    #[test]
+    fn all_neighbours_make_it_pca() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let samples =
+            Array2::from_shape_fn((60, 5), |(_, k)| rng.random_range(0.0..1.0_f32) * (5 - k) as f32);
+        let all = isomap(samples.view(), Neighbourhood::Nearest(59), 3).expect("connected");
+        let pca = Pca::fit(samples.view(), 3)
+            .expect("enough samples")
+            .transform(samples.view())
+            .expect("same width");
+        for k in 0..3 {
+            let sign = (all.coordinates.column(k).dot(&pca.column(k))).signum();
+            for (a, b) in all.coordinates.column(k).iter().zip(pca.column(k)) {
+                assert!((a - sign * b).abs() < 2e-3, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let mut samples = Array2::<f32>::zeros((10, 2));
+        assert!(matches!(
+            isomap(samples.view(), Neighbourhood::Nearest(3), 20),
+            Err(EmbeddingError::TooFewSamples { .. })
+        ));
+        // Ten equal points have no dimensions.
+        let error = isomap(samples.view(), Neighbourhood::Nearest(9), 2).expect_err("no extent");
+        assert_eq!(error, EmbeddingError::TooFewDimensions { found: 0, asked: 2 });
+        samples[[4, 1]] = f32::NAN;
+        assert_eq!(
+            isomap(samples.view(), Neighbourhood::Nearest(3), 2).expect_err("NaN"),
+            EmbeddingError::NotFinite { row: 4 }
+        );
+    }
+}

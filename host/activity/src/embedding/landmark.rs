@@ -1,0 +1,121 @@
+//! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for galleries of thousands: only the paths from some landmarks are
+//! found and scaled, the other samples are placed by their distances to the landmarks.
+//!
+//! Landmarks are chosen by farthest-point steps over the path lengths, so they cover the data. Memory is L N floats in place of
+//! N^2; 20,000 samples of 360 numbers take seconds, most of it the neighbour search.
+
+use super::geodesic::{dijkstra, from_sources};
+use super::isomap::classical_scaling;
+use super::neighbours::{Graph, Neighbourhood};
+use super::{EmbeddingError, check};
+use ndarray::{Array2, ArrayView2, s};
+use rayon::prelude::*;
+
+/// A gallery laid out by way of landmarks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LandmarkIsomap {
+    /// One row per sample, one column per dimension.
+    pub coordinates: Array2<f32>,
+    /// Rows of the landmarks among the samples.
+    pub landmarks: Vec<usize>,
+    /// The eigenvalues of the landmarks' dimensions, falling.
+    pub eigenvalues: Vec<f64>,
+}
+
+/// Lays out `samples` (N x d) by `landmarks` landmarks.
+///
+/// # Errors
+/// As [`super::isomap::isomap`], and fewer landmarks than dimensions + 2.
+pub fn landmark_isomap(
+    samples: ArrayView2<f32>,
+    neighbourhood: Neighbourhood,
+    landmarks: usize,
+    dimensions: usize,
+) -> Result<LandmarkIsomap, EmbeddingError> {
+    check(samples, dimensions + 2)?;
+    let count = landmarks.min(samples.nrows());
+    if count < dimensions + 2 {
+        return Err(EmbeddingError::Shape {
+            what: "number of landmarks (at least two more than dimensions)",
+            expected: dimensions + 2,
+            found: landmarks,
+        });
+    }
+    let graph = Graph::new(samples, neighbourhood)?;
+    graph.connected(neighbourhood)?;
+    let chosen = spread(&graph, count);
+    let paths = from_sources(&graph, &chosen);
+    let between = Array2::from_shape_fn((count, count), |(i, j)| paths[[i, chosen[j]]]);
+    let (landmark_coordinates, eigenvalues) = classical_scaling(&between, dimensions)?;
+    // Triangulation: y = -1/2 L# (delta - mean delta), with L# the rows v_k^T / sqrt(lambda_k) = coordinate_k^T / lambda_k.
+    let mean: Vec<f64> = between
+        .rows()
+        .into_iter()
+        .map(|row| row.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>() / count as f64)
+        .collect();
+    let rows: Vec<Vec<f32>> = (0..samples.nrows())
+        .into_par_iter()
+        .map(|i| {
+            let mut place = vec![0.0_f64; dimensions];
+            for (l, mean) in mean.iter().enumerate() {
+                let off = f64::from(paths[[l, i]]).powi(2) - mean;
+                for (k, out) in place.iter_mut().enumerate() {
+                    *out -= 0.5 * f64::from(landmark_coordinates[[l, k]]) / eigenvalues[k] * off;
+                }
+            }
+            place.into_iter().map(|v| v as f32).collect()
+        })
+        .collect();
+    let mut coordinates = Array2::zeros((samples.nrows(), dimensions));
+    for (i, row) in rows.into_iter().enumerate() {
+        coordinates.slice_mut(s![i, ..]).iter_mut().zip(row).for_each(|(out, v)| *out = v);
+    }
+    Ok(LandmarkIsomap { coordinates, landmarks: chosen, eigenvalues })
+}
+
+/// Farthest-point landmarks: the first tenth one by one, the rest spread evenly by rank of distance to those.
+fn spread(graph: &Graph, count: usize) -> Vec<usize> {
+    let n = graph.nodes();
+    let careful = (count / 10).max(8).min(count);
+    let mut nearest = vec![f32::INFINITY; n];
+    let (mut chosen, mut next) = (Vec::with_capacity(count), 0);
+    while chosen.len() < careful {
+        chosen.push(next);
+        for (near, d) in nearest.iter_mut().zip(dijkstra(graph, next)) {
+            *near = near.min(d);
+        }
+        next = (0..n).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])).unwrap_or(0);
+    }
+    let mut rest: Vec<usize> = (0..n).filter(|i| !chosen.contains(i)).collect();
+    rest.sort_by(|&a, &b| nearest[a].total_cmp(&nearest[b]).then(a.cmp(&b)));
+    let missing = count - chosen.len();
+    if missing > 0 {
+        chosen.extend((0..missing).map(|i| rest[(2 * i + 1) * rest.len() / (2 * missing)]));
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::isomap::isomap;
+    use super::*;
+
+    #[test]
+    fn landmarks_lay_out_what_all_samples_do() {
+        // A bent sheet of 20 x 30 points.
+        let sheet = Array2::from_shape_fn((600, 3), |(i, k)| {
+            let (a, b) = ((i % 20) as f32 * 0.1, (i / 20) as f32 * 0.1);
+            [(1.3 * b).cos(), a, (1.3 * b).sin()][k]
+        });
+        let whole = isomap(sheet.view(), Neighbourhood::Nearest(8), 2).expect("connected");
+        let part = landmark_isomap(sheet.view(), Neighbourhood::Nearest(8), 80, 2).expect("connected");
+        for k in 0..2 {
+            let (a, b) = (whole.coordinates.column(k), part.coordinates.column(k));
+            let (ma, mb) = (a.mean().expect("samples"), b.mean().expect("samples"));
+            let (a, b) = (a.mapv(|v| v - ma), b.mapv(|v| v - mb));
+            let correlation = a.dot(&b) / (a.dot(&a) * b.dot(&b)).sqrt();
+            assert!(correlation.abs() > 0.99, "dimension {k}: {correlation}");
+        }
+        assert!(landmark_isomap(sheet.view(), Neighbourhood::Nearest(8), 3, 2).is_err());
+    }
+}

@@ -1,0 +1,192 @@
+//! The neighbour graph: K nearest or all within a radius, made symmetric, as compressed sparse rows.
+//!
+//! Squared distances come in blocks from one matrix product (`|a|^2 + |b|^2 - 2 a.b`), never all at once; the few that become
+//! edges are recomputed from the samples, so that nearly equal samples do not suffer from cancellation. O(N^2 d) flops, O(N K) memory.
+
+use super::{EmbeddingError, squared_norms, times_transposed};
+use ndarray::{ArrayView2, s};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Which samples are neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Neighbourhood {
+    /// The K nearest others. K = N - 1 makes Isomap the same as PCA (so the thesis' choice does).
+    Nearest(usize),
+    /// All others nearer than this, in the samples' units.
+    Radius(f32),
+}
+
+impl std::fmt::Display for Neighbourhood {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Nearest(k) => write!(f, "the {k} nearest"),
+            Self::Radius(radius) => write!(f, "all within {radius}"),
+        }
+    }
+}
+
+/// An undirected weighted graph in compressed sparse rows; every edge stands in both its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Graph {
+    /// Where each row starts; one longer than the number of nodes.
+    pub offsets: Vec<u32>,
+    /// The other end of each edge.
+    pub targets: Vec<u32>,
+    /// The edge's length.
+    pub lengths: Vec<f32>,
+}
+
+/// Rows of the distance matrix made at once.
+const BLOCK: usize = 256;
+
+impl Graph {
+    /// The graph of a sample matrix (N x d).
+    ///
+    /// # Errors
+    /// No neighbours asked for.
+    pub fn new(samples: ArrayView2<f32>, neighbourhood: Neighbourhood) -> Result<Self, EmbeddingError> {
+        let n = samples.nrows();
+        if let Neighbourhood::Nearest(k) = neighbourhood
+            && (k == 0 || k >= n)
+        {
+            return Err(EmbeddingError::Shape {
+                what: "number of neighbours (at least 1, below the number of samples)",
+                expected: n.saturating_sub(1).min(10),
+                found: k,
+            });
+        }
+        let norms = squared_norms(samples);
+        let mut edges: Vec<(u32, u32, f32)> = Vec::with_capacity(n * 16);
+        for start in (0..n).step_by(BLOCK) {
+            let rows = start..(start + BLOCK).min(n);
+            let products = times_transposed(samples.slice(s![rows.clone(), ..]), samples);
+            let found: Vec<Vec<u32>> = rows
+                .clone()
+                .into_par_iter()
+                .map(|i| {
+                    let product = products.row(i - start);
+                    let squared: Vec<f32> =
+                        product.iter().zip(&norms).map(|(p, norm)| norm - 2.0 * p).collect();
+                    pick(&squared, norms[i], i, neighbourhood)
+                })
+                .collect();
+            for (i, neighbours) in rows.zip(found) {
+                for j in neighbours {
+                    let other = samples.row(j as usize);
+                    let squared: f32 = samples.row(i).iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum();
+                    edges.push((i as u32, j, squared.sqrt()));
+                }
+            }
+        }
+        Ok(Self::from_edges(n, &edges))
+    }
+
+    /// A graph of `n` nodes from edges that are taken both ways; the shorter of two between the same nodes counts.
+    pub fn from_edges(n: usize, edges: &[(u32, u32, f32)]) -> Self {
+        let mut rows: Vec<Vec<(u32, f32)>> = vec![Vec::new(); n];
+        for &(a, b, length) in edges.iter().filter(|(a, b, _)| a != b) {
+            rows[a as usize].push((b, length));
+            rows[b as usize].push((a, length));
+        }
+        let mut graph = Self { offsets: vec![0], targets: Vec::new(), lengths: Vec::new() };
+        for mut row in rows {
+            row.sort_by(|p, q| p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)));
+            row.dedup_by_key(|edge| edge.0);
+            for (target, length) in row {
+                graph.targets.push(target);
+                graph.lengths.push(length);
+            }
+            graph.offsets.push(graph.targets.len() as u32);
+        }
+        graph
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// The edges of a node: other end and length.
+    pub fn edges(&self, node: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
+        let range = self.offsets[node] as usize..self.offsets[node + 1] as usize;
+        range.map(|e| (self.targets[e] as usize, self.lengths[e]))
+    }
+
+    /// The connected parts, largest first, members in rising order.
+    pub fn components(&self) -> Vec<Vec<usize>> {
+        let mut seen = vec![false; self.nodes()];
+        let mut components = Vec::new();
+        for root in 0..self.nodes() {
+            if std::mem::replace(&mut seen[root], true) {
+                continue;
+            }
+            let (mut members, mut next) = (vec![root], 0);
+            while next < members.len() {
+                let node = members[next];
+                next += 1;
+                for (other, _) in self.edges(node) {
+                    if !std::mem::replace(&mut seen[other], true) {
+                        members.push(other);
+                    }
+                }
+            }
+            members.sort_unstable();
+            components.push(members);
+        }
+        components.sort_by_key(|members| std::cmp::Reverse(members.len()));
+        components
+    }
+
+    /// Ok for a connected graph.
+    ///
+    /// # Errors
+    /// [`EmbeddingError::Disconnected`] with the parts by name.
+    pub fn connected(&self, neighbourhood: Neighbourhood) -> Result<(), EmbeddingError> {
+        let components = self.components();
+        if components.len() <= 1 {
+            return Ok(());
+        }
+        Err(EmbeddingError::Disconnected { components, neighbours: neighbourhood.to_string() })
+    }
+}
+
+/// Neighbours of sample `i` given `|b|^2 - 2 a.b` for all b.
+fn pick(squared: &[f32], norm: f32, i: usize, neighbourhood: Neighbourhood) -> Vec<u32> {
+    match neighbourhood {
+        Neighbourhood::Radius(radius) => {
+            let limit = radius * radius - norm;
+            (0..squared.len() as u32).filter(|&j| j as usize != i && squared[j as usize] <= limit).collect()
+        }
+        Neighbourhood::Nearest(k) => {
+            let mut order: Vec<u32> = (0..squared.len() as u32).filter(|&j| j as usize != i).collect();
+            let by = |a: &u32, b: &u32| squared[*a as usize].total_cmp(&squared[*b as usize]).then(a.cmp(b));
+            if k < order.len() {
+                order.select_nth_unstable_by(k - 1, by);
+                order.truncate(k);
+            }
+            order
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    #[test]
+    fn a_line_of_points_has_its_neighbours_and_two_lines_are_two_parts() {
+        let line = Array2::from_shape_fn((10, 2), |(i, j)| if j == 0 { i as f32 } else { 0.5 });
+        let graph = Graph::new(line.view(), Neighbourhood::Nearest(1)).expect("enough samples");
+        assert_eq!(graph.edges(5).filter(|(_, d)| (*d - 1.0).abs() < 1e-6).count(), graph.edges(5).count());
+        let ring = Graph::new(line.view(), Neighbourhood::Radius(2.1)).expect("radius");
+        assert_eq!(ring.edges(5).map(|(j, _)| j).collect::<Vec<_>>(), vec![3, 4, 6, 7]);
+        let two = Array2::from_shape_fn((10, 1), |(i, _)| if i < 6 { i as f32 } else { 100.0 + i as f32 });
+        let graph = Graph::new(two.view(), Neighbourhood::Nearest(2)).expect("enough samples");
+        let error = graph.connected(Neighbourhood::Nearest(2)).expect_err("two parts");
+        assert!(error.to_string().contains("6 samples from 0, 1 on; 4 samples from 6, 7 on"), "{error}");
+        assert!(Graph::new(two.view(), Neighbourhood::Nearest(10)).is_err());
+    }
+}
