@@ -1,4 +1,5 @@
-//! Frames per second of the background model on one thread, 640x480, grey and colour: `cargo bench -p
+//! Frames per second of the background model, and of the whole way from frame to centred silhouette, on one thread,
+//! 640x480, grey and colour: `cargo bench -p
 //! farnear-activity --bench background`.
 //!
 //! The scene: a textured background with sensor noise, a tenth of the pixels flickering between two grey levels
@@ -7,7 +8,13 @@
 
 use std::{fs, hint::black_box, path::Path, time::Instant};
 
-use farnear_activity::background::{BackgroundModel, Frame, Settings};
+use farnear_activity::{
+    background::{BackgroundModel, Frame, Settings},
+    mask::{
+        centre::{SIDE_PX, centred},
+        extractor::{Extractor, ExtractorSettings},
+    },
+};
 use ndarray::{Array3, s};
 
 const SIZE: (usize, usize) = (480, 640);
@@ -98,6 +105,17 @@ fn time(scene: &str, colour: &[Array3<u8>]) {
         black_box(model.apply(Frame::Rgb(colour[i].view())).expect("same size"));
     });
     report(scene, "colour", fps, &model);
+
+    let first = Frame::Rgb(colour[0].view());
+    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let fps = frames_per_second(|i| {
+        let found = extractor.extract(Frame::Rgb(colour[i].view())).expect("same size");
+        black_box(centred(found.subject.mask.view(), SIDE_PX));
+    });
+    println!(
+        "frame to centred silhouette, 640x480, one thread, {scene}, colour: {:.2} ms a frame",
+        1e3 / fps
+    );
 }
 
 fn report(scene: &str, kind: &str, fps: f64, model: &BackgroundModel) {

