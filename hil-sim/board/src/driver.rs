@@ -80,6 +80,8 @@ pub struct Report {
     pub coarse_um: f64,
     /// Where the piezo really is, micrometres.
     pub piezo_um: f64,
+    /// Triggers since the board's reset.
+    pub triggers: u32,
     /// Triggers that the camera was too busy to hear.
     pub missed_triggers: u32,
     /// Bits that the line flipped, both directions.
@@ -195,6 +197,7 @@ impl Driver {
             last_step_ns: self.wiring.last_step_ns(),
             coarse_um,
             piezo_um,
+            triggers: self.wiring.camera().triggers(),
             missed_triggers: self.wiring.camera().missed(),
             flipped_bits: self.to_board.flipped() + self.to_host.flipped(),
         }

@@ -1,33 +1,69 @@
-//! Hello, homing, moves: what a host does first.
+//! Hello, homing, moves, and what goes wrong with them.
 
 mod common;
 
 use common::Bench;
 use farnear_protocol::{
-    EventKind, Nanometres,
-    message::{Axis, ResetCause, SCHEMA_KEY},
+    EventKind, Nanometres, Request, RequestError,
+    message::{Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
 };
 
 #[test]
 fn hello_tells_who_the_board_is() {
-    let bench = Bench::new(1);
-    let hello = &bench.hello;
+    let hello = Bench::new(1).say_hello();
     assert_eq!((hello.board.as_str(), hello.boot), ("nucleo-f429zi", 1));
     assert_eq!(hello.schema_key, SCHEMA_KEY);
     assert_eq!(hello.reset_cause, ResetCause::PowerOn);
     assert!(hello.emulated);
-    assert_ne!(hello.unique_id, Bench::new(2).hello.unique_id);
+    assert_ne!(hello.unique_id, Bench::new(2).say_hello().unique_id);
 }
 
 #[test]
 fn homing_finds_the_edge_and_moves_reach_their_target() {
     let mut bench = Bench::new(1);
+    let refused = bench.ask(&Request::Move { axis: Axis::SensorCoarse, target: Nanometres(0) });
+    assert!(
+        matches!(refused, Err(RequestError::NotHomed { state: PositionState::Unknown, .. })),
+        "{refused:?}"
+    );
     bench.home();
     for target in [5_831_300, 12_999_000, 1_000] {
         let end = bench.move_to(Axis::SensorCoarse, Nanometres(target));
         let EventKind::MoveDone { measured, .. } = end else { panic!("{end:?}") };
-        assert!((measured.0 - target).abs() <= 1_000, "{measured:?}");
-        let report = bench.report();
-        println!("{target} nm: measured {} nm, truly {} um", measured.0, report.coarse_um);
+        assert!((measured.0 - target).abs() <= 200, "{measured:?}: within a microstep and an encoder count");
+        let off_um = bench.report().coarse_um - 1e-3 * f64::from(target);
+        // The screw's data sheet (2 um), the home switch (3 SD = 0.9 um) and the resolution of switch and steps.
+        assert!(off_um.abs() < 3.2, "truly {off_um} um beside {target} nm");
     }
+}
+
+#[test]
+fn a_stall_is_seen_and_loses_the_position() {
+    let mut bench = Bench::new(3);
+    bench.home();
+    bench.rig.reach_in(|hands| hands.plant(|plant| plant.screw_mut().set_stalled(true))).expect("runs");
+    let end = bench.move_to(Axis::SensorCoarse, Nanometres(2_000_000));
+    assert!(
+        matches!(end, EventKind::Failed { reason: Failure::Following { .. }, .. }),
+        "a blocked motor ends with {end:?}"
+    );
+    assert_eq!(bench.status().coarse.state, PositionState::Lost);
+}
+
+#[test]
+fn a_home_switch_that_never_closes_ends_the_search() {
+    let mut bench = Bench::new(4);
+    bench
+        .rig
+        .reach_in(|hands| hands.plant(|plant| plant.screw_mut().set_stuck_home(Some(false))))
+        .expect("runs");
+    let end = bench.carry_out(&Request::Home { axis: Axis::SensorCoarse });
+    // The carriage runs against its end stop, which the encoder notices first.
+    assert!(
+        matches!(
+            end,
+            EventKind::Failed { reason: Failure::HomeSwitchNotFound | Failure::Following { .. }, .. }
+        ),
+        "{end:?}"
+    );
 }

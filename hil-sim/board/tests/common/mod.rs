@@ -4,14 +4,14 @@
 use farnear_protocol::{
     Event, EventKind, Nanometres, Request, RequestError, Response,
     frame::{Header, Kind, Packet, encode},
-    message::{Axis, Hello},
+    message::{Axis, Hello, Status},
 };
 use farnear_sim::{EmulatedRig, Report, RigConfig};
 
 /// A rig and a host that keeps count of its requests.
 pub struct Bench {
     pub rig: EmulatedRig,
-    pub hello: Hello,
+    pub boot: u32,
     next: u32,
     pub events: Vec<Event>,
 }
@@ -41,43 +41,19 @@ impl Bench {
 
     pub fn with(config: &RigConfig) -> Self {
         let rig = EmulatedRig::new(config).unwrap_or_else(|error| panic!("{error}"));
-        let hello = Hello {
-            protocol_min: 0,
-            protocol_current: 0,
-            schema_key: 0,
-            board: heapless::String::new(),
-            firmware: heapless::String::new(),
-            unique_id: [0; 12],
-            boot: 0,
-            reset_cause: farnear_protocol::message::ResetCause::Unknown,
-            emulated: false,
-            capabilities: farnear_protocol::message::Capabilities {
-                sensor_coarse: false,
-                sensor_fine: false,
-                strobe: false,
-            },
-            limits: farnear_protocol::message::Limits {
-                datum: Nanometres(0),
-                coarse_min: Nanometres(0),
-                coarse_max: Nanometres(0),
-                coarse_step_pm: 0,
-                fine_min: Nanometres(0),
-                fine_max: Nanometres(0),
-                shots_max: 0,
-                exposure_min: farnear_protocol::Micros(0),
-                exposure_max: farnear_protocol::Micros(0),
-            },
-        };
-        let mut bench = Self { rig, hello, next: 0, events: Vec::new() };
+        let mut bench = Self { rig, boot: 0, next: 0, events: Vec::new() };
         bench.say_hello();
         bench
     }
 
     /// Says hello; from now on requests carry the board's boot number.
-    pub fn say_hello(&mut self) {
-        self.hello.boot = 0;
+    pub fn say_hello(&mut self) -> Hello {
+        self.boot = 0;
         match self.ask(&Request::Hello) {
-            Ok(Response::Hello(hello)) => self.hello = hello,
+            Ok(Response::Hello(hello)) => {
+                self.boot = hello.boot;
+                hello
+            }
             other => panic!("no hello but {other:?}"),
         }
     }
@@ -85,7 +61,7 @@ impl Bench {
     /// Sends a request and gives its id, without letting time pass.
     pub fn send(&mut self, request: &Request) -> u32 {
         self.next += 1;
-        let frame = request_frame(self.next, self.hello.boot, request);
+        let frame = request_frame(self.next, self.boot, request);
         self.rig.send(&frame).expect("the rig runs");
         self.next
     }
@@ -102,16 +78,27 @@ impl Bench {
         answers
     }
 
-    /// Sends a request, lets time pass in steps of 100 us until it is answered, and gives the answer.
-    pub fn ask(&mut self, request: &Request) -> Answer {
+    /// Sends a request and lets time pass until it is answered; after 50 ms it asks again, as hosts do, and gives
+    /// up after three repeats.
+    pub fn try_ask(&mut self, request: &Request) -> Option<Answer> {
         let id = self.send(request);
-        for _ in 0..500 {
-            self.rig.advance_us(100).expect("the rig runs");
-            if let Some((_, answer)) = self.answers().into_iter().find(|(answered, _)| *answered == id) {
-                return answer;
+        for attempt in 0..4 {
+            if attempt > 0 {
+                self.rig.send(&request_frame(id, self.boot, request)).expect("the rig runs");
+            }
+            for _ in 0..250 {
+                self.rig.advance_us(200).expect("the rig runs");
+                if let Some((_, answer)) = self.answers().into_iter().find(|(answered, _)| *answered == id) {
+                    return Some(answer);
+                }
             }
         }
-        panic!("no answer to {request:?} within 50 ms");
+        None
+    }
+
+    /// The same, where an answer must come.
+    pub fn ask(&mut self, request: &Request) -> Answer {
+        self.try_ask(request).unwrap_or_else(|| panic!("no answer to {request:?}"))
     }
 
     /// Asks for something long and lets it end; gives the terminal event.
@@ -135,6 +122,13 @@ impl Bench {
 
     pub fn move_to(&mut self, axis: Axis, target: Nanometres) -> EventKind {
         self.carry_out(&Request::Move { axis, target })
+    }
+
+    pub fn status(&mut self) -> Status {
+        match self.ask(&Request::Status) {
+            Ok(Response::Status(status)) => status,
+            other => panic!("no status but {other:?}"),
+        }
     }
 
     pub fn report(&mut self) -> Report {

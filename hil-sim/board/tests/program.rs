@@ -1,0 +1,80 @@
+//! Exposure programs: how fast a pair is, and how still the sensor stands while it exposes.
+
+mod common;
+
+use common::Bench;
+use farnear_protocol::{
+    EventKind, Micros, Nanometres, Request, Response,
+    message::{Axis, Shot, ShotRecord},
+};
+
+/// Far and near setting of the 50 mm lens are this far apart (933 and 886.81 mm).
+const TRAVEL_NM: i32 = 156_270;
+const EXPOSURE: Micros = Micros(5_000);
+const WINDOW: Nanometres = Nanometres(50);
+/// The piezo's position of the far-focused exposure.
+const FAR: Nanometres = Nanometres(10_000);
+
+/// Loads a far and near pair.
+fn load_pair(bench: &mut Bench) {
+    for (index, target) in [(0, FAR), (1, Nanometres(FAR.0 + TRAVEL_NM))] {
+        let shot = Shot {
+            axis: Axis::SensorFine,
+            target,
+            exposure: EXPOSURE,
+            settle_window: WINDOW,
+            settle_dwell: Micros(2_000),
+            repeat: 1,
+        };
+        assert_eq!(bench.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
+    }
+}
+
+/// Runs the pair; gives its records.
+fn run_pair(bench: &mut Bench) -> Vec<ShotRecord> {
+    let before = bench.events.len();
+    let end = bench.carry_out(&Request::RunProgram { shots: 2 });
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
+    let records = bench.events[before..].iter().filter_map(|event| match &event.kind {
+        EventKind::ShotDone { shot, .. } => Some(*shot),
+        _ => None,
+    });
+    records.collect()
+}
+
+#[test]
+fn a_pair_is_fast_and_stands_still() {
+    let mut bench = Bench::new(1);
+    load_pair(&mut bench);
+    for turn in 0..5 {
+        let begin_ns = bench.report().now_ns;
+        let records = run_pair(&mut bench);
+        let shots = bench.rig.take_shots();
+        assert_eq!((records.len(), shots.len()), (2, 2));
+        let took_us = (shots[1].end_ns - begin_ns) / 1000;
+        let moved_us = took_us - 2 * u64::from(EXPOSURE.0);
+        println!("pair {turn}: {took_us} us, without its exposures {moved_us} us");
+        assert!(moved_us <= 60_000, "a pair takes {moved_us} us beside its exposures");
+        for (record, shot) in records.iter().zip(&shots) {
+            let asked_um = f64::from(record.asked.0) * 1e-3;
+            let off_nm = [shot.truth.piezo_min_um, shot.truth.piezo_um, shot.truth.piezo_max_um]
+                .map(|um| 1e3 * (um - asked_um));
+            println!(
+                "  {} um: min, mean, max {off_nm:.1?} nm, gauge {} nm, settle {} us",
+                asked_um,
+                record.fine.0 - record.asked.0,
+                record.settle.0
+            );
+            assert!(
+                off_nm.iter().all(|nm| nm.abs() <= f64::from(WINDOW.0)),
+                "{off_nm:?} nm during the exposure"
+            );
+            assert_eq!(record.trigger_number, shot.id);
+            // Latency 20 us with 2 us of jitter, six standard deviations; the stamps are whole microseconds.
+            let latency_us = record.strobe_start.0 - record.trigger.0;
+            assert!((7..=33).contains(&latency_us), "{latency_us} us");
+            assert_eq!(record.strobe_end.0 - record.strobe_start.0, u64::from(EXPOSURE.0));
+            assert!(record.strobe_start.0.abs_diff(shot.board_us) <= 1);
+        }
+    }
+}

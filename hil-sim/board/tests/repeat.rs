@@ -1,0 +1,63 @@
+//! The same seed gives the same bytes; another one others.
+
+mod common;
+
+use common::Bench;
+use farnear_protocol::{
+    Micros, Nanometres, Request, Response,
+    message::{Axis, Shot},
+};
+use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene};
+use farnear_sim::{eye::Eye, rig::RigConfig};
+
+const OPTICS: &str = "
+[lens]
+focal_length_mm = 50.0
+aperture_mm = 12.8
+[sensor]
+pixel_um = 7.4
+[focus]
+far_mm = 933.0
+max_blur_px = 2.703
+";
+
+/// Homes, moves, exposes a pair; gives everything that came out: trace, events, pictures.
+fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = folder.path().join("trace.csv");
+    let config = RigConfig { seed, trace: Some(trace.clone()), ..RigConfig::default() };
+    let mut bench = Bench::with(&config);
+    bench.home();
+    bench.move_to(Axis::SensorCoarse, Nanometres(5_821_300));
+    for (index, target) in [(0, 10_000), (1, 166_270)] {
+        let shot = Shot {
+            axis: Axis::SensorFine,
+            target: Nanometres(target),
+            exposure: Micros(2_000),
+            settle_window: Nanometres(50),
+            settle_dwell: Micros(2_000),
+            repeat: 1,
+        };
+        assert_eq!(bench.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
+    }
+    bench.carry_out(&Request::RunProgram { shots: 2 });
+    let lens = Lens::from_optics(&OpticsFile::parse(OPTICS).expect("optics")).expect("a lens");
+    let scene: Scene = "plane:900".parse().expect("a scene");
+    let psf: Psf = "gaussian:k=0.4578".parse().expect("a PSF");
+    let camera = Camera::new(64, 48, Noise::EightBit);
+    let mut eye = Eye::new(&scene, &lens, &psf, camera, seed).expect("a picture");
+    let frames = bench.rig.take_shots().iter().map(|shot| eye.frame(shot).expect("a picture")).collect();
+    let events = format!("{:?}", bench.events);
+    bench.rig.stop().expect("ends well");
+    (std::fs::read_to_string(&trace).expect("a trace"), events, frames)
+}
+
+#[test]
+fn one_seed_gives_one_session() {
+    let (first, second) = (session(11), session(11));
+    assert_eq!(first.2.len(), 2);
+    assert!(first.0.lines().count() > 100, "the trace has rows");
+    assert!(first == second, "two runs with one seed differ");
+    let other = session(12);
+    assert!(first.0 != other.0 && first.1 != other.1 && first.2 != other.2, "the seed decides nothing");
+}
