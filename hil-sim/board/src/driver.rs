@@ -6,13 +6,14 @@ use std::{
 };
 
 use rigless::{
+    device::Level,
     emulator::{self, AccessKind, Host, Settled, Stop},
     session::Session,
     time::VirtualNanos,
 };
 
 use crate::{
-    board::RigBoard,
+    board::{DIAG, RigBoard},
     chips::{SharedPlant, with_plant},
     error::SimError,
     faults::{Faults, NoisyLine},
@@ -105,6 +106,11 @@ impl Hands<'_, '_> {
     /// Presses the reset button.
     pub fn press_reset(&mut self) {
         self.session.reset_by_pin(self.stop.at, self.stop.instruction_count, self.host);
+    }
+
+    /// The stepper driver reports a fault on DIAG, or takes it back.
+    pub fn set_driver_fault(&mut self, fault: bool) {
+        self.session.board_mut().chip.drive_pin(self.stop.at, DIAG, Level::from(fault));
     }
 
     /// Writes a register of the chip behind the firmware's back, as a stray pointer would.

@@ -5,7 +5,7 @@ mod common;
 use common::Bench;
 use farnear_protocol::{
     EventKind, Nanometres, Request, Response,
-    message::{Axis, Failure},
+    message::{Axis, Failure, PositionState},
 };
 use farnear_sim::plant::Noise;
 
@@ -49,29 +49,53 @@ fn ten_thousand_random_step_counts_are_exact() {
     }
 }
 
+/// Starts a long move and lets it run for a while, in the ramp or at full speed, at any phase of a segment.
+fn in_mid_move(bench: &mut Bench, turn: u32) -> farnear_sim::Report {
+    let far = bench.status().coarse.measured.0 < 6_000_000;
+    let target = Nanometres(if far { 12_000_000 } else { 500_000 });
+    assert_eq!(bench.ask(&Request::Move { axis: Axis::SensorCoarse, target }), Ok(Response::Accepted));
+    bench.rig.advance_us(40_000 + u64::from(turn) * 23_137).expect("runs")
+}
+
 #[test]
-fn a_stop_in_mid_move_ends_the_steps_within_a_millisecond() {
+fn a_fault_in_mid_move_ends_the_steps_within_a_millisecond() {
+    let mut bench = Bench::new(1);
+    let mut worst_us = 0;
+    for turn in 0..12 {
+        bench.home();
+        let before = in_mid_move(&mut bench, turn);
+        bench.rig.reach_in(|hands| hands.set_driver_fault(true)).expect("runs");
+        let end = bench.settle();
+        assert!(matches!(end, EventKind::Failed { reason: Failure::DriverFault, .. }), "{end:?}");
+        let after = bench.report();
+        assert!(after.step_edges > before.step_edges, "it was moving");
+        worst_us = worst_us.max((after.last_step_ns - before.now_ns) / 1000);
+        assert_eq!(bench.status().steps, after.step_edges, "pulses were lost in the count");
+        bench.rig.reach_in(|hands| hands.set_driver_fault(false)).expect("runs");
+    }
+    println!("last STEP at most {worst_us} us after the driver's fault");
+    // The running segment lasts 1 ms at most; the fault is seen within a control tick of 200 us.
+    assert!(worst_us <= 1_000 + 200, "{worst_us} us");
+}
+
+#[test]
+fn a_stop_in_mid_move_brakes_along_the_ramp_and_loses_nothing() {
     let mut bench = Bench::new(1);
     bench.home();
     let mut worst_us = 0;
-    for turn in 0..12u32 {
-        let far = bench.status().coarse.measured.0 < 6_000_000;
-        let target = Nanometres(if far { 12_000_000 } else { 500_000 });
-        assert_eq!(bench.ask(&Request::Move { axis: Axis::SensorCoarse, target }), Ok(Response::Accepted));
-        // In the ramp, at full speed, and at any phase of a segment.
-        bench.rig.advance_us(40_000 + u64::from(turn) * 23_137).expect("runs");
-        let before = bench.report();
+    for turn in 0..12 {
+        let before = in_mid_move(&mut bench, turn);
         bench.send(&Request::Stop);
         let end = bench.settle();
         assert!(matches!(end, EventKind::Failed { reason: Failure::Stopped, .. }), "{end:?}");
         let after = bench.report();
         assert!(after.step_edges > before.step_edges, "it was moving");
         worst_us = worst_us.max((after.last_step_ns - before.now_ns) / 1000);
-        // Every pulse was counted: position and encoder still agree, so no homing is needed.
         let status = bench.status();
         assert_eq!(status.steps, after.step_edges);
-        assert_eq!(status.coarse.state, farnear_protocol::message::PositionState::Homed);
+        assert_eq!(status.coarse.state, PositionState::Homed, "position and encoder still agree");
     }
     println!("last STEP at most {worst_us} us after the request left the host");
-    assert!(worst_us <= 1_000 + 300, "{worst_us} us");
+    // 6.25 mm/s at 50 mm/s2: 125 ms; the request takes 0.1 ms, what waits in the step queue a few more.
+    assert!(worst_us <= 125_000 + 10_000, "{worst_us} us");
 }
