@@ -242,3 +242,17 @@ fn any_gauge_keeps_the_loop_in_bounds() {
         piezo.act(); // overflow checks are on
     }
 }
+
+#[test]
+fn any_way_settles_in_time() {
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    let part = Part { resonance_hz: 205.0, hysteresis: 0.12, creep: 0.015, latency_us: 50 };
+    let mut plant = Plant::new(part, 3);
+    let mut random = 99u64;
+    for _ in 0..200 {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        let target = 5_000 + (random >> 33) as i32 % 190_001;
+        let (ticks, _) = step(&mut piezo, &mut plant, target);
+        assert!(ticks as u32 * TICK_US <= 15_000, "{ticks} ticks to {target}");
+    }
+}
