@@ -1,8 +1,7 @@
 //! The camera's timing: from the trigger's edges to strobe, exposure and frame.
 //!
-//! A global-shutter camera in trigger-width mode: it collects light while the trigger is high, from
-//! [`LATENCY_NS`] after its edge (with jitter), and says so on the strobe; then it reads out for [`READOUT_NS`]
-//! and hears no trigger.
+//! A global-shutter camera in trigger-width mode: it collects light while the trigger is high, from 20 us after
+//! its edge (with 2 us of jitter), and says so on the strobe; then it reads out for 10 ms and hears no trigger.
 
 use std::collections::BTreeMap;
 

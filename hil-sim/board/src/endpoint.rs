@@ -1,7 +1,7 @@
 //! The camera endpoint: loopback TCP that hands out frames and takes control messages.
 //!
-//! One client at a time; a new one takes the place of the old one. Frames without a client wait, the newest
-//! [`WAITING`] of them; each frame is handed out once.
+//! One client at a time; a new one takes the place of the old one. Frames without a client wait, the newest 32 of
+//! them; each frame is handed out once.
 
 use std::{
     collections::VecDeque,

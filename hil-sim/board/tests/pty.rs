@@ -1,0 +1,228 @@
+//! The program as a client sees it: its JSON line, the pty through `serialport`, the camera endpoint, its end.
+
+mod common;
+
+use std::{
+    io::{BufRead, BufReader, Read, Write},
+    net::TcpStream,
+    path::Path,
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::{Answer, answer_in, request_frame};
+use farnear_protocol::{
+    Event, EventKind, Micros, Nanometres, Request, Response,
+    camera::{FRAME_HEADER, FrameHeader},
+    frame::{Decoder, Kind},
+    message::{Axis, Shot},
+};
+use serialport::SerialPort;
+
+/// Far longer than anything here takes, so that a hang fails instead of hanging.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct Program {
+    child: Child,
+    port: String,
+    camera: String,
+}
+
+impl Program {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+            .arg("run")
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("farnear-sim starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("text");
+        let value = |key: &str| {
+            let (_, rest) =
+                line.split_once(&format!("\"{key}\": \"")).unwrap_or_else(|| panic!("no {key}: {line}"));
+            rest.split('"').next().expect("a value").to_string()
+        };
+        let (port, camera) = (value("port"), value("camera"));
+        Self { child, port, camera }
+    }
+
+    /// Closes its standard input and waits for its end.
+    fn end(mut self) -> std::process::ExitStatus {
+        drop(self.child.stdin.take());
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("can be waited for") {
+                return status;
+            }
+            if Instant::now() > deadline {
+                self.child.kill().expect("can be killed");
+                panic!("farnear-sim did not end when its standard input closed");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+struct Client {
+    port: Box<dyn SerialPort>,
+    decoder: Decoder,
+    boot: u32,
+    next: u32,
+}
+
+impl Client {
+    fn open(name: &str) -> Self {
+        let port = serialport::new(name, 2_000_000)
+            .timeout(Duration::from_millis(100))
+            .open()
+            .expect("the pty opens");
+        let mut client = Self { port, decoder: Decoder::new(), boot: 0, next: 0 };
+        match client.ask(&Request::Hello) {
+            Ok(Response::Hello(hello)) => client.boot = hello.boot,
+            other => panic!("no hello but {other:?}"),
+        }
+        client
+    }
+
+    /// The next frame that `wanted` takes.
+    fn wait<T>(&mut self, wanted: impl Fn(&farnear_protocol::frame::Packet) -> Option<T>) -> T {
+        let deadline = Instant::now() + PATIENCE;
+        let mut bytes = [0; 256];
+        while Instant::now() < deadline {
+            let count = match self.port.read(&mut bytes) {
+                Ok(count) => count,
+                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => 0,
+                Err(error) => panic!("the port failed: {error}"),
+            };
+            for byte in &bytes[..count] {
+                if let Some(Ok(packet)) = self.decoder.push(*byte)
+                    && let Some(found) = wanted(&packet)
+                {
+                    return found;
+                }
+            }
+        }
+        panic!("nothing came");
+    }
+
+    fn ask(&mut self, request: &Request) -> Answer {
+        self.next += 1;
+        let id = self.next;
+        self.port.write_all(&request_frame(id, self.boot, request)).expect("the port takes bytes");
+        self.wait(|packet| {
+            answer_in(packet).filter(|(answered, _)| *answered == id).map(|(_, answer)| answer)
+        })
+    }
+
+    fn carry_out(&mut self, request: &Request) -> EventKind {
+        assert_eq!(self.ask(request), Ok(Response::Accepted));
+        self.wait(|packet| {
+            let event: Event = (packet.header.kind == Kind::Event).then(|| packet.message())??;
+            let ended = !matches!(event.kind, EventKind::Started { .. } | EventKind::ShotDone { .. });
+            ended.then_some(event.kind)
+        })
+    }
+}
+
+fn receive_frame(camera: &mut TcpStream) -> (FrameHeader, Vec<u8>) {
+    let mut length = [0; 4];
+    camera.read_exact(&mut length).expect("a frame");
+    let mut header = [0; FRAME_HEADER];
+    camera.read_exact(&mut header).expect("a header");
+    let mut pixels = vec![0; u32::from_le_bytes(length) as usize - FRAME_HEADER];
+    camera.read_exact(&mut pixels).expect("pixels");
+    (FrameHeader::from_bytes(&header).expect("a valid header"), pixels)
+}
+
+/// Homes, goes to the far focus, exposes far and near; gives both frames.
+fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
+    let mut client = Client::open(&program.port);
+    let homed = client.carry_out(&Request::Home { axis: Axis::SensorCoarse });
+    assert!(matches!(homed, EventKind::Homed { .. }), "{homed:?}");
+    let target = Nanometres(5_821_300);
+    let moved = client.carry_out(&Request::Move { axis: Axis::SensorCoarse, target });
+    assert!(matches!(moved, EventKind::MoveDone { .. }), "{moved:?}");
+    for (index, target) in [(0, 10_000), (1, 166_270)] {
+        let shot = Shot {
+            axis: Axis::SensorFine,
+            target: Nanometres(target),
+            exposure: Micros(5_000),
+            settle_window: Nanometres(50),
+            settle_dwell: Micros(2_000),
+            repeat: 1,
+        };
+        assert_eq!(client.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
+    }
+    let done = client.carry_out(&Request::RunProgram { shots: 2 });
+    assert!(matches!(done, EventKind::ProgramDone { exposures: 2, .. }), "{done:?}");
+    // The frames have waited for us.
+    let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
+    camera.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+    (0..2).map(|_| receive_frame(&mut camera)).collect()
+}
+
+#[test]
+fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
+    let arguments = ["--scene", "staircase", "--noise", "8bit", "--seed", "3"];
+    let program = Program::start(&arguments);
+    let first = capture(&program);
+    assert!(program.end().success());
+    assert_eq!((first[0].0.width, first[0].0.height, first[0].0.bits), (640, 480, 8));
+    assert_eq!([first[0].0.shot_id, first[1].0.shot_id], [0, 1]);
+    assert_ne!(first[0].1, first[1].1, "far and near look alike");
+    let program = Program::start(&arguments);
+    let second = capture(&program);
+    assert!(program.end().success());
+    assert!(first == second, "two programs with one seed differ");
+}
+
+#[test]
+fn garbage_comes_first_and_the_port_goes_away_in_mid_move() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let faults = folder.path().join("faults.toml");
+    std::fs::write(&faults, "garbage = [1, 255, 0, 66, 7]\nunplug_after_ms = 1000\n").expect("can write");
+    let program = Program::start(&["--faults", faults.to_str().expect("text")]);
+    let mut client = Client::open(&program.port);
+    assert_eq!(client.ask(&Request::Home { axis: Axis::SensorCoarse }), Ok(Response::Accepted));
+    let deadline = Instant::now() + PATIENCE;
+    let mut bytes = [0; 64];
+    let gone = loop {
+        assert!(Instant::now() < deadline, "the port is still there");
+        match client.port.read(&mut bytes) {
+            Err(error) if error.kind() != std::io::ErrorKind::TimedOut => break error,
+            _ => {}
+        }
+    };
+    println!("the client sees: {gone}");
+    assert!(!Path::new(&program.port).exists(), "its name has gone, too");
+    assert!(program.end().success());
+}
+
+#[test]
+fn a_missing_firmware_names_the_command_that_builds_it() {
+    let output = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+        .args(["run", "--firmware", "no/such.elf"])
+        .output()
+        .expect("starts");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && output.stdout.is_empty());
+    assert!(message.contains("no/such.elf") && message.contains("cargo xtask firmware"), "{message}");
+}
+
+#[test]
+fn a_file_that_is_no_firmware_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let elf = folder.path().join("no.elf");
+    for content in [&b"this is no ELF"[..], b""] {
+        std::fs::write(&elf, content).expect("can write");
+        let output = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+            .args(["run", "--firmware", elf.to_str().expect("text")])
+            .output()
+            .expect("starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{message}");
+        assert!(message.contains("no.elf"), "{message}");
+    }
+}
