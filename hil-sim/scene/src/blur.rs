@@ -1,28 +1,31 @@
-//! The blurred scene on the sensor: every texture cell spreads by its own blur, nearer surfaces hide farther ones.
+//! The blurred scene on the sensor: every texture cell spreads by its own blur, nearer surfaces hide
+//! farther ones.
 //!
 //! # What is computed
 //!
-//! *Scatter.* Each cell (half a pixel square, constant radiance) adds its light to the pixels around it with the weights of
-//! the [kernel](crate::kernel) of its own blur radius. For one plane this is the exact convolution.
+//! *Scatter.* Each cell (half a pixel square, constant radiance) adds its light to the pixels around it
+//! with the weights of the [kernel](crate::kernel) of its own blur radius. For one plane this is the exact
+//! convolution.
 //!
 //! *Occlusion.* Cells are grouped into slabs of the signed blur, nearest first. A slab gives each pixel
-//! light `L` and cover `C` (the same sum with radiance 1). Front to back, a pixel takes `L` while its aperture is not
-//! yet full; the slab that would overfill it gives its mean `L / C` for the rest that is left open. So a surface of uniform
-//! radiance looks uniform whatever its shape (radiance is conserved along rays), a sharp near edge stays sharp before a blurred
-//! background, and what a near edge hides is filled in with the mean of what is visible beside it.
-//! Within the blur radius of a depth step this is an approximation (the exact image there depends on which
-//! part of the aperture sees past the edge); `tests/exact.rs` states its size against ray casting.
+//! light `L` and cover `C` (the same sum with radiance 1). Front to back, a pixel takes `L` while its
+//! aperture is not yet full; the slab that would overfill it gives its mean `L / C` for the rest that is
+//! left open. So a surface of uniform radiance looks uniform whatever its shape (radiance is conserved
+//! along rays), a sharp near edge stays sharp before a blurred background, and what a near edge hides is
+//! filled in with the mean of what is visible beside it. Within the blur radius of a depth step this is an
+//! approximation (the exact image there depends on which part of the aperture sees past the edge);
+//! `tests/exact.rs` states its size against ray casting.
 //!
-//! *Levels.* Up to [`MAX_EXACT_LEVELS`] different depths have a slab with its exact kernel each. A continuous surface
-//! has slabs of [`SLAB_PX`] blur, in which kernels are tabulated every [`LEVEL_PX`] and interpolated linearly in the
-//! square of the radius, which keeps the second moment exact.
+//! *Levels.* Up to [`MAX_EXACT_LEVELS`] different depths have a slab with its exact kernel each. A
+//! continuous surface has slabs of [`SLAB_PX`] blur, in which kernels are tabulated every [`LEVEL_PX`] and
+//! interpolated linearly in the square of the radius, which keeps the second moment exact.
 //!
 //! # Cost
-//! Cells times the kernel's pixels, twice (light and cover; a plane has full cover and needs one): 20 to 150 ms for
-//! 640 x 480 at 2.7 px. Kernels wider than [`MAX_DIRECT_PX`] go through the FFT as one slab, [`crate::blur`]'s
-//! levels being spaced by [`LEVEL_RATIO`] of the radius: seconds, but a rig is there only while it homes.
+//! Cells times the kernel's pixels, twice (light and cover; a plane has full cover and needs one): 20 to
+//! 150 ms for 640 x 480 at 2.7 px. Kernels wider than [`MAX_DIRECT_PX`] go through the FFT as one slab with
+//! levels spaced by [`LEVEL_RATIO`] of the radius: up to a second, but a rig is there only while it homes.
 
-use ndarray::{Array2, s};
+use ndarray::Array2;
 use rustfft::num_complex::Complex32;
 
 use crate::fourier::{Fourier2, good_size};
@@ -140,7 +143,8 @@ impl Cells {
         }
     }
 
-    /// The same with kernel rows of `LANES` pixels, zero beyond the kernel, so that the compiler unrolls them.
+    /// The same with kernel rows of `LANES` pixels, zero beyond the kernel, so that the compiler unrolls
+    /// them.
     fn scatter_lanes<const LANES: usize>(
         &self,
         psf: &Psf,
@@ -391,6 +395,6 @@ impl Composite {
     /// The image; what rounding or the spread of slopes left open is scaled away.
     fn finish(mut self) -> Array2<f32> {
         self.light.zip_mut_with(&self.open, |light, open| *light /= (1.0 - open).max(f32::MIN_POSITIVE));
-        self.light.slice(s![.., ..]).to_owned()
+        self.light
     }
 }

@@ -1,8 +1,9 @@
 //! From irradiance to codes: the camera's size, its electrons and its quantisation.
 //!
 //! A pixel of mean scene radiance collects `exposure_level` of the full well on average. Each pixel draws a
-//! Poisson number of electrons (shot noise), gets normal read noise, is limited to 0..full well and rounded to the
-//! camera's codes, the largest code being the full well (Janesick, Photon Transfer, 2007, ch. 3). Costs about 0.1 us a pixel.
+//! Poisson number of electrons (shot noise), gets normal read noise, is limited to 0..full well and rounded
+//! to the camera's codes, the largest code being the full well (Janesick, Photon Transfer, 2007, ch. 3).
+//! Costs about 0.1 us a pixel.
 
 use std::fmt;
 use std::str::FromStr;
@@ -209,7 +210,8 @@ mod tests {
                 let expected_mean = f64::from(radiance) * 9_000.0;
                 let code_e = 20_000.0 / f64::from(noise.max_code());
                 let expected_variance = expected_mean + 12.0 * 12.0 + code_e * code_e / 12.0;
-                // 200,000 pixels: the mean to 0.22 %, the variance to 0.32 % of the standard deviation and variance (1 SD).
+                // 200,000 pixels: the mean to 0.22 %, the variance to 0.32 % of the standard deviation and
+                // variance (1 SD).
                 assert!(
                     (mean - expected_mean).abs() < 0.01 * expected_variance.sqrt(),
                     "{noise} {radiance} {mean}"

@@ -1,7 +1,7 @@
 //! Two-dimensional FFTs on row-major arrays, for texture synthesis and very large blur.
 //!
-//! rustfft's scalar planner is used on purpose: its vector planners round differently from CPU to CPU, and a seed
-//! must give the same image everywhere.
+//! rustfft's scalar planner is used on purpose: its vector planners round differently from CPU to CPU, and
+//! a seed must give the same image everywhere.
 
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex32;

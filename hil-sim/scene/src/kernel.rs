@@ -1,16 +1,16 @@
 //! PSFs integrated over texture cells and pixels: the weights with which the scene reaches the sensor.
 //!
-//! A texture cell is a square of half a pixel with constant radiance. Lengths here are in cells. The mean of
-//! the blurred scene over a cell-sized square at the offset `d` from a cell of radiance 1 is
-//! `V(d) = integral psf(x) tri(x - d_x) tri(y - d_y) dx dy`, where `tri(t) = max(0, 1 - |t|)` is the overlap of two
-//! squares; a pixel is the mean of its four cells. So the weights are exact for the stated model: no sampling of
-//! the PSF enters.
+//! A texture cell is a square of half a pixel with constant radiance. Lengths here are in cells. The mean
+//! of the blurred scene over a cell-sized square at the offset `d` from a cell of radiance 1 is `V(d) =
+//! integral psf(x) tri(x - d_x) tri(y - d_y) dx dy`, where `tri(t) = max(0, 1 - |t|)` is the overlap of two
+//! squares; a pixel is the mean of its four cells. So the weights are exact for the stated model: no
+//! sampling of the PSF enters.
 //!
-//! * Pill-box: the inner integral over y is a polynomial in the height of the disc, the outer one over x is split at
-//!   every kink and, with `x = R sin t`, integrated by Gauss-Legendre to rounding.
+//! * Pill-box: the inner integral over y is a polynomial in the height of the disc, the outer one over x is
+//!   split at every kink and, with `x = R sin t`, integrated by Gauss-Legendre to rounding.
 //! * Gaussian: closed form in the error function.
-//! * Generalised Gaussian: Gauss-Legendre over the smooth parts; near the centre, where `f` has a cusp for `p < 2`, as a
-//!   mixture of discs, `f(r) = integral of -f'(R) [r < R] dR`.
+//! * Generalised Gaussian: Gauss-Legendre over the smooth parts; near the centre, where `f` has a cusp for
+//!   `p < 2`, as a mixture of discs, `f(r) = integral of -f'(R) [r < R] dR`.
 //!
 //! Tails beyond `exp(-12)` of the peak are cut and the kernel is normalised to 1.
 //! Cost: 10 us (pill-box, 2.7 px) to 1 ms (generalised) a kernel, growing with the square of the radius.
@@ -225,12 +225,13 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    const PSFS: [&str; 5] = [
+    const PSFS: [&str; 6] = [
         "pillbox",
         "gaussian:k=0.4578",
         "generalised:p=1.8,k=0.4802",
         "generalised:p=0.7,k=0.2",
         "generalised:p=8,k=0.7",
+        "generalised:p=64,k=0.95",
     ];
 
     #[test]
@@ -244,9 +245,17 @@ mod tests {
                 offsets().map(|(x, y)| disc_weight(x, y, radius)).sum::<f64>() / (PI * radius * radius);
             assert!((disc - 1.0).abs() < 1e-11, "disc of {radius}: {disc}");
         }
-        for (p, sigma) in
-            [(1.8, 0.05), (1.8, 0.7), (1.8, 2.6), (0.7, 0.5), (0.7, 3.0), (8.0, 0.4), (8.0, 9.0)]
-        {
+        for (p, sigma) in [
+            (1.8, 0.05),
+            (1.8, 0.7),
+            (1.8, 2.6),
+            (0.7, 0.5),
+            (0.7, 3.0),
+            (8.0, 0.4),
+            (8.0, 9.0),
+            (64.0, 1.0),
+            (64.0, 4.0),
+        ] {
             let profile = Profile { p, sigma };
             let reach = profile.radius_at(26.0).ceil() as i32 + 1;
             let sum: f64 = (-reach..=reach)
@@ -310,7 +319,8 @@ mod tests {
 
     #[test]
     fn second_moment_is_the_psfs_plus_that_of_two_cells() {
-        // Two unit squares have 1/6 in each direction; sampling at cells adds a ripple that fades with the blur.
+        // Two unit squares have 1/6 in each direction; sampling at cells adds a ripple that fades with the
+        // blur.
         for text in PSFS {
             let psf: Psf = text.parse().unwrap();
             let (blur_px, cells) = (2.703, CELLS_PER_PIXEL as f64);

@@ -1,9 +1,9 @@
 //! The image-side telecentric thin lens: which blur an object distance gives at a sensor position.
 //!
-//! Distances in mm from the lens: `u` on the object side, `w` and `s` on the image side.
-//! `1/F = 1/u + 1/w`; the blur radius on the sensor is `|s - w(u)| D / 2F` because the telecentric aperture
-//! sits in the front focal plane, so every cone of light has the half-angle of the f-number `F/D` whatever the
-//! object distance, and the magnification does not depend on `s` (Watanabe & Nayar 1997).
+//! Distances in mm from the lens: `u` on the object side, `w` and `s` on the image side. `1/F = 1/u + 1/w`;
+//! the blur radius on the sensor is `|s - w(u)| D / 2F` because the telecentric aperture sits in the front
+//! focal plane, so every cone of light has the half-angle of the f-number `F/D` whatever the object
+//! distance, and the magnification does not depend on `s` (Watanabe & Nayar 1997).
 
 use thiserror::Error;
 

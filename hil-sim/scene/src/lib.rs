@@ -12,8 +12,8 @@
 //! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind
 //!    the lens, a sensor at `s` sees it blurred with radius `|s - w| D / 2F`, and moving the sensor does not
 //!    change the magnification.
-//! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its own blur radius, integrated over the cell and over the pixel
-//!    ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
+//! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its own blur radius, integrated over the cell and
+//!    over the pixel ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
 //! 4. **Exposure.** Electrons, shot noise, read noise, full well, quantisation ([`camera`]).
 //!
 //! [`render()`] makes one exposure; [`Renderer`] keeps the texture for many. Everything is a function of its

@@ -32,7 +32,8 @@ impl Picture {
     /// Takes radiances of 0 or more in any unit.
     ///
     /// # Errors
-    /// [`SceneError::Empty`], [`SceneError::MapValue`] and [`SceneError::Black`] name what no picture can have.
+    /// [`SceneError::Empty`], [`SceneError::MapValue`] and [`SceneError::Black`] name what no picture can
+    /// have.
     pub fn new(mut radiance: Array2<f32>) -> Result<Self, SceneError> {
         check("texture", &radiance, "a finite radiance of 0 or more", |value| value >= 0.0)?;
         let mean = radiance.iter().map(|&value| f64::from(value)).sum::<f64>() / radiance.len() as f64;

@@ -10,7 +10,7 @@ use thiserror::Error;
 use crate::lens::image_distance_mm;
 use crate::psf::{Psf, PsfError};
 
-/// Largest relative disagreement of a given `max_blur_px` with the one that `near_mm` implies.
+/// Largest relative disagreement of two values that follow from each other.
 const AGREEMENT: f64 = 0.02;
 
 /// The contents of `optics.toml`, checked.
@@ -46,11 +46,21 @@ pub enum OpticsError {
         /// What the file says.
         value: f64,
     },
-    /// Neither or both of `aperture_mm` and `f_number`.
-    #[error("optics: [lens] needs exactly one of aperture_mm and f_number, found {found}")]
-    Aperture {
-        /// `neither` or `both`.
-        found: &'static str,
+    /// Neither `aperture_mm` nor `f_number`.
+    #[error("optics: [lens] needs aperture_mm or f_number")]
+    NoAperture,
+    /// `aperture_mm` and `f_number` contradict each other.
+    #[error(
+        "optics: aperture_mm = {aperture_mm} and f_number = {f_number} disagree by more than 2 %: that aperture \
+         has f_number = {implied}"
+    )]
+    ApertureDisagreement {
+        /// `aperture_mm` in the file.
+        aperture_mm: f64,
+        /// `f_number` in the file.
+        f_number: f64,
+        /// The f-number of that aperture.
+        implied: f64,
     },
     /// An object inside the focal length has no image.
     #[error(
@@ -97,8 +107,9 @@ pub enum OpticsError {
 }
 
 impl OpticsFile {
-    /// Reads and checks the text of an `optics.toml`. Where both `near_mm` and `max_blur_px` are given,
-    /// `near_mm` is kept and the blur computed from it.
+    /// Reads and checks the text of an `optics.toml`. Where both `near_mm` and `max_blur_px` are given, the
+    /// blur is kept and the near focus computed from it; of `aperture_mm` and `f_number` the latter is
+    /// kept.
     ///
     /// # Errors
     /// [`OpticsError`] names the key, its value and what was expected.
@@ -109,8 +120,15 @@ impl OpticsFile {
         let aperture_mm = match (raw.lens.aperture_mm, raw.lens.f_number) {
             (Some(aperture_mm), None) => positive("lens.aperture_mm", aperture_mm)?,
             (None, Some(f_number)) => focal_length_mm / positive("lens.f_number", f_number)?,
-            (None, None) => return Err(OpticsError::Aperture { found: "neither" }),
-            (Some(_), Some(_)) => return Err(OpticsError::Aperture { found: "both" }),
+            (None, None) => return Err(OpticsError::NoAperture),
+            (Some(aperture_mm), Some(f_number)) => {
+                positive("lens.f_number", f_number)?;
+                let implied = focal_length_mm / positive("lens.aperture_mm", aperture_mm)?;
+                if (f_number - implied).abs() > AGREEMENT * implied {
+                    return Err(OpticsError::ApertureDisagreement { aperture_mm, f_number, implied });
+                }
+                focal_length_mm / f_number
+            }
         };
         let pixel_um = positive("sensor.pixel_um", raw.sensor.pixel_um)?;
         let far_mm = positive("focus.far_mm", raw.focus.far_mm)?;
@@ -136,19 +154,22 @@ impl OpticsFile {
                 }
                 let implied_px =
                     (image_distance_mm(focal_length_mm, near_mm) - sensor_far_mm) / travel_per_blur_mm;
-                if let Some(given_px) = given_px {
-                    positive("focus.max_blur_px", given_px)?;
-                    if (given_px - implied_px).abs() > AGREEMENT * implied_px {
+                match given_px {
+                    None => (near_mm, implied_px),
+                    Some(given_px) => {
+                        positive("focus.max_blur_px", given_px)?;
                         let implied_near_mm = near_of(given_px);
-                        return Err(OpticsError::Disagreement {
-                            given_px,
-                            near_mm,
-                            implied_px,
-                            implied_near_mm,
-                        });
+                        if (given_px - implied_px).abs() > AGREEMENT * implied_px {
+                            return Err(OpticsError::Disagreement {
+                                given_px,
+                                near_mm,
+                                implied_px,
+                                implied_near_mm,
+                            });
+                        }
+                        (implied_near_mm, given_px)
                     }
                 }
-                (near_mm, implied_px)
             }
         };
         let psf = raw.psf.map(|psf| Psf::from_parts(&psf.model, psf.p, psf.k)).transpose()?;
@@ -239,7 +260,8 @@ mod tests {
         let text = "[lens]\nfocal_length_mm = 25.0\nf_number = 8.3\n[sensor]\npixel_um = 13.04\n\
                     [focus]\nfar_mm = 869.0\nnear_mm = 529.0\nmax_blur_px = 2.307\n[psf]\nmodel = \"pillbox\"";
         let optics = OpticsFile::parse(text).unwrap();
-        assert!((optics.max_blur_px - 2.307).abs() < 1e-3, "{}", optics.max_blur_px);
+        assert_eq!(optics.max_blur_px, 2.307);
+        assert!((optics.near_mm - 529.0).abs() < 0.1, "{}", optics.near_mm);
         assert_eq!(optics.psf, Some(Psf::PillBox));
     }
 
@@ -265,8 +287,8 @@ mod tests {
             ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 12.0", "focus.near_mm = 12"),
             ("aperture_mm = 12.8", "far_mm = nan\nmax_blur_px = 2.7", "focus.far_mm = NaN"),
             ("aperture_mm = 12.8", "far_mm = 933.0", "max_blur_px or near_mm"),
-            ("", "far_mm = 933.0\nmax_blur_px = 2.7", "found neither"),
-            ("aperture_mm = 12.8\nf_number = 4.0", "far_mm = 933.0\nmax_blur_px = 2.7", "found both"),
+            ("", "far_mm = 933.0\nmax_blur_px = 2.7", "aperture_mm or f_number"),
+            ("aperture_mm = 12.8\nf_number = 4.0", "far_mm = 933.0\nmax_blur_px = 2.7", "f_number = 3.90625"),
             ("aperture = 12.8", "far_mm = 933.0\nmax_blur_px = 2.7", "unknown field `aperture`"),
         ];
         for (lens, focus, expected) in cases {

@@ -2,9 +2,9 @@
 //!
 //! * Pill-box: constant over the disc of radius `R`, the image of a round aperture.
 //! * Gaussian: standard deviation `sigma = k R` in each direction.
-//! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`, `sigma = k R`
-//!   (Claxton & Staunton 2008; the constant here is that of the plane, Li 2014, eq. 5.16 has that of the
-//!   line). At `p = 2` it is the Gaussian; for other `p` sigma is a scale, not the standard deviation.
+//! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`, `sigma
+//!   = k R` (Claxton & Staunton 2008; the constant here is that of the plane, Li 2014, eq. 5.16 has that of
+//!   the line). At `p = 2` it is the Gaussian; for other `p` sigma is a scale, not the standard deviation.
 //!
 //! Radii and scales in any one unit; the functions here have no sampling in them.
 
@@ -14,8 +14,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// Shape parameters beyond these leave the region in which the kernel's quadrature is accurate to 1e-6.
-const P_RANGE: std::ops::RangeInclusive<f64> = 0.5..=20.0;
+/// Below, the tails reach over hundreds of pixels; above, it is a pill-box to three digits.
+const P_RANGE: std::ops::RangeInclusive<f64> = 0.5..=64.0;
 const K_RANGE: std::ops::RangeInclusive<f64> = 0.01..=10.0;
 
 /// Shape of the blur; its size comes from the blur radius. Text form as in [`Psf::from_str`].

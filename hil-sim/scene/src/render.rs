@@ -53,8 +53,8 @@ pub enum RenderError {
 
 /// Renders one exposure: codes of shape (height, width), 0 to [`Noise::max_code`](crate::Noise::max_code).
 ///
-/// `sensor_distance_mm` is the distance of the sensor from the lens. The texture depends on `seed`, the noise on
-/// `seed` and `exposure_number`. To render many exposures of a scene keep a [`Renderer`].
+/// `sensor_distance_mm` is the distance of the sensor from the lens. The texture depends on `seed`, the
+/// noise on `seed` and `exposure_number`. To render many exposures of a scene keep a [`Renderer`].
 ///
 /// # Errors
 /// [`RenderError`] where lens, scene, camera or position make no image.
@@ -70,8 +70,8 @@ pub fn render(
     Renderer::new(scene, lens, psf, camera, seed)?.expose(sensor_distance_mm, exposure_number)
 }
 
-/// Renders the light of an exposure without noise, quantisation and full well: shape (height, width), as a fraction of the
-/// full well ([`Camera::exposure_level`] on average).
+/// Renders the light of an exposure without noise, quantisation and full well: shape (height, width), as a
+/// fraction of the full well ([`Camera::exposure_level`] on average).
 ///
 /// # Errors
 /// As [`render`].

@@ -1,8 +1,9 @@
 //! Scenes: a height field over the image and what it is painted with.
 //!
-//! Depths in mm from the lens. The lens is telecentric, so a place of the surface keeps its image position whatever
-//! its depth, and the height field lives in image coordinates (px, the centre of the first pixel at 0.5, 0.5). Named
-//! shapes span the lens's working range exactly, far focus to near focus; outside the image they go on.
+//! Depths in mm from the lens. The lens is telecentric, so a place of the surface keeps its image position
+//! whatever its depth, and the height field lives in image coordinates (px, the centre of the first pixel
+//! at 0.5, 0.5). Named shapes span the lens's working range exactly, far focus to near focus; outside the
+//! image they go on.
 
 use thiserror::Error;
 
@@ -37,10 +38,11 @@ pub enum Shape {
     },
     /// A plane tilted about the vertical, far focus at the left border, near focus at the right one.
     Slant,
-    /// A cone towards the camera: near focus at the tip in the image's centre, far focus from half the image's
-    /// larger side outwards.
+    /// A cone towards the camera: near focus at the tip in the image's centre, far focus from half the
+    /// image's larger side outwards.
     Cone,
-    /// A cap of 60 degrees half-angle of a ball, stretched along the axis to span the range; as wide as the cone.
+    /// A cap of 60 degrees half-angle of a ball, stretched along the axis to span the range; as wide as the
+    /// cone.
     Sphere,
     /// A height field given as an array, stretched over the image.
     HeightMap(HeightMap),

@@ -63,7 +63,8 @@ impl SceneFile {
         Ok(Self { depth: raw.depth, texture, scene, random, contrast: raw.contrast })
     }
 
-    /// The scene, given the maps that [`SceneFile::depth`] (mm) and [`SceneFile::texture`] (any radiance) name.
+    /// The scene, given the maps that [`SceneFile::depth`] (mm) and [`SceneFile::texture`] (any radiance)
+    /// name.
     ///
     /// # Errors
     /// [`SceneError`] if a map is missing, surplus or holds what it cannot.

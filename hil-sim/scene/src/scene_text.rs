@@ -81,7 +81,8 @@ impl FromStr for Texture {
 }
 
 impl fmt::Display for Scene {
-    /// The text that parses to this scene; height maps and pictures, which have none, are called by these names.
+    /// The text that parses to this scene; height maps and pictures, which have none, are called by these
+    /// names.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.shape {
             Shape::Plane { depth_mm } => write!(f, "plane:{depth_mm}")?,

@@ -1,10 +1,10 @@
 //! Random textures: what the surfaces of a scene are painted with.
 //!
-//! A texture is a Gaussian random field of a stated spectrum with two samples per pixel, mean 1, standard deviation =
-//! contrast, clipped to 0.2..1.8. It repeats with a period that is at least 64 px larger than the image, so within an image
-//! nothing repeats and every surface goes on beyond the border however large the blur is.
-//! A texture depends on the seed and the image size alone.
-//! Cost: one FFT of the period, 0.1 s for 640 x 480.
+//! A texture is a Gaussian random field of a stated spectrum with two samples per pixel, mean 1, standard
+//! deviation = contrast, clipped to 0.2..1.8. It repeats with a period that is at least 64 px larger than
+//! the image, so within an image nothing repeats and every surface goes on beyond the border however large
+//! the blur is. A texture depends on the seed and the image size alone. Cost: one FFT of the period, 0.1 s
+//! for 640 x 480.
 
 use std::fmt;
 
@@ -26,7 +26,8 @@ const CLIP: (f32, f32) = (0.2, 1.8);
 /// What a surface is painted with.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Texture {
-    /// White noise blurred by a Gaussian of SD 0.5 px, plus 1/f noise (0.954 and 0.3 of the standard deviation).
+    /// White noise blurred by a Gaussian of SD 0.5 px, plus 1/f noise (0.954 and 0.3 of the standard
+    /// deviation).
     Sand,
     /// Amplitude 1/f, flat below one cycle per 64 px.
     Fractal,
@@ -75,7 +76,8 @@ impl Spectrum {
         let (height, width) = (period(height_px), period(width_px));
         let amplitude = self.amplitudes(height, width);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        // The real part of a field with independent complex coefficients is a real Gaussian field of that spectrum.
+        // The real part of a field with independent complex coefficients is a real Gaussian field of that
+        // spectrum.
         let mut field: Vec<Complex32> = amplitude
             .iter()
             .map(|amplitude| {
@@ -163,13 +165,15 @@ mod tests {
     #[test]
     fn sand_is_fine_grain_and_fractal_is_coarse() {
         let sand = Spectrum::Sand.synthesise(320, 240, 0.2, 4);
-        // Blurred white noise falls by exp(-(2 pi f 0.5)^2) in power: by 10.2 from 0.2 to 0.52 cycles per px, a sum over
-        // one direction; the 1/f part matters below. A band of 608 rows has a standard error of 4 %.
+        // Blurred white noise falls by exp(-(2 pi f 0.5)^2) in power: by 10.2 from 0.2 to 0.52 cycles per
+        // px, a sum over one direction; the 1/f part matters below. A band of 608 rows has a standard error
+        // of 4 %.
         let ratio = row_power(&sand, 0.2) / row_power(&sand, 0.52);
         let expected = (std::f64::consts::PI.powi(2) * (0.52f64.powi(2) - 0.2f64.powi(2))).exp();
         assert!((ratio / expected - 1.0).abs() < 0.35, "{ratio} {expected}");
         let fractal = Spectrum::Fractal.synthesise(320, 240, 0.2, 4);
-        // Amplitude 1/f in the plane is power f^-1 along a line: 8 for a ratio of 8, with the plane's limit taking some.
+        // Amplitude 1/f in the plane is power f^-1 along a line: 8 for a ratio of 8, with the plane's limit
+        // taking some.
         let ratio = row_power(&fractal, 0.05) / row_power(&fractal, 0.4);
         assert!((8.0..14.0).contains(&ratio), "{ratio}");
     }

@@ -1,7 +1,8 @@
 //! The renderer against ray casting, which shares no formula with it.
 //!
-//! Differences are given relative to the mean radiance; one 8-bit code is 8.7e-3 there. The ray caster's own error with the rays
-//! used here is 1e-4 RMS on planes and 3 to 6e-4 on slopes; where a bound is not larger, the renderer's error does not show.
+//! Differences are given relative to the mean radiance; one 8-bit code is 8.7e-3 there. The ray caster's
+//! own error with the rays used here is 1e-4 RMS on planes and 3 to 6e-4 on slopes; where a bound is not
+//! larger, the renderer's error does not show.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
@@ -21,7 +22,8 @@ fn thesis_lens() -> Lens {
     Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap()
 }
 
-/// White noise per cell, the hardest texture: mean 1, SD 0.2, no correlation that could hide a misplaced weight.
+/// White noise per cell, the hardest texture: mean 1, SD 0.2, no correlation that could hide a misplaced
+/// weight.
 fn noise(camera: &Camera) -> Array2<f32> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let half_width = 0.2 * 3f32.sqrt();
@@ -132,7 +134,8 @@ fn the_distorted_field_is_exact_to_a_thousandth() {
 
 #[test]
 fn a_steep_cone_stays_within_half_a_percent() {
-    // The whole range within twelve pixels, 0.11 px of blur per pixel, forty times steeper than in a full image.
+    // The whole range within twelve pixels, 0.11 px of blur per pixel, forty times steeper than in a full
+    // image.
     let (lens, camera) = (thesis_lens(), Camera::new(48, 32, Noise::None));
     for psf in PSFS {
         let check = Check { scene: "cone", psf, lens: &lens, camera: &camera, sensor_mm: lens.sensor_far_mm };

@@ -76,7 +76,8 @@ fn a_uniform_surface_looks_uniform_whatever_its_shape() {
 
 #[test]
 fn a_sharp_near_edge_stays_sharp_before_a_blurred_background() {
-    // Near half in focus, far half blurred: the near pixels beside the edge must not take the background's light.
+    // Near half in focus, far half blurred: the near pixels beside the edge must not take the background's
+    // light.
     let (lens, camera) = (thesis_lens(), Camera::new(40, 16, Noise::None));
     let two = scene("staircase,steps=2");
     let near = scene(&format!("plane:{}", lens.near_mm));

@@ -1,9 +1,10 @@
 //! The slow exact renderer: rays from a pixel through the aperture to the first surface they meet.
 //!
-//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray that, where the
-//! signed blur radius is `b`, lies at the image position `p + b a`. A height field is met at the first `b`, coming
-//! from the lens (near, small `b`), with `b >= b_surface(p + b a)`. What the ray meets at `x` has the radiance of the texture at
-//! `x`; walls of steps too. Nothing here is a convolution and no kernel, slab or interpolation is shared with the crate.
+//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray that, where
+//! the signed blur radius is `b`, lies at the image position `p + b a`. A height field is met at the first
+//! `b`, coming from the lens (near, small `b`), with `b >= b_surface(p + b a)`. What the ray meets at `x`
+//! has the radiance of the texture at `x`; walls of steps too. Nothing here is a convolution and no kernel,
+//! slab or interpolation is shared with the crate.
 
 use farnear_scene::{Lens, Psf, Scene};
 use ndarray::Array2;
