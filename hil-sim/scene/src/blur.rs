@@ -3,7 +3,7 @@
 //!
 //! # What is computed
 //!
-//! *Scatter.* Each cell (half a pixel square, constant radiance) adds its light to the pixels around it
+//! *Scatter.* Each texture sample (one per cell of half a pixel) adds its light to the pixels around it
 //! with the weights of the [kernel](crate::kernel) of its own blur radius. For one plane this is the exact
 //! convolution.
 //!

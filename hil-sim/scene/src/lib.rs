@@ -8,7 +8,7 @@
 //! # The model
 //!
 //! 1. **Surface.** A height field over the image ([`scene`]), painted with a texture at two samples
-//!    per pixel ([`texture`]); a sample is a square cell of half a pixel with constant radiance.
+//!    per pixel ([`texture`]); radiance is bilinear between samples.
 //! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind
 //!    the lens, a sensor at `s` sees it blurred with radius `|s - w| D / 2F`, and moving the sensor does not
 //!    change the magnification.

@@ -15,7 +15,7 @@ pub struct RayCaster<'a> {
     pub blur_px: Box<dyn Fn(f64, f64) -> f64 + 'a>,
     /// Least and largest signed blur radius of the surface.
     pub range_px: (f64, f64),
-    /// Radiance in cells of half a pixel; mirrored beyond the borders.
+    /// Radiance at the centres of cells of half a pixel; linear between, mirrored beyond the borders.
     pub texture: &'a Array2<f32>,
     /// Radii in the aperture at evenly spaced quantiles.
     pub radial_quantiles: Vec<f64>,
@@ -112,10 +112,19 @@ impl RayCaster<'_> {
 
     fn radiance(&self, x: f64, y: f64) -> f64 {
         let (height, width) = self.texture.dim();
-        let fold = |position: f64, size: usize| {
-            let cell = ((2.0 * position).floor() as i64).rem_euclid(2 * size as i64) as usize;
+        let fold = |cell: f64, size: usize| {
+            let cell = (cell as i64).rem_euclid(2 * size as i64) as usize;
             cell.min(2 * size - 1 - cell)
         };
-        f64::from(self.texture[[fold(y, height), fold(x, width)]])
+        // Linear between the centres of cells.
+        let (column, row) = (2.0 * x - 0.5, 2.0 * y - 0.5);
+        let (left, top) = (column.floor(), row.floor());
+        let mut sum = 0.0;
+        for (i, row_share) in [(top, 1.0 - (row - top)), (top + 1.0, row - top)] {
+            for (j, column_share) in [(left, 1.0 - (column - left)), (left + 1.0, column - left)] {
+                sum += f64::from(self.texture[[fold(i, height), fold(j, width)]]) * row_share * column_share;
+            }
+        }
+        sum
     }
 }
