@@ -48,6 +48,9 @@ pub fn start() -> Peripherals {
     })
 }
 
+// Each log line carries the board's time.
+defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
+
 /// The board's time.
 pub fn now() -> BoardMicros {
     BoardMicros(Instant::now().as_micros())

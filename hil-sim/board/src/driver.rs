@@ -135,6 +135,7 @@ pub struct Driver {
     faults: Faults,
     trace: Option<Trace>,
     told_ns: u64,
+    held: Vec<u8>,
     told: Vec<Sender<Report>>,
     settling: Vec<Sender<Report>>,
     resets: usize,
@@ -167,6 +168,7 @@ impl Driver {
             faults: config.faults.clone(),
             trace,
             told_ns: 0,
+            held: Vec::new(),
             told: Vec::new(),
             settling: Vec::new(),
             resets: 0,
@@ -240,11 +242,11 @@ impl Driver {
         host: &mut dyn Host,
     ) -> bool {
         match command {
-            Command::Bytes(mut bytes) => {
-                if self.outlets.bytes.is_some() {
-                    self.lockstep.sent(&bytes, stop.at.0);
-                    self.to_board.carry(&mut bytes);
-                    self.line.send(&bytes);
+            Command::Bytes(bytes) => {
+                // What comes while time passes on request comes after it, however fast the host is.
+                self.held.extend(bytes);
+                if stop.at.0 >= self.told_ns {
+                    self.send_held(stop.at.0);
                 }
             }
             Command::Advance { nanos, done } => {
@@ -262,6 +264,16 @@ impl Driver {
         true
     }
 
+    /// Puts on the line what came for the board.
+    fn send_held(&mut self, now_ns: u64) {
+        let mut bytes = std::mem::take(&mut self.held);
+        if self.outlets.bytes.is_some() {
+            self.lockstep.sent(&bytes, now_ns);
+            self.to_board.carry(&mut bytes);
+            self.line.send(&bytes);
+        }
+    }
+
     /// Whether the chip was reset since the last look.
     fn note_resets(&mut self, session: &Session<RigBoard>, at: VirtualNanos) {
         let resets = session.resets().len();
@@ -274,6 +286,9 @@ impl Driver {
 
     /// Answers who waits, and says whether time may pass.
     fn may_pass(&mut self, now_ns: u64) -> bool {
+        if now_ns >= self.told_ns && !self.held.is_empty() {
+            self.send_held(now_ns);
+        }
         let report = self.report(now_ns);
         let answer = |waiting: &mut Vec<Sender<Report>>| {
             for done in waiting.drain(..) {

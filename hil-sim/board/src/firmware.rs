@@ -1,6 +1,10 @@
 //! Where the firmware's ELF lies.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::{ErrorKind, Read},
+    path::{Path, PathBuf},
+};
 
 use crate::error::SimError;
 
@@ -8,19 +12,30 @@ use crate::error::SimError;
 pub const FILE_NAME: &str = "farnear-nucleo-f429zi.elf";
 /// Environment variable that names the ELF for tests.
 pub const VARIABLE: &str = "FARNEAR_FIRMWARE";
+const ELF_MAGIC: [u8; 4] = *b"\x7fELF";
 
 /// The ELF: the one named, else the one `FARNEAR_FIRMWARE` names, else the one beside the running program (for a
 /// test, which lies in `deps`, one folder up).
 ///
 /// # Errors
-/// [`SimError::NoFirmware`] with the place where it should be.
+/// [`SimError::NoFirmware`] with the place where it should be; [`SimError::Firmware`] where that is no ELF.
 pub fn find(named: Option<&Path>) -> Result<PathBuf, SimError> {
     let path = match (named, std::env::var_os(VARIABLE)) {
         (Some(path), _) => path.to_path_buf(),
         (None, Some(path)) => path.into(),
         (None, None) => beside_program(),
     };
-    if path.is_file() { Ok(path) } else { Err(SimError::NoFirmware(path)) }
+    if !path.is_file() {
+        return Err(SimError::NoFirmware(path));
+    }
+    let mut start = [0; 4];
+    let reason = match File::open(&path).and_then(|mut file| file.read_exact(&mut start)) {
+        Ok(()) if start == ELF_MAGIC => return Ok(path),
+        Ok(()) => "it is no ELF file".to_string(),
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => "it is empty or cut short".to_string(),
+        Err(error) => error.to_string(),
+    };
+    Err(SimError::Firmware { path, reason })
 }
 
 fn beside_program() -> PathBuf {

@@ -40,7 +40,7 @@ impl ServedRig {
         eye.watch(shots, frames_out)?;
         let control = commands.clone();
         let camera = endpoint::open(frames, move |Control::AdvanceMicros(micros)| {
-            // Nobody waits for the end; requests that follow find the time passed.
+            // Nobody waits for the end: what comes from the host meanwhile is held until the time has passed.
             let (done, _) = mpsc::channel();
             let nanos = micros.saturating_mul(1000);
             let _ = control.send(Command::Advance { nanos, done }); // the rig may have ended

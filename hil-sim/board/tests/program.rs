@@ -78,3 +78,28 @@ fn a_pair_is_fast_and_stands_still() {
         }
     }
 }
+
+#[test]
+fn exposures_are_as_long_as_asked_from_the_shortest_on() {
+    let mut bench = Bench::new(2);
+    for exposure in [20, 21, 37, 100, 999, 10_000, 200_000] {
+        let shot = Shot {
+            axis: Axis::SensorFine,
+            target: Nanometres(50_000),
+            exposure: Micros(exposure),
+            settle_window: Nanometres(200),
+            settle_dwell: Micros(400),
+            repeat: 3,
+        };
+        assert_eq!(bench.ask(&Request::LoadShot { index: 0, shot }), Ok(Response::Accepted));
+        let end = bench.carry_out(&Request::RunProgram { shots: 1 });
+        assert!(matches!(end, EventKind::ProgramDone { exposures: 3, .. }), "{end:?}");
+        let shots = bench.rig.take_shots();
+        assert_eq!(shots.len(), 3);
+        for shot in shots {
+            // The timer's edges are exact; the camera's latency is the same for both.
+            assert_eq!((shot.end_ns - shot.begin_ns) / 1000, u64::from(exposure));
+        }
+    }
+    assert_eq!(bench.report().missed_triggers, 0);
+}

@@ -13,7 +13,7 @@ use std::{
 use common::{Answer, answer_in, request_frame};
 use farnear_protocol::{
     Event, EventKind, Micros, Nanometres, Request, Response,
-    camera::{FRAME_HEADER, FrameHeader},
+    camera::{Control, FRAME_HEADER, FrameHeader},
     frame::{Decoder, Kind},
     message::{Axis, Shot},
 };
@@ -116,6 +116,13 @@ impl Client {
         })
     }
 
+    fn time_us(&mut self) -> u64 {
+        match self.ask(&Request::Status) {
+            Ok(Response::Status(status)) => status.time.0,
+            other => panic!("no status but {other:?}"),
+        }
+    }
+
     fn carry_out(&mut self, request: &Request) -> EventKind {
         assert_eq!(self.ask(request), Ok(Response::Accepted));
         self.wait(|packet| {
@@ -176,6 +183,36 @@ fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
     let second = capture(&program);
     assert!(program.end().success());
     assert!(first == second, "two programs with one seed differ");
+}
+
+#[test]
+fn time_stands_still_unless_told_to_pass() {
+    let program = Program::start(&[]);
+    let mut client = Client::open(&program.port);
+    let before = client.time_us();
+    std::thread::sleep(Duration::from_millis(300));
+    let asked_us = client.time_us() - before;
+    assert!(asked_us < 50_000, "{asked_us} us passed while nobody asked for anything");
+
+    let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
+    let mut body = [0; 16];
+    let body = postcard::to_slice(&Control::AdvanceMicros(2_000_000), &mut body).expect("fits");
+    camera.write_all(&(body.len() as u32).to_le_bytes()).expect("open");
+    camera.write_all(body).expect("open");
+    let deadline = Instant::now() + PATIENCE;
+    while client.time_us() < before + 2_000_000 {
+        assert!(Instant::now() < deadline, "time does not pass");
+    }
+    assert!(program.end().success());
+}
+
+#[test]
+fn a_paced_rig_answers_too() {
+    let program = Program::start(&["--paced"]);
+    let mut client = Client::open(&program.port);
+    let before = client.time_us();
+    while client.time_us() < before + 100_000 {}
+    assert!(program.end().success());
 }
 
 #[test]
