@@ -96,9 +96,9 @@ fn a_sharp_near_edge_stays_sharp_before_a_blurred_background() {
     let image =
         |scene: &Scene| render_f32(scene, &lens, &Psf::PillBox, lens.sensor_near_mm, &camera, 1).unwrap();
     let (stepped, plane) = (image(&two), image(&near));
-    // The first pixel shares a texture sample with its neighbour across the edge.
+    // A sixteenth of the first pixel has the texture sample across the edge, which may differ by its half.
     for (a, b) in stepped.slice(s![.., 20]).iter().zip(plane.slice(s![.., 20])) {
-        assert!((a / b - 1.0).abs() < 0.02, "{a} {b}");
+        assert!((a / b - 1.0).abs() < 0.04, "{a} {b}");
     }
     for (a, b) in stepped.slice(s![.., 21..]).iter().zip(plane.slice(s![.., 21..])) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
