@@ -8,13 +8,13 @@ use core::cell::RefCell;
 use critical_section::Mutex;
 use embassy_stm32::{
     Peri,
-    gpio::{AfType, Flex, OutputType, Pull},
+    gpio::{OutputType, Pull},
     interrupt,
     interrupt::{Interrupt, Priority},
     pac::{self, timer::vals},
     peripherals::{PB10, PB11, TIM2},
     rcc,
-    timer::{Ch3, simple_pwm::PwmPin},
+    timer::{Ch3, Ch4, input_capture::CapturePin, simple_pwm::PwmPin},
 };
 use farnear_protocol::{BoardMicros, Micros};
 use farnear_rig::io::ExposureEdges;
@@ -27,8 +27,6 @@ use crate::{
 /// Channel 3 and 4 in the register arrays, which start at 0.
 const TRIGGER: usize = 2;
 const STROBE: usize = 3;
-/// Alternate function of TIM2 on PB11 (DS9405, table 12).
-const STROBE_FUNCTION: u8 = 1;
 /// From the order to the rising edge: long enough to set the compare match up.
 const LEAD_US: u32 = 10;
 /// An edge this close would be missed by the comparator.
@@ -107,7 +105,7 @@ fn strobe_edge(exposure: Option<&mut Exposure>, stamp: u32) {
 /// Trigger output and strobe input.
 pub struct CameraPort {
     _trigger: PwmPin<'static, TIM2, Ch3>,
-    _strobe: Flex<'static>,
+    _strobe: CapturePin<'static, TIM2, Ch4>,
 }
 
 impl CameraPort {
@@ -136,15 +134,14 @@ impl CameraPort {
         timer.sr().write(|w| w.0 = 0);
         timer.dier().write(|w| w.set_ccie(STROBE, true));
         let trigger = PwmPin::new(trigger, OutputType::PushPull);
-        let mut pin = Flex::new(strobe);
-        pin.set_as_af_unchecked(STROBE_FUNCTION, AfType::input(Pull::Down));
+        let strobe = CapturePin::new(strobe, Pull::Down);
         // The same crystal drives TIM5 and TIM2: set alike once, they stay within a microsecond.
         critical_section::with(|_| {
             timer.cnt().write_value(clock::now().0 as u32);
             timer.cr1().modify(|w| w.set_cen(true));
         });
         registers::enable_interrupt(Interrupt::TIM2, Priority::P1);
-        Self { _trigger: trigger, _strobe: pin }
+        Self { _trigger: trigger, _strobe: strobe }
     }
 
     /// Gives a trigger pulse of this length in a few microseconds and captures what the camera answers.

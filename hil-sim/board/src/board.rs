@@ -83,6 +83,10 @@ pub const DIR: PinName = PinName::new(b'F', 13);
 pub const ENABLE: PinName = PinName::new(b'F', 14);
 /// DIAG, high = fault.
 pub const DIAG: PinName = PinName::new(b'F', 15);
+/// Encoder, channel A.
+pub const ENCODER_A: PinName = PinName::new(b'D', 12);
+/// Encoder, channel B.
+pub const ENCODER_B: PinName = PinName::new(b'D', 13);
 /// Home switch, high = closed (actuated).
 pub const HOME: PinName = PinName::new(b'G', 0);
 /// Far switch, high = closed (actuated).

@@ -8,14 +8,18 @@ use rigless::{
 };
 
 use crate::{
-    board::{self, Chip, DIR, ENABLE, FAR, HOME, STEP, STROBE, TIM1, TIM2, TIM4, TRIGGER},
+    board::{
+        self, Chip, DIR, ENABLE, ENCODER_A, ENCODER_B, FAR, HOME, STEP, STROBE, TIM1, TIM2, TIM4, TRIGGER,
+    },
     camera::{Camera, Edge},
     chips::{SharedPlant, with_plant},
     plant::ExposureTruth,
 };
 
-/// Alternate function of TIM1 and TIM2 on their pins (DS9405, table 12).
-const TIMER_FUNCTION: u8 = 1;
+/// Alternate functions of TIM1 and TIM2, and of TIM4, on their pins (DS9405, table 12). A pin that the firmware
+/// has not switched to its timer is not connected to it.
+const TIM1_TIM2_FUNCTION: u8 = 1;
+const TIM4_FUNCTION: u8 = 2;
 /// TIM2's counter, which the firmware keeps at the lower 32 bits of its microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
 /// Addresses of the registers whose writes can move one of the watched pins: TIM2, TIM1, port F.
@@ -116,9 +120,12 @@ impl Wiring {
             plant.step_edge(at.0, away);
             plant.screw().encoder_counts()
         });
+        let connected = [ENCODER_A, ENCODER_B].iter().all(|pin| chip.function(*pin) == Some(TIM4_FUNCTION));
         while self.counts != counts {
             self.counts += (counts - self.counts).signum();
-            self.put_encoder(chip, at, self.counts);
+            if connected {
+                self.put_encoder(chip, at, self.counts);
+            }
         }
         self.put_switches(chip, at);
     }
@@ -159,7 +166,9 @@ impl Wiring {
         }
         let level = Level::from(edge == Edge::Begin);
         chip.drive_pin(at, STROBE, level);
-        chip.drive_timer(at, TIM2, channel(4), level);
+        if chip.function(STROBE) == Some(TIM1_TIM2_FUNCTION) {
+            chip.drive_timer(at, TIM2, channel(4), level);
+        }
     }
 
     /// When the camera needs attention next.
@@ -199,5 +208,5 @@ impl Wiring {
 
 /// The level of a timer's pin: high only where the pin is switched to the timer.
 fn output(chip: &mut Chip, name: board::PinName, read: impl FnOnce(&mut Chip) -> Option<Level>) -> bool {
-    read(chip) == Some(Level::High) && chip.function(name) == Some(TIMER_FUNCTION)
+    read(chip) == Some(Level::High) && chip.function(name) == Some(TIM1_TIM2_FUNCTION)
 }
