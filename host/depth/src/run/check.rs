@@ -3,9 +3,10 @@
 
 use std::fmt;
 
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 
-use super::{MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings};
+use super::simd::{self, Extremes};
+use super::{Backend, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings};
 use crate::operators::Operators;
 use crate::optics::Optics;
 use crate::psf::Psf;
@@ -70,10 +71,12 @@ impl fmt::Display for Warning {
     }
 }
 
-/// A pair that can be processed.
+/// A pair that can be processed: pixels in rows after each other.
 pub(crate) struct Input<'a> {
-    pub far: ArrayView2<'a, f32>,
-    pub near: ArrayView2<'a, f32>,
+    pub far: &'a [f32],
+    pub near: &'a [f32],
+    pub width: usize,
+    pub height: usize,
     /// Subtracted from every pixel.
     pub offset: f32,
     /// Then multiplied with every pixel.
@@ -84,10 +87,10 @@ pub(crate) struct Input<'a> {
     saturated: usize,
 }
 
-/// Checks a pair against operators, optics and settings.
+/// Checks a pair against operators, optics and settings. Both images are contiguous.
 pub(crate) fn check<'a>(
-    far: ArrayView2<'a, f32>,
-    near: ArrayView2<'a, f32>,
+    far: &'a CowArray<'_, f32, Ix2>,
+    near: &'a CowArray<'_, f32, Ix2>,
     operators: &Operators,
     optics: &Optics,
     settings: &Settings,
@@ -112,52 +115,73 @@ pub(crate) fn check<'a>(
     if difference > BLUR_TOLERANCE {
         return Err(RunError::BlurMismatch { operators_px, optics_px, percent: 100.0 * difference });
     }
-    scan(far, near)
+    let backend = settings.backend.unwrap_or_else(Backend::best);
+    scan(far.view(), near.view(), backend)
 }
 
-fn scan<'a>(far: ArrayView2<'a, f32>, near: ArrayView2<'a, f32>) -> Result<Input<'a>, RunError> {
-    let extremes = |image: ArrayView2<f32>| {
-        image
-            .iter()
-            .filter(|v| v.is_finite())
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
-    };
-    let [far_range, near_range] = [extremes(far), extremes(near)];
-    if far_range.0 > far_range.1 || near_range.0 > near_range.1 {
+/// Smallest and largest finite value of an image, and the number of values that are not finite.
+fn range(image: ArrayView2<f32>, backend: Backend) -> Extremes {
+    let mut whole = Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true };
+    for row in image.rows() {
+        let mut part = simd::extremes(backend, row.to_slice().unwrap_or(&[]));
+        if !part.finite {
+            let finite = || row.iter().copied().filter(|v| v.is_finite());
+            part.low = finite().fold(f32::INFINITY, f32::min);
+            part.high = finite().fold(f32::NEG_INFINITY, f32::max);
+        }
+        whole.low = whole.low.min(part.low);
+        whole.high = whole.high.max(part.high);
+        whole.finite &= part.finite;
+    }
+    whole
+}
+
+fn scan<'a>(
+    far: ArrayView2<'a, f32>,
+    near: ArrayView2<'a, f32>,
+    backend: Backend,
+) -> Result<Input<'a>, RunError> {
+    let (height, width) = far.dim();
+    let ranges = [far, near].map(|image| range(image, backend));
+    if ranges.iter().any(|r| r.low > r.high) {
         return Err(RunError::NothingFinite);
     }
-    for (which, (low, high)) in [("far", far_range), ("near", near_range)] {
-        if low == high {
-            return Err(RunError::Constant { which, value: low });
+    for (which, range) in ["far", "near"].into_iter().zip(ranges) {
+        if range.low == range.high {
+            return Err(RunError::Constant { which, value: range.low });
         }
     }
-    let [low, high] = [far_range.0.min(near_range.0), far_range.1.max(near_range.1)];
-    let mut bad = Array2::from_elem(far.dim(), false);
-    let mut not_finite = 0;
-    Zip::from(&mut bad).and(far).and(near).for_each(|bad, a, b| {
-        *bad = !(a.is_finite() && b.is_finite());
-        not_finite += usize::from(*bad);
-    });
-    let saturated = mark_saturated(far, near, high, &mut bad);
-    let any = not_finite + saturated > 0;
-    Ok(Input {
-        far,
-        near,
-        offset: 0.5 * (low + high),
-        gain: 1.0 / (high - low),
-        bad: any.then_some(bad),
-        not_finite,
-        saturated,
-    })
+    let [low, high] = [ranges[0].low.min(ranges[1].low), ranges[0].high.max(ranges[1].high)];
+    let not_finite_mask = (!(ranges[0].finite && ranges[1].finite))
+        .then(|| Zip::from(far).and(near).map_collect(|a, b| !(a.is_finite() && b.is_finite())));
+    let not_finite = not_finite_mask.as_ref().map_or(0, |mask| mask.iter().filter(|m| **m).count());
+    let saturated_mask = saturated(far, near, high);
+    let saturated = saturated_mask.as_ref().map_or(0, |mask| mask.iter().filter(|m| **m).count());
+    let bad = match (not_finite_mask, saturated_mask) {
+        (Some(a), Some(b)) => Some(a | b),
+        (a, b) => a.or(b),
+    };
+    let [far, near] = [far, near].map(|image| image.to_slice().unwrap_or(&[]));
+    // Halves, so that a range near the largest number does not overflow.
+    let gain = 0.5 / (0.5 * high - 0.5 * low);
+    Ok(Input { far, near, width, height, offset: 0.5 * low + 0.5 * high, gain, bad, not_finite, saturated })
 }
 
-/// Marks pixels of flat patches (2x2 and more) at the largest value, if there are so many that it cannot be chance.
-fn mark_saturated(far: ArrayView2<f32>, near: ArrayView2<f32>, high: f32, bad: &mut Array2<bool>) -> usize {
-    let (height, width) = far.dim();
-    let mut marked = Array2::from_elem((height, width), false);
+/// The pixels of flat patches (2x2 and more) at the largest value, if there are so many that it cannot be chance.
+fn saturated(far: ArrayView2<f32>, near: ArrayView2<f32>, high: f32) -> Option<Array2<bool>> {
+    let enough = (SATURATED * far.len() as f64).max(4.0);
+    // In 32 bits the loop is done in vectors.
+    let in_row = |row: &[f32]| row.iter().map(|v| u32::from(*v >= high)).sum::<u32>() as usize;
+    let at_top = |image: ArrayView2<f32>| -> usize {
+        image.rows().into_iter().map(|row| in_row(row.to_slice().unwrap_or(&[]))).sum()
+    };
+    if ((at_top(far) + at_top(near)) as f64) < enough {
+        return None;
+    }
+    let mut marked = Array2::from_elem(far.dim(), false);
     for image in [far, near] {
-        for y in 1..height {
-            for x in 1..width {
+        for y in 1..image.nrows() {
+            for x in 1..image.ncols() {
                 let patch = [(y - 1, x - 1), (y - 1, x), (y, x - 1), (y, x)];
                 if patch.iter().all(|at| image[*at] >= high) {
                     patch.iter().for_each(|at| marked[*at] = true);
@@ -165,12 +189,7 @@ fn mark_saturated(far: ArrayView2<f32>, near: ArrayView2<f32>, high: f32, bad: &
             }
         }
     }
-    let count = marked.iter().filter(|m| **m).count();
-    if (count as f64) < SATURATED * (height * width) as f64 {
-        return 0;
-    }
-    Zip::from(bad).and(&marked).for_each(|bad, marked| *bad |= marked);
-    count
+    (marked.iter().filter(|m| **m).count() as f64 >= enough).then_some(marked)
 }
 
 impl Input<'_> {
@@ -190,12 +209,16 @@ impl Input<'_> {
         warnings
     }
 
-    /// `[I2 - I1, I2 + I1]`, normalised; 0 where a pixel is not finite.
-    pub(crate) fn difference_and_sum(&self) -> [Array2<f32>; 2] {
-        let normal = |v: f32| if v.is_finite() { (v - self.offset) * self.gain } else { 0.0 };
-        let combine =
-            |sign: f32| Zip::from(self.far).and(self.near).map_collect(|a, b| normal(*b) + sign * normal(*a));
-        [combine(-1.0), combine(1.0)]
+    /// Whether some pixels are not finite or saturated.
+    pub(crate) fn has_holes(&self) -> bool {
+        self.bad.is_some()
+    }
+
+    /// `[I2 - I1, I2 + I1]` of one pixel, normalised; 0 where it is not finite.
+    pub(crate) fn normalised(&self, y: usize, x: usize) -> [f32; 2] {
+        let [far, near] = [self.far, self.near].map(|image| image[y * self.width + x]);
+        let pair = [(near - far) * self.gain, ((near - self.offset) + (far - self.offset)) * self.gain];
+        if pair.iter().all(|v| v.is_finite()) { pair } else { [0.0; 2] }
     }
 
     /// The pixels whose depth a bad pixel takes part in, if there are any.

@@ -5,6 +5,7 @@
 //! converges in four steps to single precision for every `c3 / c1 >= -0.2`; near the turning point, where the slope
 //! vanishes, the slope is kept above 2 % of `c1`.
 
+#[cfg(test)]
 use super::MAX_ALPHA;
 
 /// Newton steps.
@@ -13,7 +14,8 @@ pub(crate) const STEPS: usize = 4;
 /// The slope of the cubic, relative to `c1`, below which Newton's step is shortened.
 pub(crate) const SLOPE_FLOOR: f32 = 0.02;
 
-/// The root; `c1` must be positive.
+/// The root in plain numbers, as reference of the vectorised one; `c1` must be positive.
+#[cfg(test)]
 pub(crate) fn root(c0: f32, c1: f32, c3: f32) -> f32 {
     let ratio = c0 / c1;
     let cubic = c3 / c1;

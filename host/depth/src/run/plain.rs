@@ -1,15 +1,18 @@
-//! The run time written plainly, stage by stage over whole images: the reference of the fast variants.
+//! Plainly written parts: reflection and the median that knows missing values, which the fast run time uses around
+//! invalid pixels, and in tests the whole run time, stage by stage over whole images, as its reference.
 
-use ndarray::{Array2, ArrayView2};
-
-use super::check::Input;
-use super::{Settings, cubic};
-use crate::kernel::Kernel;
-use crate::operators::Operators;
+use ndarray::Array2;
+#[cfg(test)]
+use ndarray::ArrayView2;
+#[cfg(test)]
+use {
+    super::Settings, super::check::Input, super::cubic, crate::kernel::Kernel, crate::operators::Operators,
+};
 
 /// Maps before they become depth and confidence.
+#[cfg(test)]
 pub(crate) struct Maps {
-    /// Normalised depth after the median; NaN = invalid.
+    /// Normalised depth after the median.
     pub alpha: Array2<f32>,
     /// Texture energy c1.
     pub texture: Array2<f32>,
@@ -19,11 +22,12 @@ pub(crate) struct Maps {
 
 /// Index of a pixel beyond the border: reflected without repeating the edge pixel, as often as needed.
 pub(crate) fn reflect(i: isize, n: usize) -> usize {
-    let period = 2 * (n as isize - 1);
+    let period = (2 * (n as isize - 1)).max(1);
     let j = i.rem_euclid(period);
     (if j < n as isize { j } else { period - j }) as usize
 }
 
+#[cfg(test)]
 /// Convolution (the kernels are symmetric) with reflected borders.
 pub(crate) fn convolve(image: ArrayView2<f32>, kernel: &Kernel) -> Array2<f32> {
     let (height, width) = image.dim();
@@ -41,6 +45,7 @@ pub(crate) fn convolve(image: ArrayView2<f32>, kernel: &Kernel) -> Array2<f32> {
     })
 }
 
+#[cfg(test)]
 /// Window sums with reflected borders, rows first.
 pub(crate) fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
     let (height, width) = image.dim();
@@ -53,30 +58,28 @@ pub(crate) fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
     })
 }
 
-/// Median of the finite values in each window with reflected borders; NaN where the pixel itself is NaN.
-pub(crate) fn median(image: &Array2<f32>, size: usize) -> Array2<f32> {
+/// Median of the values around (y, x) that are not NaN, with reflected borders; NaN if there is none.
+pub(crate) fn median_at(image: &Array2<f32>, size: usize, (y, x): (usize, usize)) -> f32 {
     let (height, width) = image.dim();
     let r = (size / 2) as isize;
     let mut window = Vec::with_capacity(size * size);
-    Array2::from_shape_fn((height, width), |(y, x)| {
-        if image[(y, x)].is_nan() {
-            return f32::NAN;
-        }
-        window.clear();
-        for dy in -r..=r {
-            let row = reflect(y as isize + dy, height);
-            window.extend(
-                (-r..=r).map(|dx| image[(row, reflect(x as isize + dx, width))]).filter(|v| !v.is_nan()),
-            );
-        }
-        let middle = window.len() / 2;
-        *window.select_nth_unstable_by(middle, f32::total_cmp).1
-    })
+    for dy in -r..=r {
+        let row = reflect(y as isize + dy, height);
+        window
+            .extend((-r..=r).map(|dx| image[(row, reflect(x as isize + dx, width))]).filter(|v| !v.is_nan()));
+    }
+    if window.is_empty() {
+        return f32::NAN;
+    }
+    let middle = window.len() / 2;
+    *window.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
+#[cfg(test)]
 /// Alpha, texture and misfit of a checked pair.
 pub(crate) fn maps(input: &Input, operators: &Operators, settings: &Settings) -> Maps {
-    let [difference, sum] = input.difference_and_sum();
+    let size = (input.height, input.width);
+    let [difference, sum] = [0, 1].map(|i| Array2::from_shape_fn(size, |(y, x)| input.normalised(y, x)[i]));
     let [m, p] = [difference, sum].map(|i| convolve(i.view(), operators.prefilter()));
     let m = convolve(m.view(), operators.gm1());
     let [p1, p2] = [operators.gp1(), operators.gp2()].map(|k| convolve(p.view(), k));
@@ -84,12 +87,11 @@ pub(crate) fn maps(input: &Input, operators: &Operators, settings: &Settings) ->
     let [texture, c3, c0, energy] = [smooth(&p1, &p1), smooth(&p1, &p2), smooth(&p1, &m), smooth(&m, &m)];
     let mut alpha = Array2::from_elem(texture.dim(), f32::NAN);
     let mut misfit = Array2::zeros(texture.dim());
-    let invalid = input.invalid(operators, settings);
     for (at, c1) in texture.indexed_iter() {
-        if *c1 > 0.0 && invalid.as_ref().is_none_or(|i| !i[at]) {
-            alpha[at] = cubic::root(c0[at], *c1, c3[at]);
-            misfit[at] = ((energy[at] - c0[at] * c0[at] / c1) / c1).max(0.0);
-        }
+        let c1 = c1.max(1e-30);
+        alpha[at] = cubic::root(c0[at], c1, c3[at]);
+        misfit[at] = ((energy[at] - c0[at] * c0[at] / c1) / c1).max(0.0);
     }
-    Maps { alpha: median(&alpha, settings.median_px), texture, misfit }
+    let median = Array2::from_shape_fn(size, |at| median_at(&alpha, settings.median_px, at));
+    Maps { alpha: median, texture, misfit }
 }

@@ -1,0 +1,126 @@
+//! Times of the run time, of one convolution and of the operator designs, in milliseconds: minimum and median.
+//!
+//! `cargo bench -p farnear-depth [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The images are random: only
+//! the time is of interest. Timings are no tests: nothing here can fail.
+#![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use farnear_depth::filter::convolve;
+use farnear_depth::kernel::Kernel;
+use farnear_depth::operators::{Operators, Request, design};
+use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
+use farnear_depth::run::{Backend, Settings, depth_from_pair};
+use ndarray::Array2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn optics(psf: &str) -> Optics {
+    OpticsFile {
+        lens: LensSection { focal_length_mm: 50.0, aperture_mm: Some(12.8), f_number: None },
+        sensor: SensorSection { pixel_um: 7.4 },
+        focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
+        psf: psf.parse().unwrap(),
+    }
+    .check()
+    .unwrap()
+}
+
+fn random_image(height: usize, width: usize, seed: u64) -> Array2<f32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    Array2::from_shape_simple_fn((height, width), || rng.random_range(0.0..200.0_f32))
+}
+
+/// Minimum and median of `runs` runs in ms, after two to warm up.
+fn time<T>(runs: usize, mut run: impl FnMut() -> T) -> [f64; 2] {
+    let mut ms: Vec<f64> = (0..runs + 2)
+        .map(|_| {
+            let start = Instant::now();
+            black_box(run());
+            1e3 * start.elapsed().as_secs_f64()
+        })
+        .skip(2)
+        .collect();
+    ms.sort_by(f64::total_cmp);
+    [ms[0], ms[ms.len() / 2]]
+}
+
+fn report(name: &str, backend: Option<Backend>, threads: usize, [min, median]: [f64; 2]) {
+    let backend = backend.map_or("-".to_owned(), |b| format!("{b:?}").to_lowercase());
+    if std::env::var_os("FARNEAR_JSON").is_some() {
+        println!(
+            "{{\"name\": \"{name}\", \"backend\": \"{backend}\", \"threads\": {threads}, \"min_ms\": {min:.4}, \"median_ms\": {median:.4}}}"
+        );
+    } else {
+        println!("{name:<28} {backend:<9} threads {threads}  min {min:9.3} ms  median {median:9.3} ms");
+    }
+}
+
+fn main() {
+    let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wanted = |name: &str| filter.is_empty() || filter.iter().any(|f| name.contains(f.as_str()));
+    let optics_pill = optics("pillbox");
+    let operators = Operators::for_optics(&optics_pill).unwrap();
+    let vga = [1, 2].map(|seed| random_image(480, 640, seed));
+
+    for backend in Backend::available() {
+        if wanted("convolution_7x7") {
+            let kernel: &Kernel = operators.prefilter();
+            let mut output = Array2::zeros(vga[0].dim());
+            report(
+                "convolution_7x7",
+                Some(backend),
+                1,
+                time(60, || convolve(vga[0].view(), kernel, backend, output.view_mut())),
+            );
+        }
+        for threads in [1, 4] {
+            if wanted("chain_640x480") {
+                let settings = Settings { threads, backend: Some(backend), ..Settings::default() };
+                report(
+                    "chain_640x480",
+                    Some(backend),
+                    threads,
+                    time(40, || {
+                        depth_from_pair(vga[0].view(), vga[1].view(), &operators, &optics_pill, &settings)
+                    }),
+                );
+            }
+        }
+    }
+    for median_px in [5, 7] {
+        if wanted("chain_median") {
+            let settings = Settings { median_px, ..Settings::default() };
+            report(
+                &format!("chain_median_{median_px}"),
+                Some(Backend::best()),
+                1,
+                time(20, || {
+                    depth_from_pair(vga[0].view(), vga[1].view(), &operators, &optics_pill, &settings)
+                }),
+            );
+        }
+    }
+    if wanted("chain_4000x3000") {
+        let large = [1, 2].map(|seed| random_image(3000, 4000, seed));
+        for threads in [1, 4] {
+            let settings = Settings { threads, ..Settings::default() };
+            report(
+                "chain_4000x3000",
+                Some(Backend::best()),
+                threads,
+                time(5, || {
+                    depth_from_pair(large[0].view(), large[1].view(), &operators, &optics_pill, &settings)
+                }),
+            );
+        }
+    }
+    for psf in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802"] {
+        let request = Request::for_optics(&optics(psf));
+        let name = format!("design_{}_{}", request.family, request.design);
+        if wanted(&name) {
+            report(&name, None, 1, time(5, || design(&request)));
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! The run time as a stream of rows: every stage takes a few rows from the one before while they are in the cache.
+//!
+//! A tile (all rows of a band, at most [`MAX_TILE_PX`] columns) needs `halo` pixels around it; beyond the image the
+//! input is reflected there, which with symmetric kernels is the same as reflecting at every stage. Rows go in blocks of
+//! [`BLOCK`] through normalisation, pre-filter, the three operators, the window sums and the cubic; each stage keeps what
+//! it still needs, so nothing is computed twice within a tile. Beside the three maps a tile holds about 100 rows: less
+//! than 1 MB whatever the size of the image.
+//!
+//! Bands are independent: threads share nothing but the input.
+
+use ndarray::{Array2, ArrayViewMut2, Axis, Zip, s};
+use rayon::prelude::*;
+
+use super::check::Input;
+use super::plain::{median_at, reflect};
+use super::simd::{self, CubicRow, Plane, Taps, WindowRow};
+use super::{Backend, DepthMap, DepthOfAlpha, Settings};
+use crate::metrics::dilate_square;
+use crate::operators::Operators;
+
+/// Rows that go through a stage at a time.
+const BLOCK: usize = 8;
+
+/// Widest tile: its rows of all stages fit the second-level cache.
+const MAX_TILE_PX: usize = 704;
+
+/// Shortest band worth a thread: its halo of some 20 rows is computed twice.
+const MIN_BAND_PX: usize = 48;
+
+/// What every tile needs to know.
+pub(crate) struct Job<'a> {
+    pub input: &'a Input<'a>,
+    pub operators: &'a Operators,
+    pub settings: &'a Settings,
+    pub depth_of: DepthOfAlpha,
+    pub backend: Backend,
+}
+
+/// The maps that tiles write, (height, width).
+pub(crate) struct Maps<'a> {
+    /// Depth in mm after the median.
+    pub depth_mm: ArrayViewMut2<'a, f32>,
+    /// Texture energy c1.
+    pub texture: ArrayViewMut2<'a, f32>,
+    /// Misfit relative to c1.
+    pub misfit: ArrayViewMut2<'a, f32>,
+}
+
+impl Job<'_> {
+    /// Fills the maps, on as many threads as the settings ask for.
+    pub fn run(&self, maps: Maps<'_>) {
+        let height = maps.depth_mm.nrows();
+        let bands = threads(self.settings).min(height / MIN_BAND_PX).max(1);
+        let rows = height.div_ceil(bands);
+        let Maps { mut depth_mm, mut texture, mut misfit } = maps;
+        let band = |(i, ((depth_mm, texture), misfit)): (usize, ((ArrayViewMut2<f32>, _), _))| {
+            self.band(i * rows, Maps { depth_mm, texture, misfit });
+        };
+        if bands == 1 {
+            band((0, ((depth_mm, texture), misfit)));
+            return;
+        }
+        depth_mm
+            .axis_chunks_iter_mut(Axis(0), rows)
+            .into_par_iter()
+            .zip(texture.axis_chunks_iter_mut(Axis(0), rows))
+            .zip(misfit.axis_chunks_iter_mut(Axis(0), rows))
+            .enumerate()
+            .for_each(band);
+    }
+
+    /// Takes the pixels out that an invalid one takes part in, and takes the medians beside them over the rest.
+    pub fn repair(&self, map: &mut DepthMap, invalid: &Array2<bool>) {
+        let size = map.depth_mm.dim();
+        let settings = Settings { median_px: 1, ..*self.settings };
+        let plain = Job { settings: &settings, ..*self };
+        let [mut raw, mut texture, mut misfit] = [(); 3].map(|()| Array2::zeros(size));
+        plain.run(Maps { depth_mm: raw.view_mut(), texture: texture.view_mut(), misfit: misfit.view_mut() });
+        Zip::from(&mut raw).and(invalid).for_each(|raw, invalid| {
+            if *invalid {
+                *raw = f32::NAN;
+            }
+        });
+        let beside = dilate_square(invalid, self.settings.median_px / 2);
+        for (at, _) in beside.indexed_iter().filter(|(_, beside)| **beside) {
+            if invalid[at] {
+                map.depth_mm[at] = f32::NAN;
+                map.confidence[at] = 0.0;
+            } else if map.confidence[at] > 0.0 {
+                // Depth falls with alpha, so that the median of depths is the depth of the median.
+                map.depth_mm[at] = median_at(&raw, self.settings.median_px, at);
+            }
+        }
+    }
+
+    fn band(&self, top: usize, maps: Maps<'_>) {
+        let width = maps.depth_mm.ncols();
+        let tiles = width.div_ceil(MAX_TILE_PX);
+        let tile_width = width.div_ceil(tiles);
+        let mut tile = Tile::new(self, tile_width);
+        let Maps { mut depth_mm, mut texture, mut misfit } = maps;
+        for left in (0..width).step_by(tile_width) {
+            let columns = s![.., left..(left + tile_width).min(width)];
+            let depth_mm = depth_mm.slice_mut(columns);
+            tile.run(
+                self,
+                top,
+                left,
+                Maps { depth_mm, texture: texture.slice_mut(columns), misfit: misfit.slice_mut(columns) },
+            );
+        }
+    }
+}
+
+/// Number of threads that the settings ask for.
+fn threads(settings: &Settings) -> usize {
+    match settings.threads {
+        0 => rayon::current_num_threads(),
+        n => n.min(rayon::current_num_threads()),
+    }
+}
+
+/// The buffers of a tile.
+struct Tile {
+    /// Pixels around the tile that take part.
+    halo: usize,
+    radius: usize,
+    smoothing: usize,
+    median: usize,
+    difference: Plane,
+    sum: Plane,
+    filtered: [Plane; 2],
+    filters: [Taps; 2],
+    m: Plane,
+    p: [Plane; 2],
+    operators: [Taps; 3],
+    window: WindowRow,
+    sums: Plane,
+    alpha: Plane,
+    scratch: Plane,
+}
+
+impl Tile {
+    fn new(job: &Job, width: usize) -> Self {
+        let radius = job.operators.kernel_size() / 2;
+        let [smoothing, median] = [job.settings.smoothing_px, job.settings.median_px];
+        let halo = 2 * radius + smoothing / 2 + median / 2;
+        let full = width + 2 * halo;
+        let plane = || Plane::new(BLOCK, full);
+        let taps = |kernel| Taps::new(kernel, full);
+        let o = job.operators;
+        Self {
+            halo,
+            radius,
+            smoothing,
+            median,
+            difference: plane(),
+            sum: plane(),
+            filtered: [plane(), plane()],
+            filters: [taps(o.prefilter()), taps(o.prefilter())],
+            m: plane(),
+            p: [plane(), plane()],
+            operators: [taps(o.gm1()), taps(o.gp1()), taps(o.gp2())],
+            window: WindowRow::new(smoothing, full),
+            sums: Plane::new(4 * BLOCK, full),
+            alpha: Plane::new(median, full),
+            scratch: Plane::new(3, full),
+        }
+    }
+
+    fn run(&mut self, job: &Job, top: usize, left: usize, mut maps: Maps<'_>) {
+        let (height, width) = maps.depth_mm.dim();
+        for taps in self.filters.iter_mut().chain(&mut self.operators) {
+            taps.reset();
+        }
+        self.window.reset();
+        let backend = job.backend;
+        let inputs = height + 2 * self.halo;
+        // Columns left after each stage.
+        let filtered = width + 2 * (self.halo - self.radius);
+        let operated = filtered - 2 * self.radius;
+        let solved = operated - (self.smoothing - 1);
+        // Rows that go in before the first complete alpha comes out.
+        let lag = 4 * self.radius + self.smoothing - 1;
+        for begin in (0..inputs).step_by(BLOCK) {
+            let rows = BLOCK.min(inputs - begin);
+            for y in 0..rows {
+                let image_row = (top + begin + y) as isize - self.halo as isize;
+                self.load_row(job, image_row, left, width, y);
+            }
+            for (input, (filter, output)) in
+                [&self.difference, &self.sum].into_iter().zip(self.filters.iter_mut().zip(&mut self.filtered))
+            {
+                simd::convolve(backend, filter, input, output, rows, filtered);
+            }
+            let [difference, sum] = &self.filtered;
+            let [gm1, gp1, gp2] = &mut self.operators;
+            let [p1, p2] = &mut self.p;
+            simd::convolve(backend, gm1, difference, &mut self.m, rows, operated);
+            simd::convolve(backend, gp1, sum, p1, rows, operated);
+            simd::convolve(backend, gp2, sum, p2, rows, operated);
+            simd::vertical_sums(backend, &mut self.window, &self.m, p1, p2, &mut self.sums, rows, operated);
+            for y in 0..rows {
+                if let Some(row) = (begin + y).checked_sub(lag) {
+                    self.finish_row(job, row, y, solved, &mut maps);
+                }
+            }
+        }
+    }
+
+    /// Normalises one row of the image with its halo.
+    fn load_row(&mut self, job: &Job, image_row: isize, left: usize, width: usize, y: usize) {
+        let input = job.input;
+        let [image_height, image_width] = [input.height, input.width];
+        let row = reflect(image_row, image_height);
+        let [far, near] =
+            [input.far, input.near].map(|image| &image[row * image_width..(row + 1) * image_width]);
+        let [difference, sum] = [self.difference.row_mut(y), self.sum.row_mut(y)];
+        let full = width + 2 * self.halo;
+        // Columns of the image that the halo covers, and where they go.
+        let from = left.saturating_sub(self.halo);
+        let to = (left + width + self.halo).min(image_width);
+        let at = from + self.halo - left;
+        let inside = at..at + (to - from);
+        let (difference_part, sum_part) = (&mut difference[inside.clone()], &mut sum[inside.clone()]);
+        simd::normalise_row(
+            job.backend,
+            &far[from..to],
+            &near[from..to],
+            input.offset,
+            input.gain,
+            difference_part,
+            sum_part,
+        );
+        if input.has_holes() {
+            // Holes are filled with the middle value; whatever they touch is taken out again later.
+            for value in difference_part.iter_mut().chain(sum_part) {
+                if !value.is_finite() {
+                    *value = 0.0;
+                }
+            }
+        }
+        for x in (0..inside.start).chain(inside.end..full) {
+            let column = reflect((left + x) as isize - self.halo as isize, image_width);
+            // Reflection leads beyond what was loaded only if the tile is narrower than its halo.
+            [difference[x], sum[x]] = match (column + self.halo).checked_sub(left) {
+                Some(source) if inside.contains(&source) => [difference[source], sum[source]],
+                _ => input.normalised(row, column),
+            };
+        }
+    }
+
+    /// Solves the cubic for one row of sums and finishes the row of the maps that thereby becomes complete.
+    fn finish_row(&mut self, job: &Job, row: usize, y: usize, solved: usize, maps: &mut Maps<'_>) {
+        let (height, width) = maps.depth_mm.dim();
+        let stride = self.scratch.stride();
+        let reach = self.median / 2;
+        let (texture, rest) = self.scratch.all_mut().split_at_mut(stride);
+        let (misfit, depth) = rest.split_at_mut(stride);
+        let mut cubic = CubicRow { alpha: self.alpha.row_mut(row % self.median), texture, misfit };
+        cubic.solve(job.backend, &self.sums, y, self.smoothing, solved);
+        if let Some(at) = row.checked_sub(reach).filter(|at| *at < height) {
+            copy(&texture[reach..reach + width], &mut maps.texture, at);
+            copy(&misfit[reach..reach + width], &mut maps.misfit, at);
+        }
+        if let Some(at) = row.checked_sub(self.median - 1) {
+            let rows: [&[f32]; 7] = std::array::from_fn(|i| self.alpha.row(i.min(self.median - 1)));
+            simd::median_row(job.backend, &rows[..self.median], job.depth_of, depth, width);
+            copy(&depth[..width], &mut maps.depth_mm, at);
+        }
+    }
+}
+
+fn copy(from: &[f32], to: &mut ArrayViewMut2<f32>, row: usize) {
+    if let Some(to) = to.row_mut(row).as_slice_mut() {
+        to.copy_from_slice(from);
+    }
+}

@@ -1,0 +1,312 @@
+//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 8 as plain arrays.
+
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::*;
+
+/// A vector of [`Lanes::N`] numbers.
+///
+/// Functions over lanes must use loops rather than closures: a closure is a function of its own, which is compiled
+/// without the instructions of the function around it.
+///
+/// The methods that take pointers are unsafe in what they read; all others are, for the x86 types, only to be called
+/// from functions that are inlined into one with the instructions enabled, which `dispatch!` sees to.
+pub(crate) trait Lanes: Copy {
+    /// Number of lanes.
+    const N: usize;
+
+    /// # Safety
+    /// `N` numbers must be readable at `p`.
+    unsafe fn load(p: *const f32) -> Self;
+
+    /// # Safety
+    /// `N` numbers must be writable at `p`.
+    unsafe fn store(self, p: *mut f32);
+
+    /// `T` vectors that start at `p`, `p + 1`, ... `p + T - 1`.
+    ///
+    /// # Safety
+    /// 32 numbers must be readable at `p`; `T` is at most 16.
+    #[inline(always)]
+    unsafe fn taps<const T: usize>(p: *const f32) -> [Self; T] {
+        let mut vectors = [Self::splat(0.0); T];
+        for i in 0..T {
+            // SAFETY: the last vector ends at p + T - 1 + N, within the 32 numbers that the caller promises.
+            vectors[i] = unsafe { Self::load(p.add(i)) };
+        }
+        vectors
+    }
+
+    fn splat(value: f32) -> Self;
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    /// `self * factor + summand`, fused where the processor can.
+    fn mul_add(self, factor: Self, summand: Self) -> Self;
+    /// `1 / self` to 12 bits or better.
+    fn reciprocal_estimate(self) -> Self;
+    /// `1 / sqrt(self)` to 12 bits or better.
+    fn inverse_root_estimate(self) -> Self;
+    /// The numbers.
+    fn to_array(self) -> [f32; 16];
+
+    /// `1 / sqrt(self)` to single precision: the estimate and a Newton step.
+    #[inline(always)]
+    fn inverse_root(self) -> Self {
+        let y = self.inverse_root_estimate();
+        let half = self.mul(Self::splat(-0.5));
+        let correction = half.mul(y).mul_add(y, Self::splat(1.5));
+        y.mul(correction)
+    }
+
+    /// `self` kept between `-limit` and `limit`.
+    #[inline(always)]
+    fn clamp_to(self, limit: Self) -> Self {
+        self.min(limit).max(Self::splat(0.0).sub(limit))
+    }
+}
+
+/// Sixteen lanes of AVX-512.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512(__m512);
+
+/// Eight lanes of AVX2.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2(__m256);
+
+/// Eight lanes of portable code.
+#[derive(Clone, Copy)]
+pub(crate) struct Portable([f32; 8]);
+
+// SAFETY of the intrinsics without pointers: they only need their instruction set, and every caller is inlined into a
+// function that enables it after it was detected (`dispatch!`).
+#[cfg(target_arch = "x86_64")]
+impl Lanes for Avx512 {
+    const N: usize = 16;
+
+    #[inline(always)]
+    unsafe fn load(p: *const f32) -> Self {
+        // SAFETY: the caller's promise.
+        Self(unsafe { _mm512_loadu_ps(p) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f32) {
+        // SAFETY: the caller's promise.
+        unsafe { _mm512_storeu_ps(p, self.0) }
+    }
+
+    /// Two loads and shifts between them: an unaligned load of a whole cache line costs two accesses.
+    #[inline(always)]
+    unsafe fn taps<const T: usize>(p: *const f32) -> [Self; T] {
+        // SAFETY: the caller promises 32 readable numbers at p.
+        let [low, high] = unsafe { [_mm512_loadu_si512(p.cast()), _mm512_loadu_si512(p.add(16).cast())] };
+        let mut vectors = [Self::splat(0.0); T];
+        for i in 0..T {
+            // SAFETY: the shifts need their instruction set only; the load as above.
+            vectors[i] = Self(unsafe {
+                _mm512_castsi512_ps(match i {
+                    0 => low,
+                    1 => _mm512_alignr_epi32::<1>(high, low),
+                    2 => _mm512_alignr_epi32::<2>(high, low),
+                    3 => _mm512_alignr_epi32::<3>(high, low),
+                    4 => _mm512_alignr_epi32::<4>(high, low),
+                    5 => _mm512_alignr_epi32::<5>(high, low),
+                    6 => _mm512_alignr_epi32::<6>(high, low),
+                    7 => _mm512_alignr_epi32::<7>(high, low),
+                    8 => _mm512_alignr_epi32::<8>(high, low),
+                    9 => _mm512_alignr_epi32::<9>(high, low),
+                    10 => _mm512_alignr_epi32::<10>(high, low),
+                    _ => _mm512_loadu_si512(p.add(i).cast()),
+                })
+            });
+        }
+        vectors
+    }
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(unsafe { _mm512_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm512_add_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(unsafe { _mm512_sub_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(unsafe { _mm512_mul_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(unsafe { _mm512_div_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(unsafe { _mm512_min_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(unsafe { _mm512_max_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn reciprocal_estimate(self) -> Self {
+        Self(unsafe { _mm512_rcp14_ps(self.0) })
+    }
+    #[inline(always)]
+    fn inverse_root_estimate(self) -> Self {
+        Self(unsafe { _mm512_rsqrt14_ps(self.0) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 16] {
+        let mut numbers = [0.0; 16];
+        // SAFETY: the array holds 16 numbers.
+        unsafe { self.store(numbers.as_mut_ptr()) };
+        numbers
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for Avx2 {
+    const N: usize = 8;
+
+    #[inline(always)]
+    unsafe fn load(p: *const f32) -> Self {
+        // SAFETY: the caller's promise.
+        Self(unsafe { _mm256_loadu_ps(p) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f32) {
+        // SAFETY: the caller's promise.
+        unsafe { _mm256_storeu_ps(p, self.0) }
+    }
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm256_add_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(unsafe { _mm256_div_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+    #[inline(always)]
+    fn reciprocal_estimate(self) -> Self {
+        Self(unsafe { _mm256_rcp_ps(self.0) })
+    }
+    #[inline(always)]
+    fn inverse_root_estimate(self) -> Self {
+        Self(unsafe { _mm256_rsqrt_ps(self.0) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 16] {
+        let mut numbers = [0.0; 16];
+        // SAFETY: the array holds 16 numbers.
+        unsafe { self.store(numbers.as_mut_ptr()) };
+        numbers
+    }
+}
+
+impl Portable {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
+impl Lanes for Portable {
+    const N: usize = 8;
+
+    #[inline(always)]
+    unsafe fn load(p: *const f32) -> Self {
+        // SAFETY: the caller's promise; an array of f32 has the alignment of f32.
+        Self(unsafe { p.cast::<[f32; 8]>().read() })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f32) {
+        // SAFETY: the caller's promise.
+        unsafe { p.cast::<[f32; 8]>().write(self.0) }
+    }
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self([value; 8])
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        // Not fused: without the instruction a fused one is a slow library call.
+        self.mul(factor).add(summand)
+    }
+    #[inline(always)]
+    fn reciprocal_estimate(self) -> Self {
+        Self(self.0.map(|v| 1.0 / v))
+    }
+    #[inline(always)]
+    fn inverse_root_estimate(self) -> Self {
+        Self(self.0.map(|v| 1.0 / v.sqrt()))
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 16] {
+        std::array::from_fn(|i| self.0.get(i).copied().unwrap_or(0.0))
+    }
+}

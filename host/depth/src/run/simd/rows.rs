@@ -1,0 +1,429 @@
+//! The loops of the run time other than convolution: one row, or one block of rows, at a time.
+
+use super::lanes::Lanes;
+use super::{Plane, dispatch};
+use crate::run::cubic::{SLOPE_FLOOR, STEPS};
+use crate::run::{DepthOfAlpha, MAX_ALPHA, confidence};
+
+/// Texture energy that stands for none: keeps divisions finite, far below any real one (images are normalised).
+const TINY: f32 = 1e-30;
+
+/// Smallest and largest value of a row, and whether all are finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extremes {
+    /// Smallest value; meaningless unless all are finite.
+    pub low: f32,
+    /// Largest value; meaningless unless all are finite.
+    pub high: f32,
+    /// Whether no value is NaN or infinite.
+    pub finite: bool,
+}
+
+dispatch! {
+    /// Smallest and largest value of `row`.
+    fn extremes(row: &[f32]) -> Extremes = extremes_generic
+}
+
+#[inline(always)]
+fn extremes_generic<L: Lanes>(row: &[f32]) -> Extremes {
+    let [mut low, mut high] = [L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY)];
+    let mut poison = L::splat(0.0);
+    let whole = row.len() / L::N * L::N;
+    for x in (0..whole).step_by(L::N) {
+        // SAFETY: x + N <= row.len().
+        let value = unsafe { L::load(row.as_ptr().add(x)) };
+        low = low.min(value);
+        high = high.max(value);
+        // 0 times a number is 0, times NaN or infinity NaN.
+        poison = value.mul_add(L::splat(0.0), poison);
+    }
+    let [lows, highs, poisons] = [low.to_array(), high.to_array(), poison.to_array()];
+    let mut result = Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true };
+    for value in lows[..L::N].iter().chain(&highs[..L::N]).chain(&row[whole..]) {
+        if value.is_finite() {
+            result.low = result.low.min(*value);
+            result.high = result.high.max(*value);
+        }
+    }
+    result.finite = poisons[..L::N].iter().all(|p| *p == 0.0) && row[whole..].iter().all(|v| v.is_finite());
+    result
+}
+
+dispatch! {
+    /// `difference = (near - far) gain`, `sum = (near + far - 2 offset) gain`; all rows have one length.
+    fn normalise_row(far: &[f32], near: &[f32], offset: f32, gain: f32, difference: &mut [f32], sum: &mut [f32]) =
+        normalise_generic
+}
+
+#[inline(always)]
+fn normalise_generic<L: Lanes>(
+    far: &[f32],
+    near: &[f32],
+    offset: f32,
+    gain: f32,
+    difference: &mut [f32],
+    sum: &mut [f32],
+) {
+    let n = far.len();
+    assert!(near.len() == n && difference.len() == n && sum.len() == n);
+    for i in 0..n {
+        difference[i] = (near[i] - far[i]) * gain;
+        sum[i] = ((near[i] - offset) + (far[i] - offset)) * gain;
+    }
+}
+
+/// Sums over the last `window` rows of the four products, without the drift of a running sum.
+///
+/// Rows come in groups of `window`. A window is the tail of one group and the head of the next: tails are summed
+/// once per group, heads on the way (van Herk's scheme for sums). Three additions per product and row.
+#[derive(Debug, Clone)]
+pub(crate) struct WindowRow {
+    window: usize,
+    /// Position of the next row in its group.
+    phase: usize,
+    /// Four sums over the head of the running group.
+    heads: Plane,
+    /// For each row of a group four tails of the last group, or four products of the running one.
+    tails: Plane,
+}
+
+impl WindowRow {
+    /// For windows of `window` rows of `width` columns.
+    pub fn new(window: usize, width: usize) -> Self {
+        Self { window, phase: 0, heads: Plane::new(4, width), tails: Plane::new(4 * window, width) }
+    }
+
+    /// Forgets what was begun.
+    pub fn reset(&mut self) {
+        self.phase = 0;
+        self.heads.all_mut().fill(0.0);
+        self.tails.all_mut().fill(0.0);
+    }
+}
+
+dispatch! {
+    /// Feeds `rows` rows of `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
+    /// `p1 m`, `m m` that end with row `y`.
+    fn vertical_sums(state: &mut WindowRow, m: &Plane, p1: &Plane, p2: &Plane, sums: &mut Plane, rows: usize, width: usize) =
+        vertical_generic
+}
+
+#[inline(always)]
+fn vertical_generic<L: Lanes>(
+    state: &mut WindowRow,
+    m: &Plane,
+    p1: &Plane,
+    p2: &Plane,
+    sums: &mut Plane,
+    rows: usize,
+    width: usize,
+) {
+    let window = state.window;
+    assert!(state.heads.rows() == 4 && state.tails.rows() == 4 * window && sums.rows() >= 4 * rows);
+    assert!([m, p1, p2].iter().all(|p| p.rows() >= rows));
+    let strides = [m, p1, p2, &*sums, &state.heads, &state.tails].map(Plane::stride);
+    assert!(strides.iter().all(|s| width + Plane::PADDING <= *s));
+    let [m_stride, p1_stride, p2_stride, sums_stride, heads_stride, tails_stride] = strides;
+    let [m, p1, p2] = [m, p1, p2].map(|p| p.all().as_ptr());
+    let sums = sums.all_mut().as_mut_ptr();
+    let heads = state.heads.all_mut().as_mut_ptr();
+    let tails = state.tails.all_mut().as_mut_ptr();
+    for x in (0..width).step_by(L::N) {
+        // SAFETY: x < width and width + PADDING <= every stride, so N numbers at x lie within a row; the row indices
+        // are below the numbers of rows asserted above.
+        unsafe {
+            let tails = tails.add(x);
+            let mut head = [L::splat(0.0); 4];
+            for c in 0..4 {
+                head[c] = L::load(heads.add(c * heads_stride + x));
+            }
+            let mut phase = state.phase;
+            for y in 0..rows {
+                let m = L::load(m.add(y * m_stride + x));
+                let p1 = L::load(p1.add(y * p1_stride + x));
+                let p2 = L::load(p2.add(y * p2_stride + x));
+                let products = [p1.mul(p1), p1.mul(p2), p1.mul(m), m.mul(m)];
+                let first = phase == 0;
+                let last = phase + 1 == window;
+                for c in 0..4 {
+                    head[c] = if first { products[c] } else { head[c].add(products[c]) };
+                    let sum = if last {
+                        head[c]
+                    } else {
+                        head[c].add(L::load(tails.add((4 * (phase + 1) + c) * tails_stride)))
+                    };
+                    sum.store(sums.add((4 * y + c) * sums_stride + x));
+                    products[c].store(tails.add((4 * phase + c) * tails_stride));
+                }
+                phase += 1;
+                if last {
+                    phase = 0;
+                    let mut sum = products;
+                    for row in (0..window - 1).rev() {
+                        for c in 0..4 {
+                            let tail = tails.add((4 * row + c) * tails_stride);
+                            sum[c] = sum[c].add(L::load(tail));
+                            sum[c].store(tail);
+                        }
+                    }
+                }
+            }
+            for c in 0..4 {
+                head[c].store(heads.add(c * heads_stride + x));
+            }
+        }
+    }
+    state.phase = (state.phase + rows) % window;
+}
+
+/// What [`CubicRow::solve`] writes: rows with padding.
+pub(crate) struct CubicRow<'a> {
+    /// Normalised depth before the median.
+    pub alpha: &'a mut [f32],
+    /// Texture energy c1.
+    pub texture: &'a mut [f32],
+    /// Misfit relative to c1.
+    pub misfit: &'a mut [f32],
+}
+
+impl CubicRow<'_> {
+    /// Sums the four rows `4 y ..` of `sums` over `window` columns and solves the cubic for `width` columns.
+    pub fn solve(
+        &mut self,
+        backend: crate::run::Backend,
+        sums: &Plane,
+        y: usize,
+        window: usize,
+        width: usize,
+    ) {
+        solve(backend, self, sums, y, window, width);
+    }
+}
+
+dispatch! {
+    fn solve(output: &mut CubicRow<'_>, sums: &Plane, y: usize, window: usize, width: usize) = solve_generic
+}
+
+#[inline(always)]
+fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, window: usize, width: usize) {
+    let stride = sums.stride();
+    assert!(
+        4 * y + 4 <= sums.rows() && width + Plane::PADDING <= stride && window + 16 <= Plane::PADDING + 1
+    );
+    let [alpha, texture, misfit] = [&mut *output.alpha, output.texture, output.misfit];
+    assert!([&*alpha, texture, misfit].iter().all(|row| width + Plane::PADDING <= row.len()));
+    let [alpha, texture, misfit] = [alpha.as_mut_ptr(), texture.as_mut_ptr(), misfit.as_mut_ptr()];
+    let base = sums.all()[4 * y * stride..].as_ptr();
+    for x in (0..width).step_by(L::N) {
+        // SAFETY: x < width; reads reach x + window - 1 + N and x + 2 N, at most width + PADDING (asserted), so they stay
+        // in the row; the output rows are as long.
+        unsafe {
+            let mut window_sums = [L::splat(0.0); 4];
+            for c in 0..4 {
+                let p = base.add(c * stride + x);
+                window_sums[c] = if window == 7 { sum_of_seven(p) } else { sum_of(p, window) };
+            }
+            let [c1, c3, c0, energy] = window_sums;
+            let [root, misfit_value] = root_and_misfit(c1, c3, c0, energy);
+            root.store(alpha.add(x));
+            c1.store(texture.add(x));
+            misfit_value.store(misfit.add(x));
+        }
+    }
+}
+
+/// # Safety
+/// 32 numbers must be readable at `p`.
+#[inline(always)]
+unsafe fn sum_of_seven<L: Lanes>(p: *const f32) -> L {
+    // SAFETY: the caller's promise.
+    let [a, b, c, d, e, f, g]: [L; 7] = unsafe { L::taps(p) };
+    a.add(b).add(c.add(d)).add(e.add(f).add(g))
+}
+
+/// # Safety
+/// `window + N` numbers must be readable at `p`.
+#[inline(always)]
+unsafe fn sum_of<L: Lanes>(p: *const f32, window: usize) -> L {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let mut sum = L::load(p);
+        for i in 1..window {
+            sum = sum.add(L::load(p.add(i)));
+        }
+        sum
+    }
+}
+
+/// The cubic's root ([`crate::run::cubic`], in vectors) and the misfit ([`confidence`]).
+#[inline(always)]
+fn root_and_misfit<L: Lanes>(c1: L, c3: L, c0: L, energy: L) -> [L; 2] {
+    let [one, three] = [L::splat(1.0), L::splat(3.0)];
+    let inverse = one.div(c1.max(L::splat(TINY)));
+    let ratio = c0.mul(inverse);
+    let cubic = c3.mul(inverse);
+    let downward = L::splat(0.0).sub(cubic).max(L::splat(1e-6));
+    let limit = downward.mul(three).inverse_root().min(L::splat(MAX_ALPHA));
+    let three_cubic = cubic.mul(three);
+    let mut alpha = ratio.clamp_to(limit);
+    for _ in 0..STEPS {
+        let square = alpha.mul(alpha);
+        // An estimate of the step's divisor suffices: the value it corrects is exact.
+        let slope = three_cubic.mul_add(square, one).max(L::splat(SLOPE_FLOOR));
+        let value = cubic.mul(square).mul_add(alpha, alpha.sub(ratio));
+        alpha = alpha.sub(value.mul(slope.reciprocal_estimate())).clamp_to(limit);
+    }
+    let left_over = energy.sub(c0.mul(ratio)).mul(inverse).max(L::splat(0.0));
+    [alpha, left_over]
+}
+
+dispatch! {
+    /// Median over `rows` (as many as the window is wide) and as many columns, and its depth in mm, for `width` columns.
+    fn median_row(rows: &[&[f32]], depth_of: DepthOfAlpha, output: &mut [f32], width: usize) = median_generic
+}
+
+#[inline(always)]
+fn median_generic<L: Lanes>(rows: &[&[f32]], depth_of: DepthOfAlpha, output: &mut [f32], width: usize) {
+    assert!(rows.iter().chain([&&*output]).all(|row| width + Plane::PADDING <= row.len()));
+    let [focal, squared, offset, slope] = depth_of.coefficients();
+    let [focal, squared, offset, slope] =
+        [L::splat(focal), L::splat(squared), L::splat(offset), L::splat(slope)];
+    for x in (0..width).step_by(L::N) {
+        // SAFETY: x < width and rows are at least width + PADDING long; at most N + 2 <= 32 numbers are read at x.
+        unsafe {
+            let alpha = match rows.len() {
+                1 => L::load(rows[0].as_ptr().add(x)),
+                3 => median_of_nine([
+                    L::taps(rows[0].as_ptr().add(x)),
+                    L::taps(rows[1].as_ptr().add(x)),
+                    L::taps(rows[2].as_ptr().add(x)),
+                ]),
+                5 => median_of_many::<L, 25, 14>(window_values::<L, 25>(rows, x)),
+                7 => median_of_many::<L, 49, 26>(window_values::<L, 49>(rows, x)),
+                // `check` lets no other window through.
+                n => unreachable!("median window {n}"),
+            };
+            let depth = focal.add(squared.div(slope.mul_add(alpha, offset)));
+            depth.store(output.as_mut_ptr().add(x));
+        }
+    }
+}
+
+/// The `COUNT` values of the square windows that begin at column `x`.
+///
+/// # Safety
+/// `N` plus the number of rows must be readable at `x` in every row.
+#[inline(always)]
+unsafe fn window_values<L: Lanes, const COUNT: usize>(rows: &[&[f32]], x: usize) -> [L; COUNT] {
+    let side = rows.len();
+    let mut values = [L::splat(0.0); COUNT];
+    for i in 0..COUNT {
+        // SAFETY: the caller's promise.
+        values[i] = unsafe { L::load(rows[i / side].as_ptr().add(x + i % side)) };
+    }
+    values
+}
+
+#[inline(always)]
+fn ordered<L: Lanes>(a: L, b: L) -> [L; 2] {
+    [a.min(b), a.max(b)]
+}
+
+#[inline(always)]
+fn ordered_three<L: Lanes>([a, b, c]: [L; 3]) -> [L; 3] {
+    let [a, b] = ordered(a, b);
+    let [b, c] = ordered(b, c);
+    let [a, b] = ordered(a, b);
+    [a, b, c]
+}
+
+/// Median of 3x3: of the columns' smallest the largest, of their medians the median, of their largest the smallest.
+#[inline(always)]
+fn median_of_nine<L: Lanes>(rows: [[L; 3]; 3]) -> L {
+    let mut columns = rows;
+    for x in 0..3 {
+        columns[x] = ordered_three([rows[0][x], rows[1][x], rows[2][x]]);
+    }
+    let low = columns[0][0].max(columns[1][0]).max(columns[2][0]);
+    let [_, middle, _] = ordered_three([columns[0][1], columns[1][1], columns[2][1]]);
+    let high = columns[0][2].min(columns[1][2]).min(columns[2][2]);
+    let [_, median, _] = ordered_three([low, middle, high]);
+    median
+}
+
+/// Median of `COUNT` values by forgetting: of any `KEPT = COUNT / 2 + 2` values neither the smallest nor the largest can
+/// be the median, so they make room for the next one.
+#[inline(always)]
+fn median_of_many<L: Lanes, const COUNT: usize, const KEPT: usize>(values: [L; COUNT]) -> L {
+    let mut kept = [values[0]; KEPT];
+    kept.copy_from_slice(&values[..KEPT]);
+    let mut n = KEPT;
+    for next in KEPT..=COUNT {
+        // Smallest to the front, largest to the back.
+        for i in 0..n / 2 {
+            [kept[i], kept[n - 1 - i]] = ordered(kept[i], kept[n - 1 - i]);
+        }
+        for i in 1..n.div_ceil(2) {
+            [kept[0], kept[i]] = ordered(kept[0], kept[i]);
+        }
+        for i in n / 2..n - 1 {
+            [kept[i], kept[n - 1]] = ordered(kept[i], kept[n - 1]);
+        }
+        if next < COUNT {
+            // The new value replaces the smallest; the largest is forgotten by counting one less.
+            kept[0] = values[next];
+            n -= 1;
+        } else {
+            kept[0] = kept[1];
+        }
+    }
+    kept[0]
+}
+
+dispatch! {
+    /// Texture to confidence in place; returns whether a pixel of the row has none.
+    fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> bool = confidence_generic
+}
+
+#[inline(always)]
+fn confidence_generic<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32) -> bool {
+    let mut smallest = f32::INFINITY;
+    for (texture, misfit) in texture.iter_mut().zip(misfit) {
+        *texture = confidence::confidence(*texture, *misfit, scale);
+        smallest = if *texture < smallest { *texture } else { smallest };
+    }
+    smallest <= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lanes::Portable;
+    use super::*;
+
+    fn sorted_median(values: &[f32]) -> f32 {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f32::total_cmp);
+        sorted[sorted.len() / 2]
+    }
+
+    #[test]
+    fn medians_are_those_of_sorting() {
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            // Few distinct values, so that ties occur.
+            ((state >> 40) % 50) as f32
+        };
+        for _ in 0..500 {
+            let values: Vec<f32> = (0..49).map(|_| random()).collect();
+            let at = |i: usize| Portable::splat(values[i]);
+            let nine =
+                median_of_nine::<Portable>(std::array::from_fn(|y| std::array::from_fn(|x| at(3 * y + x))));
+            assert_eq!(nine.to_array()[0], sorted_median(&values[..9]));
+            let many = median_of_many::<Portable, 25, 14>(at);
+            assert_eq!(many.to_array()[0], sorted_median(&values[..25]));
+            let many = median_of_many::<Portable, 49, 26>(at);
+            assert_eq!(many.to_array()[0], sorted_median(&values));
+        }
+    }
+}
