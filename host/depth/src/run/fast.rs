@@ -199,7 +199,8 @@ impl Tile {
             simd::convolve(backend, gm1, difference, &mut self.m, rows, operated);
             simd::convolve(backend, gp1, sum, p1, rows, operated);
             simd::convolve(backend, gp2, sum, p2, rows, operated);
-            simd::vertical_sums(backend, &mut self.window, &self.m, p1, p2, &mut self.sums, rows, operated);
+            let operated_rows = [&self.m, p1, p2];
+            simd::vertical_sums(backend, &mut self.window, operated_rows, &mut self.sums, rows, operated);
             for y in 0..rows {
                 if let Some(row) = (begin + y).checked_sub(lag) {
                     self.finish_row(job, row, y, solved, &mut maps);

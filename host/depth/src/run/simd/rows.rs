@@ -102,18 +102,16 @@ impl WindowRow {
 }
 
 dispatch! {
-    /// Feeds `rows` rows of `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
+    /// Feeds `rows` rows of the inputs `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
     /// `p1 m`, `m m` that end with row `y`.
-    fn vertical_sums(state: &mut WindowRow, m: &Plane, p1: &Plane, p2: &Plane, sums: &mut Plane, rows: usize, width: usize) =
+    fn vertical_sums(state: &mut WindowRow, inputs: [&Plane; 3], sums: &mut Plane, rows: usize, width: usize) =
         vertical_generic
 }
 
 #[inline(always)]
 fn vertical_generic<L: Lanes>(
     state: &mut WindowRow,
-    m: &Plane,
-    p1: &Plane,
-    p2: &Plane,
+    [m, p1, p2]: [&Plane; 3],
     sums: &mut Plane,
     rows: usize,
     width: usize,
@@ -416,13 +414,12 @@ mod tests {
         };
         for _ in 0..500 {
             let values: Vec<f32> = (0..49).map(|_| random()).collect();
-            let at = |i: usize| Portable::splat(values[i]);
-            let nine =
-                median_of_nine::<Portable>(std::array::from_fn(|y| std::array::from_fn(|x| at(3 * y + x))));
+            let lanes: Vec<Portable> = values.iter().map(|v| Portable::splat(*v)).collect();
+            let nine = median_of_nine([0, 3, 6].map(|i| [lanes[i], lanes[i + 1], lanes[i + 2]]));
             assert_eq!(nine.to_array()[0], sorted_median(&values[..9]));
-            let many = median_of_many::<Portable, 25, 14>(at);
+            let many = median_of_many::<Portable, 25, 14>(lanes[..25].try_into().unwrap());
             assert_eq!(many.to_array()[0], sorted_median(&values[..25]));
-            let many = median_of_many::<Portable, 49, 26>(at);
+            let many = median_of_many::<Portable, 49, 26>(lanes[..].try_into().unwrap());
             assert_eq!(many.to_array()[0], sorted_median(&values));
         }
     }
