@@ -1,4 +1,4 @@
-//! The background model on the highway sequence of ChangeDetection.net (Goyette et al. 2012), where it is at hand.
+//! The background model and the shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al. 2012), where it is at hand.
 //!
 //! The figures to agree with are those of OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with its default
 //! settings (the same as ours), fed with the same frames in order and scored in the same way: label 255 against
@@ -11,9 +11,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_activity::background::{BackgroundModel, Frame, Label, Settings};
+use farnear_activity::{
+    background::{BackgroundModel, Frame, Label, Settings},
+    shadow_detectors::{Detector, Images, Method},
+    shadow_score::{ShadowScore, Truth},
+};
 use image::{DynamicImage, GrayImage};
-use ndarray::{ArrayView2, ArrayView3};
+use ndarray::{Array2, ArrayView2, ArrayView3};
 
 fn data() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/highway");
@@ -123,4 +127,46 @@ fn grey_with_shadow_agrees_with_opencv() {
 #[test]
 fn grey_without_shadow_agrees_with_opencv() {
     agrees(false, false, 0.1715);
+}
+
+/// Detection and discrimination rates (Sanin et al. 2012) of the five detectors on the background model's foreground.
+/// Where the frames at hand have no pixel labelled shadow, only the discrimination rate can be given.
+#[test]
+fn detectors_keep_most_of_what_moves() {
+    let Some(data) = data() else { return };
+    let mut detectors = Method::ALL.map(|method| (method, Detector::new(method), ShadowScore::default()));
+    let mut model: Option<BackgroundModel> = None;
+    for (number, picture) in frames(&data) {
+        let size = (picture.height() as usize, picture.width() as usize);
+        let rgb = picture.to_rgb8();
+        let pixels = ArrayView3::from_shape((size.0, size.1, 3), rgb.as_raw()).unwrap();
+        let settings = Settings { shadow: None, ..Settings::default() };
+        let model = model.get_or_insert_with(|| BackgroundModel::like(Frame::Rgb(pixels), settings).unwrap());
+        let foreground = model.apply(Frame::Rgb(pixels)).unwrap().mapv(|label| label == Label::Foreground);
+        if number < 470 {
+            continue;
+        }
+        let background = model.background();
+        let images = Images::new(pixels, background.view(), foreground.view()).unwrap();
+        let truth = truth(&data, number);
+        let truth =
+            Array2::from_shape_vec(size, truth.pixels().map(|p| Truth::from_grey(p.0[0]).unwrap()).collect());
+        let truth = truth.unwrap();
+        for (_, detector, score) in &mut detectors {
+            let shadow = detector.detect(&images);
+            let left = Array2::from_shape_fn(size, |at| foreground[at] && !shadow[at]);
+            score.add(Some(foreground.view()), left.view(), truth.view()).unwrap();
+        }
+    }
+    for (method, _, score) in &detectors {
+        let detection =
+            score.removed_percent().map_or("no labelled shadow".into(), |rate| format!("{rate:.1} %"));
+        let discrimination = score.discrimination_percent().unwrap();
+        println!(
+            "{}: detection {detection}, discrimination {discrimination:.1} % of {} pixels",
+            method.name(),
+            score.subject_pixels
+        );
+        assert!(discrimination > 40.0, "{}: {discrimination:.1} %", method.name());
+    }
 }

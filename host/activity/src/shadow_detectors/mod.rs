@@ -2,9 +2,26 @@
 //!
 //! The five that Li 2014 (tables 8.1 and 8.2) compares his own cut with, as chosen and described by Sanin,
 //! Sanderson and Lovell, "Shadow detection: a survey and comparative evaluation of recent methods", Pattern
-//! Recognition 45 (2012), 1684-1695.
+//! Recognition 45 (2012), 1684-1695. Each is built from its own paper, named in its module; thresholds are this
+//! project's. All need the picture of the empty scene ([`crate::background::BackgroundModel::background`]) and
+//! colour. [`made_scene`] scores them on pictures whose shadow is known.
+//!
+//! The limits that the survey names hold here too: chromaticity fails on grey clothes, geometry on shadows that fall
+//! under the body's own columns, texture on smooth ground.
+
+pub mod chromaticity;
+pub mod geometry;
+mod images;
+pub mod large_region;
+pub mod made_scene;
+pub mod physical;
+pub mod small_region;
 
 use std::str::FromStr;
+
+pub use images::{Images, ImagesError};
+
+use crate::mask::Mask;
 
 /// One of the five detectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,6 +57,46 @@ impl Method {
             Self::Geometry => "geometry",
             Self::SmallRegionTexture => "small-region-texture",
             Self::LargeRegionTexture => "large-region-texture",
+        }
+    }
+}
+
+/// One of the detectors with its default settings, ready for a sequence of frames.
+#[derive(Clone, Debug)]
+pub enum Detector {
+    /// See [`chromaticity`].
+    Chromaticity(chromaticity::Settings),
+    /// See [`physical`]; learns from frame to frame.
+    Physical(physical::Physical),
+    /// See [`geometry`].
+    Geometry(geometry::Settings),
+    /// See [`small_region`].
+    SmallRegionTexture(small_region::Settings),
+    /// See [`large_region`].
+    LargeRegionTexture(large_region::Settings),
+}
+
+impl Detector {
+    /// The detector of this name with its default settings.
+    #[must_use]
+    pub fn new(method: Method) -> Self {
+        match method {
+            Method::Chromaticity => Self::Chromaticity(chromaticity::Settings::default()),
+            Method::Physical => Self::Physical(physical::Physical::new(physical::Settings::default())),
+            Method::Geometry => Self::Geometry(geometry::Settings::default()),
+            Method::SmallRegionTexture => Self::SmallRegionTexture(small_region::Settings::default()),
+            Method::LargeRegionTexture => Self::LargeRegionTexture(large_region::Settings::default()),
+        }
+    }
+
+    /// The shadow pixels among the foreground of the next frame, shape (height, width).
+    pub fn detect(&mut self, images: &Images<'_>) -> Mask {
+        match self {
+            Self::Chromaticity(settings) => chromaticity::detect(images, settings),
+            Self::Physical(detector) => detector.detect(images),
+            Self::Geometry(settings) => geometry::detect(images, settings),
+            Self::SmallRegionTexture(settings) => small_region::detect(images, settings),
+            Self::LargeRegionTexture(settings) => large_region::detect(images, settings),
         }
     }
 }
