@@ -13,8 +13,10 @@
 //! left open. So a surface of uniform radiance looks uniform whatever its shape (radiance is conserved
 //! along rays), a sharp near edge stays sharp before a blurred background, and what a near edge hides is
 //! filled in with the mean of what is visible beside it. Within the blur radius of a depth step this is an
-//! approximation (the exact image there depends on which part of the aperture sees past the edge);
-//! `tests/exact.rs` states its size against ray casting.
+//! approximation (the exact image there depends on which part of the aperture sees past the edge): beside a
+//! step over the whole working range it is 1.5 % RMS and at most 8 % off for white noise of contrast 0.2;
+//! elsewhere the image agrees with ray casting to 1e-4 (planes) and 6e-4 (slopes), the ray caster's own
+//! error (`tests/exact.rs`).
 //!
 //! *Levels.* Up to [`MAX_EXACT_LEVELS`] different depths have a slab with its exact kernel each. A
 //! continuous surface has slabs of [`SLAB_PX`] blur, in which kernels are tabulated every [`LEVEL_PX`] and
@@ -22,12 +24,13 @@
 //!
 //! # Cost
 //! Cells times the kernel's pixels, twice (light and cover; a plane has full cover and needs one): 20 to
-//! 150 ms for 640 x 480 at 2.7 px. Kernels wider than [`MAX_DIRECT_PX`] go through the FFT as one slab with
+//! 300 ms for 640 x 480 at 2.7 px. Kernels wider than [`MAX_DIRECT_PX`] go through the FFT as one slab with
 //! levels spaced by [`LEVEL_RATIO`] of the radius: up to a second, but a rig is there only while it homes.
 
 use ndarray::Array2;
 use rustfft::num_complex::Complex32;
 
+use crate::composite::{Composite, Sums};
 use crate::fourier::{Fourier2, good_size};
 use crate::kernel::{CELLS_PER_PIXEL, CellKernel};
 use crate::psf::Psf;
@@ -326,75 +329,5 @@ impl Slab {
         let (low, high) = (self.radii_px[level], self.radii_px[level + 1]);
         let fraction = (radius * radius - low * low) / (high * high - low * low);
         (level, fraction.clamp(0.0, 1.0))
-    }
-}
-
-/// Light and cover per pixel, with a border that takes what falls beside the image.
-struct Sums {
-    light: Vec<f32>,
-    /// Empty where the slab covers everything.
-    cover: Vec<f32>,
-    border_px: usize,
-    stride: usize,
-}
-
-impl Sums {
-    fn new((height, width): (usize, usize), margin_px: usize, lanes: usize, needs_cover: bool) -> Self {
-        let border_px = 2 * margin_px;
-        let stride = width + 2 * border_px + lanes;
-        let count = (height + 2 * border_px) * stride;
-        Self {
-            light: vec![0.0; count],
-            cover: vec![0.0; if needs_cover { count } else { 0 }],
-            border_px,
-            stride,
-        }
-    }
-}
-
-/// The image while slabs are laid behind each other.
-struct Composite {
-    light: Array2<f32>,
-    /// Share of the aperture that no slab has filled yet.
-    open: Array2<f32>,
-}
-
-impl Composite {
-    fn new(size: (usize, usize)) -> Self {
-        Self { light: Array2::zeros(size), open: Array2::ones(size) }
-    }
-
-    fn add_behind(&mut self, sums: &Sums) {
-        let width = self.light.ncols();
-        for (row, (mut light, mut open)) in
-            self.light.outer_iter_mut().zip(self.open.outer_iter_mut()).enumerate()
-        {
-            let start = (row + sums.border_px) * sums.stride + sums.border_px;
-            let new_light = &sums.light[start..start + width];
-            if sums.cover.is_empty() {
-                for ((light, open), new) in light.iter_mut().zip(&mut open).zip(new_light) {
-                    *light += *open * new;
-                    *open = 0.0;
-                }
-                continue;
-            }
-            let new_cover = &sums.cover[start..start + width];
-            for (((light, open), &new), &cover) in
-                light.iter_mut().zip(&mut open).zip(new_light).zip(new_cover)
-            {
-                if cover <= 0.0 || *open <= 0.0 {
-                    continue;
-                }
-                let taken = cover.min(*open);
-                *light += new * (taken / cover);
-                *open -= taken;
-            }
-        }
-    }
-
-    /// The image; what rounding or the spread of slopes left open is scaled away.
-    fn finish(mut self) -> Array2<f32> {
-        self.light.zip_mut_with(&self.open, |light, open| *light /= (1.0 - open).max(f32::MIN_POSITIVE));
-        self.light
     }
 }

@@ -44,6 +44,7 @@
 
 pub mod blur;
 pub mod camera;
+mod composite;
 mod fourier;
 pub mod kernel;
 pub mod lens;
