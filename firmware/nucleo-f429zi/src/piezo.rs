@@ -2,10 +2,11 @@
 //!
 //! - DAC: TI DAC8830 (SLAS449): 16 bit, +-1 LSB, SPI mode 0 up to 50 MHz, 16-bit frame, takes the value when
 //!   its select rises; starts at code 0, which leaves the piezo relaxed. Select PD0.
-//! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise) in its three-wire CS mode: the rising
-//!   edge of CNV (PD1) samples; the result is ready at most 2.2 us later; with CNV low it is shifted out, two's
-//!   complement, most significant bit first, in SPI mode 0. After 18 bits the output is released and the
-//!   pull-up makes ones; that tells a converter from a broken wire.
+//! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise) in its three-wire CS mode with busy
+//!   indicator: the rising edge of CNV (PD1) samples; CNV is low again before the shortest conversion (0.5 us)
+//!   ends. When the longest (2.2 us) has ended, the output, released and pulled up till then, is low; each clock
+//!   then gives a bit of the result, two's complement, most significant first, in SPI mode 0; after the last one
+//!   the output is released again. The leading 0 and the trailing ones tell a converter from a broken wire.
 
 use embassy_stm32::{
     Peri,
@@ -21,8 +22,10 @@ use farnear_rig::io::GAUGE_CODE_MAX;
 const SPI_HZ: Hertz = Hertz(10_500_000);
 /// Longest conversion of the AD7691: 2.2 us of the 168 MHz clock.
 const CONVERSION_CYCLES: u32 = 370;
-/// Clocks after the 18 bits in a 24-bit transfer.
-const TRAILING_BITS: u32 = 6;
+/// The busy indicator, the first of the 24 bits that are read.
+const BUSY_BIT: u32 = 1 << 23;
+/// Clocks after the indicator and the 18 bits.
+const TRAILING_BITS: u32 = 5;
 const TRAILING_ONES: u32 = (1 << TRAILING_BITS) - 1;
 /// Turns two's complement into 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
@@ -62,13 +65,14 @@ impl Piezo {
     /// Samples and reads the gauge: 0 to [`GAUGE_CODE_MAX`], `None` where no converter answers. Takes 5 us.
     pub fn gauge(&mut self) -> Option<u32> {
         self.convert.set_high();
-        cortex_m::asm::delay(CONVERSION_CYCLES);
         self.convert.set_low();
+        cortex_m::asm::delay(CONVERSION_CYCLES);
         let mut bytes = [0u8; 3];
         self.spi.blocking_transfer_in_place(&mut bytes).ok()?;
         let word = u32::from_be_bytes([0, bytes[0], bytes[1], bytes[2]]);
         let code = (word >> TRAILING_BITS) & GAUGE_CODE_MAX;
-        (word & TRAILING_ONES == TRAILING_ONES).then_some(code ^ SIGN_BIT)
+        let whole = word & BUSY_BIT == 0 && word & TRAILING_ONES == TRAILING_ONES;
+        whole.then_some(code ^ SIGN_BIT)
     }
 
     /// Sets the DAC; what it holds already is not sent again.

@@ -54,6 +54,15 @@ pub const TIM4: usize = 2;
 /// TIM1 in the table of advanced timers.
 pub const TIM1: usize = 0;
 
+/// A chip on SPI3, in the order in which the board attaches them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SpiChip {
+    /// The piezo's DAC.
+    Dac,
+    /// The gauge's converter.
+    Gauge,
+}
+
 /// A pin of the chip: port A is 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct PinName {
@@ -143,6 +152,12 @@ impl Chip {
     pub fn level(&mut self, name: PinName) -> Level {
         let (port, registers) = self.part.port(name.port);
         port.level(name.pin(), registers)
+    }
+
+    /// Cuts the data lines of a chip on SPI3, or mends them.
+    pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
+        // It says whether such a chip is there; both are, since `RigBoard::new`.
+        let _ = self.part.spi[SPI3].silence(chip as usize, cut);
     }
 
     /// The alternate function that a pin is set to.

@@ -17,8 +17,8 @@ pub fn with_plant<T>(plant: &SharedPlant, work: impl FnOnce(&mut Plant) -> T) ->
     work(&mut plant.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Longest conversion of the AD7691 (t_CONV, 2.2 us).
-const CONVERSION_NS: u64 = 2_200;
+/// Shortest and longest conversion of the AD7691 (t_CONV).
+const CONVERSION_NS: (u64, u64) = (500, 2_200);
 /// Bits of a conversion.
 const RESULT_BITS: u32 = 18;
 const SIGN_BIT: u32 = 1 << 17;
@@ -66,40 +66,51 @@ impl std::fmt::Debug for Dac {
     }
 }
 
-/// AD7691 in three-wire CS mode: the select line is CNV. Its rising edge samples; while it is low, the result is
-/// shifted out. Read before the conversion is over, the result is of no use; this model then gives zeros.
+/// AD7691 in three-wire CS mode: the select line is CNV. Its rising edge samples. Where CNV is low again before
+/// the shortest conversion ends, a 0 (busy indicator) comes before the result; until the longest has ended, the
+/// output is released. A released output reads as ones, for the bus has a pull-up.
 pub struct GaugeConverter {
     plant: SharedPlant,
     sampled_ns: u64,
+    low_ns: u64,
     result: u32,
-    /// What is still to be shifted out, most significant bit first, and ones after it (released output).
-    shift: u64,
+    /// What is still to be shifted out, most significant bit first, and ones after it; `None` until it is read.
+    shift: Option<u64>,
 }
 
 impl GaugeConverter {
     /// The chip, sampling the plant's gauge.
     pub fn new(plant: SharedPlant) -> Self {
-        Self { plant, sampled_ns: 0, result: 0, shift: u64::MAX }
+        Self { plant, sampled_ns: 0, low_ns: 0, result: 0, shift: None }
+    }
+
+    /// What comes out when the first bit is read at this moment.
+    fn output(&self, now_ns: u64) -> u64 {
+        if now_ns < self.sampled_ns + CONVERSION_NS.1 {
+            return u64::MAX;
+        }
+        let indicates = self.low_ns < self.sampled_ns + CONVERSION_NS.0;
+        let lead = if indicates { 1 } else { 0 };
+        (u64::from(self.result) << (64 - RESULT_BITS - lead)) | (u64::MAX >> (RESULT_BITS + lead))
     }
 }
 
 impl Peer for GaugeConverter {
-    fn transfer(&mut self, _mosi: u32, bits: u8, _context: &mut Timeline<'_, '_>) -> u32 {
-        let out = (self.shift >> (64 - u32::from(bits))) as u32;
-        self.shift = (self.shift << bits) | ((1 << bits) - 1);
-        out
+    fn transfer(&mut self, _mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        let shift = self.shift.unwrap_or_else(|| self.output(context.now().0));
+        self.shift = Some((shift << bits) | ((1 << bits) - 1));
+        (shift >> (64 - u32::from(bits))) as u32
     }
 
-    /// CNV falls: the output comes on.
+    /// CNV falls.
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
-        let ready = context.now().0 >= self.sampled_ns + CONVERSION_NS;
-        let result = if ready { self.result } else { 0 };
-        self.shift = (u64::from(result) << (64 - RESULT_BITS)) | (u64::MAX >> RESULT_BITS);
+        self.low_ns = context.now().0;
     }
 
     /// CNV rises: sample.
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
         self.sampled_ns = context.now().0;
+        self.shift = None;
         // Straight codes to two's complement.
         self.result = with_plant(&self.plant, |plant| plant.sample_gauge(self.sampled_ns)) ^ SIGN_BIT;
     }

@@ -13,7 +13,7 @@ use rigless::{
 };
 
 use crate::{
-    board::{DIAG, RigBoard},
+    board::{DIAG, RigBoard, SpiChip},
     chips::{SharedPlant, with_plant},
     error::SimError,
     faults::{Faults, NoisyLine},
@@ -111,6 +111,11 @@ impl Hands<'_, '_> {
     /// The stepper driver reports a fault on DIAG, or takes it back.
     pub fn set_driver_fault(&mut self, fault: bool) {
         self.session.board_mut().chip.drive_pin(self.stop.at, DIAG, Level::from(fault));
+    }
+
+    /// Cuts the data lines of a chip, or mends them.
+    pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
+        self.session.board_mut().chip.disconnect(chip, cut);
     }
 
     /// Writes a register of the chip behind the firmware's back, as a stray pointer would.

@@ -7,6 +7,7 @@ use farnear_protocol::{
     EventKind, Nanometres, Request, RequestError,
     message::{Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
 };
+use farnear_sim::board::SpiChip;
 
 #[test]
 fn hello_tells_who_the_board_is() {
@@ -66,4 +67,24 @@ fn a_home_switch_that_never_closes_ends_the_search() {
         ),
         "{end:?}"
     );
+}
+
+#[test]
+fn a_cut_gauge_and_a_dead_drive_end_a_fine_move() {
+    let mut bench = Bench::new(6);
+    let go = |target| Request::Move { axis: Axis::SensorFine, target: Nanometres(target) };
+    // The gauge's code passes through every pattern of bits on the way, none of which may look like a cut wire.
+    for target in [20_000, 121_071, 121_072, 121_073, 180_000] {
+        let end = bench.carry_out(&go(target));
+        assert!(matches!(end, EventKind::MoveDone { .. }), "{target} nm: {end:?}");
+    }
+    bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Gauge, true)).expect("runs");
+    let end = bench.carry_out(&go(50_000));
+    assert!(matches!(end, EventKind::Failed { reason: Failure::Gauge, .. }), "{end:?}");
+    bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Gauge, false)).expect("runs");
+    let end = bench.carry_out(&go(50_000));
+    assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
+    bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Dac, true)).expect("runs");
+    let end = bench.carry_out(&go(150_000));
+    assert!(matches!(end, EventKind::Failed { reason: Failure::NotSettled { .. }, .. }), "{end:?}");
 }
