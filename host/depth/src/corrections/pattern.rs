@@ -1,0 +1,80 @@
+//! A series of flat targets, checked.
+
+use farnear_maths::clsf::DepthScale;
+use ndarray::ArrayView2;
+
+use super::{CorrectionError, Method};
+
+/// Smallest side of a map that can be corrected: a few pixels per region.
+const SMALLEST_PX: usize = 12;
+
+/// The depth map of a flat target and the depth at which the target stood.
+#[derive(Debug, Clone, Copy)]
+pub struct Pattern<'a> {
+    /// Measured depth, mm, (height, width), NaN = no value.
+    pub depth_mm: ArrayView2<'a, f32>,
+    /// True depth, mm.
+    pub true_mm: f64,
+}
+
+/// Patterns of one size from the farthest to the nearest.
+pub(super) struct Series<'a> {
+    patterns: Vec<Pattern<'a>>,
+    scale: DepthScale,
+}
+
+impl<'a> Series<'a> {
+    pub(super) fn new(method: Method, patterns: &[Pattern<'a>]) -> Result<Self, CorrectionError> {
+        let mut sorted = patterns.to_vec();
+        for (index, pattern) in sorted.iter().enumerate() {
+            if !(pattern.true_mm.is_finite() && pattern.true_mm > 0.0) {
+                return Err(CorrectionError::TrueDepth { index, true_mm: pattern.true_mm });
+            }
+            let (height, width) = sorted[0].depth_mm.dim();
+            let (found_height, found_width) = pattern.depth_mm.dim();
+            if (found_height, found_width) != (height, width) {
+                return Err(CorrectionError::PatternSize { index, width, height, found_width, found_height });
+            }
+        }
+        let (given, needed) = (sorted.len(), method.patterns_needed());
+        if given < needed {
+            return Err(CorrectionError::TooFewPatterns { method, given, needed });
+        }
+        let (height, width) = sorted[0].depth_mm.dim();
+        if height < SMALLEST_PX || width < SMALLEST_PX {
+            return Err(CorrectionError::TooSmall { width, height, least: SMALLEST_PX });
+        }
+        sorted.sort_by(|a, b| b.true_mm.total_cmp(&a.true_mm));
+        if let Some(pair) = sorted.windows(2).find(|pair| pair[0].true_mm == pair[1].true_mm) {
+            return Err(CorrectionError::RepeatedDepth(pair[0].true_mm));
+        }
+        let scale = scale(sorted[0].true_mm, sorted[given - 1].true_mm)?;
+        Ok(Self { patterns: sorted, scale })
+    }
+
+    pub(super) fn patterns(&self) -> &[Pattern<'a>] {
+        &self.patterns
+    }
+
+    pub(super) fn dim(&self) -> (usize, usize) {
+        self.patterns[0].depth_mm.dim()
+    }
+
+    /// Depths of the farthest and the nearest.
+    pub(super) fn range_mm(&self) -> (f64, f64) {
+        (self.patterns[0].true_mm, self.patterns[self.patterns.len() - 1].true_mm)
+    }
+
+    pub(super) fn scale(&self) -> DepthScale {
+        self.scale
+    }
+}
+
+pub(super) fn scale(far_mm: f64, near_mm: f64) -> Result<DepthScale, CorrectionError> {
+    Ok(DepthScale::for_range(far_mm as f32, near_mm as f32)?)
+}
+
+/// Depth in mm to normalised depth in f64, on the same scale as the board's.
+pub(super) fn normalise(scale: DepthScale, depth_mm: f64) -> f64 {
+    (depth_mm - f64::from(scale.centre_mm())) / f64::from(scale.half_span_mm())
+}
