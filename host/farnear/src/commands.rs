@@ -1,0 +1,9 @@
+//! One file per command: its flags, what it does, its figures.
+
+pub mod compare;
+pub mod completions;
+pub mod depth;
+pub mod operators;
+pub mod optics;
+pub mod render;
+pub mod rig;

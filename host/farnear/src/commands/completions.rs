@@ -1,0 +1,21 @@
+//! `farnear completions`: completions for a shell.
+
+use anyhow::Result;
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+/// Print completions for a shell.
+#[derive(Args)]
+#[command(
+    after_help = "Example: farnear completions bash > ~/.local/share/bash-completion/completions/farnear"
+)]
+pub struct Arguments {
+    /// The shell.
+    shell: Shell,
+}
+
+/// Prints the completions of the program whose arguments `C` describes.
+pub fn run<C: CommandFactory>(arguments: Arguments) -> Result<()> {
+    clap_complete::generate(arguments.shell, &mut C::command(), "farnear", &mut std::io::stdout());
+    Ok(())
+}

@@ -1,0 +1,180 @@
+//! `farnear depth`: a depth map from a far- and a near-focused image.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use farnear_capture::{
+    aside::Aside,
+    image_file::{encode_png, read_grey},
+    record::CAPTURE_FILE,
+};
+use farnear_depth::{
+    operators::Operators,
+    optics::Optics,
+    run::{DepthMap, Settings, depth_from_pair},
+};
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::{
+    files::{self, map, mesh},
+    picture, report,
+};
+
+/// Compute a depth map from a far- and a near-focused image.
+///
+/// Writes depth.npy and depth.tiff (mm, NaN = no value), depth.png (16 bit), confidence.npy (0 to 1), mesh.ply, view.png
+/// (a picture with a scale) and depth.toml (what made them).
+#[derive(Args)]
+#[command(after_help = "Example: farnear depth far.png near.png --optics optics.toml --out depth/")]
+pub struct Arguments {
+    /// The image focused on the far plane: PNG, TIFF (8, 16 bit, float), JPEG or PGM.
+    far: PathBuf,
+    /// The image focused on the near plane.
+    near: PathBuf,
+    /// The optics file.
+    #[arg(long, value_name = "FILE")]
+    optics: PathBuf,
+    /// Operators saved by `farnear operators`; without it they are designed for the optics.
+    #[arg(long, value_name = "FILE")]
+    operators: Option<PathBuf>,
+    /// Side of the window over which coefficients are summed, in pixels, odd.
+    #[arg(long, value_name = "PX", default_value_t = 7)]
+    smooth: usize,
+    /// Side of the median window in pixels: 1, 3, 5 or 7.
+    #[arg(long, value_name = "PX", default_value_t = 3)]
+    median: usize,
+    /// Threads; 0 = all.
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Folder for the results; without it the folder of a capture, else depth/ beside the far image.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Figures {
+    seconds: f64,
+    width: usize,
+    height: usize,
+    median_mm: f64,
+    low_texture_fraction: f64,
+    warnings: Vec<String>,
+}
+
+/// The content of `depth.toml`: what made the map.
+#[derive(Serialize)]
+struct Sidecar<'a> {
+    format: u32,
+    made_by: String,
+    far: String,
+    near: String,
+    units: &'static str,
+    warnings: &'a [String],
+    /// How depth.png's codes stand for mm; code 0 = no value.
+    png: map::Scale,
+    settings: Settings,
+    optics: Optics,
+    operators: &'a Operators,
+}
+
+/// Runs the command.
+pub fn run(arguments: Arguments) -> Result<()> {
+    let optics = files::optics::read(&arguments.optics)?;
+    let far = read_grey(&arguments.far)?.pixels;
+    let near = read_grey(&arguments.near)?.pixels;
+    let operators = operators(arguments.operators.as_deref(), &optics)?;
+    let settings =
+        Settings { smoothing_px: arguments.smooth, median_px: arguments.median, threads: arguments.threads };
+    let start = Instant::now();
+    let depth = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let warnings: Vec<String> = depth.warnings.iter().map(ToString::to_string).collect();
+    for warning in &warnings {
+        eprintln!("warning: {warning}");
+    }
+    let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.far));
+    write(&out, &arguments, &depth, &far, &operators, &optics, &warnings)?;
+    eprintln!("wrote {}", out.display());
+    let (height, width) = depth.depth_mm.dim();
+    let figures = Figures {
+        seconds: report::rounded(seconds, 6),
+        width,
+        height,
+        median_mm: report::rounded(median(&depth.depth_mm), 3),
+        low_texture_fraction: report::rounded(depth.low_texture_fraction, 6),
+        warnings,
+    };
+    report::print(&figures, arguments.json)
+}
+
+fn operators(file: Option<&Path>, optics: &Optics) -> Result<Operators> {
+    let Some(file) = file else { return Ok(Operators::for_optics(optics)?) };
+    let text =
+        fs::read_to_string(file).with_context(|| format!("cannot read the operators {}", file.display()))?;
+    toml::from_str(&text).with_context(|| format!("{} holds no operators", file.display()))
+}
+
+/// A capture's own folder, or `depth` beside the image.
+fn default_folder(far: &Path) -> PathBuf {
+    let folder = far.parent().unwrap_or(Path::new(""));
+    if folder.join(CAPTURE_FILE).exists() { folder.to_path_buf() } else { folder.join("depth") }
+}
+
+fn write(
+    out: &Path,
+    arguments: &Arguments,
+    depth: &DepthMap,
+    far: &Array2<f32>,
+    operators: &Operators,
+    optics: &Optics,
+    warnings: &[String],
+) -> Result<()> {
+    let aside = Aside::into_folder(out)?;
+    let map = depth.depth_mm.view();
+    let (codes, png) = map::codes(map);
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let sidecar = Sidecar {
+        format: 1,
+        made_by: concat!("farnear ", env!("CARGO_PKG_VERSION")).into(),
+        far: name(&arguments.far),
+        near: name(&arguments.near),
+        units: "mm",
+        warnings,
+        png,
+        // The number of threads changes nothing in the result.
+        settings: Settings {
+            smoothing_px: arguments.smooth,
+            median_px: arguments.median,
+            ..Settings::default()
+        },
+        optics: *optics,
+        operators,
+    };
+    aside.write("depth.npy", &map::npy(map)?)?;
+    aside.write("depth.tiff", &map::tiff(map)?)?;
+    aside.write("depth.png", &encode_png(codes.view(), 16).map_err(anyhow::Error::msg)?)?;
+    aside.write("confidence.npy", &map::npy(depth.confidence.view())?)?;
+    aside.write("mesh.ply", &mesh::ply(map, far.view(), optics))?;
+    aside.write("view.png", &picture::view_png(map)?)?;
+    aside.write("depth.toml", toml::to_string(&sidecar)?.as_bytes())?;
+    Ok(aside.finish()?)
+}
+
+/// Median of the values that there are, NaN where there are none.
+fn median(map: &Array2<f32>) -> f64 {
+    let mut finite: Vec<f32> = map.iter().copied().filter(|value| value.is_finite()).collect();
+    if finite.is_empty() {
+        return f64::NAN;
+    }
+    let middle = finite.len() / 2;
+    f64::from(*finite.select_nth_unstable_by(middle, f32::total_cmp).1)
+}

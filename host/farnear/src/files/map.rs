@@ -1,0 +1,125 @@
+//! Depth maps and masks in files: `.npy` (f32) and float TIFF.
+
+use std::{io::Cursor, path::Path};
+
+use anyhow::{Context, Result, bail};
+use farnear_capture::image_file;
+use ndarray::{Array2, ArrayView2};
+use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+
+/// What the files begin with.
+const NPY_MAGIC: &[u8] = b"\x93NUMPY";
+
+/// Reads a map of numbers: `.npy` with f32 or f64, or a TIFF.
+pub fn read(path: &Path) -> Result<Array2<f32>> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if bytes.is_empty() {
+        bail!("{} is empty", path.display());
+    }
+    if bytes.starts_with(NPY_MAGIC) {
+        return read_npy(&bytes).with_context(|| {
+            format!("{} is no map: a 2-D array of f32 or f64 in C order is needed", path.display())
+        });
+    }
+    let image = image_file::decode_grey(&bytes)
+        .map_err(|reason| anyhow::anyhow!("{} is neither .npy nor TIFF: {reason}", path.display()))?;
+    if image.samples != image_file::Samples::Float {
+        bail!(
+            "{} holds {} integers, not mm; give the .npy or the float .tiff",
+            path.display(),
+            image.samples
+        );
+    }
+    Ok(image.pixels)
+}
+
+fn read_npy(bytes: &[u8]) -> Result<Array2<f32>> {
+    match Array2::<f32>::read_npy(Cursor::new(bytes)) {
+        Ok(map) => Ok(map),
+        Err(ndarray_npy::ReadNpyError::WrongDescriptor(_)) => {
+            Ok(Array2::<f64>::read_npy(Cursor::new(bytes))?.mapv(|value| value as f32))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Reads a mask: what is not black counts.
+pub fn read_mask(path: &Path) -> Result<Array2<bool>> {
+    Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
+}
+
+/// A map as the bytes of an `.npy` file.
+pub fn npy(map: ArrayView2<f32>) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    map.write_npy(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// A map as the bytes of a float TIFF.
+pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>> {
+    let (height, width) = map.dim();
+    let mut bytes = Cursor::new(Vec::new());
+    let values: Vec<f32> = map.iter().copied().collect();
+    TiffEncoder::new(&mut bytes)?.write_image::<Gray32Float>(width as u32, height as u32, &values)?;
+    Ok(bytes.into_inner())
+}
+
+/// How the codes of a 16-bit depth image stand for mm: `mm = offset_mm + scale_mm * code`, 0 = no value.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Scale {
+    /// Depth of code 0, which stands for "no value".
+    pub offset_mm: f64,
+    /// Depth between codes.
+    pub scale_mm: f64,
+}
+
+/// A map as 16-bit codes over its own range.
+pub fn codes(map: ArrayView2<f32>) -> (Array2<u16>, Scale) {
+    let finite = || map.iter().copied().filter(|value| value.is_finite());
+    let low = finite().fold(f32::INFINITY, f32::min);
+    let high = finite().fold(f32::NEG_INFINITY, f32::max);
+    if low > high {
+        return (Array2::zeros(map.dim()), Scale { offset_mm: 0.0, scale_mm: 1.0 });
+    }
+    // Code 1 is the nearest depth, code 65535 the farthest.
+    let scale_mm = f64::from(high - low).max(1e-6) / 65_534.0;
+    let offset_mm = f64::from(low) - scale_mm;
+    let code = |value: f32| {
+        if value.is_finite() { ((f64::from(value) - offset_mm) / scale_mm).round() as u16 } else { 0 }
+    };
+    (map.mapv(code), Scale { offset_mm, scale_mm })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn maps_come_back_from_npy_and_tiff() {
+        let map = array![[933.0f32, f32::NAN, 900.5], [887.0, 888.0, 889.0]];
+        let folder = tempfile::tempdir().unwrap();
+        for (name, bytes) in [("a.npy", npy(map.view()).unwrap()), ("a.tiff", tiff(map.view()).unwrap())] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            let back = read(&path).unwrap();
+            assert!(back.iter().zip(&map).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}");
+        }
+    }
+
+    #[test]
+    fn codes_stand_for_the_depth_they_came_from() {
+        let map = array![[933.0f32, f32::NAN], [887.0, 900.0]];
+        let (codes, scale) = codes(map.view());
+        assert_eq!((codes[[0, 1]], codes[[1, 0]], codes[[0, 0]]), (0, 1, 65_535));
+        let back = scale.offset_mm + scale.scale_mm * f64::from(codes[[1, 1]]);
+        assert!((back - 900.0).abs() <= scale.scale_mm, "{back}");
+    }
+
+    #[test]
+    fn a_map_of_one_depth_and_a_map_of_none_have_codes() {
+        assert_eq!(codes(array![[5.0f32, 5.0]].view()).0, array![[1, 1]]);
+        assert_eq!(codes(array![[f32::NAN]].view()).0, array![[0]]);
+    }
+}

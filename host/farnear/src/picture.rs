@@ -1,0 +1,149 @@
+//! `view.png`: a depth map as a person likes to look at it - near is warm, far is cold, grey where there is no
+//! value, with a scale bar in mm.
+
+mod text;
+
+use std::io::Cursor;
+
+use anyhow::Result;
+use image::{Rgb, RgbImage};
+use ndarray::ArrayView2;
+
+use text::Writer;
+
+/// Small maps are enlarged to at least this height, by a whole number of pixels.
+const MIN_HEIGHT_PX: usize = 320;
+/// Left and right outliers that do not stretch the colours.
+const OUTLIERS: f64 = 0.005;
+const MARGIN_PX: u32 = 24;
+const BAR_PX: u32 = 22;
+const BACKGROUND: Rgb<u8> = Rgb([250, 250, 248]);
+const INK: Rgb<u8> = Rgb([40, 40, 44]);
+const NO_VALUE: Rgb<u8> = Rgb([150, 150, 152]);
+
+/// The picture of a depth map in mm as the bytes of a PNG.
+pub fn view_png(depth_mm: ArrayView2<f32>) -> Result<Vec<u8>> {
+    let mut png = Cursor::new(Vec::new());
+    draw(depth_mm)?.write_to(&mut png, image::ImageFormat::Png)?;
+    Ok(png.into_inner())
+}
+
+fn draw(depth_mm: ArrayView2<f32>) -> Result<RgbImage> {
+    let (rows, columns) = depth_mm.dim();
+    let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).max(1) as u32;
+    let (width, height) = (columns as u32 * zoom, rows as u32 * zoom);
+    let range = Range::of(depth_mm);
+    // Text grows with the picture: 4 % of its height between sensible bounds.
+    let mut writer = Writer::new((height as f32 * 0.035).clamp(13.0, 60.0))?;
+    let label_width = writer.width("0000.0 mm");
+    let bar_left = MARGIN_PX * 2 + width;
+    let canvas_width = bar_left + BAR_PX + 14 + label_width + MARGIN_PX;
+    let mut canvas = RgbImage::from_pixel(canvas_width, height + 2 * MARGIN_PX, BACKGROUND);
+
+    for (x, y, pixel) in canvas.enumerate_pixels_mut() {
+        let (Some(x), Some(y)) = (x.checked_sub(MARGIN_PX), y.checked_sub(MARGIN_PX)) else { continue };
+        if x < width && y < height {
+            *pixel = range.colour(depth_mm[[(y / zoom) as usize, (x / zoom) as usize]]);
+        }
+    }
+    let Some((near, far)) = range.0 else {
+        writer.write(&mut canvas, bar_left, MARGIN_PX, "no depth", INK);
+        return Ok(canvas);
+    };
+    // The bar: far at the top, as in the scene's distance.
+    for y in 0..height {
+        let depth = far + (near - far) * (y as f32 + 0.5) / height as f32;
+        for x in 0..BAR_PX {
+            canvas.put_pixel(bar_left + x, MARGIN_PX + y, range.colour(depth));
+        }
+    }
+    let step = tick_step(f64::from(far - near));
+    let decimals = usize::from(step < 1.0) + usize::from(step < 0.1);
+    let mut tick = (f64::from(near) / step).ceil() * step;
+    while tick <= f64::from(far) + 1e-6 * step {
+        let from_top = (f64::from(far) - tick) / f64::from(far - near) * f64::from(height - 1);
+        let y = MARGIN_PX + from_top.round() as u32;
+        for x in 0..6 {
+            canvas.put_pixel(bar_left + BAR_PX + x, y, INK);
+        }
+        let top = y.saturating_sub(writer.height() / 2);
+        writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &format!("{tick:.decimals$} mm"), INK);
+        tick += step;
+    }
+    Ok(canvas)
+}
+
+/// Nearest and farthest depth that the colours span; `None` for a map without values.
+struct Range(Option<(f32, f32)>);
+
+impl Range {
+    fn of(depth_mm: ArrayView2<f32>) -> Self {
+        let mut finite: Vec<f32> = depth_mm.iter().copied().filter(|value| value.is_finite()).collect();
+        if finite.is_empty() {
+            return Self(None);
+        }
+        let last = finite.len() - 1;
+        let mut quantile =
+            |part: f64| *finite.select_nth_unstable_by((part * last as f64) as usize, f32::total_cmp).1;
+        let (near, far) = (quantile(OUTLIERS), quantile(1.0 - OUTLIERS));
+        let middle = 0.5 * (near + far);
+        // A plane has noise, not structure: never spread less than a thousandth of the distance over all colours.
+        let half = (0.5 * (far - near)).max(5e-4 * middle.abs());
+        Self(Some((middle - half, middle + half)))
+    }
+
+    fn colour(&self, depth_mm: f32) -> Rgb<u8> {
+        let Some((near, far)) = self.0.filter(|_| depth_mm.is_finite()) else { return NO_VALUE };
+        let part = ((far - depth_mm) / (far - near)).clamp(0.0, 1.0);
+        // Turbo's ends are almost black; what lies between tells depths apart best.
+        let colour = colorous::TURBO.eval_continuous(0.06 + 0.88 * f64::from(part));
+        Rgb([colour.r, colour.g, colour.b])
+    }
+}
+
+/// Distance between ticks: 1, 2 or 5 times a power of ten, for five to eleven of them.
+fn tick_step(span: f64) -> f64 {
+    let rough = span / 8.0;
+    let power = 10f64.powf(rough.log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|step| *step >= rough)
+        .unwrap_or(rough)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, array};
+
+    #[test]
+    fn near_is_warm_far_is_cold_and_nothing_is_grey() {
+        let map = array![[900.0f32, 950.0, f32::NAN]];
+        let range = Range::of(map.view());
+        let [near, far] = [range.colour(900.0), range.colour(950.0)];
+        assert!(near[0] > near[2] && far[2] > far[0], "{near:?} {far:?}");
+        assert_eq!(range.colour(f32::NAN), NO_VALUE);
+    }
+
+    #[test]
+    fn any_map_gives_a_picture() {
+        for map in [
+            Array2::from_elem((16, 16), f32::NAN),
+            Array2::from_elem((16, 700), 900.0),
+            Array2::from_shape_fn((400, 300), |(y, x)| 600.0 + (x + y) as f32),
+        ] {
+            let png = view_png(map.view()).unwrap();
+            let picture = image::load_from_memory(&png).unwrap();
+            assert!(picture.height() >= MIN_HEIGHT_PX as u32 && picture.width() > map.dim().1 as u32);
+        }
+    }
+
+    #[test]
+    fn ticks_are_round_and_few() {
+        for span in [0.9, 4.6, 46.2, 250.0, 3000.0] {
+            let step = tick_step(span);
+            assert!((4.0..=11.0).contains(&(span / step)), "{span} {step}");
+        }
+    }
+}
