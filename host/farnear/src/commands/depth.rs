@@ -92,8 +92,12 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let far = read_grey(&arguments.far)?.pixels;
     let near = read_grey(&arguments.near)?.pixels;
     let operators = operators(arguments.operators.as_deref(), &optics)?;
-    let settings =
-        Settings { smoothing_px: arguments.smooth, median_px: arguments.median, threads: arguments.threads };
+    let settings = Settings {
+        smoothing_px: arguments.smooth,
+        median_px: arguments.median,
+        threads: arguments.threads,
+        ..Settings::default()
+    };
     let start = Instant::now();
     let depth = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings)?;
     let seconds = start.elapsed().as_secs_f64();
