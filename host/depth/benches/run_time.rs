@@ -11,7 +11,7 @@ use farnear_depth::filter::convolve;
 use farnear_depth::kernel::Kernel;
 use farnear_depth::operators::{Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
-use farnear_depth::run::{Backend, Settings, depth_from_pair};
+use farnear_depth::run::{Backend, Processor, Settings};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -62,6 +62,10 @@ fn main() {
     let wanted = |name: &str| filter.is_empty() || filter.iter().any(|f| name.contains(f.as_str()));
     let optics_pill = optics("pillbox");
     let operators = Operators::for_optics(&optics_pill).unwrap();
+    let chain = |runs: usize, pair: &[Array2<f32>; 2], settings: &Settings| {
+        let mut processor = Processor::new(&operators, &optics_pill, settings).unwrap();
+        time(runs, || processor.run(pair[0].view(), pair[1].view()).unwrap().low_texture_fraction)
+    };
     let vga = [1, 2].map(|seed| random_image(480, 640, seed));
 
     for backend in Backend::available() {
@@ -78,14 +82,7 @@ fn main() {
         for threads in [1, 4] {
             if wanted("chain_640x480") {
                 let settings = Settings { threads, backend: Some(backend), ..Settings::default() };
-                report(
-                    "chain_640x480",
-                    Some(backend),
-                    threads,
-                    time(40, || {
-                        depth_from_pair(vga[0].view(), vga[1].view(), &operators, &optics_pill, &settings)
-                    }),
-                );
+                report("chain_640x480", Some(backend), threads, chain(40, &vga, &settings));
             }
         }
     }
@@ -96,9 +93,7 @@ fn main() {
                 &format!("chain_median_{median_px}"),
                 Some(Backend::best()),
                 1,
-                time(20, || {
-                    depth_from_pair(vga[0].view(), vga[1].view(), &operators, &optics_pill, &settings)
-                }),
+                chain(20, &vga, &settings),
             );
         }
     }
@@ -106,14 +101,7 @@ fn main() {
         let large = [1, 2].map(|seed| random_image(3000, 4000, seed));
         for threads in [1, 4] {
             let settings = Settings { threads, ..Settings::default() };
-            report(
-                "chain_4000x3000",
-                Some(Backend::best()),
-                threads,
-                time(5, || {
-                    depth_from_pair(large[0].view(), large[1].view(), &operators, &optics_pill, &settings)
-                }),
-            );
+            report("chain_4000x3000", Some(Backend::best()), threads, chain(5, &large, &settings));
         }
     }
     for psf in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802"] {

@@ -1,5 +1,7 @@
 //! Run time: a defocused pair and operators to a depth map with its confidence.
 //!
+//! [`depth_from_pair`] does one pair, a [`Processor`] one after the other.
+//!
 //! 1. `M = Q * (I2 - I1)`, `P = Q * (I2 + I1)`; `m = Gm1 * M`, `p1 = Gp1 * P`, `p2 = Gp2 * P` (Li 2014, eqs. 1.7 to
 //!    1.9), borders reflected without repeating the edge pixel.
 //! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
@@ -13,6 +15,7 @@ pub mod confidence;
 mod cubic;
 mod fast;
 pub(crate) mod plain;
+mod processor;
 pub(crate) mod simd;
 
 use ndarray::{Array2, ArrayView2};
@@ -22,6 +25,7 @@ use crate::operators::Operators;
 use crate::optics::Optics;
 
 pub use check::Warning;
+pub use processor::Processor;
 pub use simd::Backend;
 
 /// Smallest width and height that can be processed: below, the operators see little but reflections.
@@ -115,6 +119,16 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// Number of threads that are used.
+    pub(crate) fn thread_count(&self) -> usize {
+        match self.threads {
+            0 => rayon::current_num_threads(),
+            n => n.min(rayon::current_num_threads()),
+        }
+    }
+}
+
 /// A depth map and what is known about it.
 #[derive(Debug, Clone)]
 pub struct DepthMap {
@@ -128,7 +142,7 @@ pub struct DepthMap {
     pub warnings: Vec<Warning>,
 }
 
-/// Depth of a pair: `far` and `near` are the far- and near-focused images, (height, width), of any common scale.
+/// Depth of one pair; for many pairs of one size a [`Processor`] keeps its buffers and is faster. `far` and `near` are the far- and near-focused images, (height, width), of any common scale.
 ///
 /// # Errors
 /// [`RunError`]: sizes, windows, constant or wholly invalid images, operators for another blur. Single invalid or
@@ -140,41 +154,9 @@ pub fn depth_from_pair(
     optics: &Optics,
     settings: &Settings,
 ) -> Result<DepthMap, RunError> {
-    let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
-    let input = check::check(&far, &near, operators, optics, settings)?;
-    let mut warnings = input.warnings(operators, optics);
-    let backend = settings.backend.unwrap_or_else(Backend::best);
-    let depth_of = DepthOfAlpha::new(optics);
-    let size = (input.height, input.width);
-    let [mut depth_mm, mut texture, mut misfit] = [(); 3].map(|()| Array2::<f32>::zeros(size));
-    let job = fast::Job { input: &input, operators, settings, depth_of, backend };
-    job.run(fast::Maps {
-        depth_mm: depth_mm.view_mut(),
-        texture: texture.view_mut(),
-        misfit: misfit.view_mut(),
-    });
-    let scale = confidence::texture_scale(texture.view());
-    let low_texture_fraction = confidence::low_texture_fraction(texture.view(), scale);
-    let mut confidence = texture;
-    for ((mut confidence, misfit), mut depth) in
-        confidence.rows_mut().into_iter().zip(misfit.rows()).zip(depth_mm.rows_mut())
-    {
-        let (Some(confidence), Some(misfit)) = (confidence.as_slice_mut(), misfit.as_slice()) else {
-            unreachable!("maps are made in standard layout");
-        };
-        if simd::confidence_row(backend, confidence, misfit, scale) {
-            for (depth, _) in depth.iter_mut().zip(confidence).filter(|(_, c)| **c <= 0.0) {
-                *depth = f32::NAN;
-            }
-        }
-    }
-    let mut map = DepthMap { depth_mm, confidence, low_texture_fraction, warnings: Vec::new() };
-    if let Some(invalid) = input.invalid(operators, settings) {
-        job.repair(&mut map, &invalid);
-    }
-    warnings.extend(check::after(map.depth_mm.view(), map.confidence.view(), optics));
-    map.warnings = warnings;
-    Ok(map)
+    let mut processor = Processor::new(operators, optics, settings)?;
+    processor.run(far, near)?;
+    Ok(processor.into_map())
 }
 
 /// Alpha to mm in single precision without cancellation.
@@ -254,7 +236,7 @@ mod tests {
             let pair = random_pair(height, width);
             let [far, near] = pair.each_ref().map(|i| CowArray::from(i.view()));
             let settings = Settings { smoothing_px, median_px, ..Settings::default() };
-            let input = check::check(&far, &near, &operators, &optics, &settings).unwrap();
+            let input = check::check(&far, &near, Backend::best(), 1).unwrap();
             let plain = plain::maps(&input, &operators, &settings);
             for backend in Backend::available() {
                 for threads in [1, 2] {
@@ -269,11 +251,14 @@ mod tests {
                         depth_of,
                         backend,
                     }
-                    .run(fast::Maps {
-                        depth_mm: depth_mm.view_mut(),
-                        texture: texture.view_mut(),
-                        misfit: misfit.view_mut(),
-                    });
+                    .run(
+                        &mut Vec::new(),
+                        fast::Maps {
+                            depth_mm: depth_mm.view_mut(),
+                            texture: texture.view_mut(),
+                            misfit: misfit.view_mut(),
+                        },
+                    );
                     let scale = plain.texture.iter().copied().fold(0.0, f32::max);
                     let at = format!("{backend:?} {width}x{height} kernel {kernel_size} threads {threads}");
                     for (a, b) in texture.iter().zip(&plain.texture) {

@@ -3,10 +3,11 @@
 
 use std::fmt;
 
-use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
+use ndarray::{Array2, CowArray, Ix2, Zip};
+use rayon::prelude::*;
 
 use super::simd::{self, Extremes};
-use super::{Backend, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings};
+use super::{Backend, DepthMap, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings};
 use crate::operators::Operators;
 use crate::optics::Optics;
 use crate::psf::Psf;
@@ -87,22 +88,12 @@ pub(crate) struct Input<'a> {
     saturated: usize,
 }
 
-/// Checks a pair against operators, optics and settings. Both images are contiguous.
-pub(crate) fn check<'a>(
-    far: &'a CowArray<'_, f32, Ix2>,
-    near: &'a CowArray<'_, f32, Ix2>,
+/// Checks windows and that the operators fit the optics.
+pub(crate) fn check_settings(
     operators: &Operators,
     optics: &Optics,
     settings: &Settings,
-) -> Result<Input<'a>, RunError> {
-    let (height, width) = far.dim();
-    if near.dim() != (height, width) {
-        let (near_height, near_width) = near.dim();
-        return Err(RunError::SizeMismatch { far_width: width, far_height: height, near_width, near_height });
-    }
-    if height < MIN_SIDE_PX || width < MIN_SIDE_PX {
-        return Err(RunError::TooSmall { width, height });
-    }
+) -> Result<(), RunError> {
     for (what, size, largest) in
         [("smoothing", settings.smoothing_px, MAX_SMOOTHING_PX), ("median", settings.median_px, 7)]
     {
@@ -115,81 +106,120 @@ pub(crate) fn check<'a>(
     if difference > BLUR_TOLERANCE {
         return Err(RunError::BlurMismatch { operators_px, optics_px, percent: 100.0 * difference });
     }
-    let backend = settings.backend.unwrap_or_else(Backend::best);
-    scan(far.view(), near.view(), backend)
+    Ok(())
 }
 
-/// Smallest and largest finite value of an image, and the number of values that are not finite.
-fn range(image: ArrayView2<f32>, backend: Backend) -> Extremes {
-    let mut whole = Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true };
-    for row in image.rows() {
-        let mut part = simd::extremes(backend, row.to_slice().unwrap_or(&[]));
-        if !part.finite {
-            let finite = || row.iter().copied().filter(|v| v.is_finite());
-            part.low = finite().fold(f32::INFINITY, f32::min);
-            part.high = finite().fold(f32::NEG_INFINITY, f32::max);
-        }
-        whole.low = whole.low.min(part.low);
-        whole.high = whole.high.max(part.high);
-        whole.finite &= part.finite;
+/// Checks a pair of contiguous images and finds its range.
+pub(crate) fn check<'a>(
+    far: &'a CowArray<'_, f32, Ix2>,
+    near: &'a CowArray<'_, f32, Ix2>,
+    backend: Backend,
+    threads: usize,
+) -> Result<Input<'a>, RunError> {
+    let (height, width) = far.dim();
+    if near.dim() != (height, width) {
+        let (near_height, near_width) = near.dim();
+        return Err(RunError::SizeMismatch { far_width: width, far_height: height, near_width, near_height });
     }
-    whole
+    if height < MIN_SIDE_PX || width < MIN_SIDE_PX {
+        return Err(RunError::TooSmall { width, height });
+    }
+    let (Some(far), Some(near)) = (far.as_slice(), near.as_slice()) else {
+        unreachable!("the images are in standard layout");
+    };
+    scan(far, near, width, backend, threads)
+}
+
+/// Smallest and largest finite value of the pixels.
+fn range(pixels: &[f32], backend: Backend) -> Extremes {
+    let mut range = simd::extremes(backend, pixels);
+    if !range.finite {
+        let finite = || pixels.iter().copied().filter(|v| v.is_finite());
+        range.low = finite().fold(f32::INFINITY, f32::min);
+        range.high = finite().fold(f32::NEG_INFINITY, f32::max);
+    }
+    range
+}
+
+/// The range of each row of an image.
+fn ranges(image: &[f32], width: usize, backend: Backend, threads: usize) -> Vec<Extremes> {
+    let rows = (image.len() / width).div_ceil(threads);
+    if threads == 1 {
+        return image.chunks(width).map(|row| range(row, backend)).collect();
+    }
+    image.par_chunks(width).with_min_len(rows).map(|row| range(row, backend)).collect()
 }
 
 fn scan<'a>(
-    far: ArrayView2<'a, f32>,
-    near: ArrayView2<'a, f32>,
+    far: &'a [f32],
+    near: &'a [f32],
+    width: usize,
     backend: Backend,
+    threads: usize,
 ) -> Result<Input<'a>, RunError> {
-    let (height, width) = far.dim();
-    let ranges = [far, near].map(|image| range(image, backend));
-    if ranges.iter().any(|r| r.low > r.high) {
+    let height = far.len() / width;
+    let of_rows = [far, near].map(|image| ranges(image, width, backend, threads));
+    let whole = of_rows.each_ref().map(|rows| {
+        rows.iter().fold(Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true }, |a, b| {
+            Extremes { low: a.low.min(b.low), high: a.high.max(b.high), finite: a.finite && b.finite }
+        })
+    });
+    if whole.iter().any(|r| r.low > r.high) {
         return Err(RunError::NothingFinite);
     }
-    for (which, range) in ["far", "near"].into_iter().zip(ranges) {
+    for (which, range) in ["far", "near"].into_iter().zip(whole) {
         if range.low == range.high {
             return Err(RunError::Constant { which, value: range.low });
         }
     }
-    let [low, high] = [ranges[0].low.min(ranges[1].low), ranges[0].high.max(ranges[1].high)];
-    let not_finite_mask = (!(ranges[0].finite && ranges[1].finite))
-        .then(|| Zip::from(far).and(near).map_collect(|a, b| !(a.is_finite() && b.is_finite())));
-    let not_finite = not_finite_mask.as_ref().map_or(0, |mask| mask.iter().filter(|m| **m).count());
-    let saturated_mask = saturated(far, near, high);
-    let saturated = saturated_mask.as_ref().map_or(0, |mask| mask.iter().filter(|m| **m).count());
+    let [low, high] = [whole[0].low.min(whole[1].low), whole[0].high.max(whole[1].high)];
+    let not_finite_mask = (!(whole[0].finite && whole[1].finite)).then(|| {
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            let i = y * width + x;
+            !(far[i].is_finite() && near[i].is_finite())
+        })
+    });
+    let count = |mask: &Option<Array2<bool>>| mask.as_ref().map_or(0, |m| m.iter().filter(|m| **m).count());
+    let saturated_mask = saturated([far, near], &of_rows, high, width);
+    let [not_finite, saturated] = [count(&not_finite_mask), count(&saturated_mask)];
     let bad = match (not_finite_mask, saturated_mask) {
         (Some(a), Some(b)) => Some(a | b),
         (a, b) => a.or(b),
     };
-    let [far, near] = [far, near].map(|image| image.to_slice().unwrap_or(&[]));
     // Halves, so that a range near the largest number does not overflow.
     let gain = 0.5 / (0.5 * high - 0.5 * low);
     Ok(Input { far, near, width, height, offset: 0.5 * low + 0.5 * high, gain, bad, not_finite, saturated })
 }
 
 /// The pixels of flat patches (2x2 and more) at the largest value, if there are so many that it cannot be chance.
-fn saturated(far: ArrayView2<f32>, near: ArrayView2<f32>, high: f32) -> Option<Array2<bool>> {
-    let enough = (SATURATED * far.len() as f64).max(4.0);
-    // In 32 bits the loop is done in vectors.
-    let in_row = |row: &[f32]| row.iter().map(|v| u32::from(*v >= high)).sum::<u32>() as usize;
-    let at_top = |image: ArrayView2<f32>| -> usize {
-        image.rows().into_iter().map(|row| in_row(row.to_slice().unwrap_or(&[]))).sum()
+fn saturated(
+    images: [&[f32]; 2],
+    of_rows: &[Vec<Extremes>; 2],
+    high: f32,
+    width: usize,
+) -> Option<Array2<bool>> {
+    let pixels = images[0].len();
+    let enough = (SATURATED * pixels as f64).max(4.0) as usize;
+    let at_top = |image: &[f32], ranges: &[Extremes]| -> usize {
+        // Only rows that reach the largest value can have such pixels; in 32 bits the loop is done in vectors.
+        let in_row = |row: &[f32]| row.iter().map(|v| u32::from(*v >= high)).sum::<u32>() as usize;
+        image.chunks(width).zip(ranges).filter(|(_, r)| r.high >= high).map(|(row, _)| in_row(row)).sum()
     };
-    if ((at_top(far) + at_top(near)) as f64) < enough {
+    if images.iter().zip(of_rows).map(|(image, ranges)| at_top(image, ranges)).sum::<usize>() < enough {
         return None;
     }
-    let mut marked = Array2::from_elem(far.dim(), false);
-    for image in [far, near] {
-        for y in 1..image.nrows() {
-            for x in 1..image.ncols() {
+    let mut marked = Array2::from_elem((pixels / width, width), false);
+    for image in images {
+        for y in 1..marked.nrows() {
+            for x in 1..width {
                 let patch = [(y - 1, x - 1), (y - 1, x), (y, x - 1), (y, x)];
-                if patch.iter().all(|at| image[*at] >= high) {
+                if patch.iter().all(|(y, x)| image[y * width + x] >= high) {
                     patch.iter().for_each(|at| marked[*at] = true);
                 }
             }
         }
     }
-    (marked.iter().filter(|m| **m).count() as f64 >= enough).then_some(marked)
+    (marked.iter().filter(|m| **m).count() >= enough).then_some(marked)
 }
 
 impl Input<'_> {
@@ -231,15 +261,12 @@ impl Input<'_> {
 /// Confidence from which a pixel has a say in whether the pair looks swapped.
 const CONFIDENT: f32 = 0.7;
 
-/// Warnings about the result.
-pub(crate) fn after(
-    depth_mm: ArrayView2<f32>,
-    confidence: ArrayView2<f32>,
-    optics: &Optics,
-) -> Option<Warning> {
+/// Warnings about the result, from a thinned sample of its pixels.
+pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
     let [mut total, mut beyond_near, mut beyond_far] = [0_usize; 3];
-    Zip::from(depth_mm).and(confidence).for_each(|depth, confidence| {
+    let sample = super::confidence::sample(map.depth_mm.dim());
+    Zip::from(map.depth_mm.slice(sample)).and(map.confidence.slice(sample)).for_each(|depth, confidence| {
         if *confidence > CONFIDENT {
             total += 1;
             beyond_near += usize::from(*depth < near_mm);

@@ -7,9 +7,9 @@
 //! threshold `T = 0.05 median(c1)`: 1/2 for a pixel on the threshold that fits perfectly. Li 2014's rule (eq. 6.15)
 //! compares the variance of the ratio with 0.0144 and has its inequality inverted; it does not separate.
 //!
-//! Cost: O(1) per pixel; the median is taken over at most some 40,000 pixels on a regular grid.
+//! Cost: O(1) per pixel; the median is taken over at most some 10,000 pixels on a regular grid.
 
-use ndarray::{ArrayView2, s};
+use ndarray::{ArrayView2, Ix2, SliceInfo, SliceInfoElem, s};
 
 /// Texture energy relative to its median below which a pixel counts as low texture.
 pub const LOW_TEXTURE: f32 = 0.05;
@@ -18,18 +18,23 @@ pub const LOW_TEXTURE: f32 = 0.05;
 const NO_TEXTURE: f32 = 1e-7;
 
 /// The sample for the median is thinned to about this number of pixels.
-const SAMPLE: usize = 40_000;
+const SAMPLE: usize = 10_000;
+
+/// A regular grid of about [`SAMPLE`] pixels of a map of this size (of all pixels of a small one).
+pub(crate) fn sample((height, width): (usize, usize)) -> SliceInfo<[SliceInfoElem; 2], Ix2, Ix2> {
+    let step = (((height * width) as f64 / SAMPLE as f64).sqrt() as usize).max(1);
+    s![step / 2..;step, step / 2..;step]
+}
 
 /// Median texture energy of the pixels that have any, by which texture is measured; 0 if there is none.
 pub fn texture_scale(texture: ArrayView2<f32>) -> f32 {
-    let step = ((texture.len() as f64 / SAMPLE as f64).sqrt() as usize).max(1);
-    let mut sample: Vec<f32> =
-        texture.slice(s![step / 2..;step, step / 2..;step]).iter().copied().filter(|t| *t > 0.0).collect();
-    if sample.is_empty() {
+    let mut values: Vec<f32> =
+        texture.slice(sample(texture.dim())).iter().copied().filter(|t| *t > 0.0).collect();
+    if values.is_empty() {
         return 0.0;
     }
-    let middle = sample.len() / 2;
-    *sample.select_nth_unstable_by(middle, f32::total_cmp).1
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// Confidence of a pixel with the texture energy `texture` and the relative misfit `misfit`; 0 without texture.
@@ -40,10 +45,4 @@ pub fn confidence(texture: f32, misfit: f32, scale: f32) -> f32 {
     } else {
         0.0
     }
-}
-
-/// Part of the pixels with a texture energy below [`LOW_TEXTURE`] times `scale`.
-pub fn low_texture_fraction(texture: ArrayView2<f32>, scale: f32) -> f64 {
-    let low = texture.iter().filter(|t| **t < LOW_TEXTURE * scale).count();
-    low as f64 / texture.len() as f64
 }

@@ -47,26 +47,29 @@ pub(crate) struct Maps<'a> {
 }
 
 impl Job<'_> {
-    /// Fills the maps, on as many threads as the settings ask for.
-    pub fn run(&self, maps: Maps<'_>) {
-        let height = maps.depth_mm.nrows();
-        let bands = threads(self.settings).min(height / MIN_BAND_PX).max(1);
+    /// Fills the maps, on as many threads as the settings ask for; `tiles` keeps the buffers for the next pair.
+    pub fn run(&self, tiles: &mut Vec<Tile>, maps: Maps<'_>) {
+        let (height, width) = maps.depth_mm.dim();
+        let bands = self.settings.thread_count().min(height / MIN_BAND_PX).max(1);
         let rows = height.div_ceil(bands);
+        let tile_width = width.div_ceil(width.div_ceil(MAX_TILE_PX));
+        if tiles.len() != bands || tiles.iter().any(|tile| tile.width != tile_width) {
+            *tiles = (0..bands).map(|_| Tile::new(self, tile_width)).collect();
+        }
         let Maps { mut depth_mm, mut texture, mut misfit } = maps;
-        let band = |(i, ((depth_mm, texture), misfit)): (usize, ((ArrayViewMut2<f32>, _), _))| {
-            self.band(i * rows, Maps { depth_mm, texture, misfit });
-        };
-        if bands == 1 {
-            band((0, ((depth_mm, texture), misfit)));
+        if let [tile] = &mut tiles[..] {
+            self.band(tile, 0, Maps { depth_mm, texture, misfit });
             return;
         }
-        depth_mm
-            .axis_chunks_iter_mut(Axis(0), rows)
-            .into_par_iter()
-            .zip(texture.axis_chunks_iter_mut(Axis(0), rows))
-            .zip(misfit.axis_chunks_iter_mut(Axis(0), rows))
+        tiles
+            .par_iter_mut()
+            .zip(depth_mm.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+            .zip(texture.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+            .zip(misfit.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
             .enumerate()
-            .for_each(band);
+            .for_each(|(i, (((tile, depth_mm), texture), misfit))| {
+                self.band(tile, i * rows, Maps { depth_mm, texture, misfit });
+            });
     }
 
     /// Takes the pixels out that an invalid one takes part in, and takes the medians beside them over the rest.
@@ -75,7 +78,10 @@ impl Job<'_> {
         let settings = Settings { median_px: 1, ..*self.settings };
         let plain = Job { settings: &settings, ..*self };
         let [mut raw, mut texture, mut misfit] = [(); 3].map(|()| Array2::zeros(size));
-        plain.run(Maps { depth_mm: raw.view_mut(), texture: texture.view_mut(), misfit: misfit.view_mut() });
+        plain.run(
+            &mut Vec::new(),
+            Maps { depth_mm: raw.view_mut(), texture: texture.view_mut(), misfit: misfit.view_mut() },
+        );
         Zip::from(&mut raw).and(invalid).for_each(|raw, invalid| {
             if *invalid {
                 *raw = f32::NAN;
@@ -93,35 +99,23 @@ impl Job<'_> {
         }
     }
 
-    fn band(&self, top: usize, maps: Maps<'_>) {
+    fn band(&self, tile: &mut Tile, top: usize, maps: Maps<'_>) {
         let width = maps.depth_mm.ncols();
-        let tiles = width.div_ceil(MAX_TILE_PX);
-        let tile_width = width.div_ceil(tiles);
-        let mut tile = Tile::new(self, tile_width);
         let Maps { mut depth_mm, mut texture, mut misfit } = maps;
-        for left in (0..width).step_by(tile_width) {
-            let columns = s![.., left..(left + tile_width).min(width)];
-            let depth_mm = depth_mm.slice_mut(columns);
-            tile.run(
-                self,
-                top,
-                left,
-                Maps { depth_mm, texture: texture.slice_mut(columns), misfit: misfit.slice_mut(columns) },
-            );
+        for left in (0..width).step_by(tile.width) {
+            let columns = s![.., left..(left + tile.width).min(width)];
+            let [depth_mm, texture, misfit] =
+                [&mut depth_mm, &mut texture, &mut misfit].map(|map| map.slice_mut(columns));
+            tile.run(self, top, left, Maps { depth_mm, texture, misfit });
         }
     }
 }
 
-/// Number of threads that the settings ask for.
-fn threads(settings: &Settings) -> usize {
-    match settings.threads {
-        0 => rayon::current_num_threads(),
-        n => n.min(rayon::current_num_threads()),
-    }
-}
-
 /// The buffers of a tile.
-struct Tile {
+#[derive(Debug)]
+pub(crate) struct Tile {
+    /// Largest width of a tile.
+    width: usize,
     /// Pixels around the tile that take part.
     halo: usize,
     radius: usize,
@@ -150,6 +144,7 @@ impl Tile {
         let taps = |kernel| Taps::new(kernel, full);
         let o = job.operators;
         Self {
+            width,
             halo,
             radius,
             smoothing,

@@ -379,18 +379,21 @@ fn median_of_many<L: Lanes, const COUNT: usize, const KEPT: usize>(values: [L; C
 }
 
 dispatch! {
-    /// Texture to confidence in place; returns whether a pixel of the row has none.
-    fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> bool = confidence_generic
+    /// Texture to confidence in place; returns the numbers of low-texture pixels and of pixels without any confidence.
+    fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] = confidence_generic
 }
 
 #[inline(always)]
-fn confidence_generic<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32) -> bool {
-    let mut smallest = f32::INFINITY;
+fn confidence_generic<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] {
+    let threshold = confidence::LOW_TEXTURE * scale;
+    // Counted in 32 bits, so that the loop is done in vectors; a band has fewer pixels than that.
+    let [mut low, mut without] = [0_u32; 2];
     for (texture, misfit) in texture.iter_mut().zip(misfit) {
+        low += u32::from(*texture < threshold);
         *texture = confidence::confidence(*texture, *misfit, scale);
-        smallest = if *texture < smallest { *texture } else { smallest };
+        without += u32::from(*texture <= 0.0);
     }
-    smallest <= 0.0
+    [low as usize, without as usize]
 }
 
 #[cfg(test)]
