@@ -49,7 +49,7 @@ pub fn convolve(image: ArrayView2<f32>, kernel: &Kernel, backend: Backend, mut o
                     row[x] = source[reflect((left + x) as isize - radius as isize, width)];
                 }
             }
-            simd::convolve(backend, &mut taps, &input, &mut result, rows, strip);
+            simd::convolve(backend, &mut taps, &input, &mut result, 0, rows, strip);
             for y in 0..rows {
                 if let Some(at) = (begin + y).checked_sub(2 * radius) {
                     let row = &result.row(y)[..strip];

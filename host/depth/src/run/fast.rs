@@ -19,7 +19,7 @@ use crate::metrics::dilate_square;
 use crate::operators::Operators;
 
 /// Rows that go through a stage at a time.
-const BLOCK: usize = 8;
+const BLOCK: usize = simd::SEVEN_BLOCK;
 
 /// Widest tile: its rows of all stages fit the second-level cache.
 const MAX_TILE_PX: usize = 704;
@@ -141,6 +141,7 @@ impl Tile {
         let halo = 2 * radius + smoothing / 2 + median / 2;
         let full = width + 2 * halo;
         let plane = || Plane::new(BLOCK, full);
+        let ring = || Plane::new(2 * BLOCK, full);
         let taps = |kernel| Taps::new(kernel, full);
         let o = job.operators;
         Self {
@@ -153,8 +154,8 @@ impl Tile {
             sum: plane(),
             filtered: [plane(), plane()],
             filters: [taps(o.prefilter()), taps(o.prefilter())],
-            m: plane(),
-            p: [plane(), plane()],
+            m: ring(),
+            p: [ring(), ring()],
             operators: [taps(o.gm1()), taps(o.gp1()), taps(o.gp2())],
             window: WindowRow::new(smoothing, full),
             sums: Plane::new(4 * BLOCK, full),
@@ -186,16 +187,31 @@ impl Tile {
             for (input, (filter, output)) in
                 [&self.difference, &self.sum].into_iter().zip(self.filters.iter_mut().zip(&mut self.filtered))
             {
-                simd::convolve(backend, filter, input, output, rows, filtered);
+                simd::convolve(backend, filter, input, output, 0, rows, filtered);
             }
             let [difference, sum] = &self.filtered;
             let [gm1, gp1, gp2] = &mut self.operators;
             let [p1, p2] = &mut self.p;
-            simd::convolve(backend, gm1, difference, &mut self.m, rows, operated);
-            simd::convolve(backend, gp1, sum, p1, rows, operated);
-            simd::convolve(backend, gp2, sum, p2, rows, operated);
+            // The sums over seven rows need the block before: it stays in the other half of the ring.
+            let half = begin / BLOCK % 2;
+            let first = half * BLOCK;
+            simd::convolve(backend, gm1, difference, &mut self.m, first, rows, operated);
+            simd::convolve(backend, gp1, sum, p1, first, rows, operated);
+            simd::convolve(backend, gp2, sum, p2, first, rows, operated);
             let operated_rows = [&self.m, p1, p2];
-            simd::vertical_sums(backend, &mut self.window, operated_rows, &mut self.sums, rows, operated);
+            if self.smoothing == 7 {
+                simd::vertical_sums_of_seven(backend, operated_rows, half, &mut self.sums, operated);
+            } else {
+                simd::vertical_sums(
+                    backend,
+                    &mut self.window,
+                    operated_rows,
+                    first,
+                    &mut self.sums,
+                    rows,
+                    operated,
+                );
+            }
             for y in 0..rows {
                 if let Some(row) = (begin + y).checked_sub(lag) {
                     self.finish_row(job, row, y, solved, &mut maps);

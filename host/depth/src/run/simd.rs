@@ -1,7 +1,7 @@
 //! The inner loops of the run time for whatever vector unit the processor has.
 //!
 //! Each loop is written once over [`Lanes`] and compiled three times: AVX-512, AVX2 with FMA, and portable code of
-//! eight lanes that any compiler turns into what it can. Which one runs is decided at run time ([`Backend::best`]).
+//! four lanes that any compiler turns into what it can. Which one runs is decided at run time ([`Backend::best`]).
 //! All rows are *valid* convolutions: output column `x` comes from the input columns `x..x + 2r`, so every load of an
 //! output vector starts aligned and rows only get shorter. Rows are padded to [`Plane::PADDING`] beyond their content,
 //! because a vector may read past the last useful column.
@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use convolve::{Taps, convolve};
 pub(crate) use rows::{
-    CubicRow, Extremes, WindowRow, confidence_row, extremes, median_row, normalise_row, vertical_sums,
+    CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, median_row, normalise_row,
+    vertical_sums, vertical_sums_of_seven,
 };
 
 /// Calls the generic function for the backend inside a function that has the backend's instructions enabled, so that
@@ -58,7 +59,7 @@ pub enum Backend {
     Avx512,
     /// 8 lanes, x86-64 with AVX2 and FMA.
     Avx2,
-    /// Whatever the compiler makes of eight lanes, on any processor.
+    /// Whatever the compiler makes of four lanes, on any processor.
     Portable,
 }
 

@@ -32,23 +32,30 @@ impl Taps {
 }
 
 dispatch! {
-    /// Feeds the first `rows` rows of `input`; writes as many rows of `width` columns to `output`. The output lags
-    /// behind by `size - 1` rows: the first ones after a reset are unfinished and to be dropped.
-    fn convolve(taps: &mut Taps, input: &Plane, output: &mut Plane, rows: usize, width: usize) = by_size
+    /// Feeds the first `rows` rows of `input`; writes as many rows of `width` columns to `output` from its row `first`
+    /// on. The output lags behind by `size - 1` rows: the first ones after a reset are unfinished and to be dropped.
+    fn convolve(taps: &mut Taps, input: &Plane, output: &mut Plane, first: usize, rows: usize, width: usize) = by_size
 }
 
 #[inline(always)]
-fn by_size<L: Lanes>(taps: &mut Taps, input: &Plane, output: &mut Plane, rows: usize, width: usize) {
-    assert!(rows <= input.rows() && rows <= output.rows() && taps.pending.rows() + 1 == taps.size);
+fn by_size<L: Lanes>(
+    taps: &mut Taps,
+    input: &Plane,
+    output: &mut Plane,
+    first: usize,
+    rows: usize,
+    width: usize,
+) {
+    assert!(rows <= input.rows() && first + rows <= output.rows() && taps.pending.rows() + 1 == taps.size);
     for plane in [input, output, &taps.pending] {
         // A vector starts below `width`, reads 2 N <= 32 numbers and stays in the row's padding.
         assert!(width + Plane::PADDING <= plane.stride());
     }
     match taps.size {
-        5 => walk::<L, 5, 3>(taps, input, output, rows, width),
-        7 => walk::<L, 7, 4>(taps, input, output, rows, width),
-        9 => walk::<L, 9, 5>(taps, input, output, rows, width),
-        11 => walk::<L, 11, 6>(taps, input, output, rows, width),
+        5 => walk::<L, 5, 3>(taps, input, output, first, rows, width),
+        7 => walk::<L, 7, 4>(taps, input, output, first, rows, width),
+        9 => walk::<L, 9, 5>(taps, input, output, first, rows, width),
+        11 => walk::<L, 11, 6>(taps, input, output, first, rows, width),
         // `Kernel` has no other size.
         _ => unreachable!("kernel size {}", taps.size),
     }
@@ -60,6 +67,7 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
     taps: &mut Taps,
     input: &Plane,
     output: &mut Plane,
+    first: usize,
     rows: usize,
     width: usize,
 ) {
@@ -80,6 +88,8 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
         // for the taps) lie in the row; row indices are below the planes' rows, asserted there.
         unsafe {
             let pending = pending_base.add(x);
+            // The first output row that is not finished comes first. A row of input is added to all of them, which at
+            // the same time moves them up; two arrays, because a shift within one would keep it out of registers.
             let mut sums = [L::splat(0.0); SIZE];
             for i in 0..SIZE - 1 {
                 sums[i] = L::load(pending.add(i * pending_stride));
@@ -90,21 +100,19 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
                 for i in 1..FOLDED {
                     folded[i] = columns[r - i].add(columns[r + i]);
                 }
+                let mut products = [columns[r]; FOLDED];
                 for dy in 0..FOLDED {
-                    let mut row = octant[index(dy, 0)].mul(folded[0]);
+                    products[dy] = octant[index(dy, 0)].mul(folded[0]);
                     for dx in 1..FOLDED {
-                        row = octant[index(dy, dx)].mul_add(folded[dx], row);
-                    }
-                    sums[r - dy] = sums[r - dy].add(row);
-                    if dy > 0 {
-                        sums[r + dy] = sums[r + dy].add(row);
+                        products[dy] = octant[index(dy, dx)].mul_add(folded[dx], products[dy]);
                     }
                 }
-                sums[0].store(output_base.add(y * output_stride + x));
+                sums[0].add(products[r]).store(output_base.add((first + y) * output_stride + x));
+                let mut moved = [L::splat(0.0); SIZE];
                 for i in 1..SIZE {
-                    sums[i - 1] = sums[i];
+                    moved[i - 1] = sums[i].add(products[i.abs_diff(r)]);
                 }
-                sums[SIZE - 1] = L::splat(0.0);
+                sums = moved;
             }
             for i in 0..SIZE - 1 {
                 sums[i].store(pending.add(i * pending_stride));

@@ -1,4 +1,4 @@
-//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 8 as plain arrays.
+//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 4 as plain arrays.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
@@ -45,6 +45,10 @@ pub(crate) trait Lanes: Copy {
     fn max(self, other: Self) -> Self;
     /// `self * factor + summand`, fused where the processor can.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// `self`, which must not be negative, with the sign of `other`.
+    fn with_sign_of(self, other: Self) -> Self;
     /// `1 / self` to 12 bits or better.
     fn reciprocal_estimate(self) -> Self;
     /// `1 / sqrt(self)` to 12 bits or better.
@@ -60,12 +64,6 @@ pub(crate) trait Lanes: Copy {
         let correction = half.mul(y).mul_add(y, Self::splat(1.5));
         y.mul(correction)
     }
-
-    /// `self` kept between `-limit` and `limit`.
-    #[inline(always)]
-    fn clamp_to(self, limit: Self) -> Self {
-        self.min(limit).max(Self::splat(0.0).sub(limit))
-    }
 }
 
 /// Sixteen lanes of AVX-512.
@@ -78,9 +76,9 @@ pub(crate) struct Avx512(__m512);
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256);
 
-/// Eight lanes of portable code.
+/// Four lanes of portable code: what every 64-bit processor has.
 #[derive(Clone, Copy)]
-pub(crate) struct Portable([f32; 8]);
+pub(crate) struct Portable([f32; 4]);
 
 // SAFETY of the intrinsics without pointers: they only need their instruction set, and every caller is inlined into a
 // function that enables it after it was detected (`dispatch!`).
@@ -161,6 +159,17 @@ impl Lanes for Avx512 {
         Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
     }
     #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm512_abs_ps(self.0) })
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        Self(unsafe {
+            let sign = _mm512_and_si512(_mm512_castps_si512(other.0), _mm512_set1_epi32(i32::MIN));
+            _mm512_castsi512_ps(_mm512_or_si512(_mm512_castps_si512(self.0), sign))
+        })
+    }
+    #[inline(always)]
     fn reciprocal_estimate(self) -> Self {
         Self(unsafe { _mm512_rcp14_ps(self.0) })
     }
@@ -226,6 +235,14 @@ impl Lanes for Avx2 {
         Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
     }
     #[inline(always)]
+    fn abs(self) -> Self {
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        Self(unsafe { _mm256_or_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), other.0)) })
+    }
+    #[inline(always)]
     fn reciprocal_estimate(self) -> Self {
         Self(unsafe { _mm256_rcp_ps(self.0) })
     }
@@ -250,23 +267,23 @@ impl Portable {
 }
 
 impl Lanes for Portable {
-    const N: usize = 8;
+    const N: usize = 4;
 
     #[inline(always)]
     unsafe fn load(p: *const f32) -> Self {
         // SAFETY: the caller's promise; an array of f32 has the alignment of f32.
-        Self(unsafe { p.cast::<[f32; 8]>().read() })
+        Self(unsafe { p.cast::<[f32; 4]>().read() })
     }
 
     #[inline(always)]
     unsafe fn store(self, p: *mut f32) {
         // SAFETY: the caller's promise.
-        unsafe { p.cast::<[f32; 8]>().write(self.0) }
+        unsafe { p.cast::<[f32; 4]>().write(self.0) }
     }
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
-        Self([value; 8])
+        Self([value; 4])
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -296,6 +313,14 @@ impl Lanes for Portable {
     fn mul_add(self, factor: Self, summand: Self) -> Self {
         // Not fused: without the instruction a fused one is a slow library call.
         self.mul(factor).add(summand)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f32::abs))
+    }
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        self.zip(other, f32::copysign)
     }
     #[inline(always)]
     fn reciprocal_estimate(self) -> Self {

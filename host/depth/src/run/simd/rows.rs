@@ -102,9 +102,9 @@ impl WindowRow {
 }
 
 dispatch! {
-    /// Feeds `rows` rows of the inputs `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
+    /// Feeds `rows` rows, from `first` on, of the inputs `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
     /// `p1 m`, `m m` that end with row `y`.
-    fn vertical_sums(state: &mut WindowRow, inputs: [&Plane; 3], sums: &mut Plane, rows: usize, width: usize) =
+    fn vertical_sums(state: &mut WindowRow, inputs: [&Plane; 3], first: usize, sums: &mut Plane, rows: usize, width: usize) =
         vertical_generic
 }
 
@@ -112,13 +112,14 @@ dispatch! {
 fn vertical_generic<L: Lanes>(
     state: &mut WindowRow,
     [m, p1, p2]: [&Plane; 3],
+    first: usize,
     sums: &mut Plane,
     rows: usize,
     width: usize,
 ) {
     let window = state.window;
     assert!(state.heads.rows() == 4 && state.tails.rows() == 4 * window && sums.rows() >= 4 * rows);
-    assert!([m, p1, p2].iter().all(|p| p.rows() >= rows));
+    assert!([m, p1, p2].iter().all(|p| p.rows() >= first + rows));
     let strides = [m, p1, p2, &*sums, &state.heads, &state.tails].map(Plane::stride);
     assert!(strides.iter().all(|s| width + Plane::PADDING <= *s));
     let [m_stride, p1_stride, p2_stride, sums_stride, heads_stride, tails_stride] = strides;
@@ -137,9 +138,9 @@ fn vertical_generic<L: Lanes>(
             }
             let mut phase = state.phase;
             for y in 0..rows {
-                let m = L::load(m.add(y * m_stride + x));
-                let p1 = L::load(p1.add(y * p1_stride + x));
-                let p2 = L::load(p2.add(y * p2_stride + x));
+                let m = L::load(m.add((first + y) * m_stride + x));
+                let p1 = L::load(p1.add((first + y) * p1_stride + x));
+                let p2 = L::load(p2.add((first + y) * p2_stride + x));
                 let products = [p1.mul(p1), p1.mul(p2), p1.mul(m), m.mul(m)];
                 let first = phase == 0;
                 let last = phase + 1 == window;
@@ -174,6 +175,73 @@ fn vertical_generic<L: Lanes>(
     state.phase = (state.phase + rows) % window;
 }
 
+/// Rows that [`vertical_sums_of_seven`] does at a time.
+pub(crate) const SEVEN_BLOCK: usize = 8;
+
+dispatch! {
+    /// As [`vertical_sums`] for windows of seven rows, without any state: `inputs` are rings of 16 rows whose rows `8 half
+    /// ..` are new and whose other half holds the eight rows before. All eight rows of `sums` are written.
+    fn vertical_sums_of_seven(inputs: [&Plane; 3], half: usize, sums: &mut Plane, width: usize) = seven_generic
+}
+
+#[inline(always)]
+fn seven_generic<L: Lanes>([m, p1, p2]: [&Plane; 3], half: usize, sums: &mut Plane, width: usize) {
+    const WINDOW: usize = 7;
+    assert!(half < 2 && sums.rows() >= 4 * SEVEN_BLOCK);
+    assert!([m, p1, p2].iter().all(|p| p.rows() == 2 * SEVEN_BLOCK && p.stride() == m.stride()));
+    let [stride, sums_stride] = [m.stride(), sums.stride()];
+    assert!(width + Plane::PADDING <= stride.min(sums_stride));
+    let [m, p1, p2] = [m.all().as_ptr(), p1.all().as_ptr(), p2.all().as_ptr()];
+    let sums = sums.all_mut().as_mut_ptr();
+    // Row 0 is the oldest of the six before the first new one, row 6 the first new one.
+    let start = SEVEN_BLOCK * (1 - half) + 2;
+    for x in (0..width).step_by(L::N) {
+        // SAFETY: x < width and width + PADDING <= both strides, so N numbers at x lie within a row; the rows are taken
+        // modulo the 16 rows asserted above, and 4 * 8 rows of sums were asserted.
+        unsafe {
+            // Windows are the tail of rows 0 to 6 and the head of rows 7 to 13.
+            let mut tails = [[L::splat(0.0); 4]; WINDOW];
+            let mut sum = products::<L>(m, p1, p2, (start + 6) % 16 * stride + x);
+            tails[6] = sum;
+            for i in (0..6).rev() {
+                let products = products::<L>(m, p1, p2, (start + i) % 16 * stride + x);
+                for c in 0..4 {
+                    sum[c] = sum[c].add(products[c]);
+                }
+                tails[i] = sum;
+            }
+            let mut head = [L::splat(0.0); 4];
+            for y in 0..SEVEN_BLOCK {
+                if y > 0 {
+                    let products = products::<L>(m, p1, p2, (start + y + 6) % 16 * stride + x);
+                    for c in 0..4 {
+                        head[c] = if y == 1 { products[c] } else { head[c].add(products[c]) };
+                    }
+                }
+                for c in 0..4 {
+                    let sum = match y {
+                        0 => tails[0][c],
+                        WINDOW => head[c],
+                        _ => tails[y][c].add(head[c]),
+                    };
+                    sum.store(sums.add((4 * y + c) * sums_stride + x));
+                }
+            }
+        }
+    }
+}
+
+/// `p1 p1`, `p1 p2`, `p1 m`, `m m` at an offset into the planes.
+///
+/// # Safety
+/// `N` numbers must be readable at the offset from each pointer.
+#[inline(always)]
+unsafe fn products<L: Lanes>(m: *const f32, p1: *const f32, p2: *const f32, offset: usize) -> [L; 4] {
+    // SAFETY: the caller's promise.
+    let [m, p1, p2] = unsafe { [L::load(m.add(offset)), L::load(p1.add(offset)), L::load(p2.add(offset))] };
+    [p1.mul(p1), p1.mul(p2), p1.mul(m), m.mul(m)]
+}
+
 /// What [`CubicRow::solve`] writes: rows with padding.
 pub(crate) struct CubicRow<'a> {
     /// Normalised depth before the median.
@@ -206,26 +274,34 @@ dispatch! {
 fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, window: usize, width: usize) {
     let stride = sums.stride();
     assert!(
-        4 * y + 4 <= sums.rows() && width + Plane::PADDING <= stride && window + 16 <= Plane::PADDING + 1
+        4 * y + 4 <= sums.rows()
+            && width + Plane::PADDING <= stride
+            && window - 1 + 32 <= Plane::PADDING
+            && 48 <= Plane::PADDING
     );
     let [alpha, texture, misfit] = [&mut *output.alpha, output.texture, output.misfit];
     assert!([&*alpha, texture, misfit].iter().all(|row| width + Plane::PADDING <= row.len()));
     let [alpha, texture, misfit] = [alpha.as_mut_ptr(), texture.as_mut_ptr(), misfit.as_mut_ptr()];
     let base = sums.all()[4 * y * stride..].as_ptr();
-    for x in (0..width).step_by(L::N) {
-        // SAFETY: x < width; reads reach x + window - 1 + N and x + 2 N, at most width + PADDING (asserted), so they stay
-        // in the row; the output rows are as long.
+    // Two vectors at a time: each waits for its own divisions and steps, the other fills the gaps.
+    for x in (0..width).step_by(2 * L::N) {
+        // SAFETY: x < width, so reads stay below x + N + max(window - 1 + N, 32) <= width + PADDING, asserted to lie in the
+        // row, and so do the 2 N numbers that are written; the output rows are as long.
         unsafe {
-            let mut window_sums = [L::splat(0.0); 4];
-            for c in 0..4 {
-                let p = base.add(c * stride + x);
-                window_sums[c] = if window == 7 { sum_of_seven(p) } else { sum_of(p, window) };
+            let mut window_sums = [[L::splat(0.0); 4]; 2];
+            for half in 0..2 {
+                for c in 0..4 {
+                    let p = base.add(c * stride + x + half * L::N);
+                    window_sums[half][c] = if window == 7 { sum_of_seven(p) } else { sum_of(p, window) };
+                }
             }
-            let [c1, c3, c0, energy] = window_sums;
-            let [root, misfit_value] = root_and_misfit(c1, c3, c0, energy);
-            root.store(alpha.add(x));
-            c1.store(texture.add(x));
-            misfit_value.store(misfit.add(x));
+            let results = [root_and_misfit(window_sums[0]), root_and_misfit(window_sums[1])];
+            for half in 0..2 {
+                let at = x + half * L::N;
+                results[half][0].store(alpha.add(at));
+                window_sums[half][0].store(texture.add(at));
+                results[half][1].store(misfit.add(at));
+            }
         }
     }
 }
@@ -255,24 +331,24 @@ unsafe fn sum_of<L: Lanes>(p: *const f32, window: usize) -> L {
 
 /// The cubic's root ([`crate::run::cubic`], in vectors) and the misfit ([`confidence`]).
 #[inline(always)]
-fn root_and_misfit<L: Lanes>(c1: L, c3: L, c0: L, energy: L) -> [L; 2] {
+fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
     let [one, three] = [L::splat(1.0), L::splat(3.0)];
     let inverse = one.div(c1.max(L::splat(TINY)));
-    let ratio = c0.mul(inverse);
+    let signed_ratio = c0.mul(inverse);
+    let ratio = signed_ratio.abs();
     let cubic = c3.mul(inverse);
-    let downward = L::splat(0.0).sub(cubic).max(L::splat(1e-6));
-    let limit = downward.mul(three).inverse_root().min(L::splat(MAX_ALPHA));
     let three_cubic = cubic.mul(three);
-    let mut alpha = ratio.clamp_to(limit);
-    for _ in 0..STEPS {
+    let limit = L::splat(0.0).sub(three_cubic).max(L::splat(3e-6)).inverse_root().min(L::splat(MAX_ALPHA));
+    let mut alpha = ratio.min(limit);
+    for _ in 0..=STEPS {
         let square = alpha.mul(alpha);
         // An estimate of the step's divisor suffices: the value it corrects is exact.
         let slope = three_cubic.mul_add(square, one).max(L::splat(SLOPE_FLOOR));
         let value = cubic.mul(square).mul_add(alpha, alpha.sub(ratio));
-        alpha = alpha.sub(value.mul(slope.reciprocal_estimate())).clamp_to(limit);
+        alpha = alpha.sub(value.mul(slope.reciprocal_estimate())).min(limit);
     }
-    let left_over = energy.sub(c0.mul(ratio)).mul(inverse).max(L::splat(0.0));
-    [alpha, left_over]
+    let left_over = energy.sub(c0.mul(signed_ratio)).mul(inverse).max(L::splat(0.0));
+    [alpha.with_sign_of(c0), left_over]
 }
 
 dispatch! {
