@@ -6,7 +6,8 @@
 //!    1.9), borders reflected without repeating the edge pixel.
 //! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
 //! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 ([`cubic`]), median, alpha to mm.
-//! 4. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`confidence`]).
+//! 4. The rim, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`rim`).
+//! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`confidence`]).
 //!
 //! Images may have any common gain and offset: they are normalised first. `I1` is the far-focused image.
 
@@ -16,6 +17,7 @@ mod cubic;
 mod fast;
 pub(crate) mod plain;
 mod processor;
+mod rim;
 pub(crate) mod simd;
 
 use ndarray::{Array2, ArrayView2};

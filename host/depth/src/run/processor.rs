@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use super::fast::{Job, Maps, Tile};
-use super::{Backend, DepthMap, DepthOfAlpha, RunError, Settings, check, confidence, simd};
+use super::{Backend, DepthMap, DepthOfAlpha, RunError, Settings, check, confidence, rim, simd};
 use crate::operators::Operators;
 use crate::optics::Optics;
 
@@ -80,6 +80,7 @@ impl Processor {
         if let Some(invalid) = input.invalid(&self.operators, &self.settings) {
             job.repair(&mut self.map, &invalid);
         }
+        rim::fill(&mut self.map, self.operators.kernel_size());
         self.map.warnings = input.warnings(&self.operators, &self.optics);
         self.map.warnings.extend(check::after(&self.map, &self.optics));
         Ok(&self.map)
