@@ -1,0 +1,285 @@
+//! Calibration on captured images: the PSF's parameters, and the series of flat targets that corrections learn from.
+//!
+//! ## PSF (Li 2014, sections 5.2.1 and 5.2.2)
+//! A flat, textured target stands at the far focus: the far-focused image is sharp and the near-focused one blurred by
+//! the largest radius R; at the near focus it is the other way round. Blurring the sharp image by trial PSFs until it
+//! equals the other gives `k` (1-D search) or `p` and `k` (a 1-D search of `k` for each `p`).
+//!
+//! Two things are done better than printed. The comparison is made on radially binned spectra, so that a trial costs a
+//! hundred OTF values and not a convolution. And the squared difference is divided by `H1^2 + H2^2`, because the sharp
+//! image's own noise is blurred along with it: without that (total least squares) a stronger trial blur always looks
+//! a little better than it is. In this form neither image need be sharp: with blur radii R1 and R2 the cost is
+//! `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`, so a target at any known depth but the middle will do.
+//!
+//! Units: R in pixels, frequencies in rad/px. Cost: two FFTs a pair, then 10 ms (Gaussian) to 0.5 s (generalised).
+
+mod search;
+mod spectra;
+
+use std::fmt;
+use std::str::FromStr;
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::corrections::Pattern;
+use crate::operators::Operators;
+use crate::optics::Optics;
+use crate::psf::Psf;
+use crate::run::{RunError, Settings, depth_from_pair};
+
+pub(crate) use spectra::{SpectrumError, transform};
+
+/// Closer to the middle of the range than this both images are blurred alike and say nothing of the PSF.
+const LEAST_ALPHA: f64 = 0.2;
+
+/// The sharper image must have this many times the other's energy for the target to stand at its focus.
+const SHARPER: f64 = 1.1;
+
+/// Which PSF is calibrated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Model {
+    /// `k` of the Gaussian.
+    Gaussian,
+    /// `p` and `k` of the generalised Gaussian.
+    Generalised,
+}
+
+impl Model {
+    /// The name as the command line writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gaussian => "gaussian",
+            Self::Generalised => "generalised",
+        }
+    }
+}
+
+impl fmt::Display for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Model {
+    type Err = CalibrationError;
+
+    fn from_str(text: &str) -> Result<Self, CalibrationError> {
+        let known = [Self::Gaussian, Self::Generalised].into_iter().find(|model| model.name() == text.trim());
+        known.ok_or_else(|| CalibrationError::UnknownModel(text.to_owned()))
+    }
+}
+
+/// Why a calibration failed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibrationError {
+    /// No model of that name.
+    #[error("`{0}` is no PSF that can be calibrated: use gaussian or generalised")]
+    UnknownModel(String),
+    /// No pair was given.
+    #[error("no pair to calibrate on")]
+    NoPair,
+    /// The images of a pair differ in size.
+    #[error(
+        "pair {index}: the far image is {far_width}x{far_height}, the near image {near_width}x{near_height}"
+    )]
+    SizeMismatch {
+        /// Which pair.
+        index: usize,
+        /// Width of the far image.
+        far_width: usize,
+        /// Height of the far image.
+        far_height: usize,
+        /// Width of the near image.
+        near_width: usize,
+        /// Height of the near image.
+        near_height: usize,
+    },
+    /// An image that has no usable spectrum.
+    #[error("pair {index}, {which} image: {reason}")]
+    Image {
+        /// Which pair.
+        index: usize,
+        /// `far` or `near`.
+        which: &'static str,
+        /// What is wrong.
+        reason: SpectrumError,
+    },
+    /// The target stands where the pair says nothing.
+    #[error(
+        "pair {index}: at alpha = {alpha:.2} both images are blurred alike; put the target at the far or the near focus"
+    )]
+    MiddleOfRange {
+        /// Which pair.
+        index: usize,
+        /// Where the target stands.
+        alpha: f64,
+    },
+    /// Neither image is clearly the sharper one.
+    #[error(
+        "pair {index}: the far image has {ratio:.2} times the detail of the near one, so neither is in focus; \
+         put the target at the far or the near focus, or say at which depth it stands"
+    )]
+    NeitherSharp {
+        /// Which pair.
+        index: usize,
+        /// Energy of the far image over that of the near one.
+        ratio: f64,
+    },
+    /// The best parameter is the search's limit.
+    #[error(
+        "the best {parameter} is {value}, the end of the search: the images do not show the blur that the optics promise; \
+         check max_blur_px, the order of the images and where the target stands"
+    )]
+    AtSearchEnd {
+        /// `p` or `k`.
+        parameter: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A flat target gave no depth map.
+    #[error("flat target {index} at {true_mm} mm: {reason}")]
+    FlatTarget {
+        /// Which target.
+        index: usize,
+        /// Its depth.
+        true_mm: f64,
+        /// Why.
+        reason: RunError,
+    },
+}
+
+/// A pair of images of a flat target.
+#[derive(Debug, Clone, Copy)]
+pub struct CapturedPair<'a> {
+    /// Far-focused image, (height, width), any scale.
+    pub far: ArrayView2<'a, f32>,
+    /// Near-focused image.
+    pub near: ArrayView2<'a, f32>,
+    /// Normalised depth of the target ([`Optics::alpha`]); where it is not known, the target is taken to stand at the
+    /// focus of the sharper image.
+    pub alpha: Option<f64>,
+}
+
+/// A calibrated PSF.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PsfFit {
+    /// The PSF.
+    pub psf: Psf,
+    /// What is left of the images' energy in the compared frequencies when one is made from the other, 0 to 1: noise,
+    /// and what the model does not describe.
+    pub residual: f64,
+    /// Where the target of each pair stands or was found to stand.
+    pub alphas: Vec<f64>,
+}
+
+/// The PSF of `model` that turns the images of the pairs into each other, jointly for all pairs.
+///
+/// # Errors
+/// [`CalibrationError`]: pairs without texture, of different size, or of a target in the middle of the range.
+pub fn fit_psf(
+    pairs: &[CapturedPair<'_>],
+    optics: &Optics,
+    model: Model,
+) -> Result<PsfFit, CalibrationError> {
+    if pairs.is_empty() {
+        return Err(CalibrationError::NoPair);
+    }
+    let mut observations = Vec::with_capacity(pairs.len());
+    let mut alphas = Vec::with_capacity(pairs.len());
+    for (index, pair) in pairs.iter().enumerate() {
+        let ((far_height, far_width), (near_height, near_width)) = (pair.far.dim(), pair.near.dim());
+        if (far_height, far_width) != (near_height, near_width) {
+            return Err(CalibrationError::SizeMismatch {
+                index,
+                far_width,
+                far_height,
+                near_width,
+                near_height,
+            });
+        }
+        let image = |which| move |reason| CalibrationError::Image { index, which, reason };
+        let far = spectra::windowed(pair.far).map_err(image("far"))?;
+        let near = spectra::windowed(pair.near).map_err(image("near"))?;
+        let bins = spectra::Bins::new(&far, &near);
+        let alpha = match pair.alpha {
+            Some(alpha) if alpha.abs() < LEAST_ALPHA => {
+                return Err(CalibrationError::MiddleOfRange { index, alpha });
+            }
+            Some(alpha) => alpha,
+            None => {
+                let ratio = bins.energy_ratio();
+                if ratio > SHARPER {
+                    -1.0
+                } else if ratio < 1.0 / SHARPER {
+                    1.0
+                } else {
+                    return Err(CalibrationError::NeitherSharp { index, ratio });
+                }
+            }
+        };
+        alphas.push(alpha);
+        observations.push((bins, optics.blur_px(alpha)));
+    }
+    let (psf, cost) = match model {
+        Model::Gaussian => search::gaussian(&observations),
+        Model::Generalised => search::generalised(&observations),
+    }?;
+    let energy: f64 = observations.iter().map(|(bins, _)| bins.energy()).sum();
+    Ok(PsfFit { psf, residual: cost / energy, alphas })
+}
+
+/// A pair of a flat target at a known depth.
+#[derive(Debug, Clone, Copy)]
+pub struct FlatTarget<'a> {
+    /// Far-focused image, (height, width).
+    pub far: ArrayView2<'a, f32>,
+    /// Near-focused image.
+    pub near: ArrayView2<'a, f32>,
+    /// Depth at which it stands, mm.
+    pub true_mm: f64,
+}
+
+/// The measured depth map of a flat target.
+#[derive(Debug, Clone)]
+pub struct MeasuredPattern {
+    /// Depth, mm, (height, width); NaN where the confidence is below the limit.
+    pub depth_mm: Array2<f32>,
+    /// Depth at which the target stood, mm.
+    pub true_mm: f64,
+}
+
+impl MeasuredPattern {
+    /// As [`crate::corrections::fit`] takes it.
+    pub fn as_pattern(&self) -> Pattern<'_> {
+        Pattern { depth_mm: self.depth_mm.view(), true_mm: self.true_mm }
+    }
+}
+
+/// The patterns of a series of flat targets; 20 to 30 of them through the working range teach any correction. Pixels
+/// below `least_confidence` are left out, so that they teach nothing.
+///
+/// # Errors
+/// [`CalibrationError::FlatTarget`] names the target that gave no depth map.
+pub fn measure_patterns(
+    targets: &[FlatTarget<'_>],
+    operators: &Operators,
+    optics: &Optics,
+    settings: &Settings,
+    least_confidence: f32,
+) -> Result<Vec<MeasuredPattern>, CalibrationError> {
+    let measure = |(index, target): (usize, &FlatTarget<'_>)| {
+        let true_mm = target.true_mm;
+        let map = depth_from_pair(target.far, target.near, operators, optics, settings)
+            .map_err(|reason| CalibrationError::FlatTarget { index, true_mm, reason })?;
+        let mut depth_mm = map.depth_mm;
+        ndarray::Zip::from(&mut depth_mm).and(&map.confidence).for_each(|depth, confidence| {
+            if *confidence < least_confidence {
+                *depth = f32::NAN;
+            }
+        });
+        Ok(MeasuredPattern { depth_mm, true_mm })
+    };
+    targets.iter().enumerate().map(measure).collect()
+}

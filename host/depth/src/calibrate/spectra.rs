@@ -1,0 +1,143 @@
+//! Spectra of images and their products in rings of equal frequency.
+
+use std::f64::consts::PI;
+
+use ndarray::{Array2, ArrayView2};
+use rustfft::{FftPlanner, num_complex::Complex64};
+
+/// Smallest side that has enough frequencies.
+const SMALLEST_PX: usize = 32;
+
+/// Frequencies that are compared, rad/px. Below, lighting differs more than blur does; above, little is left of a blurred
+/// image, and a sharp one has aliases.
+const BAND: [f64; 2] = [0.1, 2.0];
+
+/// Rings in the band.
+const RINGS: usize = 128;
+
+/// Why an image has no usable spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SpectrumError {
+    /// Too small.
+    #[error("{width}x{height} px are too few, at least 32x32 are needed")]
+    TooSmall {
+        /// Width.
+        width: usize,
+        /// Height.
+        height: usize,
+    },
+    /// A pixel without a value.
+    #[error("the pixel in column {column}, row {row} is not finite")]
+    NotFinite {
+        /// Column.
+        column: usize,
+        /// Row.
+        row: usize,
+    },
+    /// No texture.
+    #[error("it is constant or dark: there is no texture to compare")]
+    Constant,
+}
+
+/// Two-dimensional discrete Fourier transform, not normalised.
+pub(crate) fn transform(image: Array2<Complex64>) -> Array2<Complex64> {
+    let mut planner = FftPlanner::new();
+    let mut rows = |image: Array2<Complex64>| {
+        let fft = planner.plan_fft_forward(image.ncols());
+        let mut image = image.as_standard_layout().into_owned();
+        for mut row in image.outer_iter_mut() {
+            if let Some(row) = row.as_slice_mut() {
+                fft.process(row);
+            }
+        }
+        image.reversed_axes()
+    };
+    let columns = rows(image);
+    rows(columns)
+}
+
+/// The spectrum of an image divided by its mean, the mean taken off, under a Hann window.
+pub(super) fn windowed(image: ArrayView2<f32>) -> Result<Array2<Complex64>, SpectrumError> {
+    let (height, width) = image.dim();
+    if height < SMALLEST_PX || width < SMALLEST_PX {
+        return Err(SpectrumError::TooSmall { width, height });
+    }
+    if let Some(((row, column), _)) = image.indexed_iter().find(|(_, v)| !v.is_finite()) {
+        return Err(SpectrumError::NotFinite { column, row });
+    }
+    let hann = |length: usize| -> Vec<f64> {
+        (0..length).map(|i| (PI * (i as f64 + 0.5) / length as f64).sin().powi(2)).collect()
+    };
+    let (of_rows, of_columns) = (hann(height), hann(width));
+    let window = |(row, column): (usize, usize)| of_rows[row] * of_columns[column];
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (place, value) in image.indexed_iter() {
+        sum += window(place) * f64::from(*value);
+        weight += window(place);
+    }
+    let mean = sum / weight;
+    let first = image[(0, 0)];
+    if mean <= 0.0 || image.iter().all(|v| *v == first) {
+        return Err(SpectrumError::Constant);
+    }
+    Ok(transform(Array2::from_shape_fn((height, width), |place| {
+        Complex64::new(window(place) * (f64::from(image[place]) / mean - 1.0), 0.0)
+    })))
+}
+
+/// Sums over one ring of frequencies.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Ring {
+    /// Mean frequency, rad/px.
+    pub frequency: f64,
+    /// `|I1|^2`.
+    pub far: f64,
+    /// `|I2|^2`.
+    pub near: f64,
+    /// `Re(I1 conj(I2))`.
+    pub cross: f64,
+}
+
+/// The rings of a pair.
+pub(super) struct Bins {
+    pub rings: Vec<Ring>,
+}
+
+impl Bins {
+    pub(super) fn new(far: &Array2<Complex64>, near: &Array2<Complex64>) -> Self {
+        let (height, width) = far.dim();
+        let frequency = |index: usize, length: usize| {
+            let index = if 2 * index > length { index as f64 - length as f64 } else { index as f64 };
+            2.0 * PI * index / length as f64
+        };
+        let mut rings = vec![Ring::default(); RINGS];
+        let mut counts = vec![0.0; RINGS];
+        for (((row, column), far), near) in far.indexed_iter().zip(near) {
+            let w = frequency(row, height).hypot(frequency(column, width));
+            let ring = (w - BAND[0]) / (BAND[1] - BAND[0]) * RINGS as f64;
+            if (0.0..RINGS as f64).contains(&ring) {
+                let ring = ring as usize;
+                counts[ring] += 1.0;
+                rings[ring].frequency += w;
+                rings[ring].far += far.norm_sqr();
+                rings[ring].near += near.norm_sqr();
+                rings[ring].cross += (far * near.conj()).re;
+            }
+        }
+        for (ring, count) in rings.iter_mut().zip(&counts) {
+            ring.frequency /= count;
+        }
+        let rings = rings.into_iter().zip(counts).filter(|(_, count)| *count > 0.0).map(|(ring, _)| ring);
+        Self { rings: rings.collect() }
+    }
+
+    /// Energy of the far image over that of the near one.
+    pub(super) fn energy_ratio(&self) -> f64 {
+        self.rings.iter().map(|r| r.far).sum::<f64>() / self.rings.iter().map(|r| r.near).sum::<f64>()
+    }
+
+    /// Energy of both.
+    pub(super) fn energy(&self) -> f64 {
+        self.rings.iter().map(|r| r.far + r.near).sum()
+    }
+}

@@ -1,0 +1,181 @@
+//! PSF calibration and focus measures on images from the renderer, which shares no formula with this crate.
+#![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
+
+mod common;
+
+use common::rig;
+use farnear_depth::calibrate::{
+    CalibrationError, CapturedPair, FlatTarget, Model, fit_psf, measure_patterns,
+};
+use farnear_depth::corrections::{CdcSettings, Method, fit};
+use farnear_depth::focus_measure::{FocusMeasure, peak};
+use farnear_depth::operators::Operators;
+use farnear_depth::psf::Psf;
+use farnear_depth::run::Settings;
+use farnear_scene as scene;
+use ndarray::Array2;
+
+const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
+
+/// Far- and near-focused image of a plane.
+fn pair(depth_mm: f64, psf: &str, camera: &scene::Camera, seed: u64) -> [Array2<f32>; 2] {
+    let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
+    let plane: scene::Scene = format!("plane:{depth_mm}").parse().unwrap();
+    let psf: scene::Psf = psf.parse().unwrap();
+    let renderer = scene::Renderer::new(&plane, &lens, &psf, camera, seed).unwrap();
+    let travel_mm = rig("pillbox").working_range().sensor_travel_mm;
+    [0.0, travel_mm].map(|from_far| {
+        let number = u32::from(from_far > 0.0);
+        renderer.expose(lens.sensor_far_mm + from_far, number).unwrap().mapv(f32::from)
+    })
+}
+
+fn eight_bit(width: usize, height: usize) -> scene::Camera {
+    scene::Camera::new(width, height, scene::Noise::EightBit)
+}
+
+#[test]
+fn psf_is_recovered_from_noisy_pairs() {
+    let optics = rig("pillbox");
+    let range = optics.working_range();
+    let camera = eight_bit(640, 480);
+    for (text, model) in [
+        ("gaussian:k=0.4578", Model::Gaussian),
+        ("gaussian:k=0.35", Model::Gaussian),
+        ("generalised:p=1.8,k=0.4802", Model::Generalised),
+        ("generalised:p=4,k=0.5091", Model::Generalised),
+    ] {
+        let pairs = [range.far_mm, range.near_mm].map(|depth_mm| pair(depth_mm, text, &camera, 7));
+        let captured: Vec<_> = pairs
+            .iter()
+            .map(|[far, near]| CapturedPair { far: far.view(), near: near.view(), alpha: None })
+            .collect();
+        for given in [&captured[..1], &captured[1..], &captured[..]] {
+            let found = fit_psf(given, &optics, model).unwrap();
+            println!("{text}: {} residual {:.4} alphas {:?}", found.psf, found.residual, found.alphas);
+            assert_eq!(found.alphas.len(), given.len());
+            match (found.psf, text.parse::<Psf>().unwrap()) {
+                (Psf::Gaussian { k }, Psf::Gaussian { k: truth }) => {
+                    assert!((k - truth).abs() <= 0.002, "{text}: {k}");
+                }
+                (Psf::Generalised { p, k }, Psf::Generalised { p: true_p, k: true_k }) => {
+                    assert!((p - true_p).abs() <= 0.1 && (k - true_k).abs() <= 0.002, "{text}: {p} {k}");
+                }
+                (found, _) => panic!("{found} for {text}"),
+            }
+        }
+    }
+}
+
+/// Neither image need be sharp where the target's depth is known.
+#[test]
+fn a_target_off_the_foci_will_do_when_its_depth_is_given() {
+    let optics = rig("pillbox");
+    let [far, near] = pair(925.0, "gaussian:k=0.4578", &eight_bit(320, 240), 3);
+    let alpha = optics.alpha(925.0);
+    assert!((-0.8..-0.5).contains(&alpha));
+    let of = |alpha| CapturedPair { far: far.view(), near: near.view(), alpha };
+    let found = fit_psf(&[of(Some(alpha))], &optics, Model::Gaussian).unwrap();
+    let Psf::Gaussian { k } = found.psf else { panic!("{}", found.psf) };
+    // A quarter of the pixels and a smaller difference of blur than at a focus.
+    assert!((k - 0.4578).abs() < 0.004, "{k}");
+    // Taken for a target at the far focus, the pair shows less blur than it should.
+    let Psf::Gaussian { k } = fit_psf(&[of(None)], &optics, Model::Gaussian).unwrap().psf else { panic!() };
+    assert!(k < 0.42, "{k}");
+}
+
+#[test]
+fn pairs_that_say_nothing_of_the_psf_are_refused() {
+    let optics = rig("pillbox");
+    let camera = eight_bit(96, 96);
+    let [far, near] = pair(933.0, "gaussian:k=0.4578", &camera, 1);
+    let of = |far: &Array2<f32>, near: &Array2<f32>, alpha| {
+        let pair = CapturedPair { far: far.view(), near: near.view(), alpha };
+        fit_psf(&[pair], &optics, Model::Gaussian).unwrap_err()
+    };
+    assert_eq!(fit_psf(&[], &optics, Model::Gaussian).unwrap_err(), CalibrationError::NoPair);
+    let narrow = near.slice(ndarray::s![.., 1..]).to_owned();
+    assert!(matches!(of(&far, &narrow, None), CalibrationError::SizeMismatch { near_width: 95, .. }));
+    let flat = Array2::from_elem((96, 96), 90.0);
+    assert!(matches!(of(&flat, &near, None), CalibrationError::Image { which: "far", .. }));
+    let mut hole = near.clone();
+    hole[(5, 6)] = f32::NAN;
+    let error = of(&far, &hole, None);
+    assert!(error.to_string().contains("column 6, row 5"), "{error}");
+    assert!(matches!(of(&far, &near, Some(0.1)), CalibrationError::MiddleOfRange { .. }));
+    let [middle_far, middle_near] = pair(909.29, "gaussian:k=0.4578", &camera, 1);
+    assert!(matches!(of(&middle_far, &middle_near, None), CalibrationError::NeitherSharp { .. }));
+    // The sharp image named as the blurred one.
+    assert!(matches!(of(&far, &near, Some(1.0)), CalibrationError::AtSearchEnd { parameter: "k", .. }));
+    assert!("pillbox".parse::<Model>().is_err());
+}
+
+#[test]
+fn every_focus_measure_peaks_at_best_focus() {
+    let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
+    let plane: scene::Scene = "plane:900".parse().unwrap();
+    let psf: scene::Psf = "gaussian:k=0.4578".parse().unwrap();
+    let renderer = scene::Renderer::new(&plane, &lens, &psf, &eight_bit(160, 120), 5).unwrap();
+    let best_mm = lens.image_distance_mm(900.0).unwrap();
+    // The sweep does not stand on the best focus: its steps are 10 um and it is off by 3.7 um.
+    let places: Vec<f64> = (0..21).map(|i| 10.0 * f64::from(i - 10) - 3.7).collect();
+    let images: Vec<_> = (0..)
+        .zip(&places)
+        .map(|(i, um)| renderer.expose(best_mm + 1e-3 * um, i).unwrap().mapv(f32::from))
+        .collect();
+    for measure in FocusMeasure::ALL {
+        let values: Vec<f64> = images.iter().map(|image| measure.of(image.view()).unwrap()).collect();
+        let found_um = peak(&places, &values).unwrap();
+        let contrast = values[10] / values[0];
+        println!("{measure}: peak {found_um:+.2} um, best over 104 um out of focus {contrast:.2}");
+        assert!(found_um.abs() < 2.0, "{measure}: {found_um} um");
+        assert!(contrast > 1.3, "{measure}: {contrast}");
+        // One hill: from the best place the measure falls on either side, up to its noise.
+        for side in [&values[..=10], &values[10..].iter().rev().copied().collect::<Vec<_>>()] {
+            assert!(side.windows(2).all(|pair| pair[1] > pair[0] * 0.99), "{measure}: {side:?}");
+        }
+    }
+}
+
+/// From images of flat targets to a correction: a lens with elliptical distortion, and depths that were not used.
+#[test]
+fn a_flat_series_teaches_a_correction() {
+    let optics = rig("gaussian:k=0.4578");
+    let operators = Operators::for_optics(&optics).unwrap();
+    let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
+    let lens = lens.with_distortion(scene::EllipticalDistortion::default());
+    let psf: scene::Psf = "gaussian:k=0.4578".parse().unwrap();
+    let range = optics.working_range();
+    let camera = eight_bit(160, 120);
+    let shoot = |depth_mm: f64, seed| {
+        let plane: scene::Scene = format!("plane:{depth_mm}").parse().unwrap();
+        let renderer = scene::Renderer::new(&plane, &lens, &psf, &camera, seed).unwrap();
+        [lens.sensor_far_mm, lens.sensor_near_mm].map(|at| renderer.expose(at, 0).unwrap().mapv(f32::from))
+    };
+    let depth = |part: f64| range.far_mm + part * (range.near_mm - range.far_mm);
+    let series: Vec<_> = (0..9_u8).map(|i| depth(f64::from(i) / 8.0)).collect();
+    let images: Vec<_> = (0..).zip(&series).map(|(seed, depth_mm)| shoot(*depth_mm, seed)).collect();
+    let targets: Vec<_> = images
+        .iter()
+        .zip(&series)
+        .map(|([far, near], true_mm)| FlatTarget { far: far.view(), near: near.view(), true_mm: *true_mm })
+        .collect();
+    let patterns = measure_patterns(&targets, &operators, &optics, &Settings::default(), 0.02).unwrap();
+    let patterns: Vec<_> = patterns.iter().map(|pattern| pattern.as_pattern()).collect();
+    let correction = fit(Method::ClsfFull, &patterns, &CdcSettings::default()).unwrap();
+    let [far, near] = shoot(depth(0.43), 99);
+    let held_out = [FlatTarget { far: far.view(), near: near.view(), true_mm: depth(0.43) }];
+    let raw = &measure_patterns(&held_out, &operators, &optics, &Settings::default(), 0.02).unwrap()[0];
+    let rmse = |map: &Array2<f32>| {
+        let inner = map.slice(ndarray::s![8..-8, 8..-8]);
+        let errors = inner.iter().filter(|d| d.is_finite()).map(|d| (f64::from(*d) - raw.true_mm).powi(2));
+        (errors.sum::<f64>() / inner.len() as f64).sqrt()
+    };
+    let (before, after) = (rmse(&raw.depth_mm), rmse(&correction.apply(raw.depth_mm.view()).unwrap()));
+    println!("raw {before:.3} mm, corrected {after:.3} mm");
+    assert!(before > 1.2 && after < 0.75, "{before} {after}");
+    let flat = Array2::from_elem((120, 160), 90.0);
+    let blank = [FlatTarget { far: flat.view(), near: flat.view(), true_mm: 900.0 }];
+    let error = measure_patterns(&blank, &operators, &optics, &Settings::default(), 0.02).unwrap_err();
+    assert!(matches!(error, CalibrationError::FlatTarget { index: 0, .. }));
+}
