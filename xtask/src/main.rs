@@ -4,6 +4,7 @@
 
 mod demo;
 mod firmware;
+mod fuzz;
 mod install;
 mod run;
 mod sizes;
@@ -32,6 +33,12 @@ enum Job {
     Firmware,
     /// The firmware's flash and static RAM against their budgets.
     Sizes,
+    /// Run the property tests with many more cases, seed after seed.
+    Fuzz {
+        /// For about so long; a round that has begun is finished.
+        #[arg(long, default_value_t = 60)]
+        seconds: u64,
+    },
     /// Install farnear and farnear-sim (with the firmware's ELF beside it) into cargo's bin folder.
     Install,
 }
@@ -42,6 +49,7 @@ fn main() -> ExitCode {
         Job::Test => test::run(),
         Job::Firmware => firmware::build().map(|elf| println!("{}", elf.display())),
         Job::Sizes => firmware::build().and_then(|elf| sizes::check(&elf)),
+        Job::Fuzz { seconds } => fuzz::run(seconds),
         Job::Install => install::run(),
     };
     match result {
