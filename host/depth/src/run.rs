@@ -5,7 +5,7 @@
 //! 1. `M = Q * (I2 - I1)`, `P = Q * (I2 + I1)`; `m = Gm1 * M`, `p1 = Gp1 * P`, `p2 = Gp2 * P` (Li 2014, eqs. 1.7 to
 //!    1.9), borders reflected without repeating the edge pixel.
 //! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
-//! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 ([`cubic`]), median, alpha to mm.
+//! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 (`cubic`), median, alpha to mm.
 //! 4. The rim, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`rim`).
 //! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`confidence`]).
 //!
