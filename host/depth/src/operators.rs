@@ -10,6 +10,9 @@
 pub mod least_squares;
 pub mod linear;
 pub mod prefilter;
+pub mod published;
+pub mod start;
+pub mod thesis;
 
 use std::fmt;
 use std::str::FromStr;
@@ -56,6 +59,12 @@ pub enum DesignError {
         /// Number of unknowns.
         unknowns: usize,
     },
+    /// The Parks-McClellan start of a non-linear design failed.
+    #[error("no kernels to start from: {0}")]
+    Start(String),
+    /// A non-linear design did not come to an end.
+    #[error("the minimisation failed: {0}")]
+    Minimisation(String),
     /// A kernel is malformed.
     #[error(transparent)]
     Kernel(#[from] KernelError),
@@ -83,14 +92,16 @@ pub enum DesignError {
     MixedSizes([usize; 4]),
 }
 
-/// Who designed the operators, and for which PSF.
+/// Which operators, and for which PSF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
-    /// Watanabe & Nayar 1998, pill-box.
+    /// Watanabe & Nayar 1998, pill-box, by their procedure ([`published`]) whatever the [`Design`].
     Watanabe,
-    /// Raj & Staunton 2012, pill-box.
+    /// Raj & Staunton 2012, pill-box, by their procedure ([`published`]) whatever the [`Design`].
     Raj,
+    /// Pill-box rational operators by the procedures of Li 2014.
+    Ro,
     /// Gaussian rational operators (Li 2014, section 5.2.1).
     Gro,
     /// Generalised Gaussian rational operators (Li 2014, section 5.2.2).
@@ -98,25 +109,33 @@ pub enum Family {
 }
 
 impl Family {
-    /// The family that a PSF belongs to.
+    /// All families.
+    pub const ALL: [Self; 5] = [Self::Watanabe, Self::Raj, Self::Ro, Self::Gro, Self::Ggro];
+
+    /// The family that a PSF gets if none is asked for.
     pub fn of(psf: Psf) -> Self {
         match psf {
-            Psf::PillBox => Self::Watanabe,
+            Psf::PillBox => Self::Ro,
             Psf::Gaussian { .. } => Self::Gro,
             Psf::Generalised { .. } => Self::Ggro,
         }
     }
 
+    fn name(self) -> &'static str {
+        match self {
+            Self::Watanabe => "watanabe",
+            Self::Raj => "raj",
+            Self::Ro => "ro",
+            Self::Gro => "gro",
+            Self::Ggro => "ggro",
+        }
+    }
+
     fn check(self, psf: Psf) -> Result<(), DesignError> {
-        let expected = match self {
-            Self::Watanabe | Self::Raj => "pillbox",
-            Self::Gro => "gaussian",
-            Self::Ggro => "generalised",
-        };
-        let fits = match self {
-            Self::Watanabe | Self::Raj => matches!(psf, Psf::PillBox),
-            Self::Gro => matches!(psf, Psf::Gaussian { .. }),
-            Self::Ggro => matches!(psf, Psf::Generalised { .. }),
+        let (expected, fits) = match self {
+            Self::Watanabe | Self::Raj | Self::Ro => ("pillbox", matches!(psf, Psf::PillBox)),
+            Self::Gro => ("gaussian", matches!(psf, Psf::Gaussian { .. })),
+            Self::Ggro => ("generalised", matches!(psf, Psf::Generalised { .. })),
         };
         if fits { Ok(()) } else { Err(DesignError::FamilyNeedsOtherPsf { family: self, expected, psf }) }
     }
@@ -124,12 +143,7 @@ impl Family {
 
 impl fmt::Display for Family {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Watanabe => "watanabe",
-            Self::Raj => "raj",
-            Self::Gro => "gro",
-            Self::Ggro => "ggro",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -137,33 +151,30 @@ impl FromStr for Family {
     type Err = DesignError;
 
     fn from_str(name: &str) -> Result<Self, DesignError> {
-        match name {
-            "watanabe" => Ok(Self::Watanabe),
-            "raj" => Ok(Self::Raj),
-            "gro" => Ok(Self::Gro),
-            "ggro" => Ok(Self::Ggro),
-            _ => Err(DesignError::UnknownName {
-                what: "family",
-                name: name.to_owned(),
-                known: "watanabe, raj, gro or ggro",
-            }),
-        }
+        Self::ALL.into_iter().find(|family| family.name() == name).ok_or_else(|| DesignError::UnknownName {
+            what: "family",
+            name: name.to_owned(),
+            known: "watanabe, raj, ro, gro or ggro",
+        })
     }
 }
 
-/// How the kernels are fitted to the NIR.
+/// How the kernels of the families `ro`, `gro` and `ggro` are fitted to the NIR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Design {
     /// One linear least squares ([`linear`]): the most accurate, and milliseconds.
     #[default]
     Linear,
+    /// Levenberg-Marquardt on eq. 5.18 of Li 2014, put right ([`thesis`]).
+    Thesis,
 }
 
 impl fmt::Display for Design {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Linear => "linear",
+            Self::Thesis => "thesis",
         })
     }
 }
@@ -174,7 +185,12 @@ impl FromStr for Design {
     fn from_str(name: &str) -> Result<Self, DesignError> {
         match name {
             "linear" => Ok(Self::Linear),
-            _ => Err(DesignError::UnknownName { what: "design", name: name.to_owned(), known: "linear" }),
+            "thesis" => Ok(Self::Thesis),
+            _ => Err(DesignError::UnknownName {
+                what: "design",
+                name: name.to_owned(),
+                known: "linear or thesis",
+            }),
         }
     }
 }
@@ -314,14 +330,24 @@ pub fn design(request: &Request) -> Result<Operators, DesignError> {
     let Request { family, design, psf, max_blur_px, kernel_size } = *request;
     let otf = psf.checked()?.otf(max_blur_px);
     let grid = octant();
-    let target = prefilter::target(&otf, max_blur_px, &grid)?;
-    let prefilter = prefilter::fit(&target, &grid, kernel_size)?;
-    let [gm1, gp1, gp2] = match design {
-        Design::Linear => linear::design(&otf, max_blur_px, &prefilter, &grid, kernel_size)?,
+    let target = match family {
+        Family::Watanabe | Family::Raj => published::prefilter_target(&otf, max_blur_px, &grid),
+        Family::Ro | Family::Gro | Family::Ggro => prefilter::target(&otf, max_blur_px, &grid)?,
     };
+    let q = prefilter::fit(&target, &grid, kernel_size)?;
     let nir = NirFit::new(&otf, max_blur_px, first_non_monotonic(&otf, max_blur_px));
-    let name = format!("{family}-{design} {psf} rmax={max_blur_px} {kernel_size}x{kernel_size}");
-    Ok(Operators { name, request: *request, nir_rms: nir.total_rms(), prefilter, gm1, gp1, gp2, nir })
+    let [gm1, gp1, gp2] = match (family, design) {
+        (Family::Watanabe, _) => published::watanabe(&otf, max_blur_px, &q, &grid, kernel_size)?,
+        (Family::Raj, _) => published::raj(&otf, max_blur_px, &q, &grid, kernel_size)?,
+        (_, Design::Linear) => linear::design(&otf, max_blur_px, &q, &grid, kernel_size)?,
+        (_, Design::Thesis) => thesis::design(&otf, max_blur_px, &q, &nir, &grid, kernel_size)?,
+    };
+    let procedure = match family {
+        Family::Watanabe | Family::Raj => family.to_string(),
+        _ => format!("{family}-{design}"),
+    };
+    let name = format!("{procedure} {psf} rmax={max_blur_px} {kernel_size}x{kernel_size}");
+    Ok(Operators { name, request: *request, nir_rms: nir.total_rms(), prefilter: q, gm1, gp1, gp2, nir })
 }
 
 impl Operators {
