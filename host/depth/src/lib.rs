@@ -3,6 +3,7 @@
 //! Two images of one scene, one focused far and one focused near, give depth at every textured pixel by rational
 //! operators (Watanabe & Nayar 1998; Li, PhD thesis, University of Warwick, 2014).
 //! Images and maps are `ndarray::Array2<f32>` of (height, width); depth is in mm, NaN where there is no value.
+pub mod baselines;
 pub mod calibrate;
 pub mod corrections;
 pub mod filter;

@@ -1,0 +1,130 @@
+//! Other people's methods for the same pair, to compare with.
+//!
+//! | method | what | reference |
+//! |---|---|---|
+//! | [`Method::Subbarao`] | S-transform: difference of the images over the Laplacian of their mean | Subbarao & Surya 1994 |
+//! | [`Method::SubbaraoFourier`] | ratio of local spectra | Subbarao 1988; Li 2014, appendix C |
+//! | [`Method::Favaro`] | projectors on the null space of each depth, learned from rendered patches | Favaro & Soatto 2005 |
+//!
+//! (Watanabe & Nayar and Raj & Staunton differ from this project's method by their operators only: see
+//! [`crate::operators::Family`].) Each gives a [`DepthMap`] with the same meaning of depth, confidence and holes as
+//! [`crate::run::depth_from_pair`]; [`Settings::smoothing_px`] is the window over which evidence is summed.
+//!
+//! The first two know of the PSF only its second moment, `sigma^2 = 2 k^2 R^2` for a Gaussian. With the blur radii of a
+//! telecentric pair the difference of the two images' moments is linear in the normalised depth:
+//! `sigma1^2 - sigma2^2 = c Rmax^2 alpha`.
+
+mod common;
+mod favaro;
+mod fourier;
+mod s_transform;
+
+use std::fmt;
+use std::str::FromStr;
+
+use ndarray::ArrayView2;
+use serde::{Deserialize, Serialize};
+
+use crate::optics::Optics;
+use crate::run::{DepthMap, RunError, Settings};
+
+pub use favaro::{Favaro, FavaroSettings};
+
+/// Which baseline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// S-transform.
+    Subbarao,
+    /// Ratio of local spectra.
+    SubbaraoFourier,
+    /// Null-space projectors.
+    Favaro,
+}
+
+/// Why a baseline gives no depth.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BaselineError {
+    /// No method of that name.
+    #[error("`{0}` is no baseline: use subbarao, subbarao-fourier or favaro")]
+    Unknown(String),
+    /// The images cannot be used.
+    #[error(transparent)]
+    Pair(#[from] RunError),
+    /// Favaro's settings make no sense.
+    #[error("{name} = {value}: must lie between {least} and {most}")]
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// What was given.
+        value: usize,
+        /// Least.
+        least: usize,
+        /// Most.
+        most: usize,
+    },
+    /// Projectors learned for another blur radius or PSF.
+    #[error("the projectors were learned for {learned}, the optics have {optics}: learn them again")]
+    OtherOptics {
+        /// What they were learned for.
+        learned: String,
+        /// What the optics are.
+        optics: String,
+    },
+    /// The decomposition failed.
+    #[error("the patches of alpha = {alpha:.2} have no principal directions")]
+    NoDirections {
+        /// Normalised depth of the patches.
+        alpha: f64,
+    },
+}
+
+impl Method {
+    /// All baselines.
+    pub const ALL: [Self; 3] = [Self::Subbarao, Self::SubbaraoFourier, Self::Favaro];
+
+    /// The name as the command line writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Subbarao => "subbarao",
+            Self::SubbaraoFourier => "subbarao-fourier",
+            Self::Favaro => "favaro",
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = BaselineError;
+
+    fn from_str(text: &str) -> Result<Self, BaselineError> {
+        let known = Self::ALL.into_iter().find(|method| method.name() == text.trim());
+        known.ok_or_else(|| BaselineError::Unknown(text.to_owned()))
+    }
+}
+
+/// Depth of a pair by a baseline: `far` and `near` are the far- and near-focused images, (height, width), any common
+/// scale. [`Method::Favaro`] learns its projectors first; keep a [`Favaro`] to do that once for many pairs.
+///
+/// # Errors
+/// [`BaselineError::Pair`] for images that differ in size, are too small, constant or wholly invalid.
+pub fn depth_from_pair(
+    method: Method,
+    far: ArrayView2<f32>,
+    near: ArrayView2<f32>,
+    optics: &Optics,
+    settings: &Settings,
+) -> Result<DepthMap, BaselineError> {
+    let pair = common::Pair::new(far, near, settings)?;
+    let evidence = match method {
+        Method::Subbarao => s_transform::evidence(&pair, optics, settings),
+        Method::SubbaraoFourier => fourier::evidence(&pair, optics, settings),
+        Method::Favaro => Favaro::learn(optics, &FavaroSettings::default())?.evidence(&pair, settings),
+    };
+    Ok(pair.finish(evidence, optics, settings))
+}
