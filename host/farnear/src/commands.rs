@@ -7,3 +7,5 @@ pub mod operators;
 pub mod optics;
 pub mod render;
 pub mod rig;
+pub mod shadow;
+pub mod silhouettes;

@@ -1,7 +1,8 @@
 //! # farnear
 //!
 //! The command line. One file per command in [`commands`]; [`files`] reads and writes what users have, [`picture`]
-//! makes `view.png`, [`report`] prints figures as text or JSON, [`simulator`] starts the emulated rig.
+//! makes `view.png`, [`report`] prints figures as text or JSON, [`simulator`] starts the emulated rig, [`video`] reads
+//! frames.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
 
@@ -10,6 +11,7 @@ mod files;
 mod picture;
 mod report;
 mod simulator;
+mod video;
 
 use std::process::ExitCode;
 
@@ -31,6 +33,8 @@ enum Command {
     Compare(commands::compare::Arguments),
     Render(commands::render::Arguments),
     Rig(commands::rig::Arguments),
+    Shadow(commands::shadow::Arguments),
+    Silhouettes(commands::silhouettes::Arguments),
     Completions(commands::completions::Arguments),
 }
 
@@ -42,6 +46,8 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => commands::compare::run(arguments),
         Command::Render(arguments) => commands::render::run(arguments),
         Command::Rig(arguments) => commands::rig::run(arguments),
+        Command::Shadow(arguments) => commands::shadow::run(arguments),
+        Command::Silhouettes(arguments) => commands::silhouettes::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
     };
     match result {

@@ -74,6 +74,14 @@ impl Extractor {
         })
     }
 
+    /// Teaches the background a frame without asking where the subject is.
+    ///
+    /// # Errors
+    /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
+    pub fn learn(&mut self, frame: Frame<'_>) -> Result<(), BackgroundError> {
+        self.model.apply(frame).map(|_| ())
+    }
+
     /// Takes in the next frame. Pixels that the background model calls shadow are not the subject's.
     ///
     /// # Errors

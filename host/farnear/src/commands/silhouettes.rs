@@ -1,0 +1,26 @@
+//! `farnear silhouettes`: masks of a person.
+
+mod video;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+/// Make silhouettes: masks of the person who moves in a video.
+#[derive(Args)]
+#[command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")]
+pub struct Arguments {
+    #[command(subcommand)]
+    source: Source,
+}
+
+#[derive(Subcommand)]
+enum Source {
+    Video(video::Arguments),
+}
+
+/// Runs the command.
+pub fn run(arguments: Arguments) -> Result<()> {
+    match arguments.source {
+        Source::Video(arguments) => video::run(&arguments),
+    }
+}

@@ -1,0 +1,262 @@
+//! Video in, frame by frame: a folder of pictures, a Y4M file, or anything that an installed ffmpeg reads.
+//!
+//! All frames of a video have one size and are all grey or all RGB, 8 bits a sample; anything else is an error that
+//! names the frame. Nothing is read ahead, so a video may be longer than memory.
+
+mod ffmpeg;
+pub mod pictures;
+mod y4m;
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use farnear_activity::background::Frame;
+use ndarray::{Array2, Array3};
+
+/// A frame and where it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VideoFrame {
+    /// A picture's name without its extension, else `frame_000001` and so on.
+    pub name: String,
+    /// Its samples.
+    pub pixels: Pixels,
+}
+
+/// Samples of 8 bits.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pixels {
+    /// Shape (height, width).
+    Grey(Array2<u8>),
+    /// Red, green and blue, shape (height, width, 3).
+    Rgb(Array3<u8>),
+}
+
+impl Pixels {
+    /// As the background model takes it.
+    pub fn frame(&self) -> Frame<'_> {
+        match self {
+            Self::Grey(pixels) => Frame::Grey(pixels.view()),
+            Self::Rgb(pixels) => Frame::Rgb(pixels.view()),
+        }
+    }
+
+    /// Width and height in pixels, and whether in colour.
+    pub fn kind(&self) -> Kind {
+        let (height, width) = self.frame().size();
+        Kind { width, height, colour: matches!(self, Self::Rgb(_)) }
+    }
+}
+
+/// What all frames of a video share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// RGB rather than grey.
+    pub colour: bool,
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "{}x{} {}", self.width, self.height, if self.colour { "in colour" } else { "in grey" })
+    }
+}
+
+/// Why a video cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum VideoError {
+    /// The file or folder cannot be opened or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// The system's words.
+        source: io::Error,
+    },
+    /// A folder without a picture.
+    #[error("{}: no picture in this folder; expected files ending in {}", path.display(), pictures::EXTENSIONS.join(", "))]
+    NoPictures {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A video without a frame.
+    #[error("{}: no frame in this video", path.display())]
+    NoFrames {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A picture that cannot be decoded.
+    #[error("{}: not a picture that can be read: {reason}", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's words.
+        reason: String,
+    },
+    /// A Y4M stream that is damaged or of a kind that is not read.
+    #[error("{}: frame {frame} of the Y4M stream: {reason}", path.display())]
+    Y4m {
+        /// The file.
+        path: PathBuf,
+        /// Frame number from 1; 0 for the header.
+        frame: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A frame unlike the first.
+    #[error("{}: frame `{name}` is {found}, but the video began {expected}; all frames must be alike", path.display())]
+    Changed {
+        /// The video.
+        path: PathBuf,
+        /// The frame.
+        name: String,
+        /// This frame's kind.
+        found: Kind,
+        /// The first frame's.
+        expected: Kind,
+    },
+    /// Neither pictures nor Y4M, and no ffmpeg to read it with.
+    #[error(
+        "{}: only a folder of pictures and Y4M files are read directly, and there is no `ffmpeg` on the PATH for other \
+         videos; install ffmpeg, or convert with it elsewhere: ffmpeg -i VIDEO -pix_fmt yuv444p out.y4m", path.display()
+    )]
+    NoFfmpeg {
+        /// The file.
+        path: PathBuf,
+    },
+    /// ffmpeg gave up.
+    #[error("{}: ffmpeg could not read it ({status}): {message}", path.display())]
+    Ffmpeg {
+        /// The file.
+        path: PathBuf,
+        /// How it ended.
+        status: String,
+        /// The end of what it printed.
+        message: String,
+    },
+}
+
+impl VideoError {
+    fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+}
+
+type Frames = Box<dyn Iterator<Item = Result<VideoFrame, VideoError>>>;
+
+/// An opened video: an iterator over its frames, which ends after the first error.
+pub struct Video {
+    path: PathBuf,
+    frames: Frames,
+    first: Option<Kind>,
+    ended: bool,
+}
+
+impl std::fmt::Debug for Video {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.debug_struct("Video").field("path", &self.path).finish_non_exhaustive()
+    }
+}
+
+impl Video {
+    /// Opens a folder of pictures, a `.y4m` file, or, through ffmpeg, any other file.
+    ///
+    /// # Errors
+    /// [`VideoError`] where nothing can be read at all; damage further on comes with its frame.
+    pub fn open(path: &Path) -> Result<Self, VideoError> {
+        let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
+        let frames: Frames = if metadata.is_dir() {
+            Box::new(pictures::open(path)?)
+        } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m")) {
+            let file = std::fs::File::open(path).map_err(|source| VideoError::io(path, source))?;
+            Box::new(y4m::Y4m::new(path, io::BufReader::new(file))?)
+        } else {
+            Box::new(ffmpeg::open(path)?)
+        };
+        Ok(Self { path: path.into(), frames, first: None, ended: false })
+    }
+}
+
+impl Iterator for Video {
+    type Item = Result<VideoFrame, VideoError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let next = match self.frames.next() {
+            Some(Ok(frame)) => {
+                let found = frame.pixels.kind();
+                let expected = *self.first.get_or_insert(found);
+                if found == expected {
+                    return Some(Ok(frame));
+                }
+                Some(Err(VideoError::Changed { path: self.path.clone(), name: frame.name, found, expected }))
+            }
+            Some(Err(error)) => Some(Err(error)),
+            None if self.first.is_none() => Some(Err(VideoError::NoFrames { path: self.path.clone() })),
+            None => None,
+        };
+        self.ended = true;
+        next
+    }
+}
+
+/// The name of frame `number`, counted from 1, of a video without names.
+fn numbered(number: usize) -> String {
+    format!("frame_{number:06}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{GrayImage, Luma, Rgb, RgbImage};
+
+    #[test]
+    fn a_folder_is_read_in_the_order_of_its_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        for number in [10_u8, 2, 1] {
+            let picture = GrayImage::from_pixel(4, 3, Luma([number]));
+            picture.save(folder.path().join(format!("in{number}.png"))).unwrap();
+        }
+        std::fs::write(folder.path().join("notes.txt"), "not a picture").unwrap();
+        let frames: Vec<_> = Video::open(folder.path()).unwrap().map(Result::unwrap).collect();
+        let names: Vec<_> = frames.iter().map(|frame| frame.name.as_str()).collect();
+        assert_eq!(names, ["in1", "in2", "in10"]);
+        assert_eq!(frames[2].pixels, Pixels::Grey(Array2::from_elem((3, 4), 10)));
+    }
+
+    #[test]
+    fn a_frame_of_another_size_ends_the_video_with_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        RgbImage::from_pixel(4, 3, Rgb([1, 2, 3])).save(folder.path().join("a.png")).unwrap();
+        RgbImage::from_pixel(5, 3, Rgb([1, 2, 3])).save(folder.path().join("b.png")).unwrap();
+        RgbImage::from_pixel(4, 3, Rgb([1, 2, 3])).save(folder.path().join("c.png")).unwrap();
+        let mut video = Video::open(folder.path()).unwrap();
+        assert!(video.next().unwrap().is_ok());
+        let text = video.next().unwrap().unwrap_err().to_string();
+        assert!(text.contains("`b`") && text.contains("5x3") && text.contains("4x3"), "{text}");
+        assert!(video.next().is_none());
+    }
+
+    #[test]
+    fn an_empty_folder_and_a_missing_file_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let empty = Video::open(folder.path()).unwrap_err();
+        assert!(matches!(empty, VideoError::NoPictures { .. }), "{empty}");
+        let missing = Video::open(&folder.path().join("none.y4m")).unwrap_err();
+        assert!(missing.to_string().contains("none.y4m"), "{missing}");
+    }
+
+    #[test]
+    fn a_damaged_picture_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.png"), b"\x89PNG\r\n\x1a\nrubbish").unwrap();
+        let error = Video::open(folder.path()).unwrap().next().unwrap().unwrap_err();
+        assert!(error.to_string().contains("a.png"), "{error}");
+    }
+}

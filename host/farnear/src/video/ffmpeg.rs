@@ -1,0 +1,102 @@
+//! Any video through an installed ffmpeg, which is asked for a Y4M stream on its standard output.
+
+use std::{
+    io::{BufReader, ErrorKind, Read},
+    path::{Path, PathBuf},
+    process::{Child, ChildStdout, Command, Stdio},
+    thread::JoinHandle,
+};
+
+use super::{VideoError, VideoFrame, y4m::Y4m};
+
+/// How much of ffmpeg's complaint an error quotes.
+const QUOTED_CHARS: usize = 400;
+
+/// Frames from a running ffmpeg, which ends with this value.
+struct Ffmpeg {
+    path: PathBuf,
+    child: Child,
+    complaint: Option<JoinHandle<String>>,
+    frames: Option<Y4m<BufReader<ChildStdout>>>,
+}
+
+/// Starts ffmpeg on a file.
+pub(super) fn open(
+    path: &Path,
+) -> Result<impl Iterator<Item = Result<VideoFrame, VideoError>> + 'static, VideoError> {
+    let child = Command::new("ffmpeg")
+        .args(["-nostdin", "-v", "error", "-i"])
+        .arg(path)
+        // The first video stream; the option that keeps ffmpeg from evening out an uneven frame rate changed its name
+        // between versions, and a repeated frame harms nothing.
+        .args(["-map", "0:v:0", "-pix_fmt", "yuv444p", "-f", "yuv4mpegpipe", "-"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut child = child.map_err(|source| match source.kind() {
+        ErrorKind::NotFound => VideoError::NoFfmpeg { path: path.into() },
+        _ => VideoError::io(path, source),
+    })?;
+    // Read in a thread of its own, or a talkative ffmpeg would wait for room in the pipe for ever.
+    let complaint = child.stderr.take().map(|mut stderr| {
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            // What could be read is what there is to quote.
+            let _ = stderr.read_to_end(&mut bytes);
+            String::from_utf8_lossy(&bytes).into_owned()
+        })
+    });
+    let stdout = child.stdout.take();
+    let mut ffmpeg = Ffmpeg { path: path.into(), child, complaint, frames: None };
+    let stream = stdout.map(|stdout| Y4m::new(path, BufReader::new(stdout)));
+    match stream {
+        Some(Ok(frames)) => ffmpeg.frames = Some(frames),
+        // No header: ffmpeg says better why than the parser does.
+        Some(Err(error)) => return Err(ffmpeg.failure().unwrap_or(error)),
+        None => return Err(ffmpeg.failure().unwrap_or(VideoError::NoFrames { path: path.into() })),
+    }
+    Ok(ffmpeg)
+}
+
+impl Ffmpeg {
+    /// Waits for its end; `Some` where that was not a success.
+    fn failure(&mut self) -> Option<VideoError> {
+        self.frames = None;
+        let status = self.child.wait();
+        let message = self.complaint.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let message = message.trim();
+        let tail = message.char_indices().rev().nth(QUOTED_CHARS).map_or(message, |(at, _)| &message[at..]);
+        match status {
+            Ok(status) if status.success() => None,
+            Ok(status) => Some(VideoError::Ffmpeg {
+                path: self.path.clone(),
+                status: status.to_string(),
+                message: tail.into(),
+            }),
+            Err(source) => Some(VideoError::io(&self.path, source)),
+        }
+    }
+}
+
+impl Iterator for Ffmpeg {
+    type Item = Result<VideoFrame, VideoError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self.frames.as_mut()?.next() {
+            Some(Ok(frame)) => Some(Ok(frame)),
+            Some(Err(error)) => Some(Err(self.failure().unwrap_or(error))),
+            None => self.failure().map(Err),
+        }
+    }
+}
+
+impl Drop for Ffmpeg {
+    fn drop(&mut self) {
+        if self.frames.is_some() {
+            // Stopped half-way: it may have ended by itself already, which is as good.
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+}
