@@ -1,0 +1,150 @@
+//! First-order error propagation to the angle beta, and when not to believe it.
+//!
+//! `s_beta^2 = 1/4 [(Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (Hc rx ry / D)^2 s_u^2 + (u rx ry / D)^2 s_Hc^2]` with
+//! `D = u^2 rx^2 + Hc^2 ry^2`, for a subject on the optical axis; the general form has `t = u rx - X0 ry` in place of
+//! `u rx`. (Of Li 2014, eqs. 8.21 to 8.37: 8.24 needs the square of its sum, 8.27 counts the elevation twice, 8.36 and
+//! 8.37 lack covariances; printed, they are ten times too large.) `s_psi` follows from day, hour, latitude and longitude
+//! by the derivatives of the horizontal vector, `s_u` from `u = w v / wi`. The height of the subject does not enter beta.
+
+use super::{Geometry, RADIAN, Shadow};
+use crate::angle::BinaryAngle;
+use crate::sun::{Place, equatorial, horizontal};
+
+/// Standard deviations of what goes in.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Deviations {
+    /// Of the day, days (the hour of the day kept).
+    pub day: f32,
+    /// Of the time of day, hours.
+    pub time_h: f32,
+    /// Of the latitude, degrees.
+    pub latitude_deg: f32,
+    /// Of the longitude, degrees.
+    pub longitude_deg: f32,
+    /// Of the camera azimuth, degrees.
+    pub azimuth_deg: f32,
+    /// Of the camera height, m.
+    pub camera_height_m: f32,
+    /// Of the subject's height, m.
+    pub height_m: f32,
+    /// Of the subject's distance, m: see [`Deviations::of_distance`].
+    pub distance_m: f32,
+}
+
+impl Deviations {
+    /// Of a distance that was estimated by `u = w v / wi` from a head of width `w`, seen with the image distance `v` as
+    /// `wi` (Li 2014, eq. 8.17); each a value and its standard deviation, all in one unit.
+    pub fn of_distance(w: (f32, f32), v: (f32, f32), wi: (f32, f32)) -> f32 {
+        let u = w.0 * v.0 / wi.0;
+        u * libm::sqrtf(square(w.1 / w.0) + square(v.1 / v.0) + square(wi.1 / wi.0))
+    }
+}
+
+/// Whether the first-order deviation holds.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reliability {
+    /// It holds to a few percent.
+    FirstOrder,
+    /// The shadow's end may lie beside or behind the camera: beta may jump, the deviation is too small.
+    ShadowNearCamera,
+    /// The shadow may point to either side: beta folds back at the mirror, the deviation is too large or too small.
+    EitherSide,
+}
+
+/// The deviation of beta.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Deviation {
+    /// First-order standard deviation of beta, degrees.
+    pub beta_deg: f32,
+    /// Standard deviation of the sun's azimuth, degrees.
+    pub sun_azimuth_deg: f32,
+    /// Whether to believe it.
+    pub reliability: Reliability,
+}
+
+/// The end of the shadow must stay clear of the camera by this many standard deviations.
+const CLEARANCE: f32 = 4.0;
+
+/// And eta of the fold at 90 deg by this many.
+const FOLD: f32 = 2.0;
+
+impl Shadow {
+    /// The standard deviation of beta for a shadow made by [`Shadow::at`] of the same moment, place and geometry.
+    pub fn deviation(
+        &self,
+        unix_seconds: i64,
+        place: &Place,
+        geometry: &Geometry,
+        given: &Deviations,
+    ) -> Deviation {
+        let (psi2, elevation2) = of_sun(unix_seconds, place, given);
+        let direction2 = psi2 + square(given.azimuth_deg * RADIAN);
+        let (u, hc) = (geometry.distance_m, geometry.camera_height_m);
+        let (rx, ry, s) = (self.right_m, self.forward_m, self.length_m);
+        let (across, down) = (u * rx - geometry.lateral_m * ry, hc * ry);
+        let d = square(across) + square(down);
+        // d eta by the direction, by u and by Hc; the subject's offset is measured in the image, X0 = x u / v.
+        let by_direction = hc * u * s * s / d;
+        let by_distance = hc * across * ry / (u * d);
+        let by_height = across * ry / d;
+        let eta2 = square(by_direction) * direction2
+            + square(by_distance * given.distance_m)
+            + square(by_height * given.camera_height_m);
+        let eta = libm::sqrtf(eta2);
+        // The end's distance u + ry: by u, by the shadow's length (height and elevation) and its direction.
+        let of_length2 = square(ry * given.height_m / geometry.height_m)
+            + square(ry / self.sine_times_cosine(geometry)) * elevation2;
+        let end = libm::sqrtf(square(given.distance_m) + of_length2 + square(rx) * direction2);
+        let fold = 90.0 * RADIAN - (self.eta_deg * RADIAN).abs();
+        let reliability = if self.end_distance_m < CLEARANCE * end {
+            Reliability::ShadowNearCamera
+        } else if fold < FOLD * eta {
+            Reliability::EitherSide
+        } else {
+            Reliability::FirstOrder
+        };
+        Deviation { beta_deg: eta / (2.0 * RADIAN), sun_azimuth_deg: libm::sqrtf(psi2) / RADIAN, reliability }
+    }
+
+    /// `sin(elevation) cos(elevation)`: the relative change of the length is the elevation's over this.
+    fn sine_times_cosine(&self, geometry: &Geometry) -> f32 {
+        let (s, h) = (self.length_m, geometry.height_m);
+        s * h / (s * s + h * h)
+    }
+}
+
+/// Variances of the sun's azimuth and elevation, radians squared.
+fn of_sun(unix_seconds: i64, place: &Place, given: &Deviations) -> (f32, f32) {
+    let sun = equatorial(unix_seconds);
+    let sidereal = sun.sidereal;
+    let at = horizontal(sun.vector, sidereal, place);
+    // By the hour angle: the vector at the meridian's place turned by a quarter.
+    let quarter = BinaryAngle::from_units(1 << 30);
+    let turned = horizontal(sun.vector, sidereal.plus(quarter), place);
+    // Turning leaves the part along the pole, which does not change with the hour angle.
+    let polar = horizontal([0.0, 0.0, sun.vector[2]], sidereal, place);
+    let by_hour_angle: [f32; 3] = core::array::from_fn(|i| turned[i] - polar[i]);
+    let by_latitude = [0.0, -at[2], at[1]];
+    // A day later at the same hour the sidereal time is 0.9856 deg on, and so is the sun along the ecliptic.
+    let along = horizontal(sun.derivative, sidereal, place);
+    let by_day: [f32; 3] =
+        core::array::from_fn(|i| along[i] * sun.per_day + by_hour_angle[i] * SIDEREAL_PER_DAY);
+    let level2 = square(at[0]) + square(at[1]);
+    let azimuth = |by: [f32; 3]| (at[1] * by[0] - at[0] * by[1]) / level2;
+    let level = libm::sqrtf(level2);
+    let elevation = |by: [f32; 3]| by[2] / level;
+    let hour = 15.0 * RADIAN;
+    let variance = |of: &dyn Fn([f32; 3]) -> f32| {
+        square(of(by_hour_angle)) * (square(hour * given.time_h) + square(given.longitude_deg * RADIAN))
+            + square(of(by_latitude) * given.latitude_deg * RADIAN)
+            + square(of(by_day) * given.day)
+    };
+    (variance(&azimuth), variance(&elevation))
+}
+
+/// Growth of the sidereal time beyond a turn, radians a day.
+const SIDEREAL_PER_DAY: f32 = 0.065_709_85 / 24.0 * core::f32::consts::TAU;
+
+fn square(x: f32) -> f32 {
+    x * x
+}
