@@ -9,6 +9,7 @@
 
 pub mod least_squares;
 pub mod linear;
+pub mod linearise;
 pub mod prefilter;
 pub mod published;
 pub mod start;
@@ -19,6 +20,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use self::linearise::Polynomial;
 use crate::kernel::{Kernel, KernelError};
 use crate::nir::{NirFit, first_non_monotonic, octant};
 use crate::optics::Optics;
@@ -235,6 +237,7 @@ pub struct Operators {
     gm1: Kernel,
     gp1: Kernel,
     gp2: Kernel,
+    linearisation: Polynomial,
     nir: NirFit,
 }
 
@@ -249,6 +252,7 @@ struct RawOperators {
     max_blur_px: f64,
     kernel_size: usize,
     nir_rms: f64,
+    linearisation: Polynomial,
     psf: Psf,
     prefilter: Kernel,
     gm1: Kernel,
@@ -284,6 +288,7 @@ impl TryFrom<RawOperators> for Operators {
             gm1: raw.gm1,
             gp1: raw.gp1,
             gp2: raw.gp2,
+            linearisation: raw.linearisation,
             nir: raw.nir,
         })
     }
@@ -304,6 +309,7 @@ impl From<Operators> for RawOperators {
             gm1: o.gm1,
             gp1: o.gp1,
             gp2: o.gp2,
+            linearisation: o.linearisation,
             nir: o.nir,
         }
     }
@@ -342,12 +348,29 @@ pub fn design(request: &Request) -> Result<Operators, DesignError> {
         (_, Design::Linear) => linear::design(&otf, max_blur_px, &q, &grid, kernel_size)?,
         (_, Design::Thesis) => thesis::design(&otf, max_blur_px, &q, &nir, &grid, kernel_size)?,
     };
+    let linearisation = match (family, design) {
+        (Family::Ro | Family::Gro | Family::Ggro, Design::Linear) => {
+            linearise::design(&otf, max_blur_px, &q, [&gm1, &gp1, &gp2], &grid)?
+        }
+        // As published.
+        _ => linearise::IDENTITY,
+    };
     let procedure = match family {
         Family::Watanabe | Family::Raj => family.to_string(),
         _ => format!("{family}-{design}"),
     };
     let name = format!("{procedure} {psf} rmax={max_blur_px} {kernel_size}x{kernel_size}");
-    Ok(Operators { name, request: *request, nir_rms: nir.total_rms(), prefilter: q, gm1, gp1, gp2, nir })
+    Ok(Operators {
+        name,
+        request: *request,
+        nir_rms: nir.total_rms(),
+        prefilter: q,
+        gm1,
+        gp1,
+        gp2,
+        linearisation,
+        nir,
+    })
 }
 
 impl Operators {
@@ -397,6 +420,11 @@ impl Operators {
     /// Operator Gp2, applied to the filtered sum; coefficient of alpha^3.
     pub fn gp2(&self) -> &Kernel {
         &self.gp2
+    }
+
+    /// Coefficients of the odd polynomial (alpha, alpha^3, alpha^5, alpha^7) from the alpha found to the true one.
+    pub fn linearisation(&self) -> &Polynomial {
+        &self.linearisation
     }
 
     /// Cubic fit of the NIR.

@@ -65,7 +65,7 @@ impl Processor {
             input: &input,
             operators: &self.operators,
             settings: &self.settings,
-            depth_of: DepthOfAlpha::new(&self.optics),
+            depth_of: DepthOfAlpha::new(&self.operators, &self.optics),
             backend: self.backend,
         };
         job.run(

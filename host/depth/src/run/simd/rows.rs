@@ -359,6 +359,8 @@ dispatch! {
 #[inline(always)]
 fn median_generic<L: Lanes>(rows: &[&[f32]], depth_of: DepthOfAlpha, output: &mut [f32], width: usize) {
     assert!(rows.iter().chain([&&*output]).all(|row| width + Plane::PADDING <= row.len()));
+    let [c1, c3, c5, c7] = depth_of.linearisation();
+    let [c1, c3, c5, c7] = [L::splat(c1), L::splat(c3), L::splat(c5), L::splat(c7)];
     let [focal, squared, offset, slope] = depth_of.coefficients();
     let [focal, squared, offset, slope] =
         [L::splat(focal), L::splat(squared), L::splat(offset), L::splat(slope)];
@@ -377,6 +379,9 @@ fn median_generic<L: Lanes>(rows: &[&[f32]], depth_of: DepthOfAlpha, output: &mu
                 // `check` lets no other window through.
                 n => unreachable!("median window {n}"),
             };
+            let square = alpha.mul(alpha);
+            let factor = c7.mul_add(square, c5).mul_add(square, c3).mul_add(square, c1);
+            let alpha = alpha.mul(factor);
             let depth = focal.add(squared.div(slope.mul_add(alpha, offset)));
             depth.store(output.as_mut_ptr().add(x));
         }
