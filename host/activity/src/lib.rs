@@ -7,7 +7,10 @@
 //! |---|---|
 //! | [`sun`] | where the sun is (PSA+, Astronomical Almanac, the thesis' form, NREL SPA) |
 //! | [`shadow`] | where a person's shadow falls in the image, how sure that is, and cutting it off |
-//!
+//! | [`background`] | what moves in a video: an adaptive Gaussian mixture per pixel, with a shadow test |
+//! | [`mask`] | masks cleaned, regions found, the subject chosen, flagged and centred |
+//! | [`shadow_detectors`] | shadow told from the pictures alone, five ways |
+//! | [`shadow_score`] | how much shadow was taken off, and how much of the subject with it |
 //! | [`embedding`] | centroid distance, Isomap and landmark Isomap, PCA, the RBF map |
 //! | [`silhouette`] | silhouettes from bodies in space |
 //! | [`synthetic`] | seeded people and scenes |
