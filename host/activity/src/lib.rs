@@ -19,7 +19,10 @@
 
 pub mod background;
 pub mod embedding;
+pub mod evaluation;
 pub mod mask;
+pub mod readers;
+pub mod recognition;
 pub mod shadow;
 pub mod shadow_detectors;
 pub mod shadow_score;

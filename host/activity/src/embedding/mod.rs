@@ -103,7 +103,7 @@ fn check(samples: ArrayView2<f32>, needed: usize) -> Result<(), EmbeddingError> 
 }
 
 /// `a b^T` of two row-major matrices over the current rayon pool.
-fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2<f32> {
+pub(crate) fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2<f32> {
     let (a, b) = (a.as_standard_layout(), b.as_standard_layout());
     let mut product = Array2::<f32>::zeros((a.nrows(), b.nrows()));
     if let (Some(left), Some(right)) = (a.as_slice(), b.as_slice()) {
@@ -123,6 +123,6 @@ fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2<f32> {
 }
 
 /// Squared Euclidean norm of every row.
-fn squared_norms(samples: ArrayView2<f32>) -> Vec<f32> {
+pub(crate) fn squared_norms(samples: ArrayView2<f32>) -> Vec<f32> {
     samples.rows().into_iter().map(|row| row.iter().map(|v| v * v).sum()).collect()
 }

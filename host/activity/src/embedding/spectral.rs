@@ -15,7 +15,7 @@ pub(super) fn leading(matrix: &[f64], n: usize, wanted: usize) -> (Vec<f64>, Vec
     let view = MatRef::from_row_major_slice(matrix, n, n);
     let mut pairs: Vec<(f64, Vec<f64>)> = Vec::new();
     // The partial solver ranks by magnitude, so large negative eigenvalues take places: ask for more and drop them.
-    let asked = (wanted + 6).max(2 * wanted);
+    let asked = wanted + 6;
     if n > WHOLE && 4 * asked < n {
         let par = Par::rayon(0);
         let mut vectors = Mat::<f64>::zeros(n, asked);
@@ -23,14 +23,15 @@ pub(super) fn leading(matrix: &[f64], n: usize, wanted: usize) -> (Vec<f64>, Vec
         // A start vector with every direction in it, the same in every run.
         let start = Col::<f64>::from_fn(n, |i| 1.0 + 0.5 * ((i as f64) * 0.7548776662).fract());
         let start = &start * (1.0 / start.norm_l2());
-        let params = PartialEigenParams::default();
+        // Past these restarts the spectrum is too crowded for it and the whole decomposition takes over.
+        let params = PartialEigenParams { max_restarts: 40, ..PartialEigenParams::default() };
         let mut memory = MemBuffer::new(partial_self_adjoint_eigen_scratch(&view, asked, par, params));
         let info = partial_self_adjoint_eigen(
             vectors.as_mut(),
             &mut values,
             &view,
             start.as_ref(),
-            1e-9,
+            1e-7,
             par,
             MemStack::new(&mut memory),
             params,

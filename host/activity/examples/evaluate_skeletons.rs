@@ -1,0 +1,45 @@
+//! Leave-one-subject-out on skeleton data sets dressed with capsules:
+//! `cargo run --release --example evaluate_skeletons -- utkinect FILE.mat [thesis|order-free|ordered]...`
+
+use farnear_activity::embedding::descriptor::Scaling;
+use farnear_activity::evaluation::leave_one_out::{Experiment, leave_one_subject_out};
+use farnear_activity::evaluation::skeleton_clips::{florence, utkinect};
+use farnear_activity::recognition::frames::Mode;
+use farnear_activity::recognition::space::SpaceSettings;
+use std::time::Instant;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [set, path, methods @ ..] = arguments.as_slice() else {
+        return Err(
+            "usage: evaluate_skeletons utkinect|florence FILE.mat [thesis|order-free|ordered]...".into()
+        );
+    };
+    let start = Instant::now();
+    let bytes = std::fs::read(path)?;
+    let scaling = if std::env::var("STRETCH").is_ok() { Scaling::Stretch } else { Scaling::KeepAspect };
+    let clips = if set == "florence" { florence(&bytes, 4, scaling)? } else { utkinect(&bytes, 4, scaling)? };
+    println!("{} clips described in {:.1} s", clips.len(), start.elapsed().as_secs_f64());
+    for method in methods {
+        let start = Instant::now();
+        let experiment = match method.as_str() {
+            "thesis" => Experiment::thesis(),
+            "order-free" => Experiment::codebook(SpaceSettings::default()),
+            "ordered" => {
+                Experiment::codebook(SpaceSettings { mode: Mode::Ordered, ..SpaceSettings::default() })
+            }
+            other => return Err(format!("unknown method `{other}`").into()),
+        };
+        let outcome = leave_one_subject_out(&clips, &experiment, Clone::clone)?;
+        let percent = |(low, high): (f64, f64)| format!("{:.1} to {:.1}", 100.0 * low, 100.0 * high);
+        println!(
+            "{method:10} one view {:.1} % ({}), fused {:.1} % ({}), {:.1} s",
+            100.0 * outcome.each.accuracy(),
+            percent(outcome.each.interval()),
+            100.0 * outcome.fused.accuracy(),
+            percent(outcome.fused.interval()),
+            start.elapsed().as_secs_f64()
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,204 @@
+//! Body joints of skeleton data sets, and how to dress them with capsules.
+//!
+//! Clips come in the world frame of [`crate::silhouette`]: x right, y away from the sensor, z up, millimetres.
+
+use super::matlab::{self, Array, MatlabError};
+use crate::silhouette::capsule::{Capsule, Point3};
+
+/// Which joints there are and how thick the bones between them are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layout {
+    /// Joint names in file order.
+    pub joints: &'static [&'static str],
+    /// Bones: two joints and a radius in millimetres; equal joints make a ball.
+    pub bones: &'static [(usize, usize, f64)],
+    /// Millimetres per unit of the file.
+    pub unit_mm: f64,
+}
+
+/// The 20 joints of a first Kinect, metres (as in UTKinect-Action3D).
+pub const KINECT_20: Layout = Layout {
+    joints: &[
+        "hip centre",
+        "spine",
+        "shoulder centre",
+        "head",
+        "left shoulder",
+        "left elbow",
+        "left wrist",
+        "left hand",
+        "right shoulder",
+        "right elbow",
+        "right wrist",
+        "right hand",
+        "left hip",
+        "left knee",
+        "left ankle",
+        "left foot",
+        "right hip",
+        "right knee",
+        "right ankle",
+        "right foot",
+    ],
+    bones: &[
+        (3, 3, 100.0),
+        (2, 3, 60.0),
+        (0, 2, 120.0),
+        (4, 8, 70.0),
+        (12, 16, 90.0),
+        (4, 12, 85.0),
+        (8, 16, 85.0),
+        (4, 5, 48.0),
+        (5, 6, 42.0),
+        (6, 7, 38.0),
+        (8, 9, 48.0),
+        (9, 10, 42.0),
+        (10, 11, 38.0),
+        (12, 13, 75.0),
+        (13, 14, 55.0),
+        (14, 15, 40.0),
+        (16, 17, 75.0),
+        (17, 18, 55.0),
+        (18, 19, 40.0),
+    ],
+    unit_mm: 1000.0,
+};
+
+/// The 15 joints of the Florence 3D Actions set, millimetres.
+pub const FLORENCE_15: Layout = Layout {
+    joints: &[
+        "head",
+        "neck",
+        "spine",
+        "left shoulder",
+        "left elbow",
+        "left hand",
+        "right shoulder",
+        "right elbow",
+        "right hand",
+        "left hip",
+        "left knee",
+        "left foot",
+        "right hip",
+        "right knee",
+        "right foot",
+    ],
+    bones: &[
+        (0, 0, 100.0),
+        (0, 1, 60.0),
+        (1, 2, 120.0),
+        (3, 6, 70.0),
+        (9, 12, 90.0),
+        (3, 9, 85.0),
+        (6, 12, 85.0),
+        (2, 9, 95.0),
+        (2, 12, 95.0),
+        (3, 4, 48.0),
+        (4, 5, 42.0),
+        (6, 7, 48.0),
+        (7, 8, 42.0),
+        (9, 10, 75.0),
+        (10, 11, 55.0),
+        (12, 13, 75.0),
+        (13, 14, 55.0),
+    ],
+    unit_mm: 1.0,
+};
+
+/// The activities of UTKinect-Action3D in file order.
+pub const UTKINECT_ACTIVITIES: [&str; 10] =
+    ["walk", "sit down", "stand up", "pick up", "carry", "throw", "push", "pull", "wave hands", "clap hands"];
+/// The activities of Florence 3D Actions in file order.
+pub const FLORENCE_ACTIVITIES: [&str; 9] =
+    ["wave", "drink", "answer phone", "clap", "tight lace", "sit down", "stand up", "read watch", "bow"];
+
+/// One performance of one activity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SkeletonClip {
+    /// First index of the cell array.
+    pub activity: usize,
+    /// Second index.
+    pub subject: usize,
+    /// Third index.
+    pub repetition: usize,
+    /// Joints of every frame.
+    pub frames: Vec<Vec<Point3>>,
+}
+
+/// Why a skeleton file could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SkeletonError {
+    /// The file itself.
+    #[error(transparent)]
+    Matlab(#[from] MatlabError),
+    /// No cell array of the expected form.
+    #[error("no cell array `data` of activities x subjects x repetitions in the file")]
+    NoData,
+    /// A clip of another form.
+    #[error(
+        "clip (activity {activity}, subject {subject}, repetition {repetition}) is {found:?}, expected [3, {joints}, frames]"
+    )]
+    Form {
+        /// First index.
+        activity: usize,
+        /// Second index.
+        subject: usize,
+        /// Third index.
+        repetition: usize,
+        /// Its dimensions.
+        found: Vec<usize>,
+        /// Joints of the layout.
+        joints: usize,
+    },
+}
+
+/// Reads a cell array `data{activity, subject, repetition}` of 3 x joints x frames arrays in a sensor's frame (x right, y up,
+/// z away); empty cells are performances that do not exist.
+///
+/// # Errors
+/// See [`SkeletonError`].
+pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, SkeletonError> {
+    let variables = matlab::read(bytes)?;
+    let found = variables.into_iter().find_map(|(name, array)| match array {
+        Array::Cell { dimensions, cells } if name == "data" => Some((dimensions, cells)),
+        _ => None,
+    });
+    let (dimensions, cells) = found.ok_or(SkeletonError::NoData)?;
+    let &[activities, subjects, ..] = dimensions.as_slice() else { return Err(SkeletonError::NoData) };
+    let mut clips = Vec::new();
+    for (index, cell) in cells.into_iter().enumerate() {
+        let (activity, rest) = (index % activities.max(1), index / activities.max(1));
+        let (subject, repetition) = (rest % subjects.max(1), rest / subjects.max(1));
+        let form = |found: Vec<usize>| SkeletonError::Form {
+            activity,
+            subject,
+            repetition,
+            found,
+            joints: layout.joints.len(),
+        };
+        let Array::Numeric { dimensions, values } = cell else { return Err(form(Vec::new())) };
+        if values.is_empty() {
+            continue;
+        }
+        // A single frame is saved without its third dimension.
+        if dimensions.len() < 2 || dimensions[0] != 3 || dimensions[1] != layout.joints.len() {
+            return Err(form(dimensions));
+        }
+        let unit = layout.unit_mm;
+        let frames = values
+            .chunks_exact(3 * layout.joints.len())
+            .map(|frame| frame.chunks_exact(3).map(|p| [unit * p[0], unit * p[2], unit * p[1]]).collect())
+            .collect();
+        clips.push(SkeletonClip { activity, subject, repetition, frames });
+    }
+    Ok(clips)
+}
+
+/// The capsules of one frame's joints.
+pub fn dress(joints: &[Point3], layout: &Layout) -> Vec<Capsule> {
+    layout
+        .bones
+        .iter()
+        .filter_map(|&(a, b, radius_mm)| Some(Capsule::new(*joints.get(a)?, *joints.get(b)?, radius_mm)))
+        .collect()
+}

@@ -1,0 +1,106 @@
+//! Clips: what was seen of one performance from one or more views, as numbers per frame.
+
+use crate::embedding::descriptor::{ANGLES, Scaling, centroid_distance};
+use crate::mask::{BoundingBox, Mask};
+use ndarray::{Array2, Axis};
+use rayon::prelude::*;
+
+/// Numbers of the box per frame: height, width, and the silhouette's centroid (x, y), pixels.
+pub const BOX_NUMBERS: usize = 4;
+
+/// One view of one performance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// Centroid distances, one frame per row.
+    pub descriptors: Array2<f32>,
+    /// Height, width, centroid x and y in pixels, one frame per row; `None` for silhouettes that are already cut out and scaled, whose
+    /// motion is gone.
+    pub boxes: Option<Array2<f32>>,
+    /// Frames left out because their mask was empty.
+    pub empty_frames: usize,
+}
+
+/// One performance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clip {
+    /// Who.
+    pub subject: String,
+    /// What.
+    pub activity: String,
+    /// Seen from where; all clips of a set have the same views in the same order.
+    pub views: Vec<Track>,
+}
+
+impl Track {
+    /// Describes the masks of a clip. With `full_frames` the masks are whole camera frames and the box's motion is kept.
+    pub fn from_masks(masks: &[Mask], scaling: Scaling, full_frames: bool) -> Self {
+        let found: Vec<Option<([f32; ANGLES], [f32; BOX_NUMBERS])>> = masks
+            .par_iter()
+            .map(|mask| {
+                let descriptor = centroid_distance(mask.view(), scaling).ok()?;
+                let bounds = BoundingBox::of(mask.view())?;
+                let (mut n, mut sx, mut sy) = (0.0_f64, 0.0, 0.0);
+                for (y, row) in mask.axis_iter(Axis(0)).enumerate().take(bounds.bottom).skip(bounds.top) {
+                    for x in (bounds.left..bounds.right).filter(|&x| row[x]) {
+                        n += 1.0;
+                        sx += x as f64;
+                        sy += y as f64;
+                    }
+                }
+                let motion =
+                    [bounds.height() as f32, bounds.width() as f32, (sx / n) as f32, (sy / n) as f32];
+                Some((descriptor, motion))
+            })
+            .collect();
+        let kept: Vec<_> = found.iter().flatten().collect();
+        let descriptors = Array2::from_shape_fn((kept.len(), ANGLES), |(f, a)| kept[f].0[a]);
+        let boxes =
+            full_frames.then(|| Array2::from_shape_fn((kept.len(), BOX_NUMBERS), |(f, k)| kept[f].1[k]));
+        Self { descriptors, boxes, empty_frames: masks.len() - kept.len() }
+    }
+
+    /// Number of frames with a silhouette.
+    pub fn frames(&self) -> usize {
+        self.descriptors.nrows()
+    }
+
+    /// The track as a mirror would show it: angle a becomes 180 - a, x turns round.
+    pub fn mirrored(&self) -> Self {
+        let angles: Vec<usize> = (0..ANGLES).map(|a| (ANGLES + ANGLES / 2 - a) % ANGLES).collect();
+        let boxes = self.boxes.as_ref().map(|boxes| {
+            let mut boxes = boxes.clone();
+            boxes.column_mut(2).mapv_inplace(|x| -x);
+            boxes
+        });
+        Self {
+            descriptors: self.descriptors.select(Axis(1), &angles),
+            boxes,
+            empty_frames: self.empty_frames,
+        }
+    }
+
+    /// The track with frames chosen by index, in that order (shuffled, slowed down, sped up, cut).
+    pub fn select(&self, frames: &[usize]) -> Self {
+        Self {
+            descriptors: self.descriptors.select(Axis(0), frames),
+            boxes: self.boxes.as_ref().map(|boxes| boxes.select(Axis(0), frames)),
+            empty_frames: self.empty_frames,
+        }
+    }
+}
+
+impl Clip {
+    /// The mirrored performance. With views at equal steps round the subject, the first from the front, view v of the mirrored
+    /// person is the mirror of view n - v.
+    pub fn mirrored(&self) -> Self {
+        let n = self.views.len();
+        let views = (0..n).map(|v| self.views[(n - v) % n].mirrored()).collect();
+        Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
+    }
+
+    /// All views with frames chosen by a function of their number.
+    pub fn select(&self, choose: impl Fn(usize) -> Vec<usize>) -> Self {
+        let views = self.views.iter().map(|view| view.select(&choose(view.frames()))).collect();
+        Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
+    }
+}
