@@ -2,7 +2,9 @@
 //!
 //! One file per job. Every step says what it does before it does it, and every failure says what to type next.
 
+mod bench;
 mod demo;
+mod evaluate;
 mod firmware;
 mod fuzz;
 mod install;
@@ -39,6 +41,10 @@ enum Job {
         #[arg(long, default_value_t = 60)]
         seconds: u64,
     },
+    /// Times of the mathematics, with --peers beside the same chain on OpenCV.
+    Bench(bench::Arguments),
+    /// Measure the accuracy on rendered (and, where present, real) scenes and write the accuracy pages.
+    Evaluate(evaluate::Arguments),
     /// Install farnear and farnear-sim (with the firmware's ELF beside it) into cargo's bin folder.
     Install,
 }
@@ -50,6 +56,8 @@ fn main() -> ExitCode {
         Job::Firmware => firmware::build().map(|elf| println!("{}", elf.display())),
         Job::Sizes => firmware::build().and_then(|elf| sizes::check(&elf)),
         Job::Fuzz { seconds } => fuzz::run(seconds),
+        Job::Bench(arguments) => bench::run(&arguments),
+        Job::Evaluate(arguments) => evaluate::run(&arguments),
         Job::Install => install::run(),
     };
     match result {

@@ -1,0 +1,94 @@
+//! # farnear-evaluation
+//!
+//! Measures how near depth maps come to the truth and writes `docs/accuracy.md` with its pictures: rendered scenes under
+//! every point spread function and noise, wrong point spread functions, corrections of the elliptical distortion on
+//! depths that taught nothing, calibration. Where real pairs and focal stacks are at hand their figures go to
+//! `docs/accuracy-real.md`.
+//!
+//! Everything is seeded and no clock enters, so that two runs on one kind of processor write the same bytes.
+//! One part per file in [`parts`]; [`rig`] renders and compares, [`page`] writes Markdown, [`chart`] and [`panels`]
+//! draw. It takes a few minutes on four cores; run it by `cargo xtask evaluate`.
+
+mod chart;
+mod page;
+mod panels;
+mod parts;
+mod rig;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use anyhow::{Context, Result, bail};
+use clap::Parser;
+
+use page::Page;
+
+/// Measure the accuracy and write the accuracy pages.
+#[derive(Parser)]
+#[command(after_help = "Example: farnear-evaluation --docs docs/")]
+struct Arguments {
+    /// The folder of the pages; pictures go to images/ in it.
+    #[arg(long, value_name = "DIR")]
+    docs: PathBuf,
+    /// The folder with real data; without it the one beside the repository.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Measure only these parts and print them; no page is written.
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("farnear-evaluation: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    chart::register_font()?;
+    let images = arguments.docs.join("images");
+    std::fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
+    let known = parts::RENDERED.iter().map(|(name, _)| *name).chain(["real"]).collect::<Vec<_>>();
+    if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
+        bail!("no part is called {unknown:?}, there are {}", known.join(", "));
+    }
+    let wanted = |name: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
+
+    let mut page = Page::new(&images, parts::INTRODUCTION);
+    for (name, measure) in parts::RENDERED {
+        if wanted(name) {
+            eprintln!("{name}");
+            measure(&mut page).with_context(|| format!("measuring {name}"))?;
+        }
+    }
+    finish(page, arguments, "accuracy.md")?;
+
+    let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
+    let data = arguments.data.clone().unwrap_or_else(beside);
+    if !wanted("real") {
+        return Ok(());
+    }
+    if !data.is_dir() {
+        eprintln!(
+            "real: skipped, no real data ({} is no folder); docs/accuracy-real.md stays",
+            data.display()
+        );
+        return Ok(());
+    }
+    eprintln!("real");
+    let mut page = Page::new(&images, parts::real::INTRODUCTION);
+    parts::real::measure(&mut page, &data).context("measuring real scenes")?;
+    finish(page, arguments, "accuracy-real.md")
+}
+
+/// Writes the page, or prints it where only parts of it were asked for.
+fn finish(page: Page, arguments: &Arguments, name: &str) -> Result<()> {
+    if !arguments.only.is_empty() {
+        print!("{}", page.text());
+        return Ok(());
+    }
+    page.write(&arguments.docs.join(name))
+}

@@ -1,0 +1,86 @@
+//! A page of Markdown and the pictures on it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, Result};
+
+/// A page being written.
+pub struct Page {
+    images: PathBuf,
+    text: String,
+}
+
+impl Page {
+    /// A page that begins with `introduction` and whose pictures go to the folder `images`.
+    pub fn new(images: &Path, introduction: &str) -> Self {
+        Self { images: images.to_path_buf(), text: format!("{}\n", introduction.trim_end()) }
+    }
+
+    /// What was written so far.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// A heading of the second level.
+    pub fn heading(&mut self, heading: &str) {
+        self.text.push_str(&format!("\n## {heading}\n"));
+    }
+
+    /// A paragraph.
+    pub fn paragraph(&mut self, text: &str) {
+        self.text.push_str(&format!("\n{}\n", text.trim()));
+    }
+
+    /// A table; all columns but the first `left` are numbers and aligned to the right.
+    pub fn table<H: AsRef<str>>(&mut self, left: usize, head: &[H], rows: &[Vec<String>]) {
+        let line = |cells: &mut dyn Iterator<Item = &str>| {
+            let cells: Vec<&str> = cells.collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        self.text.push('\n');
+        self.text.push_str(&line(&mut head.iter().map(AsRef::as_ref)));
+        let rule: Vec<&str> = (0..head.len()).map(|i| if i < left { "---" } else { "--:" }).collect();
+        self.text.push_str(&format!("|{}|\n", rule.join("|")));
+        for row in rows {
+            self.text.push_str(&line(&mut row.iter().map(String::as_str)));
+        }
+    }
+
+    /// A picture: its file name, the bytes of its PNG, and what it shows.
+    pub fn picture(&mut self, name: &str, png: &[u8], caption: &str) -> Result<()> {
+        let path = self.images.join(name);
+        fs::write(&path, png).with_context(|| format!("cannot write {}", path.display()))?;
+        self.text.push_str(&format!("\n![{caption}](images/{name})\n"));
+        Ok(())
+    }
+
+    /// Writes the page aside and renames it.
+    pub fn write(self, path: &Path) -> Result<()> {
+        let aside = path.with_extension("md.part");
+        let about = || format!("cannot write {}", path.display());
+        fs::write(&aside, &self.text).with_context(about)?;
+        fs::rename(&aside, path).with_context(about)?;
+        eprintln!("wrote {}", path.display());
+        Ok(())
+    }
+}
+
+/// A number of mm as the tables show it: three decimals, or a dash where there is none.
+pub fn mm(value: f64) -> String {
+    if value.is_finite() { format!("{value:.3}") } else { "-".into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_align_numbers_to_the_right() {
+        let mut page = Page::new(Path::new("."), "# Title\n\n");
+        page.table(1, &["what", "mm"], &[vec!["a".into(), mm(1.0)], vec!["b".into(), mm(f64::NAN)]]);
+        assert_eq!(page.text(), "# Title\n\n| what | mm |\n|---|--:|\n| a | 1.000 |\n| b | - |\n");
+    }
+}

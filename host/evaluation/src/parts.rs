@@ -1,0 +1,39 @@
+//! The parts of the accuracy pages, in their order.
+
+mod corrections;
+mod designs;
+mod kernels;
+mod mismatch;
+mod planes;
+pub mod real;
+mod shapes;
+
+use anyhow::Result;
+
+use crate::page::Page;
+
+/// A part's name and what measures it.
+type Part = (&'static str, fn(&mut Page) -> Result<()>);
+
+/// The parts that need nothing but the renderer.
+pub const RENDERED: [Part; 6] = [
+    ("planes", planes::measure),
+    ("shapes", shapes::measure),
+    ("mismatch", mismatch::measure),
+    ("designs", designs::measure),
+    ("kernels", kernels::measure),
+    ("corrections", corrections::measure),
+];
+
+/// What a reader must know before the first figure.
+pub const INTRODUCTION: &str = "# Accuracy
+
+Written by `cargo xtask evaluate`; two runs on one kind of processor write the same bytes. All depths and errors are in mm.
+
+Scenes are rendered by [`hil-sim/scene`](../hil-sim/scene/src/lib.rs), which works with point spread functions in space and knows nothing of the
+transfer functions from which the operators are designed. The lens has 50 mm focal length and 12.8 mm aperture, pixels are 7.4 um; the pair is focused
+at 933 and 886.81 mm, so that blur reaches 2.703 px (the rig of Li, PhD thesis, University of Warwick, 2014). Images have 640 x 480 pixels;
+surfaces are painted with sand of contrast 0.2. *Clean* images are the light itself; *8-bit* and *12-bit* ones have the shot noise of a mean of 9,000
+electrons, 12 electrons of read noise, a full well of 20,000 electrons and that many bits. Unless a table says otherwise: operators of 7x7 by the
+`linear` design for the scene's own point spread function, coefficients smoothed over 7x7, median 3x3, a rim of 16 px not counted. Errors are
+root mean squares over all pixels.";

@@ -1,0 +1,150 @@
+//! The rig that is rendered, its pairs, and what is compared with what.
+
+use anyhow::{Context, Result};
+use farnear_depth::{
+    metrics::{CompareSettings, Comparison, compare},
+    operators::Operators,
+    optics::{Optics, OpticsFile},
+    psf::Psf,
+    run::{Settings, depth_from_pair},
+};
+use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, Renderer, Scene, truth};
+use ndarray::Array2;
+
+/// Li 2014, section 4.3: 50 mm lens at 933 mm, 2.703 px of blur at most, near focus at 886.81 mm.
+const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
+                      [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
+/// (width, height) in px.
+const SIZE: (usize, usize) = (640, 480);
+/// Rim that is not compared: there windows and operators see reflections.
+const BORDER_PX: usize = 16;
+/// Pixels at most this far from a depth step are not compared on a staircase.
+const AWAY_FROM_EDGES_PX: usize = 8;
+
+/// The point spread functions of every table, and how the tables call them.
+pub const PSFS: [(&str, &str); 3] = [
+    ("pill-box", "pillbox"),
+    ("Gaussian, k 0.4578", "gaussian:k=0.4578"),
+    ("generalised Gaussian, p 1.8, k 0.4802", "generalised:p=1.8,k=0.4802"),
+];
+
+/// What the camera does to the light.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Exposure {
+    /// Nothing: the light itself, in floating point.
+    Clean,
+    /// Shot and read noise, 8 bit.
+    EightBit,
+    /// Shot and read noise, 12 bit.
+    TwelveBit,
+}
+
+impl Exposure {
+    /// All of them in the order of the tables.
+    pub const ALL: [Self; 3] = [Self::Clean, Self::EightBit, Self::TwelveBit];
+
+    /// As tables call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clean => "clean",
+            Self::EightBit => "8-bit",
+            Self::TwelveBit => "12-bit",
+        }
+    }
+
+    fn noise(self) -> Noise {
+        match self {
+            Self::Clean => Noise::None,
+            Self::EightBit => Noise::EightBit,
+            Self::TwelveBit => Noise::TwelveBit,
+        }
+    }
+}
+
+/// A rendered pair and the depth it was rendered from.
+pub struct Pair {
+    /// Far-focused image.
+    pub far: Array2<f32>,
+    /// Near-focused image.
+    pub near: Array2<f32>,
+    /// True depth in mm.
+    pub truth: Array2<f32>,
+}
+
+/// The optics with a point spread function.
+pub fn optics(psf: &str) -> Result<Optics> {
+    let file: OpticsFile = toml::from_str(OPTICS).context("the evaluation's optics")?;
+    Ok(file.check()?.with_psf(psf.parse::<Psf>()?))
+}
+
+/// The lens, perfect or with the elliptical distortion.
+pub fn lens(distorted: bool) -> Result<Lens> {
+    let lens = Lens::from_optics(&farnear_scene::OpticsFile::parse(OPTICS)?)?;
+    Ok(if distorted { lens.with_distortion(EllipticalDistortion::default()) } else { lens })
+}
+
+/// Renders a pair; the seed decides texture and noise.
+pub fn render(scene: &Scene, lens: &Lens, psf: &str, exposure: Exposure, seed: u64) -> Result<Pair> {
+    let camera = Camera::new(SIZE.0, SIZE.1, exposure.noise());
+    let renderer = Renderer::new(scene, lens, &psf.parse()?, &camera, seed)?;
+    let expose = |sensor_mm: f64, number: u32| -> Result<Array2<f32>> {
+        Ok(match exposure {
+            Exposure::Clean => renderer.radiance(sensor_mm)?,
+            _ => renderer.expose(sensor_mm, number)?.mapv(f32::from),
+        })
+    };
+    Ok(Pair {
+        far: expose(lens.sensor_far_mm, 0)?,
+        near: expose(lens.sensor_near_mm, 1)?,
+        truth: truth(scene, lens, &camera),
+    })
+}
+
+/// Depths from far to near focus: `count` of them, the first and last `margin` of a step inside the range.
+pub fn depths(count: usize, margin: f64) -> Result<Vec<f64>> {
+    let range = optics("pillbox")?.working_range();
+    let steps = (count - 1) as f64 + 2.0 * margin;
+    Ok((0..count)
+        .map(|i| range.far_mm + (i as f64 + margin) / steps * (range.near_mm - range.far_mm))
+        .collect())
+}
+
+/// A plane of sand across the axis.
+pub fn plane(depth_mm: f64) -> Result<Scene> {
+    Ok(format!("plane:{depth_mm}").parse()?)
+}
+
+/// Depth by rational operators with the settings of all tables: smoothing 7, median 3.
+pub fn depth(pair: &Pair, operators: &Operators, optics: &Optics) -> Result<Array2<f32>> {
+    Ok(depth_from_pair(pair.far.view(), pair.near.view(), operators, optics, &Settings::default())?.depth_mm)
+}
+
+/// Compares a map with the truth, the rim left out.
+pub fn error(map: &Array2<f32>, truth: &Array2<f32>, away_from_edges: bool) -> Result<Comparison> {
+    let away_from_edges_px = away_from_edges.then_some(AWAY_FROM_EDGES_PX);
+    let settings = CompareSettings { border_px: BORDER_PX, away_from_edges_px };
+    Ok(compare(map.view(), truth.view(), None, &settings)?)
+}
+
+/// Root mean square over several maps, each weighted by its pixels.
+pub fn pooled_mm<'a>(comparisons: impl IntoIterator<Item = &'a Comparison>) -> f64 {
+    let (mut squares, mut pixels) = (0.0, 0.0);
+    for comparison in comparisons {
+        squares += comparison.rmse_mm.powi(2) * comparison.pixels as f64;
+        pixels += comparison.pixels as f64;
+    }
+    (squares / pixels).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depths_span_the_range() {
+        let all = depths(24, 0.0).unwrap();
+        assert!((all[0] - 933.0).abs() < 1e-9 && (all[23] - 886.81).abs() < 5e-3, "{all:?}");
+        let inside = depths(9, 0.5).unwrap();
+        assert!((inside[0] - (933.0 - 46.19 / 18.0)).abs() < 1e-2, "{inside:?}");
+    }
+}

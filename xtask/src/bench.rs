@@ -1,0 +1,256 @@
+//! Times of the mathematics in release, and their ratios to what an OpenCV user would run, on one machine in one go.
+//!
+//! The peers are scripts that belong to the project or that the user names. They are only ever run with what the
+//! machine's own `python3` has; nothing is installed. A peer runs once before and once after our own benches and its
+//! better time counts, so that a machine that slows down in between does not flatter us.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde_json::Value;
+
+use crate::run::{ROOT, cargo, finish, output, step, target_folder};
+
+/// The project's own peer.
+const PEER_SCRIPT: &str = "host/depth/benches/peer_opencv.py";
+/// Size of the images that ours and the peer's chain run on.
+const SIZE: (usize, usize) = (640, 480);
+
+/// What to time.
+#[derive(Args)]
+pub struct Arguments {
+    /// Also run the same chain on numpy and OpenCV and print the ratios; needs python3 with both.
+    #[arg(long)]
+    peers: bool,
+    /// Another peer script, called as `python3 FILE far near`, that prints one JSON object with `chain_ms`.
+    #[arg(long, value_name = "FILE")]
+    peer_script: Option<PathBuf>,
+    /// Write the page docs/speed.md from the figures.
+    #[arg(long)]
+    write: bool,
+}
+
+/// One line of our benches.
+struct Row {
+    name: String,
+    backend: String,
+    threads: u64,
+    min_ms: f64,
+    median_ms: f64,
+}
+
+/// A peer's times: minimum and median of each.
+struct Peer {
+    name: String,
+    version: String,
+    chain_ms: [f64; 2],
+    convolution_ms: Option<[f64; 2]>,
+}
+
+/// Runs the benches and prints the figures.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let mut scripts = Vec::new();
+    if arguments.peers {
+        scripts.push(ROOT.join(PEER_SCRIPT));
+    }
+    scripts.extend(arguments.peer_script.clone());
+    if !scripts.is_empty() {
+        python_is_ready()?;
+    }
+    let pair = if scripts.is_empty() { None } else { Some(random_pair()?) };
+    let peers = |when: &str| -> Result<Vec<Peer>> {
+        let Some(pair) = &pair else { return Ok(Vec::new()) };
+        step(&format!("peers, {when} our own benches"));
+        scripts.iter().map(|script| time_peer(script, pair)).collect()
+    };
+    let before = peers("before")?;
+
+    step("host/depth");
+    let bench = ["bench", "--locked", "--package", "farnear-depth", "--bench", "run_time"];
+    let text = output(cargo(bench).env("FARNEAR_JSON", "1"))?;
+    let rows = text.lines().filter(|line| line.starts_with('{')).map(row).collect::<Result<Vec<_>>>()?;
+    if rows.is_empty() {
+        bail!("the benches of host/depth printed no figures");
+    }
+
+    let after = peers("after")?;
+    let peers: Vec<Peer> = before.into_iter().zip(after).map(|(a, b)| better(a, b)).collect();
+    let tables = tables(&rows, &peers);
+    println!("\n{tables}");
+    if arguments.write {
+        let page = ROOT.join("docs/speed.md");
+        fs::write(&page, page_of(&tables)).with_context(|| format!("cannot write {}", page.display()))?;
+        println!("wrote {}", page.display());
+    }
+
+    if !ROOT.join("host/activity/benches").is_dir() {
+        return Ok(());
+    }
+    step("host/activity");
+    finish(&mut cargo(["bench", "--locked", "--package", "farnear-activity", "--benches"]))
+}
+
+/// Fails with what is missing unless python3, numpy and OpenCV are there.
+fn python_is_ready() -> Result<()> {
+    let advice =
+        "the peers need python3 with numpy and opencv-python-headless; without them run `cargo xtask bench`";
+    for module in ["sys", "numpy", "cv2"] {
+        let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
+        match found {
+            Err(error) => bail!("cannot start python3 ({error}): {advice}"),
+            Ok(found) if !found.status.success() && module == "sys" => bail!("python3 fails: {advice}"),
+            Ok(found) if !found.status.success() => bail!("python3 has no module {module}: {advice}"),
+            Ok(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// A far and a near image of noise as PGM files, the same on each run.
+fn random_pair() -> Result<[PathBuf; 2]> {
+    let folder = target_folder().join("peers");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let (width, height) = SIZE;
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut write = |name: &str| -> Result<PathBuf> {
+        let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
+        bytes.extend((0..width * height).map(|_| {
+            // xorshift64 (Marsaglia 2003).
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 32) as u8
+        }));
+        let path = folder.join(name);
+        fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    };
+    Ok([write("far.pgm")?, write("near.pgm")?])
+}
+
+fn time_peer(script: &Path, pair: &[PathBuf; 2]) -> Result<Peer> {
+    let text = output(Command::new("python3").arg(script).args(pair))?;
+    let name = script.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    peer(&name, &text).with_context(|| format!("{} printed no figures", script.display()))
+}
+
+fn peer(name: &str, text: &str) -> Result<Peer> {
+    let line = text.lines().rev().find(|line| line.starts_with('{')).context("no line is a JSON object")?;
+    let json: Value = serde_json::from_str(line).with_context(|| format!("not JSON: {line}"))?;
+    let times = |key: &str| Some([json[key]["min"].as_f64()?, json[key]["median"].as_f64()?]);
+    Ok(Peer {
+        name: name.into(),
+        version: json["opencv"].as_str().unwrap_or("?").into(),
+        chain_ms: times("chain_ms").with_context(|| format!("no chain_ms.min and .median in {line}"))?,
+        convolution_ms: times("filter2d_7x7_ms"),
+    })
+}
+
+fn better(a: Peer, b: Peer) -> Peer {
+    let least = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].min(b[1])];
+    Peer {
+        chain_ms: least(a.chain_ms, b.chain_ms),
+        convolution_ms: a.convolution_ms.zip(b.convolution_ms).map(|(a, b)| least(a, b)),
+        ..a
+    }
+}
+
+fn row(line: &str) -> Result<Row> {
+    let json: Value = serde_json::from_str(line).with_context(|| format!("not JSON: {line}"))?;
+    let read = || {
+        Some(Row {
+            name: json["name"].as_str()?.into(),
+            backend: json["backend"].as_str()?.into(),
+            threads: json["threads"].as_u64()?,
+            min_ms: json["min_ms"].as_f64()?,
+            median_ms: json["median_ms"].as_f64()?,
+        })
+    };
+    read().with_context(|| format!("not a bench's line: {line}"))
+}
+
+/// The figures as Markdown tables, ratios last.
+fn tables(rows: &[Row], peers: &[Peer]) -> String {
+    let mut text =
+        String::from("| what | vector unit | threads | min ms | median ms |\n|---|---|--:|--:|--:|\n");
+    for Row { name, backend, threads, min_ms, median_ms } in rows {
+        let _ = writeln!(text, "| {name} | {backend} | {threads} | {min_ms:.3} | {median_ms:.3} |");
+    }
+    if peers.is_empty() {
+        return text;
+    }
+    text.push_str("\n| peer, one thread | chain min ms | chain median ms | 7x7 convolution min ms |\n|---|--:|--:|--:|\n");
+    for Peer { name, version, chain_ms: [min, median], convolution_ms } in peers {
+        let convolution = convolution_ms.map_or("-".into(), |[min, _]| format!("{min:.3}"));
+        let _ = writeln!(text, "| {name}, OpenCV {version} | {min:.3} | {median:.3} | {convolution} |");
+    }
+    text.push_str("\n| ours | vector unit | threads | against | ratio of minima | ratio of medians |\n|---|---|--:|---|--:|--:|\n");
+    for row in rows {
+        for peer in peers {
+            let theirs = match row.name.as_str() {
+                "chain_640x480" => Some(peer.chain_ms),
+                "convolution_7x7" => peer.convolution_ms,
+                _ => None,
+            };
+            let Some([min, median]) = theirs else { continue };
+            let Row { name, backend, threads, min_ms, median_ms } = row;
+            let (of_min, of_median) = (min / min_ms, median / median_ms);
+            let against = &peer.name;
+            let _ = writeln!(
+                text,
+                "| {name} | {backend} | {threads} | {against} | {of_min:.2} | {of_median:.2} |"
+            );
+        }
+    }
+    text
+}
+
+fn page_of(tables: &str) -> String {
+    let cpu = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpu.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let model = model.map_or("an unnamed processor", |(_, name)| name.trim());
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!(
+        "# Speed\n\nWritten by `cargo xtask bench --peers --write` on {model}, {threads} hardware threads. Times are of this machine; \
+         ratios travel better. A ratio above 1 means that ours is faster.\n\n\
+         `chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
+         confidence. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
+         allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n{tables}"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OURS: &str =
+        r#"{"name": "chain_640x480", "backend": "avx2", "threads": 1, "min_ms": 2.0, "median_ms": 2.5}"#;
+    const THEIRS: &str = r#"{"chain_ms": {"min": 6.0, "median": 7.0}, "filter2d_7x7_ms": {"min": 0.5, "median": 0.6}, "opencv": "5"}"#;
+
+    #[test]
+    fn ratios_are_theirs_over_ours() {
+        let peer = peer("p.py", &format!("warming up\n{THEIRS}\n")).unwrap();
+        let text = tables(&[row(OURS).unwrap()], &[peer]);
+        assert!(text.contains("| chain_640x480 | avx2 | 1 | p.py | 3.00 | 2.80 |"), "{text}");
+    }
+
+    #[test]
+    fn the_better_of_two_runs_counts() {
+        let slow = peer("p.py", &THEIRS.replace("6.0", "9.0")).unwrap();
+        let both = better(slow, peer("p.py", THEIRS).unwrap());
+        assert_eq!(both.chain_ms, [6.0, 7.0]);
+    }
+
+    #[test]
+    fn what_is_no_figure_is_said() {
+        assert!(row("{\"name\": \"x\"}").is_err_and(|e| e.to_string().contains("not a bench's line")));
+        assert!(peer("p.py", "{\"chain\": 3}").is_err_and(|e| e.to_string().contains("chain_ms")));
+        assert!(peer("p.py", "Traceback").is_err());
+    }
+}

@@ -1,0 +1,33 @@
+//! Measures the accuracy and writes the accuracy pages, by the program in host/evaluation.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use crate::run::{ROOT, cargo, finish, step};
+
+/// What to measure.
+#[derive(Args)]
+pub struct Arguments {
+    /// Folder with real pairs and focal stacks; without it the folder beside the repository where tests look for them.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Only these parts, such as `planes` or `corrections`; printed, no page is written.
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+}
+
+/// Runs the evaluation.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    step("render, measure, write docs/accuracy.md");
+    let mut command = cargo(["run", "--release", "--locked", "--package", "farnear-evaluation", "--"]);
+    command.arg("--docs").arg(ROOT.join("docs"));
+    if let Some(data) = &arguments.data {
+        command.arg("--data").arg(std::path::absolute(data)?);
+    }
+    for part in &arguments.only {
+        command.args(["--only", part]);
+    }
+    finish(&mut command)
+}
