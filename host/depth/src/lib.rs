@@ -6,6 +6,7 @@
 pub mod baselines;
 pub mod calibrate;
 pub mod corrections;
+pub mod fill;
 pub mod filter;
 pub mod focus_measure;
 pub mod hankel;

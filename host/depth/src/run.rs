@@ -108,6 +108,8 @@ pub struct Settings {
     pub smoothing_px: usize,
     /// Side of the median window over alpha: 1 (none), 3, 5 or 7.
     pub median_px: usize,
+    /// Whether regions of low texture are filled from what surrounds them ([`crate::fill`]).
+    pub fill: bool,
     /// Number of threads; 0 = as many as the machine has.
     pub threads: usize,
     /// Vector unit; the fastest that the processor has if none is named.
@@ -117,7 +119,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { smoothing_px: 7, median_px: 3, threads: 1, backend: None }
+        Self { smoothing_px: 7, median_px: 3, fill: false, threads: 1, backend: None }
     }
 }
 

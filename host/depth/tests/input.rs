@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Texture, rig};
+use common::{Texture, eight_bit, rig};
 use farnear_depth::operators::{Operators, Request, design};
 use farnear_depth::optics::Optics;
 use farnear_depth::run::{DepthMap, RunError, Settings, Warning, depth_from_pair};
@@ -155,4 +155,24 @@ fn a_textureless_patch_has_no_confidence_and_counts_as_low_texture() {
         map.low_texture_fraction
     );
     assert!(map.confidence[(80, 80)] > 0.5);
+}
+
+#[test]
+fn a_textureless_disc_is_filled_from_its_surroundings() {
+    let bench = Bench::new(32);
+    let truth = bench.optics.depth_mm(ALPHA) as f32;
+    let texture = Texture::sand(160, 7).with_even_disc(30.0);
+    let pair = texture.pair(bench.optics.psf(), bench.optics.max_blur_px(), ALPHA);
+    for noisy in [false, true] {
+        let [far, near] =
+            [0, 1].map(|i| if noisy { eight_bit(&pair[i], 5 + i as u64) } else { pair[i].clone() });
+        let settings = Settings { fill: true, ..Settings::default() };
+        let map =
+            depth_from_pair(far.view(), near.view(), &bench.operators, &bench.optics, &settings).unwrap();
+        let inner = map.depth_mm.slice(s![65..95, 65..95]);
+        let rmse = (inner.iter().map(|d| (d - truth).powi(2)).sum::<f32>() / inner.len() as f32).sqrt();
+        println!("noisy {noisy}: RMSE inside the disc {rmse:.3} mm");
+        assert!(rmse < 0.25, "noisy {noisy}: {rmse}");
+        assert!(map.confidence.slice(s![65..95, 65..95]).iter().all(|c| *c > 0.0 && *c < 0.5));
+    }
 }

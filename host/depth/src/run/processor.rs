@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::fast::{Job, Maps, Tile};
 use super::{Backend, DepthMap, DepthOfAlpha, RunError, Settings, check, confidence, rim, simd};
+use crate::fill::fill_low_texture;
 use crate::operators::Operators;
 use crate::optics::Optics;
 
@@ -76,11 +77,15 @@ impl Processor {
                 misfit: self.misfit.view_mut(),
             },
         );
+        let low_texture = self.settings.fill.then(|| confidence::low_texture(self.map.confidence.view()));
         finish(&mut self.map, &self.misfit, self.backend, threads);
         if let Some(invalid) = input.invalid(&self.operators, &self.settings) {
             job.repair(&mut self.map, &invalid);
         }
         rim::fill(&mut self.map, self.operators.kernel_size());
+        if let Some(low_texture) = low_texture {
+            fill_low_texture(&mut self.map, low_texture.view());
+        }
         self.map.warnings = input.warnings(&self.operators, &self.optics);
         self.map.warnings.extend(check::after(&self.map, &self.optics));
         Ok(&self.map)

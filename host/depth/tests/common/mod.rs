@@ -77,6 +77,21 @@ impl Texture {
         Self { side_px, spectrum }
     }
 
+    /// The same texture with a disc of even brightness in its middle.
+    pub fn with_even_disc(mut self, radius_px: f64) -> Self {
+        let n = 2 * self.side_px;
+        transform(&mut self.spectrum, n, FftDirection::Inverse);
+        for (i, value) in self.spectrum.iter_mut().enumerate() {
+            let [y, x] = [i / n, i % n].map(|c| 0.5 * (c as f64 - n as f64 / 2.0));
+            *value /= (n * n) as f64;
+            if y.hypot(x) < radius_px {
+                *value = Complex64::new(1.0, 0.0);
+            }
+        }
+        transform(&mut self.spectrum, n, FftDirection::Forward);
+        self
+    }
+
     /// The far- and near-focused images of a plane at `alpha`, mean 1.
     pub fn pair(&self, psf: Psf, max_blur_px: f64, alpha: f64) -> [Array2<f32>; 2] {
         let otf = psf.otf_up_to(2.0 * std::f64::consts::SQRT_2 * PI * max_blur_px);
