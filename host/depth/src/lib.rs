@@ -17,3 +17,4 @@ pub mod operators;
 pub mod optics;
 pub mod psf;
 pub mod run;
+pub mod uncertainty;

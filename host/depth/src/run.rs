@@ -27,6 +27,7 @@ use crate::operators::Operators;
 use crate::optics::Optics;
 
 pub use check::Warning;
+pub(crate) use cubic::root;
 pub use processor::Processor;
 pub use simd::Backend;
 

@@ -8,7 +8,6 @@
 //! for `|alpha| <= 1.1` and `-0.2 <= c3 / c1 <= 0.6`; near the turning point, where the slope vanishes, the slope is kept
 //! above 2 % of `c1`.
 
-#[cfg(test)]
 use super::MAX_ALPHA;
 
 /// Newton steps after the first.
@@ -17,8 +16,7 @@ pub(crate) const STEPS: usize = 3;
 /// The slope of the cubic, relative to `c1`, below which Newton's step is shortened.
 pub(crate) const SLOPE_FLOOR: f32 = 0.02;
 
-/// The root in plain numbers, as reference of the vectorised one; `c1` must be positive.
-#[cfg(test)]
+/// The root in plain numbers, also the reference of the vectorised one; `c1` must be positive.
 pub(crate) fn root(c0: f32, c1: f32, c3: f32) -> f32 {
     let ratio = (c0 / c1).abs();
     let cubic = c3 / c1;
