@@ -12,9 +12,10 @@ use ndarray::{Array2, s};
 /// Root mean squares over the inner pixels of the predicted and the measured standard deviation, mm.
 fn predicted_and_measured(psf: &str, alpha: f64, settings: &Settings, noise: Noise) -> [f64; 2] {
     const REPEATS: usize = 12;
+    const SIDE_PX: usize = 96;
     let optics = rig(psf);
     let operators = Operators::for_optics(&optics).unwrap();
-    let [far, near] = Texture::sand(96, 11).pair(optics.psf(), optics.max_blur_px(), alpha);
+    let [far, near] = Texture::sand(SIDE_PX, 11).pair(optics.psf(), optics.max_blur_px(), alpha);
     let mut sum = Array2::<f64>::zeros(far.dim());
     let mut squares = sum.clone();
     let mut predicted = 0.0;
@@ -27,13 +28,13 @@ fn predicted_and_measured(psf: &str, alpha: f64, settings: &Settings, noise: Noi
         if i < 2 {
             let deviation =
                 standard_deviation_mm(far.view(), near.view(), &operators, &optics, settings, noise).unwrap();
-            let inner = deviation.slice(s![16..-16, 16..-16]);
+            let inner = deviation.slice(s![16..80, 16..80]);
             predicted += inner.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>() / inner.len() as f64 / 2.0;
         }
     }
     let n = REPEATS as f64;
     let variance = (&squares - &(&sum * &sum / n)) / (n - 1.0);
-    let inner = variance.slice(s![16..-16, 16..-16]);
+    let inner = variance.slice(s![16..80, 16..80]);
     [predicted.sqrt(), (inner.iter().sum::<f64>() / inner.len() as f64).sqrt()]
 }
 
