@@ -4,11 +4,14 @@
 //! itself. CLSF maps the distorted depth `U` at column `x` and row `y` to the corrected depth by a third-order
 //! polynomial fitted to flat targets (Li 2014, eq. 6.11). Three forms:
 //!
-//! | form | terms | seams | table words | instructions per pixel (Cortex-M4, inner loop) |
+//! | form | terms | seams | table words | instructions per pixel (640-pixel rows; with the tables) |
 //! |---|---|---|---|---|
-//! | [`Regions`] | 10 in each of 3x3 regions | steps at region borders | `width` | 13 |
-//! | [`Blend`] | the same, bilinear between region centres | none | `3 width` | 15 outside the outer centres, else 24 |
-//! | [`Full`] | all 20 of third order, one set | none | `3 width` | 23.3 |
+//! | [`Regions`] | 10 in each of 3x3 regions | steps at region borders | `width` | 13.5 (13.7) |
+//! | [`Blend`] | the same, bilinear between region centres | none | `3 width` | 22.1 (23.6) |
+//! | [`Full`] | all 20 of third order, one set | none | `3 width` | 22.7 (22.7) |
+//!
+//! (Counted on an emulated Cortex-M4F, built with `opt-level = "s"` and fat LTO.) [`RegionFit`] and [`FullFit`] find the
+//! coefficients from rows of flat targets.
 //!
 //! Units: depth is normalised to `U = (depth - centre) / half_span` ([`DepthScale`]) and travels as Q1.15 in an
 //! `i16`; `x` and `y` run from -1 (first column, row) to +1 (last). Coefficients are Q2.29 ([`Coefficient`]).
@@ -25,6 +28,7 @@
 //! Truncation costs at most 16 units of 2^-23, which is a sixteenth of a unit of the Q1.15 result.
 
 mod blend;
+mod fit;
 mod format;
 mod frame;
 mod full;
@@ -32,6 +36,7 @@ mod regions;
 mod row;
 
 pub use blend::Blend;
+pub use fit::{Columns, FullFit, RegionFit};
 pub use format::{Coefficient, DepthScale, NO_VALUE};
 pub use frame::{Error, Frame};
 pub use full::{FULL_TERMS, Full, FullCoefficients};

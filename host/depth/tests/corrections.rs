@@ -176,6 +176,57 @@ fn the_board_agrees_to_five_micrometres() {
     }
 }
 
+/// The board fits with integers, on a subsample: what it finds corrects as well as what the host finds.
+#[test]
+fn the_boards_own_fit_is_as_good() {
+    use farnear_maths::clsf::{Columns, DepthScale, Frame, Full, FullFit, RegionFit, Regions};
+    let series = Series::new((240, 320), 8);
+    let frame = Frame::new(320, 240).unwrap();
+    let range = optics().working_range();
+    let scale = DepthScale::for_range(range.far_mm as f32, range.near_mm as f32).unwrap();
+    let (mut regions, mut full) = (RegionFit::new(frame), FullFit::new(frame));
+    let columns = Columns { first: 2, step: 4 };
+    for (true_mm, map) in &series.maps {
+        let truth = scale.encode(*true_mm as f32);
+        for row in (2..240).step_by(4) {
+            let codes: Vec<i16> =
+                map.row(row).iter().skip(2).step_by(4).map(|mm| scale.encode(*mm)).collect();
+            regions.add_row(row as u16, columns, &codes, truth).unwrap();
+            full.add_row(row as u16, columns, &codes, truth).unwrap();
+        }
+    }
+    let (regions, full) = (regions.solve().unwrap(), full.solve().unwrap());
+    let (mut a, mut b) = (vec![0; 320], vec![0; 960]);
+    let (mut regions, mut full) =
+        (Regions::new(regions, frame, &mut a).unwrap(), Full::new(full, frame, &mut b).unwrap());
+    let mut correct = |map: &Array2<f32>, by_regions: bool| {
+        let mut corrected = map.clone();
+        for (row, mut depths) in (0..).zip(corrected.outer_iter_mut()) {
+            let mut codes: Vec<i16> = depths.iter().map(|mm| scale.encode(*mm)).collect();
+            let done = if by_regions {
+                regions.correct_row(row, &mut codes)
+            } else {
+                full.correct_row(row, &mut codes)
+            };
+            done.unwrap();
+            depths.iter_mut().zip(codes).for_each(|(mm, code)| *mm = scale.decode(code));
+        }
+        corrected
+    };
+    let mut maps =
+        series.held_out.iter().map(|(_, map)| [correct(map, true), correct(map, false)]).collect::<Vec<_>>();
+    maps.reverse();
+    for (method, limit) in [(Method::Clsf, 0.03), (Method::ClsfFull, 0.01)] {
+        let host = fit(method, &series.patterns(), &CdcSettings::default()).unwrap();
+        let host = series.rmse_mm(|map| host.apply(map.view()).unwrap());
+        let next = std::cell::RefCell::new(maps.clone());
+        let which = usize::from(method == Method::ClsfFull);
+        let board = series.rmse_mm(|_| next.borrow_mut().pop().unwrap()[which].clone());
+        println!("{method}: host {host:.4} mm, board {board:.4} mm");
+        assert!((board - host).abs() < limit, "{method}: {host} {board}");
+    }
+}
+
 #[test]
 fn corrections_survive_a_round_trip_through_toml() {
     let series = Series::new((60, 80), 4);

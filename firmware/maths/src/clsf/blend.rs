@@ -16,7 +16,7 @@ use super::{
 const BANDS: usize = REGIONS + 1;
 
 /// The correction blended between region centres. Cost: see [`crate::clsf`]; per band of rows (there are four) the
-/// table, about 150 instructions a column.
+/// table, about 245 instructions a column.
 #[derive(Debug)]
 pub struct Blend<'t> {
     coefficients: RegionCoefficients,

@@ -165,6 +165,18 @@ pub enum Error {
         /// Rows.
         height: u16,
     },
+    /// The samples do not determine the terms.
+    Underdetermined {
+        /// Samples there are.
+        samples: u32,
+        /// Terms to be found.
+        terms: u16,
+    },
+    /// More samples than the sums hold.
+    TooManySamples {
+        /// How many they hold.
+        most: u32,
+    },
     /// The table handed in is too short.
     TableTooSmall {
         /// Words given.
@@ -204,6 +216,11 @@ impl fmt::Display for Error {
                 let (least, most) = (Frame::SMALLEST, Frame::LARGEST);
                 write!(f, "a frame of {width} x {height} pixels; each side must be {least} to {most}")
             }
+            Self::Underdetermined { samples, terms } => write!(
+                f,
+                "{samples} samples do not determine {terms} terms; take four depths or more, and pixels all over the image"
+            ),
+            Self::TooManySamples { most } => write!(f, "more than {most} samples; take every other pixel"),
             Self::TableTooSmall { given, needed } => {
                 write!(f, "a table of {given} words where {needed} are needed")
             }

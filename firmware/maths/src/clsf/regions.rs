@@ -16,7 +16,7 @@ pub const REGION_TERMS: usize = 10;
 pub type RegionCoefficients = [[[Coefficient; REGION_TERMS]; REGIONS]; REGIONS];
 
 /// The correction with a set of coefficients per region. Cost per pixel: one cubic in `U` by Horner's rule on top
-/// of a table entry; per region row: the table, about 60 instructions a column.
+/// of a table entry; per region row: the table, about 50 instructions a column.
 #[derive(Debug)]
 pub struct Regions<'t> {
     coefficients: RegionCoefficients,

@@ -1,0 +1,237 @@
+//! The fit of CLSF's coefficients, rows of flat targets streamed in.
+//!
+//! The normal equations are summed in integers: every term (a product of powers of x, y and U) is rounded to 20 fraction
+//! bits, a product of two has 40, and 2^22 of them fit an `i64` with a bit to spare. Integer sums do not depend on
+//! the order of the rows. Only the solution, once at the end, is in double precision (Cholesky), which the board does
+//! in software.
+//!
+//! A subsample is enough: every eighth pixel of every eighth row of 24 targets at 640x480 is 115,200 samples. Cost per
+//! sample: 65 multiplications for ten terms, 230 for twenty. Memory: 4.7 KiB for all regions, 1.9 KiB for the full form.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::{
+    Coefficient, Error, FULL_TERMS, Frame, FullCoefficients, NO_VALUE, REGION_TERMS, REGIONS,
+    RegionCoefficients,
+};
+
+/// Fraction bits of a term.
+const TERM_BITS: u32 = 20;
+
+/// Samples that the sums hold.
+const MOST_SAMPLES: u32 = 1 << 22;
+
+/// Below this a pivot of the normalised matrix is rounding: the samples do not tell the terms apart. The third powers on
+/// a third of the image leave 6e-3; three depths in place of four leave less than 1e-6.
+const LEAST_PIVOT: f64 = 3e-5;
+
+/// Sums of products of `N` terms.
+#[derive(Clone, Debug)]
+struct Sums<const N: usize> {
+    /// Lower triangle with the diagonal.
+    matrix: [[i64; N]; N],
+    right: [i64; N],
+    samples: u32,
+}
+
+impl<const N: usize> Sums<N> {
+    const fn new() -> Self {
+        Self { matrix: [[0; N]; N], right: [0; N], samples: 0 }
+    }
+
+    fn add(&mut self, terms: &[i32; N], truth: i32) -> Result<(), Error> {
+        if self.samples == MOST_SAMPLES {
+            return Err(Error::TooManySamples { most: MOST_SAMPLES });
+        }
+        self.samples += 1;
+        for (i, (row, right)) in self.matrix.iter_mut().zip(&mut self.right).enumerate() {
+            let term = i64::from(terms[i]);
+            for (sum, other) in row[..=i].iter_mut().zip(terms) {
+                *sum += term * i64::from(*other);
+            }
+            *right += term * i64::from(truth);
+        }
+        Ok(())
+    }
+
+    fn solve(&self) -> Result<[Coefficient; N], Error> {
+        let underdetermined = Error::Underdetermined { samples: self.samples, terms: N as u16 };
+        if self.samples < N as u32 {
+            return Err(underdetermined);
+        }
+        let unit = 1.0 / (f64::from(1 << TERM_BITS) * f64::from(1 << TERM_BITS) * f64::from(self.samples));
+        let entry = |i: usize, j: usize| self.matrix[i.max(j)][i.min(j)] as f64 * unit;
+        let matrix = SMatrix::<f64, N, N>::from_fn(entry);
+        let right = SVector::<f64, N>::from_fn(|i, _| self.right[i] as f64 * unit);
+        let Some(factor) = matrix.cholesky() else { return Err(underdetermined) };
+        if (0..N).any(|i| factor.l_dirty()[(i, i)] < LEAST_PIVOT) {
+            return Err(underdetermined);
+        }
+        let solution = factor.solve(&right);
+        let mut coefficients = [Coefficient::default(); N];
+        for (coefficient, value) in coefficients.iter_mut().zip(&solution) {
+            *coefficient = Coefficient::from_f64(*value)?;
+        }
+        Ok(coefficients)
+    }
+}
+
+/// `value` (Q1.31 or, for a depth, widened to it) with the term's fraction bits, rounded.
+fn narrow(q31: i32) -> i32 {
+    (q31 >> (31 - TERM_BITS - 1)).wrapping_add(1) >> 1
+}
+
+/// The product of two terms, rounded.
+fn times(a: i32, b: i32) -> i32 {
+    ((i64::from(a) * i64::from(b) + (1 << (TERM_BITS - 1))) >> TERM_BITS) as i32
+}
+
+/// 1, v, v^2, v^3.
+fn powers(q31: i32) -> [i32; 4] {
+    let v = narrow(q31);
+    let square = times(v, v);
+    [1 << TERM_BITS, v, square, times(square, v)]
+}
+
+fn widen(code: i16) -> i32 {
+    i32::from(code) << 16
+}
+
+/// Which pixels of a row are handed in: every `step`th from `first`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Columns {
+    /// The first.
+    pub first: u16,
+    /// From one to the next, at least 1.
+    pub step: u16,
+}
+
+impl Columns {
+    /// All.
+    pub const ALL: Self = Self { first: 0, step: 1 };
+
+    fn check(self, frame: Frame, row: u16, pixels: usize) -> Result<(), Error> {
+        if row >= frame.height() {
+            return Err(Error::NoSuchRow { row, height: frame.height() });
+        }
+        let last = usize::from(self.first) + pixels.saturating_sub(1) * usize::from(self.step);
+        if self.step == 0 || last >= usize::from(frame.width()) {
+            return Err(Error::RowLength { pixels, width: frame.width() });
+        }
+        Ok(())
+    }
+
+    /// The columns of the depths that are there. After [`Self::check`] no column lies beyond the frame.
+    fn zip(self, depths: &[i16]) -> impl Iterator<Item = (u16, i16)> {
+        let columns =
+            depths.iter().enumerate().map(move |(i, depth)| (self.first + i as u16 * self.step, *depth));
+        columns.filter(|(_, depth)| *depth != NO_VALUE)
+    }
+}
+
+/// The fit of ten terms in each of 3x3 regions. (For a blend the same coefficients serve.)
+#[derive(Clone, Debug)]
+pub struct RegionFit {
+    frame: Frame,
+    sums: [[Sums<REGION_TERMS>; REGIONS]; REGIONS],
+}
+
+impl RegionFit {
+    /// A fit without samples.
+    pub const fn new(frame: Frame) -> Self {
+        Self { frame, sums: [const { [const { Sums::new() }; REGIONS] }; REGIONS] }
+    }
+
+    /// Adds pixels of row `row` of a flat target at `truth`; depths are Q1.15 codes of one
+    /// [`DepthScale`](super::DepthScale), [`NO_VALUE`] is passed over.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
+    pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
+        columns.check(self.frame, row, depths.len())?;
+        let (rows, across) = (self.frame.rows(), self.frame.columns());
+        let y = powers(rows.coordinate(row));
+        let truth = narrow(widen(truth));
+        let regions = &mut self.sums[rows.region_of(row)];
+        for (column, depth) in columns.zip(depths) {
+            let (x, u) = (powers(across.coordinate(column)), powers(widen(depth)));
+            let terms = [x[0], x[1], x[2], x[3], y[1], y[2], y[3], u[1], u[2], u[3]];
+            regions[across.region_of(column)].add(&terms, truth)?;
+        }
+        Ok(())
+    }
+
+    /// The coefficients.
+    ///
+    /// # Errors
+    /// [`Error::Underdetermined`] where a region's samples do not determine its terms (fewer than four depths, too few
+    /// pixels), [`Error::CoefficientTooLarge`].
+    pub fn solve(&self) -> Result<RegionCoefficients, Error> {
+        let mut coefficients = RegionCoefficients::default();
+        for (coefficients, sums) in coefficients.as_flattened_mut().iter_mut().zip(self.sums.as_flattened()) {
+            *coefficients = sums.solve()?;
+        }
+        Ok(coefficients)
+    }
+}
+
+/// The fit of all twenty terms for the whole image.
+#[derive(Clone, Debug)]
+pub struct FullFit {
+    frame: Frame,
+    sums: Sums<FULL_TERMS>,
+}
+
+impl FullFit {
+    /// A fit without samples.
+    pub const fn new(frame: Frame) -> Self {
+        Self { frame, sums: Sums::new() }
+    }
+
+    /// As [`RegionFit::add_row`].
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
+    pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
+        columns.check(self.frame, row, depths.len())?;
+        let y = powers(self.frame.rows().coordinate(row));
+        let truth = narrow(widen(truth));
+        for (column, depth) in columns.zip(depths) {
+            let (x, u) = (powers(self.frame.columns().coordinate(column)), powers(widen(depth)));
+            let (xy, xu, yu) = (times(x[1], y[1]), times(x[1], u[1]), times(y[1], u[1]));
+            // In the order of FULL_TERMS.
+            let terms = [
+                x[0],
+                x[1],
+                x[2],
+                x[3],
+                y[1],
+                xy,
+                times(x[2], y[1]),
+                y[2],
+                times(x[1], y[2]),
+                y[3],
+                u[1],
+                xu,
+                times(x[2], u[1]),
+                yu,
+                times(xy, u[1]),
+                times(y[2], u[1]),
+                u[2],
+                times(x[1], u[2]),
+                times(y[1], u[2]),
+                u[3],
+            ];
+            self.sums.add(&terms, truth)?;
+        }
+        Ok(())
+    }
+
+    /// The coefficients.
+    ///
+    /// # Errors
+    /// [`Error::Underdetermined`], [`Error::CoefficientTooLarge`].
+    pub fn solve(&self) -> Result<FullCoefficients, Error> {
+        self.sums.solve()
+    }
+}
