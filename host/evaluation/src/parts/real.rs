@@ -73,11 +73,7 @@ fn measure_breakfast(page: &mut Page, folder: &Path) -> Result<()> {
             map: map.depth_mm.view(),
             scale: Scale::Depth([560.0, 800.0]),
         },
-        Panel {
-            title: "confidence, 0 to 1".into(),
-            map: map.confidence.view(),
-            scale: Scale::Grey(1.0),
-        },
+        Panel { title: "confidence, 0 to 1".into(), map: map.confidence.view(), scale: Scale::Grey(1.0) },
     ])?;
     page.picture("accuracy-breakfast.png", &png, "Breakfast table: image, depth, confidence")
 }
