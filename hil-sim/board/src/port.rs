@@ -79,6 +79,10 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Vec<u8
 }
 
 /// Cuts a stream of bytes into frames, delimiter included, and garbage into pieces.
+///
+/// A delimiter alone, with which hosts end what the line may have made of an earlier frame, travels in front of the
+/// frame that follows: by itself it would let time pass until it is on the board, and how much of that had passed
+/// when the frame came would be up to the host's threads.
 #[derive(Debug, Default)]
 pub struct FrameCutter(Vec<u8>);
 
@@ -87,9 +91,14 @@ impl FrameCutter {
     pub fn cut(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
         for byte in bytes {
+            let in_frame = self.0.iter().any(|before| *before != 0);
+            if *byte == 0 && !in_frame {
+                self.0 = vec![0];
+                continue;
+            }
             self.0.push(*byte);
-            // What is longer than a frame is none and need not wait for its end.
-            if *byte == 0 || self.0.len() >= FRAME_MAX {
+            // What is longer than a frame and the delimiter before it is none and need not wait for its end.
+            if *byte == 0 || self.0.len() > FRAME_MAX {
                 frames.push(std::mem::take(&mut self.0));
             }
         }
@@ -107,6 +116,18 @@ mod tests {
         assert!(cutter.cut(&[1, 2]).is_empty());
         assert_eq!(cutter.cut(&[3, 0, 4, 0, 5]), [vec![1, 2, 3, 0], vec![4, 0]]);
         let long = cutter.cut(&[7; FRAME_MAX]);
-        assert_eq!((long.len(), long[0].len()), (1, FRAME_MAX));
+        assert_eq!((long.len(), long[0].len()), (1, FRAME_MAX + 1));
+    }
+
+    #[test]
+    fn a_lone_delimiter_travels_with_the_next_frame() {
+        let mut cutter = FrameCutter::default();
+        assert!(cutter.cut(&[0]).is_empty());
+        assert!(cutter.cut(&[0, 0]).is_empty());
+        assert_eq!(cutter.cut(&[1, 2, 0, 0, 3, 0]), [vec![0, 1, 2, 0], vec![0, 3, 0]]);
+        let mut longest = vec![9; FRAME_MAX];
+        longest[FRAME_MAX - 1] = 0;
+        assert!(cutter.cut(&[0]).is_empty());
+        assert_eq!(cutter.cut(&longest), [[&[0], longest.as_slice()].concat()]);
     }
 }

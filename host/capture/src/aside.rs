@@ -29,6 +29,9 @@ impl AsideError {
     }
 }
 
+/// Folders that killed programs left behind under one name, before the user is asked to look.
+const LEFT_BEHIND_MAX: u32 = 100;
+
 /// A folder that becomes visible under its name only when all its files are written. Dropped before, it leaves
 /// nothing behind.
 #[derive(Debug)]
@@ -64,8 +67,16 @@ impl Aside {
     }
 
     fn begin(folder: PathBuf, target: PathBuf) -> Result<Self, AsideError> {
-        fs::create_dir(&folder).map_err(AsideError::at(&folder))?;
-        Ok(Self { folder, target })
+        // A program that was killed may have left the name behind, and a container gives its number out again.
+        let mut free = folder.clone();
+        for number in 1..LEFT_BEHIND_MAX {
+            if !free.exists() {
+                break;
+            }
+            free = folder.with_added_extension(number.to_string());
+        }
+        fs::create_dir(&free).map_err(AsideError::at(&target))?;
+        Ok(Self { folder: free, target })
     }
 
     /// Where a file is to be written for the time being.
@@ -158,6 +169,17 @@ mod tests {
         aside.finish().unwrap();
         assert_eq!(names(&target), ["a"]);
         assert!(matches!(Aside::new_folder(&target), Err(AsideError::Exists { .. })));
+    }
+
+    #[test]
+    fn what_a_killed_program_left_is_in_nobodys_way() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("pair");
+        std::mem::forget(Aside::new_folder(&target).unwrap());
+        let aside = Aside::new_folder(&target).unwrap();
+        aside.write("a", b"1").unwrap();
+        aside.finish().unwrap();
+        assert_eq!(names(&target), ["a"]);
     }
 
     #[test]

@@ -50,10 +50,20 @@ impl Client {
         Self::connect(Box::new(SerialTransport::open(port)?), port)
     }
 
+    /// As [`Client::open`], where the board is known to be emulated: hello is asked as patiently as all else, so
+    /// that a slow computer does not ask it twice, which would make the run another one.
+    pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
+        Self::start(Box::new(SerialTransport::open(port)?), port, true)
+    }
+
     /// Says hello over any transport. `port` is its name in messages.
     pub fn connect(transport: Box<dyn Transport>, port: &str) -> Result<Self, ClientError> {
+        Self::start(transport, port, false)
+    }
+
+    fn start(transport: Box<dyn Transport>, port: &str, emulated: bool) -> Result<Self, ClientError> {
         let mut link = Link::new(transport, port);
-        let (hello, version) = shake_hands(&mut link)?;
+        let (hello, version) = shake_hands(&mut link, emulated)?;
         let timing = if hello.emulated { Timing::EMULATED } else { Timing::REAL };
         let events = Events { boot: hello.boot, ..Events::default() };
         let mut client = Self { link, version, hello, timing, events, interrupt: None };
@@ -63,7 +73,7 @@ impl Client {
 
     /// Says hello anew, after a reset of the board for instance. Events that were not read are forgotten.
     pub fn reopen(&mut self) -> Result<(), ClientError> {
-        (self.hello, self.version) = shake_hands(&mut self.link)?;
+        (self.hello, self.version) = shake_hands(&mut self.link, self.hello.emulated)?;
         self.events = Events { boot: self.hello.boot, ..Events::default() };
         self.join_events()
     }

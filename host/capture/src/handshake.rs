@@ -15,10 +15,15 @@ use crate::timing::Timing;
 const ATTEMPTS: u32 = 6;
 const DURING: &str = "asking the board who it is";
 
-/// Cleans the line, asks who is there and agrees on a version.
-pub(crate) fn shake_hands(link: &mut Link) -> Result<(Hello, u8), ClientError> {
+/// Cleans the line, asks who is there and agrees on a version. A board that is known to be emulated is given its
+/// own time: hello asked twice, because this computer is slow, would make the run another one.
+pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
-    let waits: Vec<Duration> = (0..ATTEMPTS).map(|attempt| Timing::REAL.reply * (1 << attempt)).collect();
+    let waits: Vec<Duration> = if known_emulated {
+        vec![Timing::EMULATED.reply; Timing::EMULATED.retries as usize + 1]
+    } else {
+        (0..ATTEMPTS).map(|attempt| Timing::REAL.reply * (1 << attempt)).collect()
+    };
     // Events of this boot are not lost by being passed over here: the status that follows tells where their
     // numbers stand.
     let (_, packet) = link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(()))?;

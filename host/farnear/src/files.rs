@@ -1,7 +1,9 @@
 //! The files that users have: optics, depth maps, meshes.
 
+pub mod cache;
 pub mod map;
 pub mod mesh;
+pub mod operators;
 pub mod optics;
 
 /// The time by this computer's clock, RFC 3339 in UTC; `None` for a clock before 1970.

@@ -19,7 +19,14 @@ use clap::{Parser, Subcommand};
 
 /// Depth from defocus: design operators, compute depth, drive the rig.
 #[derive(Parser)]
-#[command(name = "farnear", version, arg_required_else_help = true, propagate_version = true)]
+#[command(
+    name = "farnear",
+    version,
+    arg_required_else_help = true,
+    propagate_version = true,
+    after_help = "Example: farnear rig capture --port sim --optics optics.toml --out pair1/\n\
+                  \x20        farnear depth pair1/far.png pair1/near.png --optics optics.toml"
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -54,8 +61,31 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
         Err(error) => {
-            eprintln!("farnear: {error:#}");
+            eprintln!("farnear: {}", message(&error));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// An error and its causes in one line. A typed error often says its cause itself; that is not said twice.
+fn message(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message {
+        empty if empty.is_empty() => cause,
+        message if message.contains(&cause) => message,
+        message => format!("{message}: {}", cause.trim_end()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_are_said_once() {
+        let inner = std::io::Error::other("Broken pipe");
+        let said = anyhow::Error::new(inner).context("the port went away (Broken pipe)").context("capture");
+        assert_eq!(message(&said), "capture: the port went away (Broken pipe)");
+        let unsaid = anyhow::anyhow!("No such file").context("cannot read x");
+        assert_eq!(message(&unsaid), "cannot read x: No such file");
     }
 }

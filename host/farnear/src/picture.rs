@@ -21,14 +21,21 @@ const BACKGROUND: Rgb<u8> = Rgb([250, 250, 248]);
 const INK: Rgb<u8> = Rgb([40, 40, 44]);
 const NO_VALUE: Rgb<u8> = Rgb([150, 150, 152]);
 
+/// Confidence from which a pixel has its full colour.
+const CONFIDENT: f32 = 0.5;
+/// Part of its colour that a pixel of confidence 0 keeps.
+const FAINTEST: f32 = 0.15;
+
 /// The picture of a depth map in mm as the bytes of a PNG.
-pub fn view_png(depth_mm: ArrayView2<f32>) -> Result<Vec<u8>> {
+///
+/// `confidence` (0 to 1, same shape) decides how much of its colour a pixel keeps.
+pub fn view_png(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<Vec<u8>> {
     let mut png = Cursor::new(Vec::new());
-    draw(depth_mm)?.write_to(&mut png, image::ImageFormat::Png)?;
+    draw(depth_mm, confidence)?.write_to(&mut png, image::ImageFormat::Png)?;
     Ok(png.into_inner())
 }
 
-fn draw(depth_mm: ArrayView2<f32>) -> Result<RgbImage> {
+fn draw(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage> {
     let (rows, columns) = depth_mm.dim();
     let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).max(1) as u32;
     let (width, height) = (columns as u32 * zoom, rows as u32 * zoom);
@@ -43,7 +50,8 @@ fn draw(depth_mm: ArrayView2<f32>) -> Result<RgbImage> {
     for (x, y, pixel) in canvas.enumerate_pixels_mut() {
         let (Some(x), Some(y)) = (x.checked_sub(MARGIN_PX), y.checked_sub(MARGIN_PX)) else { continue };
         if x < width && y < height {
-            *pixel = range.colour(depth_mm[[(y / zoom) as usize, (x / zoom) as usize]]);
+            let at = [(y / zoom) as usize, (x / zoom) as usize];
+            *pixel = faded(range.colour(depth_mm[at]), confidence[at]);
         }
     }
     let Some((near, far)) = range.0 else {
@@ -101,6 +109,14 @@ impl Range {
     }
 }
 
+/// A colour that is believed so much: what is unsure goes to the grey of what is unknown, but keeps a tint.
+fn faded(colour: Rgb<u8>, confidence: f32) -> Rgb<u8> {
+    let kept = FAINTEST + (1.0 - FAINTEST) * (confidence / CONFIDENT).clamp(0.0, 1.0);
+    let mix =
+        |value: u8, grey: u8| (f32::from(grey) + (f32::from(value) - f32::from(grey)) * kept).round() as u8;
+    Rgb(std::array::from_fn(|channel| mix(colour[channel], NO_VALUE[channel])))
+}
+
 /// Distance between ticks: 1, 2 or 5 times a power of ten, for five to eleven of them.
 fn tick_step(span: f64) -> f64 {
     let rough = span / 8.0;
@@ -133,7 +149,7 @@ mod tests {
             Array2::from_elem((16, 700), 900.0),
             Array2::from_shape_fn((400, 300), |(y, x)| 600.0 + (x + y) as f32),
         ] {
-            let png = view_png(map.view()).unwrap();
+            let png = view_png(map.view(), Array2::ones(map.dim()).view()).unwrap();
             let picture = image::load_from_memory(&png).unwrap();
             assert!(picture.height() >= MIN_HEIGHT_PX as u32 && picture.width() > map.dim().1 as u32);
         }

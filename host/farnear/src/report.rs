@@ -1,24 +1,20 @@
 //! Figures on stdout: lines for people, one JSON object with `--json`.
 
-use anyhow::Result;
+use std::io::Write;
+
+use anyhow::{Context, Result};
 use serde::Serialize;
-use serde_json::Value;
 
 /// Prints the fields of `figures`, in their order.
 pub fn print<T: Serialize>(figures: &T, json: bool) -> Result<()> {
-    let value = serde_json::to_value(figures)?;
-    if json {
-        println!("{}", serde_json::to_string(figures)?);
-        return Ok(());
-    }
-    let Value::Object(_) = value else {
-        println!("{value}");
-        return Ok(());
-    };
-    // serde_json sorts a Value's keys; the text keeps the order of the struct.
-    let text = toml::to_string(figures)?;
-    print!("{text}");
-    Ok(())
+    let text = if json { serde_json::to_string(figures)? + "\n" } else { toml::to_string(figures)? };
+    to_stdout(text.as_bytes())
+}
+
+/// Writes to stdout; a reader that has gone or a full disk is a failure like any other, not a panic.
+pub fn to_stdout(bytes: &[u8]) -> Result<()> {
+    let mut stdout = std::io::stdout();
+    stdout.write_all(bytes).and_then(|()| stdout.flush()).context("cannot write to the standard output")
 }
 
 /// A number with so many decimals, so that a report does not claim more than is known.

@@ -4,6 +4,8 @@ use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
+use crate::report;
+
 /// Print completions for a shell.
 #[derive(Args)]
 #[command(
@@ -16,6 +18,7 @@ pub struct Arguments {
 
 /// Prints the completions of the program whose arguments `C` describes.
 pub fn run<C: CommandFactory>(arguments: Arguments) -> Result<()> {
-    clap_complete::generate(arguments.shell, &mut C::command(), "farnear", &mut std::io::stdout());
-    Ok(())
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut C::command(), "farnear", &mut script);
+    report::to_stdout(&script)
 }

@@ -1,12 +1,11 @@
 //! `farnear depth`: a depth map from a far- and a near-focused image.
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     time::Instant,
 };
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use farnear_capture::{
     aside::Aside,
@@ -16,7 +15,7 @@ use farnear_capture::{
 use farnear_depth::{
     operators::Operators,
     optics::Optics,
-    run::{DepthMap, Settings, depth_from_pair},
+    run::{DepthMap, MAX_SMOOTHING_PX, Settings, Warning, depth_from_pair},
 };
 use ndarray::Array2;
 use serde::Serialize;
@@ -40,14 +39,15 @@ pub struct Arguments {
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// Operators saved by `farnear operators`; without it they are designed for the optics.
-    #[arg(long, value_name = "FILE")]
+    /// Operators: a name such as gro:linear (family:design), or a file saved by `farnear operators`; without it they
+    /// are designed for the optics.
+    #[arg(long, value_name = "NAME|FILE")]
     operators: Option<PathBuf>,
-    /// Side of the window over which coefficients are summed, in pixels, odd.
-    #[arg(long, value_name = "PX", default_value_t = 7)]
+    /// Side of the window over which coefficients are summed, in pixels: odd, 1 to 63.
+    #[arg(long, value_name = "PX", default_value_t = 7, value_parser = odd_up_to::<MAX_SMOOTHING_PX>)]
     smooth: usize,
     /// Side of the median window in pixels: 1, 3, 5 or 7.
-    #[arg(long, value_name = "PX", default_value_t = 3)]
+    #[arg(long, value_name = "PX", default_value_t = 3, value_parser = odd_up_to::<MAX_MEDIAN_PX>)]
     median: usize,
     /// Threads; 0 = all.
     #[arg(long, default_value_t = 0)]
@@ -68,6 +68,15 @@ struct Figures {
     median_mm: f64,
     low_texture_fraction: f64,
     warnings: Vec<String>,
+}
+
+/// Largest median window that there is a network for.
+const MAX_MEDIAN_PX: usize = 7;
+
+/// The side of a window around a pixel.
+fn odd_up_to<const LARGEST: usize>(text: &str) -> Result<usize, String> {
+    let side = text.parse().ok().filter(|side| side % 2 == 1 && (1..=LARGEST).contains(side));
+    side.ok_or_else(|| format!("a window's side is an odd whole number from 1 to {LARGEST}"))
 }
 
 /// The content of `depth.toml`: what made the map.
@@ -91,7 +100,14 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let optics = files::optics::read(&arguments.optics)?;
     let far = read_grey(&arguments.far)?.pixels;
     let near = read_grey(&arguments.near)?.pixels;
-    let operators = operators(arguments.operators.as_deref(), &optics)?;
+    if far == near {
+        bail!(
+            "{} and {} hold the same image: depth needs one focused far and one focused near",
+            arguments.far.display(),
+            arguments.near.display()
+        );
+    }
+    let operators = files::operators::find(arguments.operators.as_deref(), &optics)?;
     let settings = Settings {
         smoothing_px: arguments.smooth,
         median_px: arguments.median,
@@ -99,9 +115,19 @@ pub fn run(arguments: Arguments) -> Result<()> {
         ..Settings::default()
     };
     let start = Instant::now();
-    let depth = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings)?;
+    let depth = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings)
+        .with_context(|| format!("{} and {}", arguments.far.display(), arguments.near.display()))?;
     let seconds = start.elapsed().as_secs_f64();
-    let warnings: Vec<String> = depth.warnings.iter().map(ToString::to_string).collect();
+    let mut warnings: Vec<String> = depth.warnings.iter().map(ToString::to_string).collect();
+    if named_the_other_way_round(&arguments.far, &arguments.near)
+        && !depth.warnings.iter().any(|warning| matches!(warning, Warning::LooksSwapped { .. }))
+    {
+        warnings.push(format!(
+            "the pair looks swapped by its names: {} was given as FAR and {} as NEAR",
+            name_of(&arguments.far),
+            name_of(&arguments.near)
+        ));
+    }
     for warning in &warnings {
         eprintln!("warning: {warning}");
     }
@@ -120,11 +146,18 @@ pub fn run(arguments: Arguments) -> Result<()> {
     report::print(&figures, arguments.json)
 }
 
-fn operators(file: Option<&Path>, optics: &Optics) -> Result<Operators> {
-    let Some(file) = file else { return Ok(Operators::for_optics(optics)?) };
-    let text =
-        fs::read_to_string(file).with_context(|| format!("cannot read the operators {}", file.display()))?;
-    toml::from_str(&text).with_context(|| format!("{} holds no operators", file.display()))
+/// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near:
+/// only the names tell.
+fn named_the_other_way_round(far: &Path, near: &Path) -> bool {
+    let says = |path: &Path, word: &str, other: &str| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+        stem.contains(word) && !stem.contains(other)
+    };
+    says(far, "near", "far") && says(near, "far", "near")
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// A capture's own folder, or `depth` beside the image.
@@ -145,12 +178,11 @@ fn write(
     let aside = Aside::into_folder(out)?;
     let map = depth.depth_mm.view();
     let (codes, png) = map::codes(map);
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let sidecar = Sidecar {
         format: 1,
         made_by: concat!("farnear ", env!("CARGO_PKG_VERSION")).into(),
-        far: name(&arguments.far),
-        near: name(&arguments.near),
+        far: name_of(&arguments.far),
+        near: name_of(&arguments.near),
         units: "mm",
         warnings,
         png,
@@ -168,7 +200,7 @@ fn write(
     aside.write("depth.png", &encode_png(codes.view(), 16).map_err(anyhow::Error::msg)?)?;
     aside.write("confidence.npy", &map::npy(depth.confidence.view())?)?;
     aside.write("mesh.ply", &mesh::ply(map, far.view(), optics))?;
-    aside.write("view.png", &picture::view_png(map)?)?;
+    aside.write("view.png", &picture::view_png(map, depth.confidence.view())?)?;
     aside.write("depth.toml", toml::to_string(&sidecar)?.as_bytes())?;
     Ok(aside.finish()?)
 }
@@ -181,4 +213,28 @@ fn median(map: &Array2<f32>) -> f64 {
     }
     let middle = finite.len() / 2;
     f64::from(*finite.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_a_swapped_pair() {
+        let swapped = |far: &str, near: &str| named_the_other_way_round(far.as_ref(), near.as_ref());
+        assert!(swapped("a/near.png", "a/far.png"));
+        assert!(swapped("Breakfast_NEAR.tif", "breakfast_far.tif"));
+        assert!(!swapped("far.png", "near.png"));
+        assert!(!swapped("farnear_1.png", "farnear_2.png"));
+        assert!(!swapped("near/1.png", "far/2.png"), "folders are no names of images");
+        assert!(!swapped("near1.png", "near2.png"));
+    }
+
+    #[test]
+    fn windows_are_odd() {
+        assert_eq!(odd_up_to::<7>("7"), Ok(7));
+        for wrong in ["0", "4", "9", "-1", "x", ""] {
+            assert!(odd_up_to::<7>(wrong).is_err(), "{wrong}");
+        }
+    }
 }

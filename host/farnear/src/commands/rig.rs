@@ -51,7 +51,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
 pub struct Target {
     /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig.
     #[arg(long, value_name = "PORT|sim")]
-    port: String,
+    pub port: String,
     #[command(flatten)]
     scenery: Scenery,
 }
@@ -66,8 +66,10 @@ impl Target {
     /// Connects; an interruption by the user (Ctrl-C) stops what moves.
     fn connect(&self, optics: Option<&PathBuf>) -> Result<Connected> {
         let simulator = (self.port == "sim").then(|| Simulator::start(&self.scenery, optics)).transpose()?;
-        let port = simulator.as_ref().map_or(self.port.as_str(), Simulator::port);
-        let mut client = Client::open(port)?;
+        let mut client = match &simulator {
+            Some(simulator) => Client::open_emulated(simulator.port())?,
+            None => Client::open(&self.port)?,
+        };
         let interrupted = Arc::new(AtomicBool::new(false));
         client.interrupt_by(Arc::clone(&interrupted));
         ctrlc::set_handler(move || interrupted.store(true, Ordering::Relaxed))

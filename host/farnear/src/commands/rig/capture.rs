@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use farnear_capture::{
     camera::{Camera, FolderCamera, SimCamera},
@@ -63,9 +63,13 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let table: toml::Table = files::optics::text(&arguments.optics)?.parse()?;
     // Before anything moves: a folder that cannot be written is known now.
     let folder = begin_folder(&arguments.out)?;
+    let camera = early_camera(&arguments.camera, &arguments.target.port)?;
     let mut rig = arguments.target.connect(Some(&arguments.optics))?;
-    let simulated = rig.simulator.as_ref();
-    let mut camera = camera(&arguments.camera, simulated.map(|simulator| simulator.camera()))?;
+    let mut camera = match (camera, &rig.simulator) {
+        (Some(camera), _) => camera,
+        (None, Some(simulator)) => Box::new(SimCamera::connect(simulator.camera())?),
+        (None, None) => bail!(SIM_CAMERA_ALONE),
+    };
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
     let exposures = Exposures {
         exposure: Micros(arguments.exposure_us),
@@ -98,18 +102,20 @@ pub fn run(arguments: Arguments) -> Result<()> {
     report::print(&figures, arguments.json)
 }
 
-fn camera(name: &str, simulated: Option<&str>) -> Result<Box<dyn Camera>> {
+const SIM_CAMERA_ALONE: &str =
+    "--camera sim belongs to --port sim; with another port give HOST:PORT or folder:DIR as the camera";
+
+/// The camera, unless it is the one that comes with the emulated rig. Opened before the rig, so that a camera that
+/// is not there is known before anything moves.
+fn early_camera(name: &str, port: &str) -> Result<Option<Box<dyn Camera>>> {
     if name == "sim" {
-        let address = simulated.context(
-            "--camera sim belongs to --port sim; with another port give HOST:PORT or folder:DIR as the camera",
-        )?;
-        return Ok(Box::new(SimCamera::connect(address)?));
+        return if port == "sim" { Ok(None) } else { bail!(SIM_CAMERA_ALONE) };
     }
     if let Some(folder) = name.strip_prefix("folder:") {
-        return Ok(Box::new(FolderCamera::watch(folder.as_ref())?));
+        return Ok(Some(Box::new(FolderCamera::watch(folder.as_ref())?)));
     }
     if !name.contains(':') {
         bail!("unknown camera {name:?}: expected sim, HOST:PORT or folder:DIR");
     }
-    Ok(Box::new(SimCamera::connect(name)?))
+    Ok(Some(Box::new(SimCamera::connect(name)?)))
 }

@@ -1,0 +1,173 @@
+//! Designed operators in the user's cache folder.
+//!
+//! An entry belongs to what was asked for and to the very build of this program that designed it, so that it is
+//! what a new design would give, bit for bit. One that is broken or belongs to something else is not used but
+//! written anew; where nothing can be written, nothing is cached. Reading an entry takes well below a millisecond,
+//! a design some of them (a slow one a second).
+
+use std::{
+    env, fs,
+    hash::{DefaultHasher, Hash, Hasher},
+    path::{Path, PathBuf},
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use farnear_capture::aside;
+use farnear_depth::operators::{self, DesignError, Operators, Request};
+
+/// Version of an entry's layout: one line with a sum over key and operators, then the operators as TOML.
+const LAYOUT: u32 = 1;
+/// Entries that are kept; the oldest go first. Each is 12 kB.
+const ENTRIES_MAX: usize = 64;
+
+/// Operators from the cache, else designed and put there.
+///
+/// # Errors
+/// Those of the design; none of the cache.
+pub fn operators(request: &Request) -> Result<Operators, DesignError> {
+    let (Some(folder), Some(build)) = (folder(), build()) else { return operators::design(request) };
+    cached(&folder.join("farnear").join("operators"), &build, request)
+}
+
+fn cached(folder: &Path, build: &str, request: &Request) -> Result<Operators, DesignError> {
+    let format = operators::FORMAT;
+    // The numbers of a Request are printed so that they come back to the last bit.
+    let key = format!("layout {LAYOUT}, operators {format}, build {build}, {request:?}");
+    let entry = folder.join(format!("{:016x}.toml", sum(&[&key])));
+    if let Some(found) = read(&entry, &key).filter(|found| found.request() == request) {
+        return Ok(found);
+    }
+    let designed = operators::design(request)?;
+    if let Ok(body) = toml::to_string(&designed)
+        && fs::create_dir_all(folder).is_ok()
+    {
+        let text = format!("{:016x}\n{body}", sum(&[&key, &body]));
+        // Without an entry the next design takes as long as this one did, that is all.
+        let _ = aside::write_file(&entry, text.as_bytes());
+        drop_oldest(folder);
+    }
+    Ok(designed)
+}
+
+fn read(entry: &Path, key: &str) -> Option<Operators> {
+    let text = fs::read_to_string(entry).ok()?;
+    let (written, body) = text.split_once('\n')?;
+    if u64::from_str_radix(written, 16).ok()? != sum(&[key, body]) {
+        return None;
+    }
+    toml::from_str(body).ok()
+}
+
+fn drop_oldest(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    let mut entries: Vec<(SystemTime, PathBuf)> = entries
+        .filter_map(|entry| {
+            let entry = entry.ok()?;
+            Some((entry.metadata().ok()?.modified().ok()?, entry.path()))
+        })
+        .collect();
+    entries.sort();
+    let surplus = entries.len().saturating_sub(ENTRIES_MAX);
+    for (_, path) in &entries[..surplus] {
+        let _ = fs::remove_file(path); // another program may have done so
+    }
+}
+
+/// The hasher is the same wherever one build runs, which is all that is asked of it.
+fn sum(parts: &[&str]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    parts.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// Tells builds of this program apart: a design may have changed though the version has not.
+fn build() -> Option<String> {
+    let program = fs::metadata(env::current_exe().ok()?).ok()?;
+    let written = program.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+    Some(format!("{} of {} bytes at {}", env!("CARGO_PKG_VERSION"), program.len(), written.as_nanos()))
+}
+
+/// Where programs of this user keep what can be made again.
+fn folder() -> Option<PathBuf> {
+    let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    absolute("XDG_CACHE_HOME").or_else(|| {
+        if cfg!(windows) {
+            absolute("LOCALAPPDATA")
+        } else if cfg!(target_os = "macos") {
+            Some(absolute("HOME")?.join("Library/Caches"))
+        } else {
+            Some(absolute("HOME")?.join(".cache"))
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farnear_depth::{
+        operators::{Design, Family},
+        psf::Psf,
+    };
+
+    fn request(max_blur_px: f64) -> Request {
+        let psf = Psf::PillBox;
+        Request { family: Family::of(psf), design: Design::default(), psf, max_blur_px, kernel_size: 7 }
+    }
+
+    fn entries(folder: &Path) -> Vec<PathBuf> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
+    }
+
+    #[test]
+    fn what_comes_from_the_cache_is_what_was_designed() {
+        let folder = tempfile::tempdir().unwrap();
+        // A number whose last bit matters.
+        let request = request(2.0 + f64::EPSILON * 2.0);
+        let designed = operators::design(&request).unwrap();
+        assert_eq!(cached(folder.path(), "a", &request).unwrap(), designed);
+        let [entry] = entries(folder.path()).try_into().unwrap();
+        let written = fs::metadata(&entry).unwrap().modified().unwrap();
+        assert_eq!(cached(folder.path(), "a", &request).unwrap(), designed);
+        assert_eq!(fs::metadata(&entry).unwrap().modified().unwrap(), written, "it was designed anew");
+    }
+
+    #[test]
+    fn other_builds_and_requests_have_entries_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        for (build, blur) in [("a", 2.0), ("b", 2.0), ("a", 2.5)] {
+            assert_eq!(cached(folder.path(), build, &request(blur)).unwrap().max_blur_px(), blur);
+        }
+        assert_eq!(entries(folder.path()).len(), 3);
+    }
+
+    #[test]
+    fn broken_entries_are_written_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let request = request(2.0);
+        let designed = cached(folder.path(), "a", &request).unwrap();
+        let [entry] = entries(folder.path()).try_into().unwrap();
+        let whole = fs::read_to_string(&entry).unwrap();
+        // A digit changed is still TOML and still operators, yet other ones.
+        let digit = whole.rfind(|letter: char| ('1'..'9').contains(&letter)).unwrap();
+        let mut other_digit = whole.clone();
+        other_digit.replace_range(digit..=digit, "9");
+        for broken in ["", "nonsense", &whole[..whole.len() / 2], &other_digit] {
+            fs::write(&entry, broken).unwrap();
+            assert_eq!(cached(folder.path(), "a", &request).unwrap(), designed);
+            assert_eq!(fs::read_to_string(&entry).unwrap(), whole);
+        }
+    }
+
+    #[test]
+    fn the_cache_stays_small_and_may_be_absent() {
+        let folder = tempfile::tempdir().unwrap();
+        for number in 0..ENTRIES_MAX + 9 {
+            fs::write(folder.path().join(format!("{number}.toml")), "old").unwrap();
+        }
+        cached(folder.path(), "a", &request(2.0)).unwrap();
+        assert_eq!(entries(folder.path()).len(), ENTRIES_MAX);
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        assert!(cached(&file.join("below"), "a", &request(2.0)).is_ok());
+    }
+}

@@ -1,0 +1,67 @@
+//! Operators by name, from a file, or designed for the optics and kept in the user's cache.
+
+use std::{fs, path::Path};
+
+use anyhow::{Context, Result, bail};
+use farnear_depth::{
+    operators::{self, Design, Family, Operators, Request},
+    optics::Optics,
+};
+
+use super::cache;
+
+/// Operators for some optics: those that `asked` names (`family:design`, e.g. `gro:linear`, or a file saved by
+/// `farnear operators`), else the default ones.
+///
+/// # Errors
+/// What is wrong with the name or the file, or why no operators can be designed.
+pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
+    let default = Request::for_optics(optics);
+    let Some(asked) = asked else { return Ok(cache::operators(&default)?) };
+    match named(asked) {
+        // A file is a file, whatever it is called.
+        Some(name) if !asked.exists() => {
+            let (family, design) = name.with_context(|| format!("operators {}", asked.display()))?;
+            let request = Request { family, design, ..default };
+            Ok(cache::operators(&request).with_context(|| format!("operators {family}:{design}"))?)
+        }
+        _ => read(asked),
+    }
+}
+
+/// The two halves of a name; `None` for what cannot be one.
+fn named(asked: &Path) -> Option<Result<(Family, Design), operators::DesignError>> {
+    let (family, design) = asked.to_str()?.split_once(':')?;
+    if family.contains(std::path::is_separator) || family.len() < 2 {
+        return None; // a path, or the drive of one
+    }
+    Some(family.parse().and_then(|family| Ok((family, design.parse()?))))
+}
+
+fn read(path: &Path) -> Result<Operators> {
+    let text = fs::read_to_string(path).with_context(|| {
+        format!("cannot read the operators {} (neither a file nor a name such as gro:linear)", path.display())
+    })?;
+    if text.trim().is_empty() {
+        bail!("{} is empty: expected operators saved by `farnear operators --out`", path.display());
+    }
+    toml::from_str(&text).with_context(|| {
+        format!("{} holds no operators such as `farnear operators --out` saves", path.display())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_told_from_paths() {
+        let known = named(Path::new("gro:linear")).unwrap().unwrap();
+        assert_eq!(known, (Family::Gro, Design::Linear));
+        let wrong = named(Path::new("gor:linear")).unwrap().unwrap_err();
+        assert!(wrong.to_string().contains("gro"), "{wrong}");
+        for path in ["operators.toml", "a/b:c", r"C:\operators.toml", "gro"] {
+            assert!(named(Path::new(path)).is_none(), "{path}");
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Ports without a rig behind them: absent, busy, no port at all, silent, garbage, another protocol version.
+
+use std::{
+    io::{Read, Write},
+    time::Duration,
+};
+
+use farnear_protocol::{
+    RequestError,
+    frame::{Decoder, Header, Kind, encode},
+};
+use serialport::{SerialPort, TTYPort};
+
+use crate::common::{Folder, fails, farnear, rig_optics};
+
+/// A capture with this port that must fail so and leave nothing behind.
+#[track_caller]
+fn capture_fails(port: &str, phrases: &[&str]) {
+    let folder = Folder::new();
+    let images = folder.path("images");
+    std::fs::create_dir(&images).expect("a writable folder");
+    let (out, camera) = (folder.text("out"), format!("folder:{}", folder.text("images")));
+    let capture =
+        ["rig", "capture", "--port", port, "--camera", &camera, "--optics", rig_optics(), "--out", &out];
+    fails(&mut farnear(&capture), 1, phrases);
+    assert_eq!(folder.listing(), ["images"]);
+}
+
+#[test]
+fn an_absent_port_is_named_with_those_that_are_there() {
+    capture_fails("/dev/farnear-absent", &["there is no port /dev/farnear-absent", "present"]);
+    for job in [vec!["info"], vec!["home"], vec!["stop"], vec!["move", "--axis", "fine", "--to-um", "50"]] {
+        let port = ["--port", "/dev/farnear-absent"];
+        fails(farnear(&["rig"]).args(job).args(port), 1, &["there is no port /dev/farnear-absent"]);
+    }
+}
+
+#[test]
+fn a_file_and_a_folder_are_no_ports() {
+    capture_fails(rig_optics(), &["rig.toml is not a serial port"]);
+    capture_fails(env!("CARGO_TARGET_TMPDIR"), &["is not a serial port"]);
+}
+
+/// The far end of a line and the name under which the program opens it. Both ends stay open while this lives.
+struct Line {
+    far_end: TTYPort,
+    near_end: TTYPort,
+}
+
+impl Line {
+    fn new() -> Self {
+        let (mut far_end, near_end) = TTYPort::pair().expect("a pty");
+        far_end.set_timeout(Duration::from_millis(20)).expect("a timeout");
+        Self { far_end, near_end }
+    }
+
+    fn name(&self) -> String {
+        self.near_end.name().expect("a pty's name")
+    }
+}
+
+#[test]
+fn a_busy_port_is_told_from_an_absent_one() {
+    let line = Line::new();
+    let held = serialport::new(line.name(), 115_200).open_native().expect("a free port");
+    capture_fails(&line.name(), &["is busy", &line.name(), "end that program"]);
+    drop(held);
+}
+
+#[test]
+fn a_port_on_which_nobody_answers_is_named() {
+    let line = Line::new();
+    capture_fails(&line.name(), &["no answer", &line.name(), "nothing at all came", "powered"]);
+}
+
+#[test]
+fn noise_without_a_board_behind_it_is_told_from_silence() {
+    let mut line = Line::new();
+    let name = line.name();
+    std::thread::spawn(move || {
+        // Till the program has gone: a repeating pattern with the frames' delimiter in it.
+        for byte in (0..=255u8).cycle() {
+            std::thread::sleep(Duration::from_millis(2));
+            if line.far_end.write_all(&[byte, byte.wrapping_mul(7), 0]).is_err() {
+                return;
+            }
+        }
+    });
+    capture_fails(&name, &["no answer", &name, "broken frames came", "right port"]);
+}
+
+/// Answers every request as a board does that speaks protocol 2 to 3 only.
+fn board_of_the_future(mut line: Line) {
+    let mut decoder = Decoder::new();
+    let mut bytes = [0; 64];
+    while let Ok(count) = line.far_end.read(&mut bytes).or_else(|error| match error.kind() {
+        std::io::ErrorKind::TimedOut => Ok(0),
+        _ => Err(error),
+    }) {
+        for byte in &bytes[..count] {
+            let Some(Ok(packet)) = decoder.push(*byte) else { continue };
+            let header = Header { kind: Kind::Error, ..packet.header };
+            let answer = encode(header, &RequestError::Version { min: 2, current: 3 }).expect("it fits");
+            line.far_end.write_all(&answer).expect("a line");
+        }
+    }
+}
+
+#[test]
+fn a_board_of_another_protocol_version_is_told_with_both_versions() {
+    let line = Line::new();
+    let name = line.name();
+    std::thread::spawn(move || board_of_the_future(line));
+    let phrases = ["the board speaks protocol 2 to 3, this program 1 to 1", "use a newer farnear"];
+    fails(&mut farnear(&["rig", "info", "--port", &name]), 1, &phrases);
+    capture_fails(&name, &phrases);
+}
+
+#[test]
+fn a_camera_that_is_none_is_named_before_anything_moves() {
+    let folder = Folder::new();
+    let out = folder.text("out");
+    for (camera, phrases) in [
+        ("webcam", vec!["unknown camera \"webcam\"", "folder:DIR"]),
+        ("folder:/farnear-absent", vec!["/farnear-absent", "No such file"]),
+        ("sim", vec!["--camera sim belongs to --port sim"]),
+        ("127.0.0.1:1", vec!["127.0.0.1:1", "refused"]),
+    ] {
+        // The port is absent as well: it would be the one that is named if it were looked at first.
+        let capture = ["rig", "capture", "--port", "/dev/farnear-absent", "--camera", camera];
+        fails(farnear(&capture).args(["--optics", rig_optics(), "--out", &out]), 1, &phrases);
+        assert_eq!(folder.listing(), Vec::<String>::new());
+    }
+}

@@ -1,0 +1,172 @@
+//! The emulated rig missing in whole or in part, or going away, or on a bad line.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Read},
+    process::{Child, Command, Stdio},
+};
+
+use assert_cmd::Command as Assert;
+use serde_json::Value;
+
+use crate::common::{Folder, SIM, beside, fails, farnear, has_emulated_rig, rig_optics, succeeds};
+
+/// A copy of the program alone in a folder, with nothing on its PATH.
+fn alone(folder: &Folder) -> Assert {
+    let copy = folder.path("farnear");
+    fs::copy(env!("CARGO_BIN_EXE_farnear"), &copy).expect("a copy");
+    let mut command = Assert::new(copy);
+    command.env("PATH", "").env_remove("FARNEAR_FIRMWARE");
+    command.args(["rig", "capture", "--port", "sim", "--optics", rig_optics(), "--out", &folder.text("out")]);
+    command
+}
+
+#[test]
+fn a_missing_simulator_is_named_with_what_to_do() {
+    let folder = Folder::new();
+    fails(
+        &mut alone(&folder),
+        1,
+        &["farnear-sim is neither beside this program nor on the PATH", "cargo xtask"],
+    );
+    assert_eq!(folder.listing(), ["farnear"]);
+}
+
+#[test]
+fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    fs::copy(beside(SIM), folder.path(SIM)).expect("a copy");
+    let mut command = alone(&folder);
+    let elf = "farnear-nucleo-f429zi.elf";
+    fails(&mut command, 1, &["no firmware at", elf, "cargo xtask firmware", "--firmware"]);
+    assert_eq!(folder.listing(), ["farnear", SIM]);
+    for (content, reason) in
+        [("", "empty or cut short"), ("not a program", "no ELF"), ("\x7fELF", "cannot be loaded")]
+    {
+        folder.file(elf, content);
+        fails(&mut command, 1, &[elf, "cannot be loaded", reason]);
+        assert_eq!(folder.listing(), ["farnear", elf, SIM]);
+    }
+}
+
+#[test]
+fn what_the_simulator_refuses_is_passed_on() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    let typo = folder.file("faults.toml", "bit_eror_rate = 0.1");
+    for (arguments, phrases) in [
+        (["--scene", "cube"], ["cube", "farnear-sim ended at once"]),
+        (["--noise", "9bit"], ["9bit", "farnear-sim ended at once"]),
+        (["--faults", &typo], ["bit_eror_rate", "farnear-sim ended at once"]),
+    ] {
+        fails(farnear(&["rig", "info", "--port", "sim"]).args(arguments), 1, &phrases);
+    }
+}
+
+/// A capture on the emulated rig with these faults of the line.
+fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
+    let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
+    command.args(["--out", &folder.text(out)]);
+    if let Some(faults) = faults {
+        command.args(["--faults", &folder.file("faults.toml", faults)]);
+    }
+    command
+}
+
+#[test]
+fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    // Homing takes some 2 s of the board's time, both exposures lie at 2.76 s and 2.78 s.
+    for milliseconds in [300, 2_770] {
+        let faults = format!("unplug_after_ms = {milliseconds}");
+        fails(&mut capture(&folder, Some(&faults), "out"), 1, &["went away while", "check its cable"]);
+        assert_eq!(folder.listing(), ["faults.toml"]);
+    }
+}
+
+/// A line of the simulator's or the program's output that contains `phrase`.
+fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
+    let mut line = String::new();
+    while !line.contains(phrase) {
+        line.clear();
+        assert!(output.read_line(&mut line).expect("text") > 0, "it ended without {phrase:?}");
+    }
+    line
+}
+
+/// Ends the child, should the test fail.
+struct Reaped(Child);
+
+impl Drop for Reaped {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    let mut command = Command::new(beside(SIM));
+    command.args(["run", "--optics", rig_optics()]).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut simulator = Reaped(command.spawn().expect("farnear-sim starts"));
+    let output = simulator.0.stdout.take().expect("its output");
+    let line = wait_for(&mut BufReader::new(output), "port");
+    let address: Value = serde_json::from_str(&line).expect("one line of JSON");
+    let text = |key: &str| address[key].as_str().expect("an address").to_string();
+
+    let mut command = Command::new(env!("CARGO_BIN_EXE_farnear"));
+    command.args(["rig", "capture", "--port", &text("port"), "--camera", &text("camera")]);
+    command.args(["--optics", rig_optics(), "--out", &folder.text("out")]).stderr(Stdio::piped());
+    let mut program = Reaped(command.spawn().expect("farnear starts"));
+    let mut said = BufReader::new(program.0.stderr.take().expect("its messages"));
+    wait_for(&mut said, "homing");
+    simulator.0.kill().expect("it was running");
+    let mut rest = String::new();
+    said.read_to_string(&mut rest).expect("text");
+    let status = program.0.wait().expect("it ends");
+    assert_eq!(status.code(), Some(1), "{rest}");
+    assert!(rest.contains("went away while homing") && rest.contains(&text("port")), "{rest}");
+    assert_eq!(folder.listing(), Vec::<String>::new());
+}
+
+#[test]
+fn a_bad_line_changes_nothing_or_fails_cleanly() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    succeeds(&mut capture(&folder, None, "clean"));
+    let images = |name: &str| {
+        ["far.png", "near.png"]
+            .map(|file| fs::read(folder.path(&format!("{name}/{file}"))).expect("an image"))
+    };
+    // A stranger's frame, half a frame, delimiters: as from a terminal that was left open.
+    succeeds(&mut capture(&folder, Some("garbage = [3, 255, 0, 66, 17, 0, 0, 9]"), "garbage"));
+    assert!(images("clean") == images("garbage"));
+    let record = |name: &str| fs::read(folder.path(&format!("{name}/capture.toml"))).expect("a record");
+    assert!(record("clean") == record("garbage"));
+
+    let before = folder.listing();
+    let output = capture(&folder, Some("bit_error_rate = 1e-4"), "noisy").output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    match output.status.code() {
+        Some(0) => assert!(images("clean") == images("noisy"), "a capture over a bad line differs"),
+        Some(1) => {
+            assert!(said.contains("farnear: "), "{said}");
+            assert_eq!(folder.listing(), before);
+        }
+        other => panic!("{other:?}: {said}"),
+    }
+}

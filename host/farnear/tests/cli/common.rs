@@ -1,0 +1,134 @@
+//! Running the program, and what is looked at afterwards.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// The program, with a cache of its own instead of the user's.
+pub fn farnear(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_farnear"));
+    command.env("XDG_CACHE_HOME", concat!(env!("CARGO_TARGET_TMPDIR"), "/cache")).args(arguments);
+    command
+}
+
+/// The optics of the rig in docs/: 933 to 886.81 mm, Gaussian.
+pub fn rig_optics() -> &'static str {
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/rig.toml")
+}
+
+/// A folder for one test.
+pub struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// A path as an argument.
+    pub fn text(&self, name: &str) -> String {
+        self.path(name).to_str().expect("temporary folders have plain names").into()
+    }
+
+    /// Writes a file and gives its path as an argument.
+    pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        fs::write(self.path(name), content).expect("a writable folder");
+        self.text(name)
+    }
+
+    /// Everything below the folder, hidden files too.
+    pub fn listing(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        list(self.0.path(), "", &mut names);
+        names.sort();
+        names
+    }
+}
+
+fn list(folder: &Path, before: &str, names: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let entry = entry.expect("an entry");
+        let name = format!("{before}{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() {
+            list(&entry.path(), &format!("{name}/"), names);
+        }
+        names.push(name);
+    }
+}
+
+/// Runs a program that must fail with this exit code, say all of `phrases` on stderr in a few lines and nothing on
+/// stdout. Gives what it said.
+#[track_caller]
+pub fn fails(command: &mut Command, code: i32, phrases: &[&str]) -> String {
+    let output = command.output().expect("the program starts");
+    let said = String::from_utf8(output.stderr).expect("messages are UTF-8");
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    for phrase in phrases {
+        assert!(said.contains(phrase), "{phrase:?} is not in: {said}");
+    }
+    assert!(!said.contains("panicked") && !said.contains("backtrace"), "{said}");
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "", "figures of a failure");
+    said
+}
+
+/// Runs a program that must succeed; gives its stdout and stderr.
+#[track_caller]
+pub fn succeeds(command: &mut Command) -> (String, String) {
+    let output = command.output().expect("the program starts");
+    let [stdout, stderr] =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("UTF-8"));
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    (stdout, stderr)
+}
+
+/// Runs a program whose stdout is one JSON object and nothing else.
+#[track_caller]
+pub fn figures(command: &mut Command) -> Value {
+    let (stdout, _) = succeeds(command);
+    let value: Value = serde_json::from_str(&stdout).unwrap_or_else(|error| panic!("{error}: {stdout}"));
+    assert!(value.is_object() && stdout.lines().count() == 1, "{stdout}");
+    value
+}
+
+/// A number among figures.
+#[track_caller]
+pub fn number(figures: &Value, key: &str) -> f64 {
+    figures[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {figures}"))
+}
+
+/// Renders a noisy 8-bit pair of 320 x 240 pixels into `name`: small, because it is rendered often.
+#[track_caller]
+pub fn render(folder: &Folder, scene: &str, name: &str) {
+    let out = folder.text(name);
+    let size = ["--width", "320", "--height", "240"];
+    succeeds(farnear(&["render", "--scene", scene, "--optics", rig_optics(), "--out", &out]).args(size));
+}
+
+/// Whether the emulated rig can be started; says so where not. With `FARNEAR_REQUIRE_SIM=1` it must be there.
+pub fn has_emulated_rig() -> bool {
+    let firmware = env::var_os("FARNEAR_FIRMWARE").map_or_else(|| beside(FIRMWARE), PathBuf::from);
+    for needed in [beside(SIM), firmware] {
+        if !needed.is_file() {
+            assert!(env::var_os("FARNEAR_REQUIRE_SIM").is_none(), "{} is missing", needed.display());
+            println!("skipped: farnear-sim not built ({} is missing)", needed.display());
+            return false;
+        }
+    }
+    true
+}
+
+/// Name of the emulated rig's program.
+pub const SIM: &str = "farnear-sim";
+const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
+
+/// A file in the folder in which the programs are built.
+pub fn beside(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_BIN_EXE_farnear")).with_file_name(name)
+}

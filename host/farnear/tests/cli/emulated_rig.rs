@@ -1,0 +1,107 @@
+//! The rig's commands on the emulated rig.
+
+use std::fs;
+
+use crate::common::{Folder, fails, farnear, figures, has_emulated_rig, number, rig_optics, succeeds};
+
+fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
+    let mut command = farnear(&["rig"]);
+    command.args(arguments).args(["--port", "sim"]);
+    command
+}
+
+#[test]
+fn info_says_who_is_there_and_that_it_is_emulated() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let mut command = on_the_rig(&["info", "--json"]);
+    let info = figures(&mut command);
+    assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &1.into(), &1.into()));
+    assert_eq!(info["board"], "nucleo-f429zi");
+    assert_eq!(info["coarse"]["state"], "unknown");
+    let (_, said) = succeeds(&mut on_the_rig(&["info"]));
+    assert!(said.contains("starting the emulated rig") && said.contains("no hardware"), "{said}");
+}
+
+#[test]
+fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let homed = figures(&mut on_the_rig(&["home", "--json"]));
+    assert!(homed["shift_um"].is_number(), "{homed}");
+    let coarse = ["move", "--axis", "coarse", "--to-um", "123.5"];
+    fails(&mut on_the_rig(&coarse), 1, &["refused", "123.500 um", "home it first"]);
+    let moved = figures(on_the_rig(&coarse).args(["--home", "--json"]));
+    // A step is 0.15625 um; the encoder counts 0.125 um.
+    assert!((number(&moved, "measured_um") - 123.5).abs() < 0.3, "{moved}");
+    let fine = figures(&mut on_the_rig(&["move", "--axis", "fine", "--to-um", "50", "--json"]));
+    assert!((number(&fine, "measured_um") - 50.0).abs() <= 0.05, "{fine}");
+    let beyond = ["move", "--axis", "fine", "--to-um", "500"];
+    fails(&mut on_the_rig(&beyond), 1, &["refused", "500.000 um", "5.000 to 195.000 um"]);
+    let below = ["move", "--axis", "fine", "--to-um", "-1"];
+    fails(&mut on_the_rig(&below), 1, &["-1.000 um", "5.000 to 195.000 um"]);
+    fails(&mut on_the_rig(&["move", "--axis", "fine", "--to-um", "1e9"]), 1, &["is no position"]);
+    succeeds(&mut on_the_rig(&["stop"]));
+}
+
+/// What the images, the record and the maps of a capture folder hold.
+fn content(folder: &Folder, name: &str) -> Vec<(String, Vec<u8>)> {
+    let names = folder.listing().into_iter().filter_map(|file| Some(file.strip_prefix(name)?.to_string()));
+    let files = names.filter(|file| file.len() > 1);
+    files
+        .map(|file| (file.clone(), fs::read(folder.path(&format!("{name}{file}"))).expect("a file")))
+        .collect()
+}
+
+#[test]
+fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    let mut maps = Vec::new();
+    for (name, seed) in [("a", "1"), ("b", "1"), ("c", "2")] {
+        let out = folder.text(name);
+        let capture = ["capture", "--optics", rig_optics(), "--seed", seed, "--out", &out, "--json"];
+        let figures = figures(&mut on_the_rig(&capture));
+        assert!(number(&figures, "pair_ms") <= 60.0, "{figures}");
+        let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("{name}/{file}")));
+        // Without --out the maps go into the capture's own folder.
+        succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--median", "5"]));
+        maps.push(content(&folder, name));
+    }
+    let names: Vec<_> = maps[0].iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "/capture.toml",
+            "/confidence.npy",
+            "/depth.npy",
+            "/depth.png",
+            "/depth.tiff",
+            "/depth.toml",
+            "/far.png",
+            "/mesh.ply",
+            "/near.png",
+            "/view.png"
+        ]
+    );
+    assert!(maps[0] == maps[1], "one seed gives two captures");
+    assert!(maps[0] != maps[2], "two seeds give one capture");
+    let record = String::from_utf8(maps[0][0].1.clone()).expect("text");
+    for private in ["/dev/", "127.0.0.1", "time =", folder.path("").to_str().expect("a plain name")] {
+        assert!(!record.contains(private), "{private} in {record}");
+    }
+
+    let again = ["capture", "--optics", rig_optics(), "--out", &folder.text("a")];
+    fails(&mut on_the_rig(&again), 1, &["exists already and is not empty"]);
+
+    let scene = folder.text("scene");
+    succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
+    let (map, truth) = (folder.text("a/depth.npy"), format!("{scene}/truth.npy"));
+    let compared = figures(&mut farnear(&["compare", &map, &truth, "--away-from-edges", "8", "--json"]));
+    // The project's promise for the noisy 8-bit staircase.
+    assert!(number(&compared, "rmse_mm") <= 0.75, "{compared}");
+}

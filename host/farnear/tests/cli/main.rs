@@ -1,0 +1,11 @@
+//! The program as its users meet it: what it prints, what it writes, how it ends.
+
+mod common;
+
+mod bad_images;
+mod bad_optics;
+mod bad_ports;
+mod bad_rigs;
+mod emulated_rig;
+mod maps;
+mod usage;

@@ -1,0 +1,161 @@
+//! Help, bad usage and where figures go.
+
+use std::{fs, fs::File, process::Stdio};
+
+use crate::common::{Folder, fails, farnear, figures, rig_optics, succeeds};
+
+/// Every command and its subcommands.
+const COMMANDS: &[&[&str]] = &[
+    &["optics"],
+    &["operators"],
+    &["depth"],
+    &["compare"],
+    &["render"],
+    &["rig"],
+    &["rig", "info"],
+    &["rig", "home"],
+    &["rig", "move"],
+    &["rig", "stop"],
+    &["rig", "capture"],
+    &["shadow"],
+    &["shadow", "score"],
+    &["silhouettes"],
+    &["silhouettes", "video"],
+    &["completions"],
+];
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let (help, _) = succeeds(&mut farnear(&["--help"]));
+    assert!(help.contains("Example: farnear "), "{help}");
+    for command in COMMANDS {
+        let (help, _) = succeeds(farnear(command).arg("--help"));
+        assert!(help.contains("Example: farnear ") && help.contains(&command.join(" ")), "{help}");
+    }
+    for folder in [&[] as &[&str], &["rig"], &["shadow"], &["silhouettes"]] {
+        let (help, _) = succeeds(farnear(folder).arg("--help"));
+        let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+        for line in listed.take_while(|line| !line.is_empty()) {
+            let name = line.split_whitespace().next().unwrap_or_default();
+            let known = COMMANDS.iter().any(|command| command.last() == Some(&name));
+            assert!(known || name == "help", "{name} is not in this test's list");
+        }
+    }
+}
+
+#[test]
+fn bad_usage_ends_with_2() {
+    let optics = rig_optics();
+    for (arguments, phrases) in [
+        (vec![], vec!["Usage: farnear"]),
+        (vec!["rig"], vec!["Usage: farnear rig"]),
+        (vec!["dept"], vec!["dept", "depth"]),
+        (vec!["optics"], vec!["--optics <FILE>"]),
+        (vec!["depth", "a.png", "--optics", optics], vec!["<NEAR>"]),
+        (
+            vec!["depth", "a.png", "b.png", "--optics", optics, "--smooth", "4"],
+            vec!["--smooth", "'4'", "odd", "63"],
+        ),
+        (
+            vec!["depth", "a.png", "b.png", "--optics", optics, "--median", "9"],
+            vec!["--median", "'9'", "1 to 7"],
+        ),
+        (vec!["depth", "a.png", "b.png", "--optics", optics, "--smooth", "-3"], vec!["'-3'"]),
+        (vec!["operators", "--optics", optics, "--psf", "airy"], vec!["airy", "gaussian"]),
+        (vec!["operators", "--optics", optics, "--family", "grow"], vec!["grow", "ggro"]),
+        (vec!["operators", "--optics", optics, "--design", "cubic"], vec!["cubic", "linear"]),
+        (vec!["render", "--optics", optics, "--out", "x", "--scene", "cube"], vec!["cube", "staircase"]),
+        (vec!["render", "--optics", optics, "--out", "x", "--noise", "9bit"], vec!["9bit", "12bit"]),
+        (vec!["rig", "info"], vec!["--port"]),
+        (vec!["rig", "move", "--port", "sim", "--axis", "lens", "--to-um", "1"], vec!["lens", "coarse"]),
+        (vec!["completions", "cmd"], vec!["cmd", "bash"]),
+    ] {
+        fails(&mut farnear(&arguments), 2, &phrases);
+    }
+}
+
+#[test]
+fn figures_are_json_on_stdout_and_text_without_the_flag() {
+    let optics = ["optics", "--optics", rig_optics()];
+    let json = figures(farnear(&optics).arg("--json"));
+    let (text, _) = succeeds(&mut farnear(&optics));
+    let keys: Vec<_> = json.as_object().expect("an object").keys().collect();
+    assert_eq!(text.lines().count(), keys.len());
+    assert!(keys.iter().all(|key| text.contains(&format!("{key} = "))), "{text}");
+}
+
+#[test]
+fn completions_name_the_commands() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let (script, _) = succeeds(&mut farnear(&["completions", shell]));
+        assert!(script.contains("farnear") && script.contains("capture"), "{shell}: {script}");
+    }
+}
+
+/// A reader that has gone is a failure with a message, not a panic.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_stdout_that_takes_nothing_is_a_failure() {
+    for arguments in [vec!["optics", "--optics", rig_optics()], vec!["completions", "bash"]] {
+        let full = File::options().write(true).open("/dev/full").expect("Linux has /dev/full");
+        let child = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"))
+            .args(&arguments)
+            .stdout(full)
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let output = child.wait_with_output().expect("it ends");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("cannot write to the standard output"), "{said}");
+    }
+}
+
+#[test]
+fn operators_are_named_or_read_or_refused() {
+    let folder = Folder::new();
+    let saved = folder.text("operators.toml");
+    let design = ["operators", "--optics", rig_optics(), "--psf", "gaussian:k=0.4578", "--family", "gro"];
+    let json = figures(farnear(&design).args(["--design", "linear", "--out", &saved, "--json"]));
+    assert!(json["nir_rms"].as_f64() < Some(0.1) && json["seconds"].is_number(), "{json}");
+
+    let wrong = ["operators", "--optics", rig_optics(), "--family", "watanabe"];
+    fails(&mut farnear(&wrong), 1, &["watanabe", "pillbox", "gaussian"]);
+    let [far, near] = ["far.png", "near.png"].map(|name| folder.text(name));
+    crate::common::render(&folder, "cone", "cone");
+    for name in ["far.png", "near.png"] {
+        fs::copy(folder.path(&format!("cone/{name}")), folder.path(name)).expect("a copy");
+    }
+    let depth = |operators: &str, out: &str| {
+        let mut command = farnear(&["depth", &far, &near, "--optics", rig_optics()]);
+        command.args(["--operators", operators, "--out", &folder.text(out)]);
+        command
+    };
+    succeeds(&mut depth(&saved, "saved"));
+    succeeds(&mut depth("gro:linear", "named"));
+    succeeds(&mut farnear(&[
+        "depth",
+        &far,
+        &near,
+        "--optics",
+        rig_optics(),
+        "--out",
+        &folder.text("default"),
+    ]));
+    let map = |name: &str| fs::read(folder.path(&format!("{name}/depth.npy"))).expect("a map");
+    assert!(map("saved") == map("named") && map("named") == map("default"));
+
+    let before = folder.listing();
+    let empty = folder.file("empty.toml", "");
+    for (operators, phrases) in [
+        ("gro:cubic", ["cubic", "linear"]),
+        ("watanabe:linear", ["watanabe", "pillbox"]),
+        ("absent.toml", ["absent.toml", "gro:linear"]),
+        (&empty, ["empty.toml", "is empty"]),
+        (rig_optics(), ["rig.toml", "holds no operators"]),
+    ] {
+        fails(&mut depth(operators, "new"), 1, &phrases);
+    }
+    fs::remove_file(empty).expect("the file");
+    assert_eq!(folder.listing(), before);
+}
