@@ -1,4 +1,4 @@
-//! Leave-one-subject-out on skeleton data sets dressed with capsules:
+//! Leave-one-subject-out on skeleton data sets dressed with capsules, or on 21 synthetic people (`synthetic -`):
 //! `cargo run --release --example evaluate_skeletons -- utkinect FILE.mat [thesis|order-free|ordered]...`
 
 use farnear_activity::embedding::descriptor::Scaling;
@@ -6,19 +6,26 @@ use farnear_activity::evaluation::leave_one_out::{Experiment, leave_one_subject_
 use farnear_activity::evaluation::skeleton_clips::{florence, utkinect};
 use farnear_activity::recognition::frames::Mode;
 use farnear_activity::recognition::space::SpaceSettings;
+use farnear_activity::synthetic::activities::clips as synthetic;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [set, path, methods @ ..] = arguments.as_slice() else {
         return Err(
-            "usage: evaluate_skeletons utkinect|florence FILE.mat [thesis|order-free|ordered]...".into()
+            "usage: evaluate_skeletons utkinect|florence|synthetic FILE.mat|- [thesis|order-free|ordered]..."
+                .into(),
         );
     };
     let start = Instant::now();
-    let bytes = std::fs::read(path)?;
-    let scaling = if std::env::var("STRETCH").is_ok() { Scaling::Stretch } else { Scaling::KeepAspect };
-    let clips = if set == "florence" { florence(&bytes, 4, scaling)? } else { utkinect(&bytes, 4, scaling)? };
+    let bytes = if set == "synthetic" { Vec::new() } else { std::fs::read(path)? };
+    let scaling = Scaling::default();
+    let clips = match set.as_str() {
+        "utkinect" => utkinect(&bytes, 4, scaling)?,
+        "florence" => florence(&bytes, 4, scaling)?,
+        "synthetic" => synthetic(21, 4, 8.0, scaling),
+        other => return Err(format!("unknown set `{other}`").into()),
+    };
     println!("{} clips described in {:.1} s", clips.len(), start.elapsed().as_secs_f64());
     for method in methods {
         let start = Instant::now();

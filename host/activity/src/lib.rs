@@ -7,12 +7,13 @@
 //! |---|---|
 //! | [`sun`] | where the sun is (PSA+, Astronomical Almanac, the thesis' form, NREL SPA) |
 //! | [`shadow`] | where a person's shadow falls in the image, how sure that is, and cutting it off |
-//! | [`background`] | what moves in a video: an adaptive Gaussian mixture per pixel, with a shadow test |
-//! | [`mask`] | masks cleaned, regions found, the subject chosen, flagged and centred |
-//! | [`shadow_detectors`] | shadow told from the pictures alone, five ways |
-//! | [`shadow_score`] | how much shadow was taken off, and how much of the subject with it |
+//! | [`shadow_detectors`], [`shadow_score`] | shadows by colour and texture, and how well any removal did |
+//! | [`background`], [`mask`] | masks from video |
+//! | [`silhouette`] | silhouettes from markers and joints in space, any view |
+//! | [`readers`] | C3D, TRC, CSV, MATLAB skeletons |
 //! | [`embedding`] | centroid distance, Isomap and landmark Isomap, PCA, the RBF map |
-//! | [`silhouette`] | silhouettes from bodies in space |
+//! | [`recognition`] | patterns, classifiers, models, live answers |
+//! | [`evaluation`] | leave-one-subject-out, confusion, intervals |
 //! | [`synthetic`] | seeded people and scenes |
 //!
 //! Masks are `Array2<bool>` of shape (height, width), row 0 at the top.

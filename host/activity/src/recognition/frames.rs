@@ -4,8 +4,8 @@
 //! - Relative point: the same against the clip's mean, which takes a person's build out.
 //! - Box: height and width over the clip's largest height, centroid against the clip's mean over the same. The 100 x 100
 //!   normalisation throws these away. All are the same when frames are shuffled.
-//! - Motion: difference over a time that is a fixed share of nothing but frames, over the clip's RMS difference: its direction and relative
-//!   size stay when the whole clip runs slower or faster.
+//! - Motion: central difference over two frames either way, over the clip's RMS difference: its direction and relative size stay
+//!   when the whole clip runs slower or faster.
 
 use super::clip::{BOX_NUMBERS, Track};
 use ndarray::{Array2, ArrayView2, Axis, s};
@@ -46,7 +46,7 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { relative_weight: 0.7, box_weight: 3.0, motion_weight: 0.7 }
+        Self { relative_weight: 1.0, box_weight: 6.0, motion_weight: 0.7 }
     }
 }
 

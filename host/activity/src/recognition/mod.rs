@@ -5,6 +5,8 @@ pub mod clip;
 pub mod codebook;
 pub mod frames;
 pub mod knn;
+pub mod live;
+pub mod model;
 pub mod occupancy;
 pub mod space;
 pub mod svc;

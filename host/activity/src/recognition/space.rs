@@ -35,6 +35,10 @@ pub enum PatternKind {
 }
 
 /// Everything that is chosen before patterns exist.
+///
+/// The default lays frames out by twenty principal components: with the codebook they recognise more than Isomap does (UTKinect
+/// order-free, one view / four: 77 / 85 % against 70 / 84 % in six Isomap dimensions) and need no neighbour graph.
+/// [`SpaceSettings::thesis`] keeps Isomap.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSettings {
     /// How the gallery is laid out.
@@ -60,8 +64,8 @@ pub struct SpaceSettings {
 impl Default for SpaceSettings {
     fn default() -> Self {
         Self {
-            layout: Layout::Isomap(12),
-            dimensions: 6,
+            layout: Layout::Pca,
+            dimensions: 20,
             gallery: 1500,
             gamma: 0.1,
             ridge: 1e-3,
@@ -76,7 +80,12 @@ impl Default for SpaceSettings {
 impl SpaceSettings {
     /// The thesis' choices: three dimensions, 15 x 9 x 9 cells.
     pub fn thesis() -> Self {
-        Self { dimensions: 3, pattern: PatternKind::Thesis(vec![15, 9, 9]), ..Self::default() }
+        Self {
+            layout: Layout::Isomap(12),
+            dimensions: 3,
+            pattern: PatternKind::Thesis(vec![15, 9, 9]),
+            ..Self::default()
+        }
     }
 }
 

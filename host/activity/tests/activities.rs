@@ -1,0 +1,123 @@
+//! Recognition through the public face: synthetic people, order, speed, damage, models and live use.
+
+use farnear_activity::embedding::descriptor::Scaling;
+use farnear_activity::evaluation::leave_one_out::{Experiment, leave_one_subject_out};
+use farnear_activity::mask::Mask;
+use farnear_activity::recognition::classifier::ClassifierKind;
+use farnear_activity::recognition::clip::Clip;
+use farnear_activity::recognition::frames::Mode;
+use farnear_activity::recognition::live::{Live, windows};
+use farnear_activity::recognition::model::{ModelError, Recogniser, RecogniserSettings};
+use farnear_activity::recognition::space::{PatternKind, SpaceSettings};
+use farnear_activity::silhouette::view::{Canvas, draw, extent, views_round};
+use farnear_activity::synthetic::activities::{clips, performance};
+
+/// A small space: enough to recognise, quick to train.
+fn small(mode: Mode) -> SpaceSettings {
+    SpaceSettings { gallery: 500, pattern: PatternKind::Codebook(80), mode, ..SpaceSettings::default() }
+}
+
+fn experiment(mode: Mode) -> Experiment {
+    Experiment {
+        sharpness: vec![2.0],
+        classifiers: vec![ClassifierKind::Svc(5.0)],
+        ..Experiment::codebook(small(mode))
+    }
+}
+
+#[test]
+fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
+    let people = clips(6, 1, 8.0, Scaling::KeepAspect);
+    let right = |mode: Mode, change: fn(&Clip) -> Clip| {
+        leave_one_subject_out(&people, &experiment(mode), change).expect("an outcome").each.accuracy()
+    };
+    let plain = right(Mode::OrderFree, Clone::clone);
+    let shuffled = right(Mode::OrderFree, |clip| {
+        clip.select(|n| (0..n).map(|i| (i * 7919 + 3) % n).collect::<Vec<_>>())
+    });
+    let reversed = right(Mode::OrderFree, |clip| clip.select(|n| (0..n).rev().collect()));
+    let slow = right(Mode::OrderFree, |clip| clip.select(|n| (0..2 * n).map(|i| i / 2).collect()));
+    println!("plain {plain:.3}, shuffled {shuffled:.3}, reversed {reversed:.3}, half speed {slow:.3}");
+    assert!(plain > 0.75, "{plain}");
+    assert_eq!(plain, reversed, "reversing changes nothing");
+    assert!((plain - slow).abs() <= 0.05, "{plain} {slow}");
+    let ordered = right(Mode::Ordered, Clone::clone);
+    assert!(ordered > 0.75, "{ordered}");
+    assert!((shuffled - plain).abs() < 0.2);
+}
+
+fn trained() -> (Vec<Clip>, Recogniser) {
+    let people = clips(4, 1, 8.0, Scaling::KeepAspect);
+    let settings = RecogniserSettings { space: small(Mode::OrderFree), ..RecogniserSettings::default() };
+    let recogniser = Recogniser::train(&people, &settings).expect("trained");
+    (people, recogniser)
+}
+
+#[test]
+fn models_come_back_from_bytes_and_damage_is_refused() {
+    let (people, recogniser) = trained();
+    let bytes = recogniser.to_bytes().expect("encoded");
+    let back = Recogniser::from_bytes(&bytes).expect("decoded");
+    for clip in people.iter().take(12) {
+        let (a, b) =
+            (recogniser.recognise(&clip.views).expect("fits"), back.recognise(&clip.views).expect("fits"));
+        assert_eq!(a, b);
+    }
+    let mut damaged = bytes.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    assert!(matches!(Recogniser::from_bytes(&damaged), Err(ModelError::Checksum { .. })));
+    assert!(Recogniser::from_bytes(&bytes[..bytes.len() - 1]).is_err());
+    assert!(Recogniser::from_bytes(b"nonsense").is_err());
+    let mut newer = bytes.clone();
+    newer[12] = 9;
+    let error = Recogniser::from_bytes(&newer).expect_err("another descriptor");
+    assert!(error.to_string().contains("descriptor version 9"), "{error}");
+}
+
+#[test]
+fn clips_that_do_not_fit_are_refused_and_strange_ones_unknown() {
+    let (people, recogniser) = trained();
+    let mut cut_out = people[0].clone();
+    cut_out.views[0].boxes = None;
+    assert!(matches!(recogniser.recognise(&cut_out.views), Err(ModelError::Clip { found_boxes: false, .. })));
+    assert!(matches!(recogniser.recognise(&[]), Err(ModelError::Clip { found: 0, .. })));
+    let blank = vec![Mask::default((60, 60)); 20];
+    let nothing = farnear_activity::recognition::clip::Track::from_masks(&blank, Scaling::KeepAspect, true);
+    assert_eq!(nothing.empty_frames, 20);
+    assert_eq!(recogniser.recognise(&[nothing]).expect("an answer").activity, None);
+    // A lying slab that pulses is no person.
+    let slabs: Vec<Mask> = (0..20)
+        .map(|i| {
+            Mask::from_shape_fn((200, 300), |(y, x)| (90..100 + 3 * i).contains(&y) && (20..280).contains(&x))
+        })
+        .collect();
+    let slab = farnear_activity::recognition::clip::Track::from_masks(&slabs, Scaling::KeepAspect, true);
+    let answer = recogniser.recognise(&[slab]).expect("an answer");
+    assert_eq!(answer.activity, None, "{answer:?}");
+}
+
+#[test]
+fn live_answers_settle_on_what_is_done_and_windows_cover_a_recording() {
+    let (people, recogniser) = trained();
+    let digging = performance(1, 9, 0, 8.0);
+    let view = {
+        let mut view = views_round(1, 0.0)[0];
+        view.gamma_deg += 45.0;
+        view
+    };
+    let mut live = Live::new(&recogniser, 60, true);
+    let reach: Vec<_> = digging.iter().flat_map(|body| extent(body, &view)).collect();
+    let canvas = Canvas::fitting(&reach, 10.0, 2).expect("finite");
+    let mut last = None;
+    for body in &digging {
+        let answer = live.push(&[draw(body, &view, &canvas)]).expect("one view");
+        assert!((0.0..=1.0).contains(&answer.confidence));
+        last = answer.activity;
+    }
+    assert_eq!(last.as_deref(), Some("dig"));
+    assert!(live.push(&[]).is_err());
+    let track = &people[0].views;
+    let stretches = windows(&recogniser, track, 16, 8).expect("windows");
+    assert_eq!((stretches[0].from, stretches.last().map(|s| s.to)), (0, Some(track[0].frames())));
+}
