@@ -156,10 +156,17 @@ impl Nearest {
         self.least.fill(f32::INFINITY);
         self.index.fill(-1.0);
         for pattern in 0..ring.patterns {
+            let number = pattern as f32;
+            let keep = |residual: f32, least: &mut f32, index: &mut f32| {
+                let better = residual < *least;
+                *index = if better { number } else { *index };
+                *least = if better { residual } else { *least };
+            };
+            let columns = self.least.iter_mut().zip(&mut self.index);
             if ring.slots == 3 {
                 let (a, b, c) = (ring.sums(0, pattern), ring.sums(1, pattern), ring.sums(2, pattern));
-                for (((out, a), b), c) in self.residual.iter_mut().zip(a).zip(b).zip(c) {
-                    *out = a + b + c;
+                for ((((least, index), a), b), c) in columns.zip(a).zip(b).zip(c) {
+                    keep(a + b + c, least, index);
                 }
             } else {
                 self.residual.copy_from_slice(ring.sums(0, pattern));
@@ -168,12 +175,9 @@ impl Nearest {
                         *out += sum;
                     }
                 }
-            }
-            let number = pattern as f32;
-            for ((residual, least), index) in self.residual.iter().zip(&mut self.least).zip(&mut self.index) {
-                let better = residual < least;
-                *index = if better { number } else { *index };
-                *least = if better { *residual } else { *least };
+                for ((least, index), residual) in columns.zip(&self.residual) {
+                    keep(*residual, least, index);
+                }
             }
         }
     }
