@@ -23,7 +23,7 @@ pub struct Experiment {
     pub spaces: Vec<SpaceSettings>,
     /// Sharpness of the codebook's shares to choose from.
     pub sharpness: Vec<f32>,
-    /// Classifiers to choose from.
+    /// Classifiers to choose from. The first of everything is kept unless another is better by more than one standard error.
     pub classifiers: Vec<ClassifierKind>,
     /// Whether the training clips' mirrors train too (people are left- and right-handed).
     pub mirror: bool,
@@ -36,8 +36,8 @@ impl Experiment {
     pub fn codebook(space: SpaceSettings) -> Self {
         Self {
             spaces: vec![space],
-            sharpness: vec![1.0, 2.0, 4.0],
-            classifiers: vec![ClassifierKind::Svc(1.0), ClassifierKind::Svc(10.0)],
+            sharpness: vec![2.0, 1.0, 4.0],
+            classifiers: vec![ClassifierKind::Svc(5.0), ClassifierKind::Svc(1.0)],
             mirror: true,
             inner_folds: 4,
         }
@@ -185,13 +185,19 @@ fn one_fold(
             rows(&clips.iter().map(|views| joined(views, chosen_views)).collect::<Vec<_>>())
         };
         let mut best: Option<(u32, usize, ClassifierKind)> = None;
+        // The first candidate stays unless another is better by more than chance explains (the one-standard-error rule).
+        let mut first = 0;
         let single = candidates.len() * experiment.classifiers.len() == 1;
         for (index, candidate) in candidates.iter().enumerate() {
             let gram = if single { Array2::zeros((0, 0)) } else { products(&gathered(&candidate.train)) };
             for &kind in &experiment.classifiers {
                 let right =
                     if single { 0 } else { inner_right(&gram, &train_labels, &group, classes.len(), kind) };
-                if best.is_none_or(|(most, _, _)| right > most) {
+                if best.is_none_or(|(most, _, _)| right > most.max(first + doubt(first, train_labels.len())))
+                {
+                    if best.is_none() {
+                        first = right;
+                    }
                     best = Some((right, index, kind));
                 }
             }
@@ -211,6 +217,12 @@ fn one_fold(
         }
     }
     Ok(outcome)
+}
+
+/// Standard error of a count of right answers, rounded up.
+fn doubt(right: u32, of: usize) -> u32 {
+    let share = f64::from(right) / of.max(1) as f64;
+    (of as f64 * share * (1.0 - share)).max(0.0).sqrt().ceil() as u32
 }
 
 /// Products of all pairs of patterns.
