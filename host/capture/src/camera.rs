@@ -29,7 +29,8 @@ pub trait Camera {
     /// Makes ready for triggers: images from before do not count.
     fn arm(&mut self) -> Result<(), CameraError>;
 
-    /// The image of this exposure, waiting at most `wait` for it. Called once for each exposure, in order.
+    /// The image of this exposure, waiting at most `wait` for it. Called for each exposure, in order; after
+    /// [`CameraError::Late`] it may be called for the same exposure again.
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
 }
 

@@ -121,6 +121,11 @@ impl Client {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
+    /// The flag of [`Client::interrupt_by`].
+    pub(crate) fn interrupt_flag(&self) -> Option<Arc<AtomicBool>> {
+        self.interrupt.clone()
+    }
+
     /// Sends a request until its answer comes. `during` says what for, e.g. "homing". Gives the request's id,
     /// which events will name.
     pub fn request(&mut self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {

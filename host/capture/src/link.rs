@@ -69,10 +69,11 @@ impl Link {
         let begin = Instant::now();
         let (bytes, bad_frames) = (self.bytes, self.bad_frames);
         for (attempt, wait) in waits.iter().enumerate() {
-            if attempt > 0 {
-                self.send(&[0], *wait, during)?; // ends what the line has made of the last attempt
-            }
-            self.send(&frame, *wait, during)?;
+            // A delimiter in front ends what the line has made of the last attempt, or an earlier program has
+            // left of a frame. One write for both, so that an emulated board never sees the one alone.
+            let in_doubt = attempt > 0 || *request == Request::Hello;
+            let bytes = if in_doubt { [&[0], frame.as_slice()].concat() } else { frame.to_vec() };
+            self.send(&bytes, *wait, during)?;
             let until = Instant::now() + *wait;
             while let Some(packet) = self.receive(until, during)? {
                 match packet.header.kind {
@@ -117,8 +118,7 @@ impl Link {
         }
     }
 
-    /// Reads until the line is silent, so that no answer meant for an earlier program is taken for ours, and
-    /// ends the half frame that such a program may have left at the board.
+    /// Reads until the line is silent, so that no answer meant for an earlier program is taken for ours.
     pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
         self.transport.discard_input().map_err(|source| self.gone(source, during))?;
         let until = Instant::now() + QUIET_AT_MOST;
@@ -131,7 +131,7 @@ impl Link {
         }
         self.unread = 0..0;
         self.decoder = Decoder::new();
-        self.send(&[0], SEND_AT_LEAST, during)
+        Ok(())
     }
 
     fn send(&mut self, bytes: &[u8], wait: Duration, during: &str) -> Result<(), ClientError> {

@@ -1,6 +1,7 @@
 //! Taking a pair: home where needed, bring the coarse stage near, expose far and near by piezo.
 
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use farnear_protocol::message::{Axis, PositionState, Shot, ShotRecord};
 use farnear_protocol::units::{Micros, Nanometres};
@@ -11,6 +12,9 @@ use crate::describe::{state_name, um};
 use crate::error::ClientError;
 use crate::plan::{PlanError, SensorPair, approach_for, coarse_for, fine_for};
 use crate::work::Moved;
+
+/// Longest single wait for an image, so that an interruption by the user is seen soon.
+const SLICE: Duration = Duration::from_millis(200);
 
 /// How the exposures are taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -134,8 +138,9 @@ pub fn capture_pair(
     camera.arm()?;
     let mut asked = [sensor.far_mm, sensor.near_mm].into_iter();
     let mut taken = Vec::new();
+    let interrupt = client.interrupt_flag();
     client.run_program(&[shot(fine_far), shot(fine_near)], |record| -> Result<(), CaptureError> {
-        let image = camera.image(record, exposures.image_wait)?;
+        let image = wait_for_image(camera, record, exposures.image_wait, interrupt.as_deref())?;
         if let Some(sensor_asked_mm) = asked.next() {
             let measured = i64::from(limits.datum.0) + i64::from(record.coarse.0) + i64::from(record.fine.0);
             let sensor_measured_mm = measured as f64 / 1e6;
@@ -159,6 +164,30 @@ pub fn capture_pair(
         });
     }
     Ok(Pair { far, near, coarse })
+}
+
+fn wait_for_image(
+    camera: &mut dyn Camera,
+    record: &ShotRecord,
+    allowed: Duration,
+    interrupt: Option<&AtomicBool>,
+) -> Result<Image, CaptureError> {
+    let until = Instant::now() + allowed;
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        match camera.image(record, left.min(SLICE)) {
+            Err(CameraError::Late { camera, trigger_number, .. }) => {
+                if interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                    let during = "waiting for the camera's image".into();
+                    return Err(ClientError::Interrupted { during }.into());
+                }
+                if Instant::now() >= until {
+                    return Err(CameraError::Late { camera, trigger_number, waited: allowed }.into());
+                }
+            }
+            result => return Ok(result?),
+        }
+    }
 }
 
 /// Homes the coarse stage unless it is homed, and moves it, from the home side, to `target`.

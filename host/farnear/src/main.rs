@@ -62,7 +62,7 @@ fn main() -> ExitCode {
         // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
         Err(error) => {
             eprintln!("farnear: {}", message(&error));
-            ExitCode::FAILURE
+            if error.is::<report::Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }

@@ -1,9 +1,21 @@
-//! Figures on stdout: lines for people, one JSON object with `--json`.
+//! Figures on stdout: lines for people, one JSON object with `--json`; and the error that means bad usage.
 
 use std::io::Write;
 
 use anyhow::{Context, Result};
 use serde::Serialize;
+
+/// What was asked for contradicts itself: exit code 2, like what the argument parser refuses.
+#[derive(Debug)]
+pub struct Usage(pub String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
 
 /// Prints the fields of `figures`, in their order.
 pub fn print<T: Serialize>(figures: &T, json: bool) -> Result<()> {

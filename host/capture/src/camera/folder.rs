@@ -21,12 +21,14 @@ const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
 pub struct FolderCamera {
     folder: PathBuf,
     used: BTreeSet<PathBuf>,
+    /// The next image, while it may still be being written: its bytes, and since when they are the same.
+    candidate: Option<(PathBuf, Vec<u8>, Instant)>,
 }
 
 impl FolderCamera {
     /// Watches a folder, which must exist.
     pub fn watch(folder: &Path) -> Result<Self, CameraError> {
-        let mut camera = Self { folder: folder.into(), used: BTreeSet::new() };
+        let mut camera = Self { folder: folder.into(), used: BTreeSet::new(), candidate: None };
         camera.arm()?;
         Ok(camera)
     }
@@ -66,11 +68,10 @@ impl Camera for FolderCamera {
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         let until = Instant::now() + wait;
-        let mut before: Option<(PathBuf, Vec<u8>, Instant)> = None;
         loop {
             if let Some((_, path)) = self.fresh()?.into_iter().next() {
                 let bytes = fs::read(&path).unwrap_or_default();
-                match &before {
+                match &self.candidate {
                     // The same bytes twice: it is no longer being written (half a JPEG would decode, too).
                     Some((same, content, since)) if *same == path && *content == bytes => {
                         match decode_grey(&bytes) {
@@ -85,7 +86,7 @@ impl Camera for FolderCamera {
                             Err(_) => {}
                         }
                     }
-                    _ => before = Some((path, bytes, Instant::now())),
+                    _ => self.candidate = Some((path, bytes, Instant::now())),
                 }
             }
             if Instant::now() >= until {

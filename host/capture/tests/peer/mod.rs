@@ -5,6 +5,7 @@
 
 // Each test binary uses its own part.
 #![allow(dead_code)]
+#![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io;

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use farnear_capture::{
     aside::Aside,
-    image_file::{encode_png, read_grey},
+    image_file::{Samples, encode_png, read_grey},
     record::CAPTURE_FILE,
 };
 use farnear_depth::{
@@ -36,9 +36,9 @@ pub struct Arguments {
     far: PathBuf,
     /// The image focused on the near plane.
     near: PathBuf,
-    /// The optics file.
+    /// The optics file; without it what capture.toml or optics.toml beside the far image says.
     #[arg(long, value_name = "FILE")]
-    optics: PathBuf,
+    optics: Option<PathBuf>,
     /// Operators: a name such as gro:linear (family:design), or a file saved by `farnear operators`; without it they
     /// are designed for the optics.
     #[arg(long, value_name = "NAME|FILE")]
@@ -97,9 +97,8 @@ struct Sidecar<'a> {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let optics = files::optics::read(&arguments.optics)?;
-    let far = read_grey(&arguments.far)?.pixels;
-    let near = read_grey(&arguments.near)?.pixels;
+    let optics = files::optics::of_pair(arguments.optics.as_deref(), &arguments.far)?;
+    let [far, near] = read_pair(&arguments.far, &arguments.near)?;
     if far == near {
         bail!(
             "{} and {} hold the same image: depth needs one focused far and one focused near",
@@ -144,6 +143,21 @@ pub fn run(arguments: Arguments) -> Result<()> {
         warnings,
     };
     report::print(&figures, arguments.json)
+}
+
+/// The images' pixels, which must mean the same: integers of any depth share one scale, float files have their own.
+fn read_pair(far: &Path, near: &Path) -> Result<[Array2<f32>; 2]> {
+    let (far_image, near_image) = (read_grey(far)?, read_grey(near)?);
+    if (far_image.samples == Samples::Float) != (near_image.samples == Samples::Float) {
+        bail!(
+            "{} has {} pixels and {} {} ones: give both as integers or both as float",
+            far.display(),
+            far_image.samples,
+            near.display(),
+            near_image.samples
+        );
+    }
+    Ok([far_image.pixels, near_image.pixels])
 }
 
 /// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near:

@@ -5,18 +5,22 @@ mod info;
 mod motion;
 
 use std::{
-    path::PathBuf,
+    path::Path,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
 };
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 use farnear_capture::Client;
+use farnear_depth::psf::Psf;
 
-use crate::simulator::{Scenery, Simulator};
+use crate::{
+    report::Usage,
+    simulator::{Scenery, Simulator},
+};
 
 /// Drive a rig: who is there, home, move, stop, capture a pair.
 #[derive(Args)]
@@ -64,8 +68,12 @@ struct Connected {
 
 impl Target {
     /// Connects; an interruption by the user (Ctrl-C) stops what moves.
-    fn connect(&self, optics: Option<&PathBuf>) -> Result<Connected> {
-        let simulator = (self.port == "sim").then(|| Simulator::start(&self.scenery, optics)).transpose()?;
+    fn connect(&self, optics: Option<(&Path, Psf)>) -> Result<Connected> {
+        let emulated = self.port == "sim";
+        if let Some(flag) = self.scenery.given().filter(|_| !emulated) {
+            bail!(Usage(format!("{flag} goes with --port sim only; {} has a world of its own", self.port)));
+        }
+        let simulator = emulated.then(|| Simulator::start(&self.scenery, optics)).transpose()?;
         let mut client = match &simulator {
             Some(simulator) => Client::open_emulated(simulator.port())?,
             None => Client::open(&self.port)?,

@@ -10,8 +10,8 @@ use farnear_depth::{
 
 use super::cache;
 
-/// Operators for some optics: those that `asked` names (`family:design`, e.g. `gro:linear`, or a file saved by
-/// `farnear operators`), else the default ones.
+/// Operators for some optics: those that `asked` names (`family:design` or a family alone, e.g. `gro:linear` or
+/// `gro`, or a file saved by `farnear operators`), else the default ones.
 ///
 /// # Errors
 /// What is wrong with the name or the file, or why no operators can be designed.
@@ -31,7 +31,10 @@ pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
 
 /// The two halves of a name; `None` for what cannot be one.
 fn named(asked: &Path) -> Option<Result<(Family, Design), operators::DesignError>> {
-    let (family, design) = asked.to_str()?.split_once(':')?;
+    let text = asked.to_str()?;
+    let Some((family, design)) = text.split_once(':') else {
+        return text.parse().ok().map(|family| Ok((family, Design::default())));
+    };
     if family.contains(std::path::is_separator) || family.len() < 2 {
         return None; // a path, or the drive of one
     }
@@ -58,9 +61,10 @@ mod tests {
     fn names_are_told_from_paths() {
         let known = named(Path::new("gro:linear")).unwrap().unwrap();
         assert_eq!(known, (Family::Gro, Design::Linear));
+        assert_eq!(named(Path::new("gro")).unwrap().unwrap(), known);
         let wrong = named(Path::new("gor:linear")).unwrap().unwrap_err();
         assert!(wrong.to_string().contains("gro"), "{wrong}");
-        for path in ["operators.toml", "a/b:c", r"C:\operators.toml", "gro"] {
+        for path in ["operators.toml", "a/b:c", r"C:\operators.toml", "grow"] {
             assert!(named(Path::new(path)).is_none(), "{path}");
         }
     }

@@ -8,4 +8,5 @@ mod bad_ports;
 mod bad_rigs;
 mod emulated_rig;
 mod maps;
+mod scripted_board;
 mod usage;

@@ -67,6 +67,9 @@ fn bad_usage_ends_with_2() {
         (vec!["render", "--optics", optics, "--out", "x", "--scene", "cube"], vec!["cube", "staircase"]),
         (vec!["render", "--optics", optics, "--out", "x", "--noise", "9bit"], vec!["9bit", "12bit"]),
         (vec!["rig", "info"], vec!["--port"]),
+        (vec!["rig", "info", "--port", "sim", "--scene", "cube"], vec!["cube", "staircase"]),
+        (vec!["rig", "info", "--port", "sim", "--noise", "9bit"], vec!["9bit", "12bit"]),
+        (vec!["rig", "info", "--port", "/dev/x", "--seed", "2"], vec!["--seed goes with --port sim only"]),
         (vec!["rig", "move", "--port", "sim", "--axis", "lens", "--to-um", "1"], vec!["lens", "coarse"]),
         (vec!["completions", "cmd"], vec!["cmd", "bash"]),
     ] {

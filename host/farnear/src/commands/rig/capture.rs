@@ -14,7 +14,10 @@ use farnear_protocol::Micros;
 use serde::Serialize;
 
 use super::Target;
-use crate::{files, report};
+use crate::{
+    files,
+    report::{self, Usage},
+};
 
 /// Capture a far- and a near-focused image: homes where needed, brings the stage near, exposes both by piezo.
 ///
@@ -59,12 +62,13 @@ struct Figures {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let range = files::optics::read(&arguments.optics)?.working_range();
+    let optics = files::optics::read(&arguments.optics)?;
+    let range = optics.working_range();
     let table: toml::Table = files::optics::text(&arguments.optics)?.parse()?;
     // Before anything moves: a folder that cannot be written is known now.
     let folder = begin_folder(&arguments.out)?;
     let camera = early_camera(&arguments.camera, &arguments.target.port)?;
-    let mut rig = arguments.target.connect(Some(&arguments.optics))?;
+    let mut rig = arguments.target.connect(Some((&arguments.optics, optics.psf())))?;
     let mut camera = match (camera, &rig.simulator) {
         (Some(camera), _) => camera,
         (None, Some(simulator)) => Box::new(SimCamera::connect(simulator.camera())?),
@@ -82,7 +86,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         made_by: concat!("farnear ", env!("CARGO_PKG_VERSION")).into(),
         time: (!rig.client.hello().emulated).then(files::now_rfc3339).flatten(),
         camera: camera.kind(),
-        simulation: rig.simulator.as_ref().map(|_| arguments.target.scenery.record()),
+        simulation: rig.simulator.as_ref().map(|_| arguments.target.scenery.decided(optics.psf())),
         optics: table,
     };
     let record = record_of(&pair, &rig.client, circumstances);
@@ -109,13 +113,13 @@ const SIM_CAMERA_ALONE: &str =
 /// is not there is known before anything moves.
 fn early_camera(name: &str, port: &str) -> Result<Option<Box<dyn Camera>>> {
     if name == "sim" {
-        return if port == "sim" { Ok(None) } else { bail!(SIM_CAMERA_ALONE) };
+        return if port == "sim" { Ok(None) } else { bail!(Usage(SIM_CAMERA_ALONE.into())) };
     }
     if let Some(folder) = name.strip_prefix("folder:") {
         return Ok(Some(Box::new(FolderCamera::watch(folder.as_ref())?)));
     }
     if !name.contains(':') {
-        bail!("unknown camera {name:?}: expected sim, HOST:PORT or folder:DIR");
+        bail!(Usage(format!("unknown camera {name:?}: expected sim, HOST:PORT or folder:DIR")));
     }
     Ok(Some(Box::new(SimCamera::connect(name)?)))
 }

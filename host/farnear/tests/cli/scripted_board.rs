@@ -1,0 +1,113 @@
+//! Boards in trouble, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
+#![cfg(target_os = "linux")]
+
+// The board that the client's own tests talk to; not all of its faults are used here.
+#[path = "../../../capture/tests/peer/mod.rs"]
+mod peer;
+
+use std::{
+    fs::File,
+    io::{Read, Write},
+    thread,
+    time::Duration,
+};
+
+use farnear_capture::Transport;
+use peer::{Faults, Peer};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+
+use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
+
+/// Puts a scripted board behind a pseudo-terminal; gives the port's name. The port goes away with the board.
+fn plug_in(faults: Faults) -> (String, Peer) {
+    // Not with serialport's pair: the programs that tests start would inherit its ends and hold the line.
+    let far_end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).expect("a pty");
+    grantpt(&far_end).and_then(|()| unlockpt(&far_end)).expect("a pty");
+    let port = ptsname(&far_end, Vec::new()).expect("a pty's name").into_string().expect("a plain name");
+    let near_end = File::options().read(true).write(true).open(&port).expect("the other end");
+    let mut far_end = File::from(far_end);
+    let peer = Peer::new(faults);
+    let mut board = peer.clone();
+    thread::spawn(move || {
+        let _near_end = near_end; // held, so that clients may come and go
+        let mut bytes = [0; 512];
+        while let Ok(count) = far_end.read(&mut bytes) {
+            if board.send(&bytes[..count], Duration::ZERO).is_err() {
+                return;
+            }
+            loop {
+                match board.receive(&mut bytes, Duration::ZERO) {
+                    Ok(0) => break,
+                    Ok(count) => far_end.write_all(&bytes[..count]).expect("a line"),
+                    Err(_) => return, // unplugged
+                }
+            }
+        }
+    });
+    (port, peer)
+}
+
+/// A capture with this port that must fail so and leave nothing behind.
+#[track_caller]
+fn capture_fails(port: &str, phrases: &[&str]) {
+    let folder = Folder::new();
+    let (out, camera) = (folder.text("out"), format!("folder:{}", folder.text("")));
+    let capture = ["rig", "capture", "--port", port, "--camera", &camera, "--optics", rig_optics()];
+    fails(farnear(&capture).args(["--out", &out, "--image-wait-s", "1"]), 1, phrases);
+    assert_eq!(folder.listing(), Vec::<String>::new());
+}
+
+#[test]
+fn a_board_behind_a_port_is_driven_by_one_program_after_the_other() {
+    let (port, peer) = plug_in(Faults::default());
+    let rig = |arguments: &[&str]| {
+        let mut command = farnear(&["rig"]);
+        command.args(arguments).args(["--port", &port]);
+        command
+    };
+    let info = figures(&mut rig(&["info", "--json"]));
+    assert_eq!((&info["board"], &info["emulated"]), (&"scripted".into(), &false.into()));
+    succeeds(&mut rig(&["home"]));
+    let moved = figures(&mut rig(&["move", "--axis", "coarse", "--to-um", "5000", "--json"]));
+    assert_eq!(number(&moved, "measured_um"), 5000.375);
+    succeeds(&mut rig(&["stop"]));
+    let far_off = ["move", "--axis", "coarse", "--to-um", "-5"];
+    fails(&mut rig(&far_off), 1, &["-5.000 um is outside the limits", "0.000 to 13000.000 um"]);
+    let board = peer.board();
+    assert_eq!((board.acts, board.stops), (2, 1));
+}
+
+#[test]
+fn a_port_that_goes_away_between_the_exposures_leaves_nothing() {
+    let (port, _board) = plug_in(Faults { gone_at_program: true, ..Faults::default() });
+    capture_fails(&port, &["went away while running the exposure program", &port]);
+}
+
+#[test]
+fn a_board_that_is_reset_in_mid_capture_leaves_nothing() {
+    let (port, peer) = plug_in(Faults::default());
+    succeeds(&mut farnear(&["rig", "home", "--port", &port]));
+    peer.board().faults.reset_at_move = true;
+    capture_fails(&port, &["the board was reset while moving", "boot 7 became 8", "watchdog"]);
+}
+
+#[test]
+fn a_camera_without_images_is_waited_for_no_longer_than_asked_and_the_rig_stops() {
+    let (port, peer) = plug_in(Faults::default());
+    capture_fails(&port, &["gave no image of exposure 0 within 1s"]);
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn another_message_table_under_the_same_version_is_told_with_both_keys() {
+    let (port, peer) = plug_in(Faults::default());
+    peer.board().hello.schema_key = 0xabc;
+    capture_fails(&port, &["message tables differ", "0000000000000abc", "flash the firmware"]);
+}
+
+#[test]
+fn garbage_between_frames_costs_nothing() {
+    let (port, peer) = plug_in(Faults { garbage: vec![7, 0, 255, 255, 0], ..Faults::default() });
+    succeeds(&mut farnear(&["rig", "home", "--port", &port]));
+    assert_eq!(peer.board().acts, 1);
+}
