@@ -7,11 +7,13 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use farnear_depth::fill::fill_low_texture;
 use farnear_depth::filter::convolve;
 use farnear_depth::kernel::Kernel;
-use farnear_depth::operators::{Operators, Request, design};
+use farnear_depth::operators::{Design, Family, Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
 use farnear_depth::run::{Backend, Processor, Settings};
+use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -97,6 +99,34 @@ fn main() {
             );
         }
     }
+    if wanted("fill_640x480") {
+        // A map with 20 discs of 30 px without texture.
+        let low = Array2::from_shape_fn((480, 640), |(y, x)| {
+            (y % 120).abs_diff(60).pow(2) + (x % 128).abs_diff(64).pow(2) < 900
+        });
+        let map = farnear_depth::run::depth_from_pair(
+            vga[0].view(),
+            vga[1].view(),
+            &operators,
+            &optics_pill,
+            &Settings::default(),
+        )
+        .unwrap();
+        report("fill_640x480", None, 1, time(20, || fill_low_texture(&mut map.clone(), low.view())));
+    }
+    if wanted("uncertainty_640x480") {
+        let settings = Settings::default();
+        let [far, near] = [vga[0].view(), vga[1].view()];
+        report(
+            "uncertainty_640x480",
+            None,
+            1,
+            time(5, || {
+                standard_deviation_mm(far, near, &operators, &optics_pill, &settings, Noise::Estimated)
+                    .unwrap()
+            }),
+        );
+    }
     if wanted("chain_4000x3000") {
         let large = [1, 2].map(|seed| random_image(3000, 4000, seed));
         for threads in [1, 4] {
@@ -104,8 +134,17 @@ fn main() {
             report("chain_4000x3000", Some(Backend::best()), threads, chain(5, &large, &settings));
         }
     }
-    for psf in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802"] {
-        let request = Request::for_optics(&optics(psf));
+    let designs = [
+        (Family::Ro, "pillbox"),
+        (Family::Watanabe, "pillbox"),
+        (Family::Raj, "pillbox"),
+        (Family::Gro, "gaussian:k=0.4578"),
+        (Family::Ggro, "generalised:p=1.8,k=0.4802"),
+    ];
+    for (design_by, (family, psf)) in
+        [Design::Linear, Design::Thesis].into_iter().flat_map(|d| designs.map(|f| (d, f)))
+    {
+        let request = Request { family, design: design_by, ..Request::for_optics(&optics(psf)) };
         let name = format!("design_{}_{}", request.family, request.design);
         if wanted(&name) {
             report(&name, None, 1, time(5, || design(&request)));

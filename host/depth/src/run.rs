@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use crate::operators::Operators;
 use crate::optics::Optics;
 
-pub use check::Warning;
+pub use check::{SwapEvidence, Warning};
 pub(crate) use cubic::root;
 pub use processor::Processor;
 pub use simd::Backend;

@@ -20,7 +20,7 @@ const HUBER: f64 = 1.345;
 const ROUNDS: usize = 4;
 
 /// At most about this many samples are used; more only repeat each other.
-const MAX_SAMPLES: usize = 3_000;
+const MAX_SAMPLES: usize = 800;
 
 /// A fitted surface.
 pub(super) struct Surface {

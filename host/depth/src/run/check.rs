@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use ndarray::{Array2, CowArray, Ix2, Zip};
+use ndarray::{Array2, CowArray, Ix2};
 use rayon::prelude::*;
 
 use super::simd::{self, Extremes};
@@ -38,10 +38,24 @@ pub enum Warning {
         /// PSF of the optics.
         optics: Psf,
     },
-    /// The far image seems to be the near one: most of the scene would lie nearer than the near focus.
-    LooksSwapped {
-        /// Part of the confident pixels beyond the near focus.
-        beyond_near: f64,
+    /// The far image seems to be the near one. Exchanging the images turns alpha into -alpha and nothing else, so only what
+    /// is known of scenes can tell; a scene that says nothing, as a plane, draws no warning.
+    LooksSwapped(SwapEvidence),
+}
+
+/// What speaks for a swapped pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SwapEvidence {
+    /// Much of the scene would lie before the near focus and almost nothing beyond the far focus; backgrounds do the
+    /// opposite.
+    BeyondNear {
+        /// Part of the confident pixels before the near focus.
+        fraction: f64,
+    },
+    /// The lower third of the image would lie farther away than the upper third; grounds and tables do the opposite.
+    LowerPartFarther {
+        /// Difference of the median depths, mm.
+        difference_mm: f64,
     },
 }
 
@@ -62,12 +76,19 @@ impl fmt::Display for Warning {
                 f,
                 "the operators were designed for the PSF {operators}, the optics have {optics}: expect errors of millimetres"
             ),
-            Self::LooksSwapped { beyond_near } => write!(
-                f,
-                "the pair looks swapped: {:.0} % of the scene would lie nearer than the near focus; is FAR really the \
-                 far-focused image?",
-                100.0 * beyond_near
-            ),
+            Self::LooksSwapped(evidence) => {
+                write!(f, "the pair looks swapped: ")?;
+                match evidence {
+                    SwapEvidence::BeyondNear { fraction } => {
+                        write!(f, "{:.0} % of the scene would lie before the near focus", 100.0 * fraction)?;
+                    }
+                    SwapEvidence::LowerPartFarther { difference_mm } => write!(
+                        f,
+                        "the lower part of the scene would lie {difference_mm:.0} mm farther away than the upper part"
+                    )?,
+                }
+                write!(f, "; is FAR really the far-focused image?")
+            }
         }
     }
 }
@@ -261,19 +282,39 @@ impl Input<'_> {
 /// Confidence from which a pixel has a say in whether the pair looks swapped.
 const CONFIDENT: f32 = 0.7;
 
+/// Part of the working range by which the lower third must lie farther away to draw a warning.
+const TILT: f64 = 0.15;
+
 /// Warnings about the result, from a thinned sample of its pixels.
 pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
     let [mut total, mut beyond_near, mut beyond_far] = [0_usize; 3];
+    let mut thirds: [Vec<f32>; 3] = Default::default();
     let sample = super::confidence::sample(map.depth_mm.dim());
-    Zip::from(map.depth_mm.slice(sample)).and(map.confidence.slice(sample)).for_each(|depth, confidence| {
-        if *confidence > CONFIDENT {
+    let [depths, confidences] = [map.depth_mm.slice(sample), map.confidence.slice(sample)];
+    let height = depths.nrows();
+    for (y, (depths, confidences)) in depths.rows().into_iter().zip(confidences.rows()).enumerate() {
+        for (depth, _) in depths.iter().zip(confidences).filter(|(_, c)| **c > CONFIDENT) {
             total += 1;
             beyond_near += usize::from(*depth < near_mm);
             beyond_far += usize::from(*depth > far_mm);
+            thirds[3 * y / height].push(*depth);
         }
-    });
+    }
     let part = |n: usize| n as f64 / total.max(1) as f64;
-    (part(beyond_near) > 0.3 && beyond_near > 4 * beyond_far)
-        .then(|| Warning::LooksSwapped { beyond_near: part(beyond_near) })
+    if part(beyond_near) > 0.3 && beyond_near > 4 * beyond_far {
+        return Some(Warning::LooksSwapped(SwapEvidence::BeyondNear { fraction: part(beyond_near) }));
+    }
+    // Each third must have its say.
+    if thirds.iter().any(|third| third.len() < total / 10 + 10) {
+        return None;
+    }
+    let [upper, _, lower] = thirds.map(|mut third| {
+        let middle = third.len() / 2;
+        f64::from(*third.select_nth_unstable_by(middle, f32::total_cmp).1)
+    });
+    let range = optics.working_range();
+    let difference_mm = lower - upper;
+    (difference_mm > TILT * (range.far_mm - range.near_mm))
+        .then_some(Warning::LooksSwapped(SwapEvidence::LowerPartFarther { difference_mm }))
 }
