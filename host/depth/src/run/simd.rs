@@ -12,14 +12,16 @@
 
 mod convolve;
 mod lanes;
+mod median;
 mod rows;
 
 use serde::{Deserialize, Serialize};
 
 pub(crate) use convolve::{Taps, convolve};
+pub(crate) use median::median_row;
 pub(crate) use rows::{
-    CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, median_row, normalise_row,
-    vertical_sums, vertical_sums_of_seven,
+    CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
+    vertical_sums_of_seven,
 };
 
 /// Calls the generic function for the backend inside a function that has the backend's instructions enabled, so that
