@@ -1,12 +1,17 @@
 //! The parts of the accuracy pages, in their order.
 
+mod calibration;
 mod corrections;
 mod designs;
+mod fill;
 mod kernels;
+mod methods;
 mod mismatch;
 mod planes;
 pub mod real;
 mod shapes;
+mod stacks;
+mod uncertainty;
 
 use anyhow::Result;
 
@@ -16,12 +21,16 @@ use crate::page::Page;
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
 /// The parts that need nothing but the renderer.
-pub const RENDERED: [Part; 6] = [
+pub const RENDERED: [Part; 10] = [
     ("planes", planes::measure),
     ("shapes", shapes::measure),
     ("mismatch", mismatch::measure),
+    ("methods", methods::measure),
     ("designs", designs::measure),
     ("kernels", kernels::measure),
+    ("fill", fill::measure),
+    ("uncertainty", uncertainty::measure),
+    ("calibration", calibration::measure),
     ("corrections", corrections::measure),
 ];
 

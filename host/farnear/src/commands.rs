@@ -1,7 +1,9 @@
 //! One file per command: its flags, what it does, its figures.
 
+pub mod calibrate;
 pub mod compare;
 pub mod completions;
+pub mod correct;
 pub mod depth;
 pub mod operators;
 pub mod optics;

@@ -1,6 +1,7 @@
 //! The files that users have: optics, depth maps, meshes.
 
 pub mod cache;
+pub mod correction;
 pub mod map;
 pub mod mesh;
 pub mod operators;

@@ -1,7 +1,7 @@
 //! # farnear
 //!
 //! The command line. One file per command in [`commands`]; [`files`] reads and writes what users have, [`picture`]
-//! makes `view.png`, [`report`] prints figures as text or JSON, [`simulator`] starts the emulated rig, [`video`] reads
+//! makes `view.png`, [`plot`] draws operators, [`report`] prints figures as text or JSON, [`simulator`] starts the emulated rig, [`video`] reads
 //! frames.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
@@ -9,6 +9,7 @@
 mod commands;
 mod files;
 mod picture;
+mod plot;
 mod report;
 mod simulator;
 mod video;
@@ -37,6 +38,8 @@ enum Command {
     Optics(commands::optics::Arguments),
     Operators(commands::operators::Arguments),
     Depth(commands::depth::Arguments),
+    Calibrate(commands::calibrate::Arguments),
+    Correct(commands::correct::Arguments),
     Compare(commands::compare::Arguments),
     Render(commands::render::Arguments),
     Rig(commands::rig::Arguments),
@@ -50,6 +53,8 @@ fn main() -> ExitCode {
         Command::Optics(arguments) => commands::optics::run(arguments),
         Command::Operators(arguments) => commands::operators::run(arguments),
         Command::Depth(arguments) => commands::depth::run(arguments),
+        Command::Calibrate(arguments) => commands::calibrate::run(arguments),
+        Command::Correct(arguments) => commands::correct::run(arguments),
         Command::Compare(arguments) => commands::compare::run(arguments),
         Command::Render(arguments) => commands::render::run(arguments),
         Command::Rig(arguments) => commands::rig::run(arguments),

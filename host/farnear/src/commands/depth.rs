@@ -13,6 +13,8 @@ use farnear_capture::{
     record::CAPTURE_FILE,
 };
 use farnear_depth::{
+    baselines,
+    corrections::Correction,
     operators::Operators,
     optics::Optics,
     run::{DepthMap, MAX_SMOOTHING_PX, Settings, Warning, depth_from_pair},
@@ -43,6 +45,15 @@ pub struct Arguments {
     /// are designed for the optics.
     #[arg(long, value_name = "NAME|FILE")]
     operators: Option<PathBuf>,
+    /// How: ro (rational operators), or a method to compare with: subbarao, subbarao-fourier or favaro.
+    #[arg(long, default_value = "ro", value_parser = method)]
+    method: Method,
+    /// Correction saved by `farnear calibrate correction`, applied to the map.
+    #[arg(long, value_name = "FILE")]
+    correction: Option<PathBuf>,
+    /// Fill regions without texture with the surface of what surrounds them (ro only).
+    #[arg(long)]
+    fill: bool,
     /// Side of the window over which coefficients are summed, in pixels: odd, 1 to 63.
     #[arg(long, value_name = "PX", default_value_t = 7, value_parser = odd_up_to::<MAX_SMOOTHING_PX>)]
     smooth: usize,
@@ -79,6 +90,81 @@ fn odd_up_to<const LARGEST: usize>(text: &str) -> Result<usize, String> {
     side.ok_or_else(|| format!("a window's side is an odd whole number from 1 to {LARGEST}"))
 }
 
+/// How depth is computed.
+#[derive(Clone, Copy)]
+enum Method {
+    RationalOperators,
+    Baseline(baselines::Method),
+}
+
+fn method(text: &str) -> Result<Method, String> {
+    if text == "ro" {
+        return Ok(Method::RationalOperators);
+    }
+    let baseline = text.parse().map(Method::Baseline);
+    baseline.map_err(|_| "expected ro, subbarao, subbarao-fourier or favaro".to_owned())
+}
+
+/// A method with what it needs.
+enum Prepared {
+    RationalOperators(Box<Operators>),
+    Baseline(baselines::Method),
+}
+
+impl Prepared {
+    fn new(arguments: &Arguments, optics: &Optics) -> Result<Self> {
+        match (arguments.method, arguments.operators.as_deref()) {
+            (Method::RationalOperators, asked) => {
+                Ok(Self::RationalOperators(Box::new(files::operators::find(asked, optics)?)))
+            }
+            (Method::Baseline(method), Some(_)) => bail!("--method {method} uses no --operators"),
+            (Method::Baseline(method), None) if arguments.fill => {
+                bail!("--method {method} cannot --fill; ro can")
+            }
+            (Method::Baseline(method), None) => Ok(Self::Baseline(method)),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::RationalOperators(_) => "ro",
+            Self::Baseline(method) => method.name(),
+        }
+    }
+
+    fn operators(&self) -> Option<&Operators> {
+        match self {
+            Self::RationalOperators(operators) => Some(operators),
+            Self::Baseline(_) => None,
+        }
+    }
+
+    fn depth(
+        &self,
+        far: &Array2<f32>,
+        near: &Array2<f32>,
+        optics: &Optics,
+        settings: &Settings,
+    ) -> Result<DepthMap> {
+        let (far, near) = (far.view(), near.view());
+        Ok(match self {
+            Self::RationalOperators(operators) => depth_from_pair(far, near, operators, optics, settings)?,
+            Self::Baseline(method) => baselines::depth_from_pair(*method, far, near, optics, settings)?,
+        })
+    }
+}
+
+/// Corrects a map; what lies beyond the correction loses depth and confidence alike.
+fn correct(depth: &mut DepthMap, correction: &Correction) -> Result<()> {
+    correction.apply_in_place(depth.depth_mm.view_mut())?;
+    for (confidence, depth_mm) in depth.confidence.iter_mut().zip(&depth.depth_mm) {
+        if depth_mm.is_nan() {
+            *confidence = 0.0;
+        }
+    }
+    Ok(())
+}
+
 /// The content of `depth.toml`: what made the map.
 #[derive(Serialize)]
 struct Sidecar<'a> {
@@ -90,9 +176,13 @@ struct Sidecar<'a> {
     warnings: &'a [String],
     /// How depth.png's codes stand for mm; code 0 = no value.
     png: map::Scale,
+    method: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    correction: Option<String>,
     settings: Settings,
     optics: Optics,
-    operators: &'a Operators,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    operators: Option<&'a Operators>,
 }
 
 /// Runs the command.
@@ -106,16 +196,25 @@ pub fn run(arguments: Arguments) -> Result<()> {
             arguments.near.display()
         );
     }
-    let operators = files::operators::find(arguments.operators.as_deref(), &optics)?;
+    let method = Prepared::new(&arguments, &optics)?;
+    let correction = arguments.correction.as_deref().map(files::correction::read).transpose()?;
+    if let Some(correction) = &correction {
+        correction.check_range(&optics.working_range())?;
+    }
     let settings = Settings {
         smoothing_px: arguments.smooth,
         median_px: arguments.median,
+        fill: arguments.fill,
         threads: arguments.threads,
         ..Settings::default()
     };
     let start = Instant::now();
-    let depth = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings)
+    let mut depth = method
+        .depth(&far, &near, &optics, &settings)
         .with_context(|| format!("{} and {}", arguments.far.display(), arguments.near.display()))?;
+    if let Some(correction) = &correction {
+        correct(&mut depth, correction)?;
+    }
     let seconds = start.elapsed().as_secs_f64();
     let mut warnings: Vec<String> = depth.warnings.iter().map(ToString::to_string).collect();
     if named_the_other_way_round(&arguments.far, &arguments.near)
@@ -131,7 +230,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         eprintln!("warning: {warning}");
     }
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.far));
-    write(&out, &arguments, &depth, &far, &operators, &optics, &warnings)?;
+    write(&out, &arguments, &depth, &far, &method, &optics, &warnings)?;
     eprintln!("wrote {}", out.display());
     let (height, width) = depth.depth_mm.dim();
     let figures = Figures {
@@ -185,7 +284,7 @@ fn write(
     arguments: &Arguments,
     depth: &DepthMap,
     far: &Array2<f32>,
-    operators: &Operators,
+    method: &Prepared,
     optics: &Optics,
     warnings: &[String],
 ) -> Result<()> {
@@ -200,14 +299,17 @@ fn write(
         units: "mm",
         warnings,
         png,
+        method: method.name(),
+        correction: arguments.correction.as_deref().map(name_of),
         // The number of threads changes nothing in the result.
         settings: Settings {
             smoothing_px: arguments.smooth,
             median_px: arguments.median,
+            fill: arguments.fill,
             ..Settings::default()
         },
         optics: *optics,
-        operators,
+        operators: method.operators(),
     };
     aside.write("depth.npy", &map::npy(map)?)?;
     aside.write("depth.tiff", &map::tiff(map)?)?;

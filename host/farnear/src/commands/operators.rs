@@ -11,7 +11,7 @@ use farnear_depth::{
 };
 use serde::Serialize;
 
-use crate::{files, report};
+use crate::{files, plot, report};
 
 /// Design rational operators and say how well they fit.
 #[derive(Args)]
@@ -37,6 +37,9 @@ pub struct Arguments {
     /// Where to save the operators, as TOML.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Where to draw what was fitted and how the kernels respond: .svg or .png.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -67,6 +70,10 @@ pub fn run(arguments: Arguments) -> Result<()> {
     if let Some(out) = &arguments.out {
         aside::write_file(out, toml::to_string(&operators)?.as_bytes())?;
         eprintln!("wrote {}", out.display());
+    }
+    if let Some(file) = &arguments.plot {
+        aside::write_file(file, &plot::plot(&operators, file)?)?;
+        eprintln!("wrote {}", file.display());
     }
     let figures = Figures {
         name: operators.name().into(),

@@ -1,0 +1,28 @@
+//! `farnear calibrate`: learns what the optics do from captured images and depth maps.
+
+mod correction;
+mod psf;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+/// Learn the point spread function, or a correction of the lens's distortion.
+#[derive(Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    Psf(psf::Arguments),
+    Correction(correction::Arguments),
+}
+
+/// Runs the command.
+pub fn run(arguments: Arguments) -> Result<()> {
+    match arguments.what {
+        What::Psf(arguments) => psf::run(arguments),
+        What::Correction(arguments) => correction::run(arguments),
+    }
+}

@@ -1,0 +1,150 @@
+//! `farnear calibrate`, `correct`, `depth --method --correction --fill` and `operators --plot` as a user runs them, on
+//! small rendered pairs.
+
+#![allow(clippy::unwrap_used)] // helpers of tests: what cannot be prepared must stop the test
+
+use std::{fs, path::Path};
+
+use assert_cmd::Command;
+use ndarray::Array2;
+use ndarray_npy::{read_npy, write_npy};
+use tempfile::TempDir;
+
+const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
+                      [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
+const SIZE: (usize, usize) = (120, 160);
+
+struct Bench(TempDir);
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("optics.toml"), OPTICS).unwrap();
+        Self(folder)
+    }
+
+    fn output(&self, arguments: &[&str]) -> std::process::Output {
+        let mut command = Command::cargo_bin("farnear").unwrap();
+        command.args(arguments).current_dir(self.0.path()).output().unwrap()
+    }
+
+    #[track_caller]
+    fn figures(&self, arguments: &[&str]) -> serde_json::Value {
+        let output = self.output(&[arguments, &["--json"]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    #[track_caller]
+    fn fails(&self, code: i32, arguments: &[&str], expected: &str) {
+        let output = self.output(arguments);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{text}");
+        assert!(text.contains(expected), "`{expected}` is not in: {text}");
+    }
+
+    fn render(&self, scene: &str, noise: &str, out: &str) {
+        let optics = ["--optics", "optics.toml", "--width", "320", "--height", "240"];
+        let what = ["render", "--scene", scene, "--noise", noise, "--out", out];
+        self.figures(&[&what[..], &optics].concat());
+    }
+
+    /// Depth maps of flat targets that come out `bow` times too deep towards the corners, and their list.
+    fn targets(&self, bow: f32) {
+        let mut list = String::new();
+        for (index, true_mm) in [932.0_f32, 920.0, 910.0, 900.0, 888.0].into_iter().enumerate() {
+            let name = format!("flat{index}.npy");
+            write_npy(self.0.path().join(&name), &bowl(true_mm, bow)).unwrap();
+            list += &format!("[[pattern]]\ndepth = \"{name}\"\ntrue_mm = {true_mm}.0\n");
+        }
+        fs::write(self.0.path().join("patterns.toml"), list).unwrap();
+    }
+}
+
+fn bowl(true_mm: f32, bow: f32) -> Array2<f32> {
+    Array2::from_shape_fn(SIZE, |(row, column)| {
+        let [y, x] = [row as f32 / SIZE.0 as f32 - 0.5, column as f32 / SIZE.1 as f32 - 0.5];
+        true_mm + bow * (x * x + y * y)
+    })
+}
+
+#[test]
+fn the_blur_constant_of_a_rendered_pair_is_found() {
+    let bench = Bench::new();
+    bench.render("plane:933", "8bit", "far-plane");
+    let pair = ["far-plane/far.png", "far-plane/near.png", "--optics", "optics.toml"];
+    let find = [&["calibrate", "psf"], &pair[..], &["--model", "gaussian", "--out", "found.toml"]].concat();
+    let found = bench.figures(&find);
+    // A quarter of the pixels of the accuracy pages, so twice their tolerance of 0.002.
+    assert!((found["k"].as_f64().unwrap() - 0.4578).abs() < 0.004, "{found}");
+    assert_eq!(found["target_mm"], 933.0);
+    let written = fs::read_to_string(bench.0.path().join("found.toml")).unwrap();
+    assert!(written.contains("gaussian"), "{written}");
+    bench.figures(&["optics", "--optics", "found.toml"]);
+    bench.fails(2, &[&["calibrate", "psf"], &pair[..], &["--model", "pillbox"]].concat(), "gaussian");
+    let inside = [&find[..], &["--depth", "20"]].concat();
+    bench.fails(1, &inside, "no image");
+}
+
+#[test]
+fn corrections_flatten_what_they_never_saw() {
+    let bench = Bench::new();
+    bench.targets(12.0);
+    write_npy(bench.0.path().join("other.npy"), &bowl(905.0, 12.0)).unwrap();
+    for method in ["clsf", "clsf-blend", "clsf-full", "cdc", "two-step"] {
+        let learn = ["calibrate", "correction", "patterns.toml", "--method", method, "--out", "c.toml"];
+        let learned = bench.figures(&learn);
+        assert_eq!(learned["patterns"], 5);
+        assert!(learned["rmse_before_mm"].as_f64().unwrap() > 2.0, "{learned}");
+        bench.figures(&["correct", "other.npy", "--correction", "c.toml", "--out", "flat.npy"]);
+        let flat: Array2<f32> = read_npy(bench.0.path().join("flat.npy")).unwrap();
+        let worst = flat.iter().map(|depth| (depth - 905.0).abs()).fold(0.0, f32::max);
+        // cdc smooths its patterns, which bends their corners.
+        assert!(worst < if method == "cdc" { 0.3 } else { 0.1 }, "{method}: {worst} mm");
+    }
+    let correct = |out: &'static str| ["correct", "other.npy", "--correction", "c.toml", "--out", out];
+    bench.figures(&correct("flat.tiff"));
+    bench.fails(1, &correct("flat.png"), ".npy or .tiff");
+    write_npy(bench.0.path().join("small.npy"), &Array2::from_elem((20, 30), 900.0_f32)).unwrap();
+    bench.fails(1, &["correct", "small.npy", "--correction", "c.toml", "--out", "x.npy"], "30x20");
+    fs::write(bench.0.path().join("patterns.toml"), "").unwrap();
+    let learn = ["calibrate", "correction", "patterns.toml", "--method", "clsf", "--out", "d.toml"];
+    bench.fails(1, &learn, "lists no [[pattern]]");
+    assert!(!bench.0.path().join("d.toml").exists());
+}
+
+#[test]
+fn other_methods_give_depth_and_say_who_they_are() {
+    let bench = Bench::new();
+    bench.render("plane:905", "none", "plane");
+    let depth = ["depth", "plane/far.png", "plane/near.png", "--optics", "optics.toml", "--out", "out"];
+    for method in ["ro", "subbarao", "subbarao-fourier"] {
+        let found = bench.figures(&[&depth[..], &["--method", method]].concat());
+        let median = found["median_mm"].as_f64().unwrap();
+        // The baselines know of the PSF only its second moment.
+        assert!((median - 905.0).abs() < if method == "ro" { 0.2 } else { 4.0 }, "{method}: {median}");
+        let record = fs::read_to_string(bench.0.path().join("out/depth.toml")).unwrap();
+        assert!(record.contains(&format!("method = \"{method}\"")), "{record}");
+        assert_eq!(record.contains("[operators"), method == "ro");
+    }
+    bench.figures(&[&depth[..], &["--fill"]].concat());
+    bench.fails(1, &[&depth[..], &["--method", "subbarao", "--fill"]].concat(), "cannot --fill");
+    bench.fails(2, &[&depth[..], &["--method", "magic"]].concat(), "subbarao-fourier");
+    bench.targets(1.0);
+    let learn = ["calibrate", "correction", "patterns.toml", "--method", "clsf-full", "--out", "c.toml"];
+    bench.figures(&learn);
+    // The correction's maps have another size than this pair's.
+    bench.fails(1, &[&depth[..], &["--correction", "c.toml"]].concat(), "160x120");
+}
+
+#[test]
+fn operators_are_drawn() {
+    let bench = Bench::new();
+    let plot = |file: &'static str| ["operators", "--optics", "optics.toml", "--plot", file];
+    for file in ["plot.svg", "plot.png"] {
+        bench.figures(&plot(file));
+        assert!(fs::metadata(bench.0.path().join(file)).unwrap().len() > 4_000, "{file}");
+    }
+    bench.fails(1, &plot("plot.pdf"), ".svg or .png");
+    assert!(!Path::new(&bench.0.path().join("plot.pdf")).exists());
+}
