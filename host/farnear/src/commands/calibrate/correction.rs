@@ -16,18 +16,15 @@ use crate::{files::map, report};
 
 /// Learn a correction of the elliptical distortion from depth maps of flat targets at known depths.
 ///
-/// PATTERNS.toml lists them, paths relative to itself:
-///
-///   [[pattern]]
-///   depth = "target-01/depth.npy"
-///   true_mm = 933.0
-///
-/// 20 to 30 targets through the working range teach any method.
+/// PATTERNS.toml lists the maps, paths relative to itself. 20 to 30 targets through the working range teach any method.
 #[derive(Args)]
-#[command(
-    verbatim_doc_comment,
-    after_help = "Example: farnear calibrate correction patterns.toml --method clsf-full --out correction.toml"
-)]
+#[command(after_help = "\
+PATTERNS.toml has an entry for each map:
+  [[pattern]]
+  depth = \"target-01/depth.npy\"
+  true_mm = 933.0
+
+Example: farnear calibrate correction patterns.toml --method clsf-full --out correction.toml")]
 pub struct Arguments {
     /// The list of depth maps.
     patterns: PathBuf,
