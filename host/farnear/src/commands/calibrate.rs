@@ -8,6 +8,9 @@ use clap::{Args, Subcommand};
 
 /// Learn the point spread function, or a correction of the lens's distortion.
 #[derive(Args)]
+#[command(
+    after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian"
+)]
 pub struct Arguments {
     #[command(subcommand)]
     what: What,
