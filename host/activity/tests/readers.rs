@@ -29,7 +29,7 @@ fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
         &recording.names[..8]
     );
     assert!(recording.names.len() >= 41 && recording.frames.len() > 100 && recording.rate_hz > 50.0);
-    let template = Template::plug_in_gait();
+    let template = Template::named("plug-in-gait").expect("built in");
     template.check(&recording.names).expect("the suit is Plug-in Gait's");
     let frame = recording.by_name(recording.frames.len() / 2);
     for view in views_round(8, 0.0) {
@@ -146,7 +146,10 @@ proptest! {
 
 #[test]
 fn unknown_markers_are_named() {
-    let error = Template::plug_in_gait().check(&["A".into(), "B".into()]).expect_err("no such suit");
+    let error = Template::named("plug-in-gait")
+        .expect("built in")
+        .check(&["A".into(), "B".into()])
+        .expect_err("no such suit");
     assert!(error.to_string().contains("LFHD") && error.to_string().contains("plug-in-gait"), "{error}");
     assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
 }

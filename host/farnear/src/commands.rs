@@ -11,3 +11,4 @@ pub mod render;
 pub mod rig;
 pub mod shadow;
 pub mod silhouettes;
+pub mod sun;

@@ -1,6 +1,6 @@
 //! # farnear
 //!
-//! The command line. One file per command in [`commands`]; [`files`] reads and writes what users have, [`picture`]
+//! The command line. One file per command in [`commands`]; [`files`] and [`masks`] read and write what users have, [`picture`]
 //! makes `view.png`, [`plot`] draws operators, [`report`] prints figures as text or JSON, [`simulator`] starts the emulated rig, [`video`] reads
 //! frames.
 //!
@@ -8,6 +8,7 @@
 
 mod commands;
 mod files;
+mod masks;
 mod picture;
 mod plot;
 mod report;
@@ -43,6 +44,7 @@ enum Command {
     Compare(commands::compare::Arguments),
     Render(commands::render::Arguments),
     Rig(commands::rig::Arguments),
+    Sun(commands::sun::Arguments),
     Shadow(commands::shadow::Arguments),
     Silhouettes(commands::silhouettes::Arguments),
     Completions(commands::completions::Arguments),
@@ -58,6 +60,7 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => commands::compare::run(arguments),
         Command::Render(arguments) => commands::render::run(arguments),
         Command::Rig(arguments) => commands::rig::run(arguments),
+        Command::Sun(arguments) => commands::sun::run(&arguments),
         Command::Shadow(arguments) => commands::shadow::run(arguments),
         Command::Silhouettes(arguments) => commands::silhouettes::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),

@@ -28,6 +28,7 @@
 //! image_distance_um = 20.0
 //! ```
 
+use crate::sun::SunPosition;
 use serde::{Deserialize, Serialize};
 
 /// How the camera stands.
@@ -236,6 +237,18 @@ impl Camera {
         Some([cx + self.focal_px() * point[0] / depth, cy + self.focal_px() * down / depth])
     }
 
+    /// Whether the sun itself stands in the picture: its glare spoils masks, and all shadows come towards the camera.
+    pub fn sees_sun(&self, sun: SunPosition) -> bool {
+        let (sin_e, cos_e) = sun.elevation_deg.to_radians().sin_cos();
+        // The camera's azimuth is counted anticlockwise.
+        let (right, forward) = (sun.azimuth_deg + self.azimuth_deg).to_radians().sin_cos();
+        const FAR_M: f64 = 1e9;
+        let at = [FAR_M * cos_e * right, FAR_M * cos_e * forward, FAR_M * sin_e];
+        self.project(at).is_some_and(|[x, y]| {
+            (0.0..self.width_px as f64).contains(&x) && (0.0..self.height_px as f64).contains(&y)
+        })
+    }
+
     /// The ground point seen at a pixel, `[x, y]` in metres, `None` at or above the horizon.
     pub fn ground_point(&self, pixel: [f64; 2]) -> Option<[f64; 2]> {
         let [cx, cy] = self.principal_point();
@@ -266,6 +279,19 @@ mod tests {
         assert!(bad.to_string().contains("camera.height_m = -0.8"), "{bad}");
         assert!(CameraFile::parse(&format!("{TEXT}hight = 3\n")).is_err());
         assert!(CameraFile::parse(&TEXT.replace("4.0", "nan")).is_err());
+    }
+
+    #[test]
+    fn the_sun_is_seen_where_the_camera_looks() {
+        let mut camera = CameraFile::parse(TEXT).expect("valid").camera;
+        // 140 deg anticlockwise from north is 220 deg clockwise; the picture reaches 19.8 deg up and 25.6 deg sideways.
+        let sees = |camera: &Camera, azimuth_deg, elevation_deg| {
+            camera.sees_sun(SunPosition { azimuth_deg, elevation_deg })
+        };
+        assert!(sees(&camera, 220.0, 15.0) && sees(&camera, 244.0, 5.0) && sees(&camera, 196.0, 5.0));
+        assert!(!sees(&camera, 247.0, 5.0) && !sees(&camera, 220.0, 25.0) && !sees(&camera, 40.0, 15.0));
+        camera.pitch_deg = -10.0;
+        assert!(sees(&camera, 220.0, 25.0));
     }
 
     #[test]

@@ -60,6 +60,24 @@ pub struct CutReport {
 /// Smoothing window of the lower edge's gradient, columns.
 const GRADIENT_WINDOW: usize = 9;
 
+/// Distance and offset of the subject in a mask, from its head's width and row.
+///
+/// # Errors
+/// Empty masks, a mask of another shape than the camera's.
+pub fn subject_of(mask: &Mask, file: &CameraFile) -> Result<Subject, ShadowError> {
+    let outline = checked_outline(mask, file)?;
+    Ok(estimate_subject(mask, &outline, file))
+}
+
+fn checked_outline(mask: &Mask, file: &CameraFile) -> Result<Outline, ShadowError> {
+    let (mask_height, mask_width) = mask.dim();
+    let (camera_height, camera_width) = (file.camera.height_px, file.camera.width_px);
+    if (mask_height, mask_width) != (camera_height, camera_width) {
+        return Err(ShadowError::Shape { mask_height, mask_width, camera_height, camera_width });
+    }
+    Outline::new(mask).ok_or(ShadowError::EmptyMask)
+}
+
 /// Removes the shadow of the one subject in `mask`, with the sun's position and the camera known.
 ///
 /// `beta_sd_rad` is the standard deviation of the cutting angle ([`super::uncertainty`]); only `thesis` uses it.
@@ -73,17 +91,8 @@ pub fn remove(
     beta_sd_rad: f64,
     method: Method,
 ) -> Result<(Mask, CutReport), ShadowError> {
-    let (mask_height, mask_width) = mask.dim();
     let camera = &file.camera;
-    if (mask_height, mask_width) != (camera.height_px, camera.width_px) {
-        return Err(ShadowError::Shape {
-            mask_height,
-            mask_width,
-            camera_height: camera.height_px,
-            camera_width: camera.width_px,
-        });
-    }
-    let outline = Outline::new(mask).ok_or(ShadowError::EmptyMask)?;
+    let outline = checked_outline(mask, file)?;
     let subject = estimate_subject(mask, &outline, file);
     let ground = projection::on_ground(sun, subject.height_m, camera)?;
     let shadow = projection::in_image(ground, subject, camera)?;

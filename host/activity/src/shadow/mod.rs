@@ -12,5 +12,5 @@ pub mod projection;
 pub mod uncertainty;
 
 pub use camera::CameraFile;
-pub use cut::{CutReport, Method, remove};
+pub use cut::{CutReport, Method, remove, subject_of};
 pub use projection::{GroundShadow, ImageShadow, ShadowError, Subject};

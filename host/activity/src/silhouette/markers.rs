@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn triplets_and_hull_draw_the_same_picture() {
-        let template = Template::thesis();
+        let template = Template::named("thesis").expect("built in");
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(6);
         let names: Vec<String> = template.parts.iter().flat_map(|p| p.markers.clone()).collect();
         for round in 0..5 {

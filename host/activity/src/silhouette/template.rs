@@ -42,6 +42,9 @@ pub enum TemplateError {
     /// Not the TOML that is expected.
     #[error("template: {0}")]
     Syntax(String),
+    /// No such built-in template.
+    #[error("no built-in template `{0}`: there are {names}; or name a TOML file", names = Template::NAMES.join(", "))]
+    Name(String),
     /// A part that cannot be drawn.
     #[error("template: part `{part}` {reason}")]
     Part {
@@ -52,7 +55,7 @@ pub enum TemplateError {
     },
     /// The recording lacks markers.
     #[error(
-        "the recording has no markers named {missing:?} (of {of} in template `{template}`); it has {present:?}"
+        "the recording lacks {} of the {of} markers of template `{template}` ({}); it has {}", .missing.len(), listed(.missing), listed(.present)
     )]
     UnknownMarkers {
         /// Markers of the template that the recording lacks.
@@ -64,6 +67,13 @@ pub enum TemplateError {
         /// Some markers of the recording.
         present: Vec<String>,
     },
+}
+
+/// The first few names, with a sign that there are more.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 10;
+    let more = if names.len() > SHOWN { ", ..." } else { "" };
+    names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ") + more
 }
 
 impl Template {
@@ -117,63 +127,41 @@ impl Template {
         Ok(())
     }
 
-    /// Vicon's Plug-in Gait / CMU's 41 markers, with the thickness that flesh has over few markers.
-    pub fn plug_in_gait() -> Self {
-        let part = |name: &str, thickness_mm: f64, markers: &[&str]| Part {
-            name: name.into(),
-            markers: markers.iter().map(|m| (*m).to_owned()).collect(),
-            thickness_mm,
+    /// A built-in template: one of [`Template::NAMES`]. Their files lie in the crate's `templates` folder, to be copied and changed.
+    ///
+    /// # Errors
+    /// [`TemplateError::Name`] for any other name.
+    pub fn named(name: &str) -> Result<Self, TemplateError> {
+        let text = match name {
+            "plug-in-gait" => include_str!("../../templates/plug-in-gait.toml"),
+            "vicon-53" => include_str!("../../templates/vicon-53.toml"),
+            "opencap" => include_str!("../../templates/opencap.toml"),
+            "thesis" => include_str!("../../templates/thesis.toml"),
+            other => return Err(TemplateError::Name(other.to_owned())),
         };
-        Self {
-            name: "plug-in-gait".into(),
-            parts: vec![
-                part("head", 60.0, &["LFHD", "RFHD", "LBHD", "RBHD"]),
-                part("neck", 50.0, &["LBHD", "RBHD", "C7", "CLAV"]),
-                part("upper torso", 30.0, &["C7", "CLAV", "STRN", "T10", "LSHO", "RSHO", "RBAC"]),
-                part(
-                    "lower torso",
-                    30.0,
-                    &["STRN", "T10", "LFWT", "RFWT", "LBWT", "RBWT", "LASI", "RASI", "LPSI", "RPSI"],
-                ),
-                part("left arm", 45.0, &["LSHO", "LUPA", "LELB"]),
-                part("right arm", 45.0, &["RSHO", "RUPA", "RELB"]),
-                part("left forearm and hand", 38.0, &["LELB", "LFRM", "LWRA", "LWRB", "LFIN"]),
-                part("right forearm and hand", 38.0, &["RELB", "RFRM", "RWRA", "RWRB", "RFIN"]),
-                part("left thigh", 65.0, &["LFWT", "LBWT", "LASI", "LPSI", "LTHI", "LKNE"]),
-                part("right thigh", 65.0, &["RFWT", "RBWT", "RASI", "RPSI", "RTHI", "RKNE"]),
-                part("left leg and foot", 40.0, &["LKNE", "LSHN", "LTIB", "LANK", "LHEE", "LMT5", "LTOE"]),
-                part("right leg and foot", 40.0, &["RKNE", "RSHN", "RTIB", "RANK", "RHEE", "RMT5", "RTOE"]),
-            ],
-        }
+        Self::parse(text)
     }
 
-    /// The suit and props of Li 2014, figures 7.2 and 7.4, by the counts printed there: jacket 36, trousers 32, head cover 5, gloves
-    /// 2 each; bag 9, spade 10, short gun 4, long gun 6. The thesis prints no names, so markers are numbered per part, e.g. `LTHI1`.
-    pub fn thesis() -> Self {
-        let numbered = |name: &str, prefix: &str, count: usize| Part {
-            name: name.into(),
-            markers: (1..=count).map(|i| format!("{prefix}{i}")).collect(),
-            thickness_mm: 0.0,
-        };
-        Self {
-            name: "thesis".into(),
-            parts: vec![
-                numbered("head", "HEAD", 5),
-                numbered("upper torso", "UTOR", 12),
-                numbered("lower torso", "LTOR", 8),
-                numbered("left arm", "LARM", 4),
-                numbered("right arm", "RARM", 4),
-                numbered("left forearm and hand", "LFOR", 6),
-                numbered("right forearm and hand", "RFOR", 6),
-                numbered("left thigh", "LTHI", 8),
-                numbered("right thigh", "RTHI", 8),
-                numbered("left leg and foot", "LLEG", 8),
-                numbered("right leg and foot", "RLEG", 8),
-                numbered("bag", "BAG", 9),
-                numbered("spade", "SPAD", 10),
-                numbered("short gun", "SGUN", 4),
-                numbered("long gun", "LGUN", 6),
-            ],
+    /// Names of the built-in templates: Plug-in Gait (and CMU 41), Vicon's 53 markers, OpenCap's laboratory markers, and the
+    /// suit and props of Li 2014.
+    pub const NAMES: [&str; 4] = ["plug-in-gait", "vicon-53", "opencap", "thesis"];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_templates_are_whole() {
+        for name in Template::NAMES {
+            let template = Template::named(name).expect("a template");
+            assert_eq!(template.name, name);
+            let sided = |side: &str| template.parts.iter().filter(|part| part.name.starts_with(side)).count();
+            assert!(sided("left ") == sided("right ") && sided("left ") == 4, "{name}");
         }
+        // Li 2014, figures 7.2 and 7.4: jacket 36, trousers 32, head 5, gloves 2 each, props 9 + 10 + 4 + 6.
+        let thesis = Template::named("thesis").expect("a template");
+        assert_eq!(thesis.parts.iter().map(|part| part.markers.len()).sum::<usize>(), 77 + 29);
+        assert!(matches!(Template::named("jacket"), Err(TemplateError::Name(_))));
     }
 }

@@ -1,11 +1,12 @@
 //! `farnear silhouettes`: masks of a person.
 
+mod markers;
 mod video;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-/// Make silhouettes: masks of the person who moves in a video.
+/// Make silhouettes: masks of the person who moves in a video, or of a motion-capture recording from any view.
 #[derive(Args)]
 #[command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")]
 pub struct Arguments {
@@ -15,12 +16,14 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Source {
+    Markers(markers::Arguments),
     Video(video::Arguments),
 }
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.source {
+        Source::Markers(arguments) => markers::run(&arguments),
         Source::Video(arguments) => video::run(&arguments),
     }
 }

@@ -8,5 +8,8 @@ mod bad_ports;
 mod bad_rigs;
 mod emulated_rig;
 mod maps;
+mod markers;
 mod scripted_board;
+mod shadow_remove;
+mod sun;
 mod usage;

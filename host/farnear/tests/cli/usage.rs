@@ -21,9 +21,12 @@ const COMMANDS: &[&[&str]] = &[
     &["rig", "move"],
     &["rig", "stop"],
     &["rig", "capture"],
+    &["sun"],
     &["shadow"],
+    &["shadow", "remove"],
     &["shadow", "score"],
     &["silhouettes"],
+    &["silhouettes", "markers"],
     &["silhouettes", "video"],
     &["completions"],
 ];
@@ -75,6 +78,17 @@ fn bad_usage_ends_with_2() {
         (vec!["rig", "info", "--port", "sim", "--noise", "9bit"], vec!["9bit", "12bit"]),
         (vec!["rig", "info", "--port", "/dev/x", "--seed", "2"], vec!["--seed goes with --port sim only"]),
         (vec!["rig", "move", "--port", "sim", "--axis", "lens", "--to-um", "1"], vec!["lens", "coarse"]),
+        (vec!["sun", "--lat", "95", "--lon", "0", "--time", "2014-06-23T11:30:00Z"], vec!["95", "-90 to 90"]),
+        (vec!["sun", "--lat", "9", "--lon", "-181", "--time", "2014-06-23T11:30:00Z"], vec!["-181", "360"]),
+        (vec!["sun", "--lat", "52", "--lon", "0", "--time", "noon"], vec!["noon", "RFC 3339"]),
+        (
+            vec!["sun", "--lat", "52", "--lon", "0", "--time", "2014-06-23T11:30:00Z", "--model", "noaa"],
+            vec!["noaa", "psa", "board"],
+        ),
+        (
+            vec!["silhouettes", "markers", "a.c3d", "--template", "x", "--out", "y", "--views", "0"],
+            vec!["72"],
+        ),
         (vec!["completions", "cmd"], vec!["cmd", "bash"]),
     ] {
         fails(&mut farnear(&arguments), 2, &phrases);

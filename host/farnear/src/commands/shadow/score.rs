@@ -8,12 +8,13 @@ use std::{
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use farnear_activity::shadow_score::{ShadowScore, Truth};
-use ndarray::{Array2, Axis, Zip};
+use ndarray::{Array2, Zip};
 use serde::Serialize;
 
 use crate::{
+    masks::{self, listed},
     report,
-    video::{Pixels, pictures},
+    video::pictures,
 };
 
 /// Scores shadow removal against a ground truth, over one mask or a folder of them.
@@ -87,15 +88,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     report::print(&figures, arguments.json)
 }
 
-/// The pictures of a folder in natural order, or the one picture.
-fn listed(path: &Path) -> Result<Vec<PathBuf>> {
-    if path.is_dir() {
-        return Ok(pictures::list(path)?);
-    }
-    ensure!(path.is_file(), "{}: no such picture or folder", path.display());
-    Ok(vec![path.into()])
-}
-
 /// Masks to be found by the name of their truth.
 struct Partners {
     path: PathBuf,
@@ -134,7 +126,7 @@ impl Partners {
                 truth.display()
             )
         };
-        Ok(grey(path)?.mapv(|level| level >= 128))
+        masks::read(path)
     }
 }
 
@@ -145,7 +137,7 @@ fn trailing_number(name: &str) -> Option<u64> {
 }
 
 fn truth(path: &Path) -> Result<Array2<Truth>> {
-    let levels = grey(path)?;
+    let levels = masks::grey(path)?;
     for ((row, column), &level) in levels.indexed_iter() {
         ensure!(
             Truth::from_grey(level).is_some(),
@@ -155,21 +147,4 @@ fn truth(path: &Path) -> Result<Array2<Truth>> {
         );
     }
     Ok(levels.mapv(|level| Truth::from_grey(level).unwrap_or(Truth::Ignored)))
-}
-
-/// Grey levels of a picture; one in colour must have equal channels.
-fn grey(path: &Path) -> Result<Array2<u8>> {
-    match pictures::read(path)? {
-        Pixels::Grey(levels) => Ok(levels),
-        Pixels::Rgb(rgb) => {
-            for ((row, column), pixel) in rgb.map_axis(Axis(2), |p| [p[0], p[1], p[2]]).indexed_iter() {
-                ensure!(
-                    pixel[0] == pixel[1] && pixel[1] == pixel[2],
-                    "{}: colour {pixel:?} at column {column}, row {row}; masks and truths are grey",
-                    path.display()
-                );
-            }
-            Ok(rgb.index_axis_move(Axis(2), 0))
-        }
-    }
 }

@@ -1,10 +1,6 @@
 //! `farnear silhouettes video`: masks of the person who moves in a video, one PNG per frame.
 
-use std::{
-    io::{Cursor, IsTerminal},
-    path::PathBuf,
-    time::Instant,
-};
+use std::{io::IsTerminal, path::PathBuf, time::Instant};
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
@@ -19,12 +15,11 @@ use farnear_activity::{
     shadow_detectors::{Detector, Images, Method},
 };
 use farnear_capture::aside::Aside;
-use image::{GrayImage, ImageFormat, Luma};
-use ndarray::{Array2, Array3, Axis};
+use ndarray::{Array3, Axis};
 use serde::Serialize;
 
 use crate::{
-    report,
+    masks, report,
     video::{Pixels, Video, VideoFrame},
 };
 
@@ -146,13 +141,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         } else {
             mask
         };
-        save(&out, &file, &picture, |&set| if set { 255 } else { 0 })?;
+        out.write(&file, &masks::png(&picture)?)?;
         if let Some(labels) = &labels {
-            save(labels, &file, &found.labels, |label| match label {
+            let levels = masks::encoded(&found.labels, |label| match label {
                 Label::Background => 0,
                 Label::Shadow => 127,
                 Label::Foreground => 255,
             })?;
+            labels.write(&file, &levels)?;
         }
         index.frame.push(Entry {
             file,
@@ -232,14 +228,4 @@ impl Work {
         }
         Ok((found, mask))
     }
-}
-
-/// Writes a picture of one grey level per pixel.
-fn save<T>(folder: &Aside, name: &str, pixels: &Array2<T>, level: impl Fn(&T) -> u8) -> Result<()> {
-    let (height, width) = pixels.dim();
-    let levels = |x: u32, y: u32| Luma([level(&pixels[[y as usize, x as usize]])]);
-    let picture = GrayImage::from_fn(width as u32, height as u32, levels);
-    let mut bytes = Vec::new();
-    picture.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)?;
-    Ok(folder.write(name, &bytes)?)
 }

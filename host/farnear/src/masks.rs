@@ -1,0 +1,104 @@
+//! Masks as pictures: grey PNGs (or other pictures), set from level 128 on, one per frame.
+
+use std::{
+    io::Cursor,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Result, ensure};
+use farnear_activity::mask::Mask;
+use image::{GrayImage, ImageFormat, Luma};
+use ndarray::{Array2, Axis};
+
+use crate::video::{Pixels, pictures};
+
+/// A mask and the name of the frame it belongs to.
+pub struct Named {
+    /// The picture's name without its extension.
+    pub name: String,
+    /// The mask.
+    pub mask: Mask,
+}
+
+/// The pictures of a folder in natural order, or the one picture.
+///
+/// # Errors
+/// A path that is neither, a folder without pictures.
+pub fn listed(path: &Path) -> Result<Vec<PathBuf>> {
+    if path.is_dir() {
+        return Ok(pictures::list(path)?);
+    }
+    ensure!(path.is_file(), "{}: no such picture or folder", path.display());
+    Ok(vec![path.into()])
+}
+
+/// Grey levels of a picture; one in colour must have equal channels.
+///
+/// # Errors
+/// Pictures that cannot be read, and coloured ones.
+pub fn grey(path: &Path) -> Result<Array2<u8>> {
+    match pictures::read(path)? {
+        Pixels::Grey(levels) => Ok(levels),
+        Pixels::Rgb(rgb) => {
+            for ((row, column), pixel) in rgb.map_axis(Axis(2), |p| [p[0], p[1], p[2]]).indexed_iter() {
+                ensure!(
+                    pixel[0] == pixel[1] && pixel[1] == pixel[2],
+                    "{}: colour {pixel:?} at column {column}, row {row}; masks and truths are grey",
+                    path.display()
+                );
+            }
+            Ok(rgb.index_axis_move(Axis(2), 0))
+        }
+    }
+}
+
+/// The mask in a picture.
+///
+/// # Errors
+/// See [`grey`].
+pub fn read(path: &Path) -> Result<Mask> {
+    Ok(grey(path)?.mapv(|level| level >= 128))
+}
+
+/// All masks of a folder (or one picture), in natural order; they must have one size.
+///
+/// # Errors
+/// See [`grey`] and [`listed`]; a mask of another size than the first.
+pub fn read_all(path: &Path) -> Result<Vec<Named>> {
+    let mut all: Vec<Named> = Vec::new();
+    for file in listed(path)? {
+        let mask = read(&file)?;
+        if let Some(first) = all.first() {
+            let ((h, w), (h0, w0)) = (mask.dim(), first.mask.dim());
+            ensure!(
+                (h, w) == (h0, w0),
+                "{}: the mask is {w}x{h}, but `{}` is {w0}x{h0}; the masks of a sequence must be alike",
+                file.display(),
+                first.name
+            );
+        }
+        all.push(Named { name: pictures::stem(&file), mask });
+    }
+    Ok(all)
+}
+
+/// A mask as PNG: 255 = set.
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn png(mask: &Mask) -> Result<Vec<u8>> {
+    encoded(mask, |&set| if set { 255 } else { 0 })
+}
+
+/// A picture of one grey level per pixel as PNG.
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn encoded<T>(pixels: &Array2<T>, level: impl Fn(&T) -> u8) -> Result<Vec<u8>> {
+    let (height, width) = pixels.dim();
+    let levels = |x: u32, y: u32| Luma([level(&pixels[[y as usize, x as usize]])]);
+    let mut bytes = Vec::new();
+    GrayImage::from_fn(width as u32, height as u32, levels)
+        .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)?;
+    Ok(bytes)
+}

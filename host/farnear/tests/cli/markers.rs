@@ -1,0 +1,149 @@
+//! `farnear silhouettes markers` on a made CSV suit and, where they are at hand, on real recordings.
+
+use std::{fs, path::PathBuf};
+
+use image::GrayImage;
+
+use crate::common::{Folder, fails, farnear, figures, number, succeeds};
+
+/// A suit of two boxes: a body 1 m tall, 0.4 m wide and 0.2 m deep, and a head on it.
+const TEMPLATE: &str = "name = 'boxes'\n[[part]]\nname = 'body'\nmarkers = ['B1', 'B2', 'B3', 'B4', 'B5', 'B6', 'B7', 'B8']\n\
+                        [[part]]\nname = 'head'\nmarkers = ['H1', 'H2', 'H3']\n";
+
+/// Three frames in which the figure steps 0.5 m along x; in the last the head is hidden.
+fn recording() -> String {
+    let mut points: Vec<(String, [f64; 3])> = (0..8)
+        .map(|i| {
+            let corner = [i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from);
+            (format!("B{}", i + 1), [400.0 * corner[0], 200.0 * corner[1], 1000.0 * corner[2]])
+        })
+        .collect();
+    for (i, x) in [100.0, 300.0, 200.0].into_iter().enumerate() {
+        points.push((format!("H{}", i + 1), [x, 100.0, if i == 2 { 1300.0 } else { 1000.0 }]));
+    }
+    let columns: Vec<String> = points.iter().map(|(n, _)| format!("{n}_x,{n}_y,{n}_z")).collect();
+    let mut text = format!("frame,{}\n", columns.join(","));
+    for frame in 0..3 {
+        let cells: Vec<String> = points
+            .iter()
+            .map(|(name, [x, y, z])| match (frame, name.starts_with('H')) {
+                (2, true) => ",,".into(),
+                _ => format!("{},{y},{z}", x + 500.0 * f64::from(frame)),
+            })
+            .collect();
+        text += &format!("{},{}\n", frame + 1, cells.join(","));
+    }
+    text
+}
+
+fn bounds(picture: &GrayImage) -> [u32; 4] {
+    let set = picture.enumerate_pixels().filter(|(_, _, level)| level.0[0] == 255);
+    set.fold([u32::MAX, u32::MAX, 0, 0], |[t, l, b, r], (x, y, _)| {
+        [t.min(y), l.min(x), b.max(y + 1), r.max(x + 1)]
+    })
+}
+
+#[test]
+fn every_view_gets_its_masks_and_hidden_parts_are_flagged() {
+    let folder = Folder::new();
+    let (file, template) = (folder.file("walk.csv", recording()), folder.file("suit.toml", TEMPLATE));
+    let out = folder.text("masks");
+    let arguments =
+        ["silhouettes", "markers", &file, "--template", &template, "--views", "4", "--mm-per-px", "10"];
+    let found = figures(farnear(&arguments).args(["--out", &out, "--json"]));
+    assert_eq!((number(&found, "views"), number(&found, "silhouettes")), (4.0, 12.0));
+    assert_eq!((number(&found, "flagged_frames"), number(&found, "empty_frames")), (1.0, 0.0));
+    let mask = |view: u32, frame: u32| {
+        image::open(folder.path(&format!("masks/view{view}/frame_{frame:06}.png")))
+            .expect("a mask")
+            .into_luma8()
+    };
+    // The front is 40 x 130 pixels and moves 50 a frame; the side is 20 wide and stands still. A pixel either way is rounding.
+    let [top, left, bottom, right] = bounds(&mask(1, 1));
+    assert!(
+        (bottom - top).abs_diff(131) <= 1 && (right - left).abs_diff(41) <= 1,
+        "{:?}",
+        bounds(&mask(1, 1))
+    );
+    assert!(bounds(&mask(1, 2))[1].abs_diff(left + 50) <= 1);
+    let [_, side_left, _, side_right] = bounds(&mask(2, 1));
+    assert!((side_right - side_left).abs_diff(21) <= 1);
+    assert!(bounds(&mask(2, 3))[1].abs_diff(side_left) <= 1);
+    let index = fs::read_to_string(folder.path("masks/silhouettes.toml")).expect("an index");
+    assert!(index.contains("missing:head") && index.contains("frame_000003"), "{index}");
+    assert!(!index.contains("frame_000001"), "{index}");
+
+    let [gallery, small] = ["gallery", "small"].map(|name| folder.text(name));
+    let kept = figures(farnear(&arguments).args(["--out", &gallery, "--keep", "5", "--json"]));
+    assert_eq!(number(&kept, "silhouettes"), 5.0);
+    let pictures =
+        folder.listing().into_iter().filter(|name| name.starts_with("gallery/") && name.ends_with("png"));
+    assert_eq!(pictures.count(), 5);
+    succeeds(farnear(&arguments).args(["--out", &small, "--centred", "--fill", "triplets"]));
+    let picture = image::open(folder.path("small/view1/frame_000002.png")).expect("a mask").into_luma8();
+    let [top, _, bottom, _] = bounds(&picture);
+    // Filled to the height, but for the head's pointed tip, whose last pixels fall between two samples.
+    assert!(picture.dimensions() == (100, 100) && bottom - top >= 97, "{top} {bottom}");
+}
+
+#[test]
+fn recordings_that_do_not_fit_are_refused_by_name() {
+    let folder = Folder::new();
+    let (good, template) = (folder.file("walk.csv", recording()), folder.file("suit.toml", TEMPLATE));
+    let empty = folder.file("empty.csv", "frame,A_x,A_y,A_z\n1,,,\n");
+    let far = folder.file("far.csv", recording().replace("\n1,0,", "\n1,90000000,"));
+    let broken = folder.file("broken.csv", recording().replace("1000", "tall"));
+    let short = folder.file("short.trc", "PathFileType\t4\n");
+    let odd = folder.file("odd.c3d", [2_u8, 0x50, 1, 2, 3]);
+    let other = folder.file("walk.bvh", "HIERARCHY");
+    let one = folder.file("one.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = ['A']\n");
+    let doubled = folder.file("doubled.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = []\n");
+    let before = folder.listing();
+    for (file, template, phrases) in [
+        (&good, "plug-in-gait", vec!["walk.csv", "LFHD", "B1"]),
+        (&good, "jacket", vec!["jacket", "vicon-53"]),
+        (&good, &doubled, vec!["doubled.toml", "no markers"]),
+        (&empty, &one, vec!["empty.csv", "no frame has a visible marker"]),
+        (&far, &template, vec!["unit"]),
+        (&broken, &template, vec!["broken.csv", "line 2", "tall"]),
+        (&short, &template, vec!["short.trc", "line"]),
+        (&odd, &template, vec!["odd.c3d", "C3D", "ends within"]),
+        (&other, &template, vec!["walk.bvh", ".c3d"]),
+        (&folder.text("none.c3d"), &template, vec!["none.c3d"]),
+    ] {
+        let out = folder.text("masks");
+        let arguments = ["silhouettes", "markers", file, "--template", template, "--out", &out];
+        fails(&mut farnear(&arguments), 1, &phrases);
+    }
+    assert_eq!(folder.listing(), before, "nothing is left behind");
+}
+
+#[test]
+fn real_recordings_fit_built_in_templates() {
+    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/mocap");
+    if !data.is_dir() {
+        println!("skipped: no shared data");
+        return;
+    }
+    let folder = Folder::new();
+    for (name, template) in [
+        ("cmu_02_05.c3d", "plug-in-gait"),
+        ("nick_freeform_001.c3d", "vicon-53"),
+        ("walking1.trc", "opencap"),
+    ] {
+        let (file, out) = (data.join(name).display().to_string(), folder.text(name));
+        let arguments =
+            ["silhouettes", "markers", &file, "--template", template, "--views", "2", "--every", "40"];
+        let found = figures(farnear(&arguments).args(["--out", &out, "--json"]));
+        assert_eq!(number(&found, "silhouettes"), 2.0 * number(&found, "frames"), "{name}");
+        // Whole parts are hidden in few frames, if in any.
+        assert!(number(&found, "flagged_frames") <= 0.2 * number(&found, "frames"), "{name}: {found}");
+    }
+    let file = data.join("walking1.trc").display().to_string();
+    let out = folder.text("wrong");
+    let wrong = ["silhouettes", "markers", &file, "--template", "plug-in-gait", "--out", &out];
+    fails(&mut farnear(&wrong), 1, &["walking1.trc", "LFHD", "`opencap` fits"]);
+    let cut = folder.file("cut.c3d", &fs::read(data.join("cmu_02_05.c3d")).expect("readable")[..100_000]);
+    let truncated = ["silhouettes", "markers", &cut, "--template", "plug-in-gait", "--out", &out];
+    fails(&mut farnear(&truncated), 1, &["cut.c3d", "ends within the frames", "100000"]);
+}
