@@ -2,10 +2,10 @@
 //! `cargo run --release --example evaluate_skeletons -- utkinect FILE.mat [thesis|order-free|ordered]...`
 
 use farnear_activity::embedding::descriptor::Scaling;
-use farnear_activity::evaluation::leave_one_out::{Experiment, leave_one_subject_out};
+use farnear_activity::evaluation::experiment::Experiment;
+use farnear_activity::evaluation::leave_one_out::leave_one_subject_out;
 use farnear_activity::evaluation::skeleton_clips::{florence, utkinect};
 use farnear_activity::recognition::frames::Mode;
-use farnear_activity::recognition::space::SpaceSettings;
 use farnear_activity::synthetic::activities::clips as synthetic;
 use std::time::Instant;
 
@@ -31,10 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let start = Instant::now();
         let experiment = match method.as_str() {
             "thesis" => Experiment::thesis(),
-            "order-free" => Experiment::codebook(SpaceSettings::default()),
-            "ordered" => {
-                Experiment::codebook(SpaceSettings { mode: Mode::Ordered, ..SpaceSettings::default() })
-            }
+            "order-free" => Experiment::searched(Mode::OrderFree),
+            "ordered" => Experiment::searched(Mode::Ordered),
             other => return Err(format!("unknown method `{other}`").into()),
         };
         let outcome = leave_one_subject_out(&clips, &experiment, Clone::clone)?;

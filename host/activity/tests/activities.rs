@@ -1,7 +1,8 @@
 //! Recognition through the public face: synthetic people, order, speed, damage, models and live use.
 
 use farnear_activity::embedding::descriptor::Scaling;
-use farnear_activity::evaluation::leave_one_out::{Experiment, leave_one_subject_out};
+use farnear_activity::evaluation::experiment::Experiment;
+use farnear_activity::evaluation::leave_one_out::leave_one_subject_out;
 use farnear_activity::mask::Mask;
 use farnear_activity::recognition::classifier::ClassifierKind;
 use farnear_activity::recognition::clip::Clip;

@@ -1,5 +1,6 @@
 //! One file per command: its flags, what it does, its figures.
 
+pub mod activity;
 pub mod calibrate;
 pub mod compare;
 pub mod completions;

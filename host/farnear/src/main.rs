@@ -47,6 +47,7 @@ enum Command {
     Sun(commands::sun::Arguments),
     Shadow(commands::shadow::Arguments),
     Silhouettes(commands::silhouettes::Arguments),
+    Activity(commands::activity::Arguments),
     Completions(commands::completions::Arguments),
 }
 
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         Command::Sun(arguments) => commands::sun::run(&arguments),
         Command::Shadow(arguments) => commands::shadow::run(arguments),
         Command::Silhouettes(arguments) => commands::silhouettes::run(arguments),
+        Command::Activity(arguments) => commands::activity::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
     };
     match result {

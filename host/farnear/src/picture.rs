@@ -1,7 +1,7 @@
 //! `view.png`: a depth map as a person likes to look at it - near is warm, far is cold, grey where there is no
 //! value, with a scale bar in mm.
 
-mod text;
+pub mod text;
 
 use std::io::Cursor;
 

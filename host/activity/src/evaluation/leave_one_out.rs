@@ -1,63 +1,19 @@
 //! Leave one subject out, all parameters chosen on the others.
 //!
-//! Per left-out subject: the space (gallery, Isomap, RBF map, codebook) is learned from the other subjects' clips; sharpness and the
-//! classifier's parameter are chosen by cross-validation over those subjects; the classifier is trained on all of them; the
-//! left-out subject's clips are recognised once. Nothing of the left-out subject is ever seen before.
+//! Per left-out subject: the space (gallery, layout, RBF map, codebook) is learned from the other subjects' clips; its
+//! parameters, sharpness and the classifier's parameter are chosen by cross-validation over those subjects
+//! ([`super::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
+//! left-out subject is ever seen before.
 
+use super::choice::{Views, choose, gathered, names, patterns_of, vectors_of};
 use super::confusion::Confusion;
+use super::experiment::Experiment;
 use crate::embedding::EmbeddingError;
 use crate::recognition::classifier::{Classifier, ClassifierKind};
 use crate::recognition::clip::Clip;
-use crate::recognition::knn;
-use crate::recognition::occupancy::rows;
-use crate::recognition::space::{PatternKind, Space, SpaceSettings};
-use crate::recognition::svc::DualSvc;
-use ndarray::{Array1, Array2};
+use crate::recognition::space::SpaceSettings;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
-
-/// What is tried, and what is chosen from.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Experiment {
-    /// The spaces to choose from (one, or several with other members per dimension or gamma).
-    pub spaces: Vec<SpaceSettings>,
-    /// Sharpness of the codebook's shares to choose from.
-    pub sharpness: Vec<f32>,
-    /// Classifiers to choose from. The first of everything is kept unless another is better by more than one standard error.
-    pub classifiers: Vec<ClassifierKind>,
-    /// Whether the training clips' mirrors train too (people are left- and right-handed).
-    pub mirror: bool,
-    /// Folds of the choice inside the training subjects.
-    pub inner_folds: usize,
-}
-
-impl Experiment {
-    /// The default method with a linear SVC.
-    pub fn codebook(space: SpaceSettings) -> Self {
-        Self {
-            spaces: vec![space],
-            sharpness: vec![2.0, 1.0, 4.0],
-            classifiers: vec![ClassifierKind::Svc(5.0), ClassifierKind::Svc(1.0)],
-            mirror: true,
-            inner_folds: 4,
-        }
-    }
-
-    /// The thesis' method: 0/1 grids of several sizes, k nearest neighbours.
-    pub fn thesis() -> Self {
-        let space = |bins: [usize; 3]| SpaceSettings {
-            pattern: PatternKind::Thesis(bins.to_vec()),
-            ..SpaceSettings::thesis()
-        };
-        Self {
-            spaces: vec![space([9, 9, 9]), space([15, 9, 9]), space([6, 6, 6])],
-            sharpness: vec![1.0],
-            classifiers: vec![ClassifierKind::Knn(1), ClassifierKind::Knn(3)],
-            mirror: false,
-            inner_folds: 4,
-        }
-    }
-}
+use serde::Serialize;
 
 /// What came out.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +22,34 @@ pub struct Outcome {
     pub each: Confusion,
     /// All views fused.
     pub fused: Confusion,
+    /// What was chosen in every fold.
+    pub chosen: Vec<Choice>,
+}
+
+/// What was chosen in one fold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Choice {
+    /// Who was left out.
+    pub left_out: Vec<String>,
+    /// For which views.
+    pub views: Views,
+    /// The space.
+    pub space: SpaceSettings,
+    /// Sharpness of the codebook's shares.
+    pub sharpness: f32,
+    /// Classifier.
+    pub classifier: ClassifierKind,
+    /// Accuracy over the inner folds, 0 to 1.
+    pub inner_accuracy: Option<f64>,
+    /// Condition number of the RBF system, if there is one.
+    pub condition: Option<f64>,
+}
+
+impl Outcome {
+    fn empty(classes: &[String]) -> Self {
+        let none = Confusion::new(classes.to_vec());
+        Self { each: none.clone(), fused: none, chosen: Vec::new() }
+    }
 }
 
 /// Why an evaluation could not be done.
@@ -91,11 +75,6 @@ pub enum EvaluationError {
     Embedding(#[from] EmbeddingError),
 }
 
-/// Names in order of first appearance in sorted order.
-pub fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
-    all.cloned().collect::<BTreeSet<_>>().into_iter().collect()
-}
-
 /// Runs the experiment over all subjects. `change` alters the left-out subject's clips before they are recognised (speed, shuffling,
 /// damage); training is never altered.
 ///
@@ -106,39 +85,62 @@ pub fn leave_one_subject_out(
     experiment: &Experiment,
     change: impl Fn(&Clip) -> Clip + Sync,
 ) -> Result<Outcome, EvaluationError> {
+    let changed: Vec<Clip> = clips.iter().map(change).collect();
     let subjects = names(clips.iter().map(|clip| &clip.subject));
-    let classes = names(clips.iter().map(|clip| &clip.activity));
     if subjects.len() < 3 {
         return Err(EvaluationError::Subjects(subjects.len()));
     }
-    let views = clips[0].views.len();
-    if let Some((clip, found)) = clips.iter().enumerate().find(|(_, clip)| clip.views.len() != views) {
+    train_on_others(clips, &changed, experiment, &[Views::Each, Views::Fused])
+}
+
+/// Recognises the clips of every subject of `test`, trained on the clips of all OTHER subjects of `train` (which may be the same
+/// people: clean clips for damaged ones, say). Only the asked arrangements of views are computed; others stay empty.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn train_on_others(
+    train: &[Clip],
+    test: &[Clip],
+    experiment: &Experiment,
+    arrangements: &[Views],
+) -> Result<Outcome, EvaluationError> {
+    let classes = names(train.iter().chain(test).map(|clip| &clip.activity));
+    let views = train.first().map_or(0, |clip| clip.views.len());
+    if let Some((clip, found)) =
+        train.iter().chain(test).enumerate().find(|(_, clip)| clip.views.len() != views)
+    {
         return Err(EvaluationError::Views { clip, found: found.views.len(), expected: views });
     }
-    let folds: Result<Vec<Outcome>, EvaluationError> = subjects
+    let subjects = names(test.iter().map(|clip| &clip.subject));
+    // Where training and test share nobody, one training does for all.
+    let shared = |subject: &String| train.iter().any(|clip| clip.subject == *subject);
+    let (left_out, strangers): (Vec<&String>, Vec<&String>) = subjects.iter().partition(|s| shared(s));
+    let mut groups: Vec<Vec<&String>> = left_out.into_iter().map(|subject| vec![subject]).collect();
+    if !strangers.is_empty() {
+        groups.push(strangers);
+    }
+    let folds: Result<Vec<Outcome>, EvaluationError> = groups
         .par_iter()
-        .map(|left_out| {
-            let kept = clips.iter().filter(|clip| clip.subject != *left_out);
+        .map(|tested| {
+            let kept: Vec<&Clip> = train.iter().filter(|clip| !tested.contains(&&clip.subject)).collect();
+            let others = names(kept.iter().map(|clip| &clip.subject)).len();
+            if others == 0 {
+                return Err(EvaluationError::Subjects(1));
+            }
             let mirrors: Vec<Clip> =
-                if experiment.mirror { kept.clone().map(Clip::mirrored).collect() } else { Vec::new() };
-            let train: Vec<&Clip> = kept.chain(&mirrors).collect();
-            let test: Vec<Clip> =
-                clips.iter().filter(|clip| clip.subject == *left_out).map(&change).collect();
-            one_fold(&train, &test.iter().collect::<Vec<_>>(), &classes, views, experiment)
+                if experiment.mirror { kept.iter().map(|c| c.mirrored()).collect() } else { Vec::new() };
+            let training: Vec<&Clip> = kept.into_iter().chain(&mirrors).collect();
+            let held: Vec<&Clip> = test.iter().filter(|clip| tested.contains(&&clip.subject)).collect();
+            one_fold(&training, &held, &classes, views, experiment, arrangements)
         })
         .collect();
-    let mut outcome = Outcome { each: Confusion::new(classes.clone()), fused: Confusion::new(classes) };
+    let mut outcome = Outcome::empty(&classes);
     for fold in folds? {
         outcome.each.add(&fold.each);
         outcome.fused.add(&fold.fused);
+        outcome.chosen.extend(fold.chosen);
     }
     Ok(outcome)
-}
-
-/// A space and a sharpness with the patterns of training and test clips: `[clip][view]`.
-struct Candidate {
-    train: Vec<Vec<Array1<f32>>>,
-    test: Vec<Vec<Array1<f32>>>,
 }
 
 fn one_fold(
@@ -147,123 +149,40 @@ fn one_fold(
     classes: &[String],
     views: usize,
     experiment: &Experiment,
+    arrangements: &[Views],
 ) -> Result<Outcome, EvaluationError> {
     let label = |clip: &&Clip| classes.iter().position(|class| *class == clip.activity).unwrap_or(0);
     let (train_labels, test_labels): (Vec<usize>, Vec<usize>) =
         (train.iter().map(label).collect(), test.iter().map(label).collect());
-    let train_subjects = names(train.iter().map(|clip| &clip.subject));
-    let group: Vec<usize> = train
-        .iter()
-        .map(|clip| {
-            train_subjects.iter().position(|s| *s == clip.subject).unwrap_or(0)
-                % experiment.inner_folds.max(2)
-        })
-        .collect();
-    let mut candidates = Vec::new();
-    for settings in &experiment.spaces {
-        let space = Space::train(train, settings)?;
-        let vectors = |clips: &[&Clip]| -> Result<Vec<Vec<Array2<f32>>>, EmbeddingError> {
-            clips.par_iter().map(|clip| clip.views.iter().map(|view| space.vectors(view)).collect()).collect()
-        };
-        let (train_vectors, test_vectors) = (vectors(train)?, vectors(test)?);
-        for &sharpness in &experiment.sharpness {
-            let patterns = |clips: &[Vec<Array2<f32>>]| -> Vec<Vec<Array1<f32>>> {
-                clips
-                    .par_iter()
-                    .map(|views| views.iter().map(|v| space.pattern_of(v.view(), sharpness)).collect())
-                    .collect()
-            };
-            candidates.push(Candidate { train: patterns(&train_vectors), test: patterns(&test_vectors) });
+    let mut outcome = Outcome::empty(classes);
+    for &arrangement in arrangements {
+        if arrangement == Views::Fused && views == 1 && arrangements.contains(&Views::Each) {
+            continue;
         }
+        let chosen = choose(train, classes, experiment, arrangement)?;
+        let tested = patterns_of(&chosen.space, &vectors_of(&chosen.space, test)?, chosen.sharpness);
+        let confusion = if arrangement == Views::Each { &mut outcome.each } else { &mut outcome.fused };
+        for joint in arrangement.arrangements(views) {
+            let training = gathered(&chosen.patterns, &joint);
+            let classifier =
+                Classifier::train(chosen.classifier, training.view(), &train_labels, classes.len());
+            for (row, &truth) in gathered(&tested, &joint).rows().into_iter().zip(&test_labels) {
+                confusion.count(truth, classifier.best(row).0);
+            }
+        }
+        outcome.chosen.push(Choice {
+            left_out: names(test.iter().map(|clip| &clip.subject)),
+            views: arrangement,
+            space: chosen.space.settings.clone(),
+            sharpness: chosen.sharpness,
+            classifier: chosen.classifier,
+            inner_accuracy: chosen.inner_accuracy,
+            condition: chosen.condition(),
+        });
     }
-    let mut outcome =
-        Outcome { each: Confusion::new(classes.to_vec()), fused: Confusion::new(classes.to_vec()) };
-    let arrangements: Vec<Vec<usize>> =
-        (0..views).map(|view| vec![view]).chain((views > 1).then(|| (0..views).collect())).collect();
-    for chosen_views in &arrangements {
-        let gathered = |clips: &[Vec<Array1<f32>>]| -> Array2<f32> {
-            rows(&clips.iter().map(|views| joined(views, chosen_views)).collect::<Vec<_>>())
-        };
-        let mut best: Option<(u32, usize, ClassifierKind)> = None;
-        // The first candidate stays unless another is better by more than chance explains (the one-standard-error rule).
-        let mut first = 0;
-        let single = candidates.len() * experiment.classifiers.len() == 1;
-        for (index, candidate) in candidates.iter().enumerate() {
-            let gram = if single { Array2::zeros((0, 0)) } else { products(&gathered(&candidate.train)) };
-            for &kind in &experiment.classifiers {
-                let right =
-                    if single { 0 } else { inner_right(&gram, &train_labels, &group, classes.len(), kind) };
-                if best.is_none_or(|(most, _, _)| right > most.max(first + doubt(first, train_labels.len())))
-                {
-                    if best.is_none() {
-                        first = right;
-                    }
-                    best = Some((right, index, kind));
-                }
-            }
-        }
-        let Some((_, index, kind)) = best else { continue };
-        let classifier =
-            Classifier::train(kind, gathered(&candidates[index].train).view(), &train_labels, classes.len());
-        let tested = gathered(&candidates[index].test);
-        for (row, &truth) in tested.rows().into_iter().zip(&test_labels) {
-            let answer = classifier.best(row).0;
-            if chosen_views.len() == 1 {
-                outcome.each.count(truth, answer);
-            }
-            if chosen_views.len() == views {
-                outcome.fused.count(truth, answer);
-            }
-        }
+    // One view by itself is all of its views.
+    if views == 1 && arrangements.contains(&Views::Each) {
+        outcome.fused = outcome.each.clone();
     }
     Ok(outcome)
-}
-
-/// Standard error of a count of right answers, rounded up.
-fn doubt(right: u32, of: usize) -> u32 {
-    let share = f64::from(right) / of.max(1) as f64;
-    (of as f64 * share * (1.0 - share)).max(0.0).sqrt().ceil() as u32
-}
-
-/// Products of all pairs of patterns.
-fn products(patterns: &Array2<f32>) -> Array2<f32> {
-    patterns.dot(&patterns.t())
-}
-
-/// The patterns of some views, one after the other.
-pub(crate) fn joined(views: &[Array1<f32>], chosen: &[usize]) -> Array1<f32> {
-    chosen.iter().flat_map(|&view| views[view].iter().copied()).collect()
-}
-
-/// Right answers of a classifier over the folds of training subjects, from the patterns' Gram matrix.
-fn inner_right(
-    gram: &Array2<f32>,
-    labels: &[usize],
-    group: &[usize],
-    classes: usize,
-    kind: ClassifierKind,
-) -> u32 {
-    let folds = group.iter().max().map_or(0, |most| most + 1);
-    let best = |values: &[f32]| {
-        values.iter().enumerate().fold(0, |best, (k, v)| if *v > values[best] { k } else { best })
-    };
-    (0..folds)
-        .into_par_iter()
-        .map(|fold| {
-            let kept: Vec<usize> = (0..labels.len()).filter(|&i| group[i] != fold).collect();
-            let held = (0..labels.len()).filter(|&i| group[i] == fold);
-            match kind {
-                ClassifierKind::Svc(c) => {
-                    let svc = DualSvc::train(gram.view(), &kept, labels, classes, c);
-                    held.filter(|&i| best(&svc.decide(gram.row(i)).to_vec()) == labels[i]).count() as u32
-                }
-                ClassifierKind::Knn(k) => held
-                    .filter(|&i| {
-                        let distances = kept.iter().map(|&j| (gram[[j, j]] - 2.0 * gram[[i, j]], labels[j]));
-                        best(&knn::vote(distances.collect(), classes, k)) == labels[i]
-                    })
-                    .count() as u32,
-            }
-        })
-        .sum()
 }

@@ -122,7 +122,7 @@ impl Codebook {
 }
 
 /// The parts of a clip that a pattern holds: (which, of how many).
-fn segments(mode: Mode) -> &'static [(usize, usize)] {
+pub(super) fn segments(mode: Mode) -> &'static [(usize, usize)] {
     match mode {
         Mode::OrderFree => &[(0, 1)],
         Mode::Ordered => &[(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3)],

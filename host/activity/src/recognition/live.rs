@@ -30,13 +30,21 @@ impl<'a> Live<'a> {
         let scaling = self.recogniser.settings.scaling;
         let moment =
             masks.iter().map(|mask| Track::from_masks(std::slice::from_ref(mask), scaling, self.full_frames));
-        self.frames.push_back(moment.collect());
+        self.push_described(moment.collect())
+    }
+
+    /// As [`Self::push`], for masks that are described already: one track of a single frame per view.
+    ///
+    /// # Errors
+    /// Another number of views than the model's.
+    pub fn push_described(&mut self, moment: Vec<Track>) -> Result<Answer, ModelError> {
+        let count = moment.len();
+        self.frames.push_back(moment);
         if self.frames.len() > self.window {
             self.frames.pop_front();
         }
-        let views: Vec<Track> = (0..masks.len())
-            .map(|view| joined(self.frames.iter().filter_map(|moment| moment.get(view))))
-            .collect();
+        let views: Vec<Track> =
+            (0..count).map(|view| joined(self.frames.iter().filter_map(|moment| moment.get(view)))).collect();
         self.recogniser.recognise(&views)
     }
 
@@ -47,7 +55,7 @@ impl<'a> Live<'a> {
 }
 
 /// Tracks one after the other.
-fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
+pub fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
     let parts: Vec<&Track> = parts.collect();
     let empty_frames = parts.iter().map(|part| part.empty_frames).sum();
     let descriptors: Vec<_> = parts.iter().map(|part| part.descriptors.view()).collect();
@@ -57,6 +65,48 @@ fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
         boxes: boxes.and_then(|boxes| concatenate(Axis(0), &boxes).ok()),
         empty_frames,
     }
+}
+
+/// A recording cut where the answer changes: every frame goes to the window whose middle is nearest, neighbours with one answer
+/// become one stretch, whose confidence is the mean.
+pub fn segments(windows: &[Stretch]) -> Vec<Segment> {
+    let mut found: Vec<Segment> = Vec::new();
+    let mut merged = 0.0;
+    for (index, window) in windows.iter().enumerate() {
+        let border = |a: &Stretch, b: &Stretch| (a.from + a.to + b.from + b.to).div_ceil(4);
+        let from = if index == 0 { window.from } else { border(&windows[index - 1], window) };
+        let to = windows.get(index + 1).map_or(window.to, |next| border(window, next));
+        match found.last_mut().filter(|last| last.activity == window.answer.activity) {
+            Some(last) => {
+                last.to = to;
+                merged += 1.0;
+                last.confidence += (window.answer.confidence - last.confidence) / merged;
+            }
+            None => {
+                merged = 1.0;
+                found.push(Segment {
+                    from,
+                    to,
+                    activity: window.answer.activity.clone(),
+                    confidence: window.answer.confidence,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// A part of a recording with one answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// First frame.
+    pub from: usize,
+    /// One past the last frame.
+    pub to: usize,
+    /// The activity, `None` = unknown.
+    pub activity: Option<String>,
+    /// Mean confidence of its windows, 0 to 1.
+    pub confidence: f32,
 }
 
 /// What was recognised in a stretch of a recording.
@@ -92,5 +142,35 @@ pub fn windows(
             return Ok(found);
         }
         from += step.max(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_with_one_answer_become_one_segment() {
+        let window = |from: usize, activity: Option<&str>, confidence: f32| Stretch {
+            from,
+            to: from + 20,
+            answer: Answer {
+                activity: activity.map(str::to_owned),
+                confidence,
+                shares: Vec::new(),
+                strangeness: 0.5,
+            },
+        };
+        let windows = [
+            window(0, Some("walk"), 0.5),
+            window(10, Some("walk"), 0.75),
+            window(20, None, 0.25),
+            window(30, Some("dig"), 1.0),
+        ];
+        let found = segments(&windows);
+        let spans: Vec<_> = found.iter().map(|s| (s.from, s.to, s.activity.as_deref())).collect();
+        assert_eq!(spans, [(0, 25, Some("walk")), (25, 35, None), (35, 50, Some("dig"))]);
+        assert!((found[0].confidence - 0.625).abs() < 1e-6);
+        assert!(segments(&[]).is_empty());
     }
 }

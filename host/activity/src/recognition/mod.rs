@@ -7,6 +7,7 @@ pub mod frames;
 pub mod knn;
 pub mod live;
 pub mod model;
+pub mod model_file;
 pub mod occupancy;
 pub mod space;
 pub mod svc;

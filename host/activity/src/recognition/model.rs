@@ -1,25 +1,16 @@
-//! A trained recogniser as one value, saved and read as bytes with a version and a checksum.
-//!
-//! File: the 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
-//! little-endian, then the body (postcard). Anything that does not fit is refused by name, never guessed.
+//! A trained recogniser as one value; [`super::model_file`] saves and reads it.
 
 use super::classifier::{Classifier, ClassifierKind};
 use super::clip::{Clip, Track};
-use super::codebook::Codebook;
-use super::occupancy::{OccupancyGrid, rows};
+use super::frames::Mode;
+use super::occupancy::rows;
 use super::space::{Map, Pattern, Space, SpaceSettings};
 use crate::embedding::EmbeddingError;
-use crate::embedding::descriptor::{DESCRIPTOR_VERSION, Scaling};
-use crate::embedding::pca::Pca;
-use crate::embedding::rbf::Rbf;
-use crate::evaluation::leave_one_out::{joined, names};
+use crate::embedding::descriptor::Scaling;
+use crate::evaluation::choice::{Chosen, Views, choose, joined, names};
+use crate::evaluation::experiment::Experiment;
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
-
-/// Version of the file's format.
-pub const FORMAT_VERSION: u32 = 1;
-const MAGIC: &[u8; 8] = b"farnearA";
-const HEADER: usize = 28;
 
 /// Everything that is chosen for a recogniser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,10 +52,12 @@ pub struct Recogniser {
     pub space: Space,
     /// The classifier.
     pub classifier: Classifier,
-    /// Training frames' distances to the gallery: 99th percentile of the embedded frames' squared distance to their nearest pattern neighbour.
+    /// Squared distance to the nearest training pattern beyond which a clip is unknown.
     pub far: f32,
     /// Training patterns, against which strangeness is measured.
     pub patterns: Array2<f32>,
+    /// Frames of a training clip, median: what a window over a long recording should hold.
+    pub typical_frames: usize,
 }
 
 /// What was recognised.
@@ -104,9 +97,12 @@ pub enum ModelError {
         /// In the header.
         expected: u32,
     },
-    /// The body does not hold together.
+    /// The body cannot be read.
     #[error("the model's body cannot be read: {0}")]
     Body(String),
+    /// The parts of the body do not belong together.
+    #[error("the model's parts do not belong together: {0}")]
+    Parts(&'static str),
     /// The clip does not fit the model.
     #[error("the clip has {found} views{boxes}, the model was trained on {expected}{expected_boxes}", boxes = with(*.found_boxes), expected_boxes = with(*.expected_boxes))]
     Clip {
@@ -131,66 +127,77 @@ fn with(boxes: bool) -> &'static str {
     if boxes { " of full frames" } else { " of cut-out silhouettes" }
 }
 
-/// The body of a file: plain values only.
-#[derive(Serialize, Deserialize)]
-struct Body {
-    settings: RecogniserSettings,
-    activities: Vec<String>,
-    views: usize,
-    map: SavedMap,
-    spread: f32,
-    neighbours: usize,
-    pattern: SavedPattern,
-    classifier: Classifier,
-    far: f32,
-    patterns: Array2<f32>,
-}
-
-#[derive(Serialize, Deserialize)]
-enum SavedMap {
-    Rbf { centres: Array2<f32>, weights: Array2<f32>, gamma: f32, ridge: f64, condition: f64 },
-    Pca { mean: Array1<f32>, directions: Array2<f32>, variances: Vec<f64> },
-}
-
-#[derive(Serialize, Deserialize)]
-enum SavedPattern {
-    Thesis(OccupancyGrid),
-    Codebook(Codebook),
-}
-
 impl Recogniser {
-    /// Trains on clips that all have the same views.
+    /// Trains on clips that all have the same views, with settings as they are.
     ///
     /// # Errors
     /// Fewer than two activities, clips with other views, a gallery that cannot be laid out.
     pub fn train(clips: &[Clip], settings: &RecogniserSettings) -> Result<Self, ModelError> {
+        let experiment = Experiment {
+            space: settings.space.clone(),
+            sweeps: Vec::new(),
+            sharpness: vec![settings.sharpness],
+            classifiers: vec![settings.classifier],
+            mirror: settings.mirror,
+            inner_folds: 2,
+        };
+        Self::train_searched(clips, &experiment, settings.scaling).map(|(recogniser, _)| recogniser)
+    }
+
+    /// Trains with settings chosen by cross-validation over the clips' subjects; gives the accuracy over the folds beside it (0 to
+    /// 1, of the chosen settings and so a little too good), `None` where nothing was compared: one subject, or one of everything.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub fn train_searched(
+        clips: &[Clip],
+        experiment: &Experiment,
+        scaling: Scaling,
+    ) -> Result<(Self, Option<f64>), ModelError> {
         let activities = names(clips.iter().map(|clip| &clip.activity));
         if activities.len() < 2 {
             return Err(ModelError::Activities(activities.len()));
         }
         let (views, boxes) = shape(&clips[0]);
+        if views == 0 {
+            return Err(ModelError::Clip {
+                found: 0,
+                found_boxes: false,
+                expected: 1,
+                expected_boxes: false,
+            });
+        }
         for clip in clips {
             fits(clip, views, boxes)?;
         }
         let mirrors: Vec<Clip> =
-            if settings.mirror { clips.iter().map(Clip::mirrored).collect() } else { Vec::new() };
+            if experiment.mirror { clips.iter().map(Clip::mirrored).collect() } else { Vec::new() };
         let all: Vec<&Clip> = clips.iter().chain(&mirrors).collect();
-        let space = Space::train(&all, &settings.space)?;
-        let found: Result<Vec<Array1<f32>>, ModelError> =
-            all.iter().map(|clip| pattern(&space, &clip.views, settings.sharpness)).collect();
-        let patterns = rows(&found?);
+        let Chosen { space, sharpness, classifier: kind, inner_accuracy, patterns } =
+            choose(&all, &activities, experiment, Views::Fused)?;
+        let order: Vec<usize> = (0..views).collect();
+        let patterns = rows(&patterns.iter().map(|of_views| joined(of_views, &order)).collect::<Vec<_>>());
         let labels: Vec<usize> =
             all.iter().map(|clip| activities.iter().position(|a| *a == clip.activity).unwrap_or(0)).collect();
-        let classifier = Classifier::train(settings.classifier, patterns.view(), &labels, activities.len());
-        Ok(Self {
+        let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
+        lengths.sort_unstable();
+        let recogniser = Self {
+            typical_frames: lengths[lengths.len() / 2],
             far: unknown_beyond(&patterns),
-            settings: settings.clone(),
+            settings: RecogniserSettings {
+                scaling,
+                space: space.settings.clone(),
+                sharpness,
+                classifier: kind,
+                mirror: experiment.mirror,
+            },
+            classifier: Classifier::train(kind, patterns.view(), &labels, activities.len()),
             activities,
             views,
             space,
-            classifier,
             patterns,
-        })
+        };
+        Ok((recogniser, inner_accuracy))
     }
 
     /// Recognises one clip.
@@ -212,6 +219,14 @@ impl Recogniser {
             let shares = self.activities.iter().map(|a| (a.clone(), 0.0)).collect();
             return Ok(Answer { activity: None, confidence: 0.0, shares, strangeness: f32::INFINITY });
         }
+        // A model of cut-out silhouettes looks at shapes only, also in full frames.
+        let shapes: Vec<Track>;
+        let views = if boxes || !found_boxes {
+            views
+        } else {
+            shapes = views.iter().map(|view| Track { boxes: None, ..view.clone() }).collect();
+            &shapes
+        };
         let pattern = pattern(&self.space, views, self.settings.sharpness)?;
         let shares = self.classifier.shares(pattern.view());
         let (best, confidence) = self.classifier.best(pattern.view());
@@ -233,111 +248,11 @@ impl Recogniser {
                     Map::Rbf(rbf) => rbf.dimensions(),
                     Map::Pca(pca) => pca.directions.nrows(),
                 };
-                let repeats = if self.settings.space.mode == super::frames::Mode::Ordered { 3 } else { 2 };
+                let repeats = if self.settings.space.mode == Mode::Ordered { 3 } else { 2 };
                 book.centres.ncols() > repeats * dimensions
             }
         }
     }
-
-    /// The model as a file's bytes.
-    ///
-    /// # Errors
-    /// [`ModelError::Body`] if it cannot be encoded.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
-        let body = Body {
-            settings: self.settings.clone(),
-            activities: self.activities.clone(),
-            views: self.views,
-            map: match &self.space.map {
-                Map::Rbf(rbf) => SavedMap::Rbf {
-                    centres: rbf.centres.clone(),
-                    weights: rbf.weights.clone(),
-                    gamma: rbf.gamma,
-                    ridge: rbf.ridge,
-                    condition: rbf.condition,
-                },
-                Map::Pca(pca) => SavedMap::Pca {
-                    mean: pca.mean.clone(),
-                    directions: pca.directions.clone(),
-                    variances: pca.variances.clone(),
-                },
-            },
-            spread: self.space.spread,
-            neighbours: self.space.neighbours,
-            pattern: match &self.space.pattern {
-                Pattern::Thesis(grid) => SavedPattern::Thesis(grid.clone()),
-                Pattern::Codebook(book) => SavedPattern::Codebook(book.clone()),
-            },
-            classifier: self.classifier.clone(),
-            far: self.far,
-            patterns: self.patterns.clone(),
-        };
-        let body = postcard::to_stdvec(&body).map_err(|error| ModelError::Body(error.to_string()))?;
-        let mut bytes = Vec::with_capacity(HEADER + body.len());
-        bytes.extend(MAGIC);
-        bytes.extend(FORMAT_VERSION.to_le_bytes());
-        bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
-        bytes.extend((body.len() as u64).to_le_bytes());
-        bytes.extend(checksum(&body).to_le_bytes());
-        bytes.extend(body);
-        Ok(bytes)
-    }
-
-    /// A model from a file's bytes.
-    ///
-    /// # Errors
-    /// Anything that is not a whole, undamaged model of this version and this descriptor.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
-        let header = bytes.get(..HEADER).ok_or(ModelError::NotAModel("shorter than its header"))?;
-        if &header[..8] != MAGIC {
-            return Err(ModelError::NotAModel("it does not start with `farnearA`"));
-        }
-        let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
-        for (what, at, expected) in [("format", 8, FORMAT_VERSION), ("descriptor", 12, DESCRIPTOR_VERSION)] {
-            if word(at) != expected {
-                return Err(ModelError::Version { what, found: word(at), expected });
-            }
-        }
-        let body = &bytes[HEADER..];
-        if body.len() as u64 != u64::from_le_bytes(header[16..24].try_into().unwrap_or_default()) {
-            return Err(ModelError::NotAModel("its length is not what its header says (cut short?)"));
-        }
-        if checksum(body) != word(24) {
-            return Err(ModelError::Checksum { found: checksum(body), expected: word(24) });
-        }
-        let body: Body = postcard::from_bytes(body).map_err(|error| ModelError::Body(error.to_string()))?;
-        let map = match body.map {
-            SavedMap::Rbf { centres, weights, gamma, ridge, condition } => {
-                Map::Rbf(Rbf::assemble(centres, weights, gamma, ridge, condition))
-            }
-            SavedMap::Pca { mean, directions, variances } => Map::Pca(Pca { mean, directions, variances }),
-        };
-        let pattern = match body.pattern {
-            SavedPattern::Thesis(grid) => Pattern::Thesis(grid),
-            SavedPattern::Codebook(book) => Pattern::Codebook(book),
-        };
-        let space = Space {
-            settings: body.settings.space.clone(),
-            map,
-            spread: body.spread,
-            pattern,
-            neighbours: body.neighbours,
-        };
-        Ok(Self {
-            settings: body.settings,
-            activities: body.activities,
-            views: body.views,
-            space,
-            classifier: body.classifier,
-            far: body.far,
-            patterns: body.patterns,
-        })
-    }
-}
-
-/// CRC-32 as in zip files.
-fn checksum(body: &[u8]) -> u32 {
-    crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(body)
 }
 
 /// Views of a clip and whether they have box motion.

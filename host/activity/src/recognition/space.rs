@@ -36,10 +36,9 @@ pub enum PatternKind {
 
 /// Everything that is chosen before patterns exist.
 ///
-/// The default lays frames out by twenty principal components: they need no neighbour graph that could fall apart, and in trials
-/// with the codebook they recognised at least as much as six Isomap dimensions. Those trials, and the default weights, were
-/// made on public sets of skeletons, so accuracies reported for the same sets are on the optimistic side.
-/// [`SpaceSettings::thesis`] keeps Isomap.
+/// The default lays frames out by twenty principal components: they need no neighbour graph that could fall apart.
+/// [`SpaceSettings::thesis`] keeps Isomap. Accuracies are to be reported for settings that were chosen on other subjects
+/// ([`crate::evaluation::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSettings {
     /// How the gallery is laid out.
@@ -129,35 +128,7 @@ impl Space {
     /// # Errors
     /// Too few silhouettes, or a gallery that cannot be laid out.
     pub fn train(clips: &[&Clip], settings: &SpaceSettings) -> Result<Self, EmbeddingError> {
-        let tracks: Vec<&Track> = clips.iter().flat_map(|clip| &clip.views).collect();
-        let all = stacked(tracks.iter().map(|track| track.descriptors.view()));
-        let gallery = evenly(all.view(), settings.gallery);
-        let (map, coordinates, neighbours) = lay_out(gallery.view(), settings)?;
-        let first = coordinates.column(0);
-        let mean = first.sum() / first.len().max(1) as f32;
-        let spread = (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / first.len().max(1) as f32)
-            .sqrt()
-            .max(1e-6);
-        let mut space = Self {
-            settings: settings.clone(),
-            map,
-            spread,
-            pattern: Pattern::Thesis(OccupancyGrid { low: Vec::new(), range: Vec::new(), bins: Vec::new() }),
-            neighbours,
-        };
-        space.pattern = match &settings.pattern {
-            PatternKind::Thesis(bins) => {
-                Pattern::Thesis(OccupancyGrid::new((&coordinates / spread).view(), bins))
-            }
-            PatternKind::Codebook(size) => {
-                let vectors: Result<Vec<Array2<f32>>, EmbeddingError> =
-                    tracks.par_iter().map(|track| space.vectors(track)).collect();
-                let vectors = vectors?;
-                let frames = stacked(vectors.iter().map(|v| v.view()));
-                Pattern::Codebook(Codebook::train(frames.view(), *size, settings.seed))
-            }
-        };
-        Ok(space)
+        Galleries::default().space(clips, settings)
     }
 
     /// Embeds the frames of a track: frames x D, over the gallery's spread.
@@ -208,35 +179,109 @@ fn evenly(all: ArrayView2<f32>, count: usize) -> Array2<f32> {
 /// Galleries above this size are laid out by landmarks.
 const LARGE: usize = 4000;
 
-fn lay_out(
-    gallery: ArrayView2<f32>,
-    settings: &SpaceSettings,
-) -> Result<(Map, Array2<f32>, usize), EmbeddingError> {
-    let Layout::Isomap(least) = settings.layout else {
-        let pca = Pca::fit(gallery, settings.dimensions)?;
-        let coordinates = pca.transform(gallery)?;
-        return Ok((Map::Pca(pca), coordinates, 0));
-    };
-    let mut neighbours = least.clamp(1, gallery.nrows().saturating_sub(1).max(1));
-    let coordinates = loop {
-        let near = Neighbourhood::Nearest(neighbours);
-        let tried = if gallery.nrows() > LARGE {
-            landmark_isomap(gallery, near, 500, settings.dimensions).map(|laid_out| laid_out.coordinates)
-        } else {
-            isomap(gallery, near, settings.dimensions).map(|laid_out| laid_out.coordinates)
+/// A gallery laid out: what spaces share that differ in their RBF map, weights or patterns only.
+#[derive(Debug)]
+struct Gallery {
+    key: (Layout, usize, usize),
+    samples: Array2<f32>,
+    coordinates: Array2<f32>,
+    pca: Option<Pca>,
+    neighbours: usize,
+}
+
+/// Galleries of one set of clips, each laid out once.
+#[derive(Debug, Default)]
+pub struct Galleries(Vec<Gallery>);
+
+impl Galleries {
+    /// The space of `settings` for the clips, all of their views together; always ask with the same clips.
+    ///
+    /// # Errors
+    /// Too few silhouettes, or a gallery that cannot be laid out.
+    pub fn space(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<Space, EmbeddingError> {
+        let tracks: Vec<&Track> = clips.iter().flat_map(|clip| &clip.views).collect();
+        let key = (settings.layout, settings.dimensions, settings.gallery);
+        let index = match self.0.iter().position(|gallery| gallery.key == key) {
+            Some(index) => index,
+            None => {
+                let all = stacked(tracks.iter().map(|track| track.descriptors.view()));
+                self.0.push(Gallery::new(evenly(all.view(), settings.gallery), settings, key)?);
+                self.0.len() - 1
+            }
         };
-        match tried {
-            Err(EmbeddingError::Disconnected { .. }) if 2 * neighbours < gallery.nrows() => neighbours *= 2,
-            other => break other?,
+        let gallery = &self.0[index];
+        let map = gallery.map(settings)?;
+        let first = gallery.coordinates.column(0);
+        let mean = first.sum() / first.len().max(1) as f32;
+        let spread = (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / first.len().max(1) as f32)
+            .sqrt()
+            .max(1e-6);
+        let mut space = Space {
+            settings: settings.clone(),
+            map,
+            spread,
+            pattern: Pattern::Thesis(OccupancyGrid { low: Vec::new(), range: Vec::new(), bins: Vec::new() }),
+            neighbours: gallery.neighbours,
+        };
+        space.pattern = match &settings.pattern {
+            PatternKind::Thesis(bins) => {
+                Pattern::Thesis(OccupancyGrid::new((&gallery.coordinates / spread).view(), bins))
+            }
+            PatternKind::Codebook(size) => {
+                let vectors: Result<Vec<Array2<f32>>, EmbeddingError> =
+                    tracks.par_iter().map(|track| space.vectors(track)).collect();
+                let vectors = vectors?;
+                let frames = stacked(vectors.iter().map(|v| v.view()));
+                Pattern::Codebook(Codebook::train(frames.view(), *size, settings.seed))
+            }
+        };
+        Ok(space)
+    }
+}
+
+impl Gallery {
+    fn new(
+        samples: Array2<f32>,
+        settings: &SpaceSettings,
+        key: (Layout, usize, usize),
+    ) -> Result<Self, EmbeddingError> {
+        let Layout::Isomap(least) = settings.layout else {
+            let pca = Pca::fit(samples.view(), settings.dimensions)?;
+            let coordinates = pca.transform(samples.view())?;
+            return Ok(Self { key, samples, coordinates, pca: Some(pca), neighbours: 0 });
+        };
+        let mut neighbours = least.clamp(1, samples.nrows().saturating_sub(1).max(1));
+        let coordinates = loop {
+            let near = Neighbourhood::Nearest(neighbours);
+            let tried = if samples.nrows() > LARGE {
+                landmark_isomap(samples.view(), near, 500, settings.dimensions)
+                    .map(|laid_out| laid_out.coordinates)
+            } else {
+                isomap(samples.view(), near, settings.dimensions).map(|laid_out| laid_out.coordinates)
+            };
+            match tried {
+                Err(EmbeddingError::Disconnected { .. }) if 2 * neighbours < samples.nrows() => {
+                    neighbours *= 2
+                }
+                other => break other?,
+            }
+        };
+        Ok(Self { key, samples, coordinates, pca: None, neighbours })
+    }
+
+    /// The map that embeds new silhouettes.
+    fn map(&self, settings: &SpaceSettings) -> Result<Map, EmbeddingError> {
+        if let Some(pca) = &self.pca {
+            return Ok(Map::Pca(pca.clone()));
         }
-    };
-    // Landmark placement is for all samples; the map's centres stay few enough to embed a frame in microseconds.
-    let step = gallery.nrows().div_ceil(LARGE).max(1);
-    let rbf = Rbf::train(
-        gallery.slice(s![..;step, ..]),
-        coordinates.slice(s![..;step, ..]),
-        settings.gamma,
-        settings.ridge,
-    )?;
-    Ok((Map::Rbf(rbf), coordinates, neighbours))
+        // Landmark placement is for all samples; the map's centres stay few enough to embed a frame in microseconds.
+        let step = self.samples.nrows().div_ceil(LARGE).max(1);
+        let rbf = Rbf::train(
+            self.samples.slice(s![..;step, ..]),
+            self.coordinates.slice(s![..;step, ..]),
+            settings.gamma,
+            settings.ridge,
+        )?;
+        Ok(Map::Rbf(rbf))
+    }
 }

@@ -2,6 +2,7 @@
 
 mod common;
 
+mod activity;
 mod bad_images;
 mod bad_optics;
 mod bad_ports;

@@ -28,6 +28,10 @@ const COMMANDS: &[&[&str]] = &[
     &["silhouettes"],
     &["silhouettes", "markers"],
     &["silhouettes", "video"],
+    &["activity"],
+    &["activity", "train"],
+    &["activity", "recognise"],
+    &["activity", "evaluate"],
     &["completions"],
 ];
 
@@ -39,7 +43,7 @@ fn every_command_has_help_with_an_example() {
         let (help, _) = succeeds(farnear(command).arg("--help"));
         assert!(help.contains("Example: farnear ") && help.contains(&command.join(" ")), "{help}");
     }
-    for folder in [&[] as &[&str], &["calibrate"], &["rig"], &["shadow"], &["silhouettes"]] {
+    for folder in [&[] as &[&str], &["activity"], &["calibrate"], &["rig"], &["shadow"], &["silhouettes"]] {
         let (help, _) = succeeds(farnear(folder).arg("--help"));
         let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1);
         for line in listed.take_while(|line| !line.is_empty()) {

@@ -32,17 +32,16 @@ const BEHIND: f64 = -0.45;
 ///
 /// The camera file says how the camera stands:
 ///
-///   [camera]
-///   height_m = 0.8              # lens above the ground
-///   azimuth_deg = 140.0         # viewing direction, anticlockwise from north
-///   pitch_deg = 0.0             # downwards positive
-///   focal_length_mm = 4.0
-///   pixel_um = 6.0
-///   width_px = 640
-///   height_px = 480
+///     [camera]
+///     height_m = 0.8              # lens above the ground
+///     azimuth_deg = 140.0         # viewing direction, anticlockwise from north
+///     pitch_deg = 0.0             # downwards positive
+///     focal_length_mm = 4.0
+///     pixel_um = 6.0
+///     width_px = 640
+///     height_px = 480
 ///
-/// and, where they differ from the usual, [subject] height_m = 1.75, head_width_m = 0.17 and the [standard_deviations] of all of
-/// it. Frames whose cut is doubtful (nobody or several people in it, the shadow behind the person or cut off by the picture's
+/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17) and `standard_deviations`, what differs from the usual. Frames whose cut is doubtful (nobody or several people in it, the shadow behind the person or cut off by the picture's
 /// lower edge, much removed, an angle too unsure) are flagged in `shadow.toml` beside the masks.
 #[derive(Args)]
 #[command(

@@ -1,0 +1,212 @@
+//! Models as files: bytes with a version and a checksum.
+//!
+//! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
+//! little-endian, then the body (postcard). Anything that does not fit is refused by name, never guessed; a body that decodes is
+//! also checked part against part, so that a crafted file cannot make recognition panic.
+
+use super::classifier::Classifier;
+use super::clip::BOX_NUMBERS;
+use super::codebook::Codebook;
+use super::frames::Mode;
+use super::model::{ModelError, Recogniser, RecogniserSettings};
+use super::occupancy::OccupancyGrid;
+use super::space::{Map, Pattern, Space};
+use crate::embedding::descriptor::{ANGLES, DESCRIPTOR_VERSION};
+use crate::embedding::pca::Pca;
+use crate::embedding::rbf::Rbf;
+use ndarray::{Array1, Array2};
+use serde::{Deserialize, Serialize};
+
+/// Version of the file's format.
+pub const FORMAT_VERSION: u32 = 1;
+const MAGIC: &[u8; 8] = b"farnearA";
+const HEADER: usize = 28;
+
+/// The body of a file: plain values only.
+#[derive(Serialize, Deserialize)]
+struct Body {
+    settings: RecogniserSettings,
+    activities: Vec<String>,
+    views: usize,
+    map: SavedMap,
+    spread: f32,
+    neighbours: usize,
+    pattern: SavedPattern,
+    classifier: Classifier,
+    far: f32,
+    patterns: Array2<f32>,
+    typical_frames: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+enum SavedMap {
+    Rbf { centres: Array2<f32>, weights: Array2<f32>, gamma: f32, ridge: f64, condition: f64 },
+    Pca { mean: Array1<f32>, directions: Array2<f32>, variances: Vec<f64> },
+}
+
+#[derive(Serialize, Deserialize)]
+enum SavedPattern {
+    Thesis(OccupancyGrid),
+    Codebook(Codebook),
+}
+
+impl Recogniser {
+    /// The model as a file's bytes.
+    ///
+    /// # Errors
+    /// [`ModelError::Body`] if it cannot be encoded.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
+        let body = Body {
+            settings: self.settings.clone(),
+            activities: self.activities.clone(),
+            views: self.views,
+            map: match &self.space.map {
+                Map::Rbf(rbf) => SavedMap::Rbf {
+                    centres: rbf.centres.clone(),
+                    weights: rbf.weights.clone(),
+                    gamma: rbf.gamma,
+                    ridge: rbf.ridge,
+                    condition: rbf.condition,
+                },
+                Map::Pca(pca) => SavedMap::Pca {
+                    mean: pca.mean.clone(),
+                    directions: pca.directions.clone(),
+                    variances: pca.variances.clone(),
+                },
+            },
+            spread: self.space.spread,
+            neighbours: self.space.neighbours,
+            pattern: match &self.space.pattern {
+                Pattern::Thesis(grid) => SavedPattern::Thesis(grid.clone()),
+                Pattern::Codebook(book) => SavedPattern::Codebook(book.clone()),
+            },
+            classifier: self.classifier.clone(),
+            far: self.far,
+            patterns: self.patterns.clone(),
+            typical_frames: self.typical_frames as u64,
+        };
+        let body = postcard::to_stdvec(&body).map_err(|error| ModelError::Body(error.to_string()))?;
+        let mut bytes = Vec::with_capacity(HEADER + body.len());
+        bytes.extend(MAGIC);
+        bytes.extend(FORMAT_VERSION.to_le_bytes());
+        bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
+        bytes.extend((body.len() as u64).to_le_bytes());
+        bytes.extend(checksum(&body).to_le_bytes());
+        bytes.extend(body);
+        Ok(bytes)
+    }
+
+    /// A model from a file's bytes.
+    ///
+    /// # Errors
+    /// Anything that is not a whole, undamaged model of this version and this descriptor.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
+        let header = bytes.get(..HEADER).ok_or(ModelError::NotAModel("shorter than its header"))?;
+        if &header[..8] != MAGIC {
+            return Err(ModelError::NotAModel("it does not start with `farnearA`"));
+        }
+        let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
+        for (what, at, expected) in [("format", 8, FORMAT_VERSION), ("descriptor", 12, DESCRIPTOR_VERSION)] {
+            if word(at) != expected {
+                return Err(ModelError::Version { what, found: word(at), expected });
+            }
+        }
+        let body = &bytes[HEADER..];
+        if body.len() as u64 != u64::from_le_bytes(header[16..24].try_into().unwrap_or_default()) {
+            return Err(ModelError::NotAModel("its length is not what its header says (cut short?)"));
+        }
+        if checksum(body) != word(24) {
+            return Err(ModelError::Checksum { found: checksum(body), expected: word(24) });
+        }
+        let body: Body = postcard::from_bytes(body).map_err(|error| ModelError::Body(error.to_string()))?;
+        let map = match body.map {
+            SavedMap::Rbf { centres, weights, gamma, ridge, condition } => {
+                Map::Rbf(Rbf::assemble(centres, weights, gamma, ridge, condition))
+            }
+            SavedMap::Pca { mean, directions, variances } => Map::Pca(Pca { mean, directions, variances }),
+        };
+        let pattern = match body.pattern {
+            SavedPattern::Thesis(grid) => Pattern::Thesis(grid),
+            SavedPattern::Codebook(book) => Pattern::Codebook(book),
+        };
+        let space = Space {
+            settings: body.settings.space.clone(),
+            map,
+            spread: body.spread,
+            pattern,
+            neighbours: body.neighbours,
+        };
+        let recogniser = Self {
+            settings: body.settings,
+            activities: body.activities,
+            views: body.views,
+            space,
+            classifier: body.classifier,
+            far: body.far,
+            patterns: body.patterns,
+            typical_frames: body.typical_frames as usize,
+        };
+        recogniser.checked()
+    }
+}
+
+/// CRC-32 as in zip files.
+fn checksum(body: &[u8]) -> u32 {
+    crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(body)
+}
+
+impl Recogniser {
+    /// Checks that all parts have the sizes that recognition relies on.
+    fn checked(self) -> Result<Self, ModelError> {
+        let fits =
+            |holds: bool, what: &'static str| if holds { Ok(()) } else { Err(ModelError::Parts(what)) };
+        fits(self.activities.len() >= 2 && self.views >= 1, "activities or views are missing")?;
+        let dimensions = match &self.space.map {
+            Map::Rbf(rbf) => {
+                let sizes = rbf.centres.ncols() == ANGLES && rbf.weights.nrows() == rbf.centres.nrows();
+                fits(sizes && rbf.weights.ncols() > 0, "centres and weights of the RBF map")?;
+                rbf.dimensions()
+            }
+            Map::Pca(pca) => {
+                let sizes = pca.mean.len() == ANGLES && pca.directions.ncols() == ANGLES;
+                fits(sizes && pca.directions.nrows() > 0, "mean and directions of the principal components")?;
+                pca.directions.nrows()
+            }
+        };
+        fits(self.space.spread > 0.0, "the gallery's spread")?;
+        let of_view = match &self.space.pattern {
+            Pattern::Thesis(grid) => {
+                let sizes = [grid.low.len(), grid.range.len()] == [grid.bins.len(); 2];
+                fits(
+                    sizes && grid.bins.len() <= dimensions && !grid.bins.contains(&0),
+                    "the grid's dimensions",
+                )?;
+                grid.bins.iter().try_fold(1_usize, |product, &bins| product.checked_mul(bins))
+            }
+            Pattern::Codebook(book) => {
+                let ordered = self.settings.space.mode == Mode::Ordered;
+                let width =
+                    |boxes: usize| 2 * dimensions + boxes + if ordered { dimensions + boxes } else { 0 };
+                let found = book.centres.ncols();
+                fits(found == width(0) || found == width(BOX_NUMBERS), "the codebook's width")?;
+                book.centres.nrows().checked_mul(super::codebook::segments(self.settings.space.mode).len())
+            }
+        };
+        let width = of_view.and_then(|width| width.checked_mul(self.views)).unwrap_or(usize::MAX);
+        fits(self.patterns.ncols() == width, "the training patterns' width")?;
+        let classes = self.activities.len();
+        match &self.classifier {
+            Classifier::Knn { patterns, labels, classes: known, k } => {
+                let sizes =
+                    patterns.ncols() == width && patterns.nrows() == labels.len() && *known == classes;
+                let neighbours = *k > 0 && !labels.is_empty() && labels.iter().all(|&label| label < classes);
+                fits(sizes && neighbours, "the nearest-neighbour classifier")
+            }
+            Classifier::Svc(svc) => fits(
+                svc.weights.dim() == (classes, width) && svc.offsets.len() == classes,
+                "the SVC's weights",
+            ),
+        }?;
+        Ok(self)
+    }
+}

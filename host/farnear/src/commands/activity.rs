@@ -1,0 +1,36 @@
+//! `farnear activity`: train, recognise, evaluate.
+
+mod confusion;
+mod evaluate;
+mod method;
+mod recognise;
+mod samples;
+mod train;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+/// Recognise what people do from their silhouettes: train a model, use it, evaluate the method.
+#[derive(Args)]
+#[command(after_help = "Example: farnear activity train samples.toml --out model.fnm\n\
+                        \x20        farnear activity recognise masks/ --model model.fnm")]
+pub struct Arguments {
+    #[command(subcommand)]
+    job: Job,
+}
+
+#[derive(Subcommand)]
+enum Job {
+    Train(train::Arguments),
+    Recognise(recognise::Arguments),
+    Evaluate(evaluate::Arguments),
+}
+
+/// Runs the command.
+pub fn run(arguments: Arguments) -> Result<()> {
+    match arguments.job {
+        Job::Train(arguments) => train::run(&arguments),
+        Job::Recognise(arguments) => recognise::run(&arguments),
+        Job::Evaluate(arguments) => evaluate::run(&arguments),
+    }
+}

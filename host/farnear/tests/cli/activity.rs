@@ -1,0 +1,303 @@
+//! `farnear activity` on synthetic people: training, recognition in masks and video, evaluation, and what is refused.
+
+use std::{fs, sync::LazyLock};
+
+use farnear_activity::{
+    silhouette::view::{Canvas, View, draw, extent},
+    synthetic::activities::{ACTIVITIES, performance},
+};
+use image::{GrayImage, Luma};
+use serde_json::Value;
+
+use crate::common::{Folder, fails, farnear, figures, number, succeeds};
+
+/// Walking, crouching and digging.
+const CHOSEN: [usize; 3] = [0, 2, 9];
+const SUBJECTS: usize = 4;
+
+/// Masks of four people at three activities from two views, and a file of samples; made once for all tests.
+struct People {
+    folder: Folder,
+    samples: String,
+}
+
+static PEOPLE: LazyLock<People> = LazyLock::new(|| {
+    let folder = Folder::new();
+    let mut samples = String::new();
+    for (subject, activity) in (0..SUBJECTS).flat_map(|s| CHOSEN.map(|a| (s, a))) {
+        let bodies = performance(subject, activity, 0, 6.0);
+        for view in 1..=2 {
+            let name = format!("p{subject}-{}-{view}", ACTIVITIES[activity]);
+            let seen = View { gamma_deg: 45.0 * f64::from(view), ..View::default() };
+            let reach: Vec<_> = bodies.iter().flat_map(|body| extent(body, &seen)).collect();
+            let canvas = Canvas::fitting(&reach, 25.0, 2).expect("finite");
+            fs::create_dir(folder.path(&name)).expect("a folder");
+            for (frame, body) in bodies.iter().enumerate() {
+                let mask = draw(body, &seen, &canvas);
+                let (height, width) = mask.dim();
+                let level = |x, y| Luma([if mask[[y as usize, x as usize]] { 255_u8 } else { 0 }]);
+                GrayImage::from_fn(width as u32, height as u32, level)
+                    .save(folder.path(&format!("{name}/f{frame}.png")))
+                    .expect("a picture");
+            }
+            samples += &format!(
+                "[[sample]]\nmasks = \"{name}\"\nsubject = \"p{subject}\"\nactivity = \"{}\"\nview = {view}\n",
+                ACTIVITIES[activity]
+            );
+        }
+    }
+    let samples = folder.file("samples.toml", samples);
+    People { folder, samples }
+});
+
+impl People {
+    fn text(&self, name: &str) -> String {
+        self.folder.text(name)
+    }
+
+    /// The samples of which `keep` holds, as a file of their own beside the others.
+    fn only(&self, name: &str, keep: impl Fn(&str) -> bool) -> String {
+        let all = fs::read_to_string(&self.samples).expect("samples");
+        let kept: String = all
+            .split_inclusive("view = 1\n")
+            .flat_map(|part| part.split_inclusive("view = 2\n"))
+            .filter(|sample| keep(sample))
+            .collect();
+        self.folder.file(name, kept)
+    }
+}
+
+#[test]
+fn unseen_people_are_recognised_and_the_results_are_whole() {
+    let people = &*PEOPLE;
+    let out = people.text("evaluation");
+    let evaluate =
+        ["activity", "evaluate", &people.samples, "--leave-one-subject-out", "--no-search", "--json"];
+    let found = figures(farnear(&evaluate).args(["--out", &out]));
+    assert!(number(&found, "accuracy") > 0.8, "{found}");
+    assert_eq!((number(&found, "clips"), number(&found, "answers")), (12.0, 12.0));
+    assert_eq!((&found["views"], &found["full_frames"]), (&"fused".into(), &true.into()));
+    assert_eq!(found["confusion"]["classes"], serde_json::json!(["crouch", "dig", "walk"]));
+    let counts: u64 = found["confusion"]["counts"]
+        .as_array()
+        .expect("rows")
+        .iter()
+        .flat_map(|row| row.as_array().expect("a row"))
+        .filter_map(Value::as_u64)
+        .sum();
+    assert_eq!(counts, 12);
+    let [low, high] = [0, 1].map(|i| found["confidence_interval"][i].as_f64().expect("a number"));
+    assert!(low < number(&found, "accuracy") && number(&found, "accuracy") <= high && high <= 1.0);
+    assert!(number(&found, "seconds_per_frame") > 0.0);
+    assert!(image::open(people.folder.path("evaluation/confusion.png")).is_ok());
+    let table = fs::read_to_string(people.folder.path("evaluation/confusion.md")).expect("a table");
+    assert!(table.contains("| | crouch | dig | walk |"), "{table}");
+    let record = fs::read_to_string(people.folder.path("evaluation/evaluation.toml")).expect("a record");
+    assert_eq!(record.matches("[[fold]]").count(), SUBJECTS, "{record}");
+
+    let each =
+        figures(farnear(&evaluate).args(["--views", "each", "--classifier", "knn", "--mode", "ordered"]));
+    assert_eq!((number(&each, "answers"), &each["mode"]), (24.0, &"ordered".into()));
+    let thesis = figures(farnear(&evaluate).args(["--epl", "thesis"]));
+    assert_eq!(thesis["mode"], "thesis");
+}
+
+#[test]
+fn other_samples_can_be_learned_from_but_never_the_same_people() {
+    let people = &*PEOPLE;
+    let one = people.only("p0.toml", |sample| sample.contains("\"p0\""));
+    let others = people.only("others.toml", |sample| !sample.contains("\"p0\""));
+    let evaluate = |test: &str, more: &[&str]| {
+        let mut command = farnear(&["activity", "evaluate", test, "--no-search", "--json"]);
+        command.args(more);
+        command
+    };
+    let found = figures(&mut evaluate(&one, &["--train", &others]));
+    assert_eq!((number(&found, "answers"), number(&found, "subjects")), (3.0, 1.0));
+    // Leaving p0 out of the training on everybody is the same training.
+    let left_out = figures(&mut evaluate(&one, &["--train", &people.samples, "--leave-one-subject-out"]));
+    assert_eq!(found["confusion"], left_out["confusion"]);
+    fails(&mut evaluate(&one, &["--train", &people.samples]), 1, &["`p0`", "--leave-one-subject-out"]);
+    fails(&mut evaluate(&one, &["--leave-one-subject-out"]), 1, &["at least 3 subjects", "1"]);
+    fails(&mut evaluate(&one, &[]), 2, &["--leave-one-subject-out", "--train"]);
+    let lame = people.only("lame.toml", |sample| !sample.contains("p2-dig-2"));
+    fails(
+        &mut evaluate(&lame, &["--leave-one-subject-out", "--views", "fused"]),
+        1,
+        &["lame.toml", "--views each"],
+    );
+    let each = figures(&mut evaluate(&lame, &["--leave-one-subject-out"]));
+    assert_eq!((&each["views"], number(&each, "answers")), (&"each".into(), 23.0));
+}
+
+#[test]
+fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
+    let people = &*PEOPLE;
+    let model = people.text("model.fnm");
+    let trained = figures(&mut farnear(&[
+        "activity",
+        "train",
+        &people.samples,
+        "--out",
+        &model,
+        "--any-view",
+        "--no-search",
+        "--json",
+    ]));
+    assert_eq!((number(&trained, "clips"), number(&trained, "views")), (24.0, 1.0));
+    let masks = people.text("p1-dig-1");
+    let recognise = ["activity", "recognise", &masks, "--model", &model];
+    let (lines, _) = succeeds(&mut farnear(&recognise));
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let (whole, running) = lines.split_last().expect("lines");
+    assert_eq!(whole["frames"], running.len());
+    assert_eq!(whole["activity"], "dig");
+    assert_eq!(running.last().expect("a frame")["activity"], "dig");
+    for line in running {
+        assert!((0.0..=1.0).contains(&number(line, "confidence")) && line["name"].is_string(), "{line}");
+    }
+    let one = figures(farnear(&recognise).args(["--json", "--window", "20"]));
+    let windows = one["windows"].as_array().expect("windows");
+    assert!(
+        windows.len() > 1 && windows[0]["from"] == 1 && windows.last().expect("one")["to"] == whole["frames"]
+    );
+
+    // A lying bar that pulses is no person at any of these.
+    let bar = people.text("bar");
+    fs::create_dir(&bar).expect("a folder");
+    for frame in 0..20_u32 {
+        let level = |x: u32, y: u32| {
+            Luma([if (40..44 + frame).contains(&y) && (10..140).contains(&x) { 255_u8 } else { 0 }])
+        };
+        GrayImage::from_fn(150, 90, level)
+            .save(people.folder.path(&format!("bar/{frame}.png")))
+            .expect("a picture");
+    }
+    let bar = figures(&mut farnear(&["activity", "recognise", &bar, "--model", &model, "--json"]));
+    assert!(bar["activity"].is_null() && number(&bar, "strangeness") > 1.0, "{bar}");
+
+    // The same person walking in a video: dark before a light wall. (At a dozen pixels across the spade of the digger is
+    // cleaned away.)
+    fs::create_dir(people.folder.path("video")).expect("a folder");
+    let count = fs::read_dir(people.folder.path("p1-walk-1")).expect("a folder").count();
+    for frame in 0..count + 12 {
+        let name = format!("p1-walk-1/f{}.png", frame.saturating_sub(12));
+        let mask = image::open(people.folder.path(&name)).expect("a mask").into_luma8();
+        let picture = GrayImage::from_fn(mask.width(), mask.height(), |x, y| {
+            let noise = ((frame as u32 * 7919 + y * 104_729 + x * 1_299_709) % 7) as u8;
+            let person = frame >= 12 && mask[(x, y)].0[0] > 0;
+            Luma([if person { 60 + noise } else { 180 + noise }])
+        });
+        picture.save(people.folder.path(&format!("video/f{frame:03}.png"))).expect("a picture");
+    }
+    let video = people.text("video");
+    let seen = figures(&mut farnear(&["activity", "recognise", &video, "--model", &model, "--json"]));
+    assert_eq!((&seen["activity"], number(&seen, "frames")), (&"walk".into(), (count + 12) as f64), "{seen}");
+    assert!(
+        number(&seen, "flagged_frames") >= 10.0,
+        "the background is learned from frames without a person"
+    );
+
+    let fused = people.text("fused.fnm");
+    succeeds(&mut farnear(&["activity", "train", &people.samples, "--out", &fused, "--no-search"]));
+    let second = people.text("p1-dig-2");
+    fails(&mut farnear(&["activity", "recognise", &masks, "--model", &fused]), 1, &["fused.fnm", "2 views"]);
+    let both =
+        figures(&mut farnear(&["activity", "recognise", &masks, &second, "--model", &fused, "--json"]));
+    assert_eq!(both["activity"], "dig");
+}
+
+#[test]
+fn settings_are_chosen_over_the_subjects_where_they_are_not_given() {
+    let people = &*PEOPLE;
+    let model = people.text("thesis.fnm");
+    let trained = figures(&mut farnear(&[
+        "activity",
+        "train",
+        &people.samples,
+        "--out",
+        &model,
+        "--epl",
+        "thesis",
+        "--json",
+    ]));
+    assert!(number(&trained, "condition_number") > 1.0, "{trained}");
+    let gamma = number(&trained, "gamma");
+    assert!([0.03, 0.1, 0.3, 1.0].iter().any(|g| (g - gamma).abs() < 1e-6), "{trained}");
+    assert!((0.3..=1.0).contains(&number(&trained, "inner_accuracy")), "{trained}");
+    assert!(trained["layout"].as_str().is_some_and(|text| text.starts_with("isomap:3,k=")), "{trained}");
+}
+
+#[test]
+fn damaged_models_and_samples_are_named_and_nothing_is_written() {
+    let people = &*PEOPLE;
+    let model = people.text("whole.fnm");
+    let shapes = people.folder.path("shapes");
+    fs::create_dir(&shapes).expect("a folder");
+    for frame in 0..6 {
+        GrayImage::from_pixel(100, 100, Luma([255]))
+            .save(shapes.join(format!("{frame}.png")))
+            .expect("a picture");
+    }
+    let empty = people.folder.path("empty");
+    fs::create_dir(&empty).expect("a folder");
+    GrayImage::new(50, 40).save(empty.join("0.png")).expect("a picture");
+    fs::create_dir(people.folder.path("mixed")).expect("a folder");
+    GrayImage::new(50, 40).save(people.folder.path("mixed/0.png")).expect("a picture");
+    GrayImage::new(51, 40).save(people.folder.path("mixed/1.png")).expect("a picture");
+    succeeds(&mut farnear(&[
+        "activity",
+        "train",
+        &people.samples,
+        "--out",
+        &model,
+        "--any-view",
+        "--no-search",
+    ]));
+    let bytes = fs::read(&model).expect("a model");
+    let changed = |name: &str, at: usize| {
+        let mut bytes = bytes.clone();
+        bytes[at] ^= 4;
+        people.folder.file(name, bytes)
+    };
+    let [format, descriptor, body] =
+        [("format.fnm", 8), ("descriptor.fnm", 12), ("body.fnm", bytes.len() / 2)]
+            .map(|(name, at)| changed(name, at));
+    let cut = people.folder.file("cut.fnm", &bytes[..bytes.len() / 2]);
+    let masks = people.text("p1-dig-1");
+    let shapes = shapes.display().to_string();
+    for (view, model, phrases) in [
+        (&masks, &format, vec!["format.fnm", "format version 5", "train it again"]),
+        (&masks, &descriptor, vec!["descriptor.fnm", "descriptor version 5", "train it again"]),
+        (&masks, &body, vec!["body.fnm", "damaged", "checksum"]),
+        (&masks, &cut, vec!["cut.fnm", "cut short"]),
+        (&masks, &people.samples, vec!["samples.toml", "not a farnear activity model"]),
+        (&masks, &people.text("none.fnm"), vec!["none.fnm"]),
+        (&shapes, &model, vec!["cut-out silhouettes", "full frames"]),
+        (&people.text("nowhere"), &model, vec!["nowhere"]),
+    ] {
+        fails(&mut farnear(&["activity", "recognise", view, "--model", model]), 1, &phrases);
+    }
+    let out = people.text("new.fnm");
+    let sample = |masks: &str, activity: &str| {
+        format!("[[sample]]\nmasks = \"{masks}\"\nsubject = \"a\"\nactivity = \"{activity}\"\n")
+    };
+    for (name, text, phrases) in [
+        ("no.toml", String::new(), vec!["no.toml", "[[sample]]"]),
+        ("one.toml", sample("p0-dig-1", "dig"), vec!["one.toml", "two activities"]),
+        ("absent.toml", sample("p9", "dig"), vec!["p9", "no such"]),
+        ("blank.toml", sample("empty", "dig"), vec!["empty", "all 1 masks are empty"]),
+        ("mixed.toml", sample("mixed", "dig"), vec!["51x40", "50x40"]),
+        ("kinds.toml", sample("p0-dig-1", "dig") + &sample("shapes", "lie"), vec!["full frames", "100x100"]),
+        ("typo.toml", sample("p0-dig-1", "dig").replace("subject", "person"), vec!["typo.toml", "person"]),
+        (
+            "twice.toml",
+            (sample("p0-dig-1", "dig") + "clip = \"x\"\n").repeat(2),
+            vec!["twice.toml", "clip `x`", "view 1 twice"],
+        ),
+    ] {
+        let file = people.folder.file(name, text);
+        fails(&mut farnear(&["activity", "train", &file, "--out", &out]), 1, &phrases);
+    }
+    assert!(!people.folder.path("new.fnm").exists());
+}
