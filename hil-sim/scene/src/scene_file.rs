@@ -60,6 +60,11 @@ impl SceneFile {
         }
         let random = raw.texture.as_deref().and_then(|name| name.parse().ok());
         let texture = raw.texture.filter(|_| random.is_none());
+        if let (Some(name), Some(_)) = (&texture, raw.contrast) {
+            return Err(SceneError::Syntax(format!(
+                "contrast is of sand and fractal; the picture {name:?} has its own"
+            )));
+        }
         Ok(Self { depth: raw.depth, texture, scene, random, contrast: raw.contrast })
     }
 
@@ -128,6 +133,7 @@ mod tests {
             ("scene = \"cube\"", "unknown scene \"cube\""),
             ("scene = \"cone\"\ncontrast = 3.0", "contrast = 3"),
             ("depht = \"d.npy\"", "unknown field `depht`"),
+            ("scene = \"cone\"\ntexture = \"b.png\"\ncontrast = 0.3", "the picture \"b.png\" has its own"),
         ] {
             let error = SceneFile::parse(text).unwrap_err().to_string();
             assert!(error.contains(expected), "{error:?} should contain {expected:?}");

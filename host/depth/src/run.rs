@@ -27,6 +27,7 @@ use crate::operators::Operators;
 use crate::optics::Optics;
 
 pub use check::{SwapEvidence, Warning};
+pub(crate) use check::{after as warnings_after, check, check_windows};
 pub(crate) use cubic::root;
 pub use processor::Processor;
 pub use simd::Backend;

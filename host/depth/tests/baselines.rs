@@ -5,9 +5,10 @@ mod common;
 
 use common::{Texture, eight_bit, rig};
 use farnear_depth::baselines::{BaselineError, Favaro, FavaroSettings, Method, depth_from_pair};
+use farnear_depth::fill::FILLED_CONFIDENCE;
 use farnear_depth::optics::Optics;
 use farnear_depth::run::{RunError, Settings, Warning};
-use ndarray::{Array2, s};
+use ndarray::{Array2, Axis, concatenate, s};
 
 const SIDE: usize = 128;
 /// Filters and windows of the baselines reach at most this far.
@@ -98,6 +99,41 @@ fn holes_and_blank_regions_are_marked() {
         let depth = map.depth_mm[(48, 40)];
         assert!((f64::from(depth) - optics.depth_mm(0.4)).abs() < 2.5, "{method}: {depth}");
     }
+}
+
+/// What `run::depth_from_pair` tells about a pair the baselines tell too, and they fill as it does.
+#[test]
+fn checks_and_filling_are_those_of_the_rational_operators() {
+    let optics = rig("gaussian:k=0.4578");
+    let [mut far, mut near] = Texture::sand(SIDE, 3).pair(optics.psf(), optics.max_blur_px(), 0.4);
+    let top = far.iter().chain(&near).copied().fold(0.0, f32::max);
+    far.slice_mut(s![90..100, 80..90]).fill(top);
+    for image in [&mut far, &mut near] {
+        image.slice_mut(s![12..72, 12..72]).fill(1.0);
+    }
+    for method in [Method::Subbarao, Method::SubbaraoFourier] {
+        let settings = Settings { fill: true, ..Settings::default() };
+        let map = depth_from_pair(method, far.view(), near.view(), &optics, &settings).unwrap();
+        let [Warning::Saturated { fraction }] = map.warnings[..] else {
+            panic!("{method}: {:?}", map.warnings)
+        };
+        assert!((fraction - 100.0 / (SIDE * SIDE) as f64).abs() < 1e-4, "{method}: {fraction}");
+        assert!(map.depth_mm[(95, 85)].is_nan() && map.confidence[(95, 85)] == 0.0, "{method}");
+        assert_eq!(map.confidence[(42, 42)], FILLED_CONFIDENCE, "{method}");
+        let depth = f64::from(map.depth_mm[(42, 42)]);
+        assert!((depth - optics.depth_mm(0.4)).abs() < 2.5, "{method}: {depth}");
+    }
+    // The lower half is nearer; given the wrong way round it is farther.
+    let texture = Texture::sand(SIDE, 3);
+    let [[far, near], [lower_far, lower_near]] =
+        [-0.7, 0.7].map(|alpha| texture.pair(optics.psf(), optics.max_blur_px(), alpha));
+    let halves = |upper: &Array2<f32>, lower: &Array2<f32>| {
+        concatenate![Axis(0), upper.slice(s![..SIDE / 2, ..]), lower.slice(s![SIDE / 2.., ..])]
+    };
+    let [far, near] = [halves(&far, &lower_far), halves(&near, &lower_near)];
+    let map =
+        depth_from_pair(Method::Subbarao, near.view(), far.view(), &optics, &Settings::default()).unwrap();
+    assert!(matches!(map.warnings[..], [Warning::LooksSwapped(_)]), "{:?}", map.warnings);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The files that users have: optics, depth maps, meshes.
+//! The files that users have: optics, scenes, depth maps, meshes.
 
 pub mod cache;
 pub mod correction;
@@ -6,6 +6,7 @@ pub mod map;
 pub mod mesh;
 pub mod operators;
 pub mod optics;
+pub mod scene;
 
 /// The time by this computer's clock, RFC 3339 in UTC; `None` for a clock before 1970.
 pub fn now_rfc3339() -> Option<String> {

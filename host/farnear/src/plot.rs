@@ -130,6 +130,24 @@ fn frequencies() -> impl Iterator<Item = f64> {
     (0..=STEPS).map(|i| PI * i as f64 / STEPS as f64)
 }
 
+/// The corner where a legend of so many lines covers the fewest of the points, whose coordinates run from 0 to 1 over the
+/// chart; the lower right one if that is as good as any.
+fn free_corner(points: Vec<[f64; 2]>, lines: usize) -> SeriesLabelPosition {
+    // A little more than the legend takes of a chart.
+    let (width, height) = (0.3, 0.06 + 0.055 * lines as f64);
+    let corners = [
+        (SeriesLabelPosition::LowerRight, [1.0, 0.0]),
+        (SeriesLabelPosition::UpperLeft, [0.0, 1.0]),
+        (SeriesLabelPosition::LowerLeft, [0.0, 0.0]),
+        (SeriesLabelPosition::UpperRight, [1.0, 1.0]),
+    ];
+    let covered = |[u, v]: [f64; 2]| {
+        points.iter().filter(|[x, y]| (x - u).abs() < width && (y - v).abs() < height).count()
+    };
+    let best = corners.into_iter().min_by_key(|(_, corner)| covered(*corner));
+    best.map_or(SeriesLabelPosition::LowerRight, |(position, _)| position)
+}
+
 fn chart<B: DrawingBackend>(
     area: &DrawingArea<B, Shift>,
     title: &str,
@@ -147,10 +165,16 @@ fn chart<B: DrawingBackend>(
         .margin(10)
         .x_label_area_size(38)
         .y_label_area_size(48)
-        .build_cartesian_2d(x, low - room..high + room)?;
+        .build_cartesian_2d(x.clone(), low - room..high + room)?;
+    let points = lines.iter().chain(dots).flat_map(|(.., points)| points);
+    let relative = points
+        .map(|(u, v)| [(u - x.start) / (x.end - x.start), (v - low + room) / (high - low + 2.0 * room)]);
+    let place = free_corner(relative.collect(), lines.len());
     chart
         .configure_mesh()
         .x_desc(x_label)
+        // Rounding leaves a -0.0 where 0 is meant.
+        .y_label_formatter(&|value| format!("{:.1}", if value.abs() < 1e-6 { 0.0 } else { *value }))
         .label_style(("sans-serif", 12))
         .axis_desc_style(("sans-serif", 13))
         .light_line_style(RGBColor(246, 246, 246))
@@ -168,7 +192,7 @@ fn chart<B: DrawingBackend>(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::LowerRight)
+        .position(place)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(205, 205, 205))
         .label_font(("sans-serif", 12))
@@ -179,6 +203,15 @@ fn chart<B: DrawingBackend>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_legend_goes_where_no_curve_is() {
+        let falling: Vec<[f64; 2]> = (0..=50).map(|i| f64::from(i) / 50.0).map(|x| [x, 1.0 - x]).collect();
+        assert!(matches!(free_corner(falling.clone(), 3), SeriesLabelPosition::LowerLeft));
+        let rising: Vec<[f64; 2]> = falling.iter().map(|[x, y]| [*x, 1.0 - y]).collect();
+        assert!(matches!(free_corner(rising, 3), SeriesLabelPosition::LowerRight));
+        assert!(matches!(free_corner(Vec::new(), 3), SeriesLabelPosition::LowerRight));
+    }
     use farnear_depth::operators::{Design, Family, Request, design};
 
     #[test]

@@ -127,8 +127,9 @@ fn other_methods_give_depth_and_say_who_they_are() {
         assert!(record.contains(&format!("method = \"{method}\"")), "{record}");
         assert_eq!(record.contains("[operators"), method == "ro");
     }
-    bench.figures(&[&depth[..], &["--fill"]].concat());
-    bench.fails(1, &[&depth[..], &["--method", "subbarao", "--fill"]].concat(), "cannot --fill");
+    for method in ["ro", "subbarao"] {
+        bench.figures(&[&depth[..], &["--method", method, "--fill"]].concat());
+    }
     bench.fails(2, &[&depth[..], &["--method", "magic"]].concat(), "subbarao-fourier");
     bench.targets(1.0);
     let learn = ["calibrate", "correction", "patterns.toml", "--method", "clsf-full", "--out", "c.toml"];

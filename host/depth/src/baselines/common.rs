@@ -1,19 +1,23 @@
 //! What the baselines share: checking and normalising a pair, separable filters, and turning their evidence into a map.
 
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 
+use crate::fill::fill_low_texture;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::psf::Psf;
 use crate::run::{
-    DepthMap, MAX_ALPHA, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings, Warning, confidence,
+    Backend, DepthMap, MAX_ALPHA, RunError, Settings, SwapEvidence, Warning, check, check_windows,
+    confidence, warnings_after,
 };
 
 /// A checked pair, each image divided by its mean; pixels without a value hold the mean.
 pub(super) struct Pair {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
+    /// Pixels that are not finite or saturated.
     holes: Option<Array2<bool>>,
+    warnings: Vec<Warning>,
 }
 
 /// What a method found out, each (height, width).
@@ -34,72 +38,51 @@ impl Pair {
         near: ArrayView2<f32>,
         settings: &Settings,
     ) -> Result<Self, RunError> {
-        let (height, width) = far.dim();
-        let (near_height, near_width) = near.dim();
-        if (near_height, near_width) != (height, width) {
-            return Err(RunError::SizeMismatch {
-                far_width: width,
-                far_height: height,
-                near_width,
-                near_height,
-            });
-        }
-        if height < MIN_SIDE_PX || width < MIN_SIDE_PX {
-            return Err(RunError::TooSmall { width, height });
-        }
-        for (what, size, largest) in
-            [("smoothing", settings.smoothing_px, MAX_SMOOTHING_PX), ("median", settings.median_px, 7)]
-        {
-            if size % 2 == 0 || size > largest {
-                return Err(RunError::Window { what, size, largest });
-            }
-        }
-        let mut holes = Array2::from_elem((height, width), false);
-        Zip::from(&mut holes).and(far).and(near).for_each(|hole, far, near| {
-            *hole = !(far.is_finite() && near.is_finite());
-        });
-        let missing = holes.iter().filter(|hole| **hole).count();
-        if missing == height * width {
-            return Err(RunError::NothingFinite);
-        }
-        let normalise = |which, image: ArrayView2<f32>| {
-            let valid = || image.iter().zip(&holes).filter(|(_, hole)| !**hole).map(|(value, _)| *value);
-            let first = valid().next().unwrap_or(0.0);
+        check_windows(settings)?;
+        let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
+        let input = check(&far, &near, Backend::best(), 1)?;
+        let (holes, warnings) = (input.bad().cloned(), input.pixel_warnings());
+        let valid_at = |at: usize| !holes.as_ref().and_then(|holes| holes.as_slice()).is_some_and(|h| h[at]);
+        let normalise = |which, image: &CowArray<'_, f32, Ix2>| {
+            let valid = || image.iter().enumerate().filter(|(at, _)| valid_at(*at)).map(|(_, value)| *value);
+            let Some(first) = valid().next() else { return Err(RunError::NothingFinite) };
             if valid().all(|value| value == first) {
                 return Err(RunError::Constant { which, value: first });
             }
-            let count = (height * width - missing) as f64;
+            let count = valid().count() as f64;
             let mean = valid().map(f64::from).sum::<f64>() / count;
             // An image may be centred on 0; then its spread is the scale.
             let spread = (valid().map(|v| (f64::from(v) - mean).powi(2)).sum::<f64>() / count).sqrt();
             let scale = if mean.abs() > spread { mean } else { spread };
             let mut normalised = image.mapv(|value| ((f64::from(value) - mean) / scale) as f32);
-            Zip::from(&mut normalised).and(&holes).for_each(|value, hole| {
-                if *hole {
-                    *value = 0.0;
-                }
-            });
+            if let Some(holes) = &holes {
+                Zip::from(&mut normalised).and(holes).for_each(|value, hole| {
+                    if *hole {
+                        *value = 0.0;
+                    }
+                });
+            }
             Ok(normalised)
         };
-        let (far, near) = (normalise("far", far)?, normalise("near", near)?);
-        Ok(Self { far, near, holes: (missing > 0).then_some(holes) })
+        let (far, near) = (normalise("far", &far)?, normalise("near", &near)?);
+        Ok(Self { far, near, holes, warnings })
     }
 
     /// The depth map of the evidence.
     pub(super) fn finish(&self, evidence: Evidence, optics: &Optics, settings: &Settings) -> DepthMap {
         let Evidence { alpha, mut texture, misfit, reach_px } = evidence;
         let mut alpha = alpha;
-        let mut warnings = Vec::new();
+        let mut low_texture = settings.fill.then(|| confidence::low_texture(texture.view()));
         if let Some(holes) = &self.holes {
-            let pixels = holes.iter().filter(|hole| **hole).count();
-            warnings.push(Warning::NotFinite { pixels });
-            Zip::from(&mut alpha).and(&mut texture).and(&dilate_square(holes, reach_px)).for_each(
-                |alpha, texture, near_hole| {
-                    if *near_hole {
-                        (*alpha, *texture) = (f32::NAN, 0.0);
-                    }
-                },
-            );
+            let near_holes = dilate_square(holes, reach_px);
+            Zip::from(&mut alpha).and(&mut texture).and(&near_holes).for_each(|alpha, texture, near_hole| {
+                if *near_hole {
+                    (*alpha, *texture) = (f32::NAN, 0.0);
+                }
+            });
+            if let Some(low_texture) = &mut low_texture {
+                Zip::from(low_texture).and(&near_holes).for_each(|low, near_hole| *low &= !near_hole);
+            }
         }
         let scale = confidence::texture_scale(texture.view());
         let low = texture.iter().filter(|t| **t < confidence::LOW_TEXTURE * scale).count();
@@ -112,7 +95,17 @@ impl Pair {
             let alpha = depth.clamp(-MAX_ALPHA, MAX_ALPHA);
             *depth = if *value > 0.0 { optics.depth_mm(f64::from(alpha)) as f32 } else { f32::NAN };
         });
-        DepthMap { depth_mm, confidence: values, low_texture_fraction, warnings }
+        let warnings = self.warnings.clone();
+        let mut map = DepthMap { depth_mm, confidence: values, low_texture_fraction, warnings };
+        if let Some(low_texture) = low_texture {
+            fill_low_texture(&mut map, low_texture.view());
+        }
+        // A baseline's own bias may carry much of a scene beyond the near focus.
+        let beyond =
+            |warning: &Warning| matches!(warning, Warning::LooksSwapped(SwapEvidence::BeyondNear { .. }));
+        let swapped = warnings_after(&map, optics).filter(|warning| !beyond(warning));
+        map.warnings.extend(swapped);
+        map
     }
 }
 

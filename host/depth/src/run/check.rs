@@ -109,12 +109,8 @@ pub(crate) struct Input<'a> {
     saturated: usize,
 }
 
-/// Checks windows and that the operators fit the optics.
-pub(crate) fn check_settings(
-    operators: &Operators,
-    optics: &Optics,
-    settings: &Settings,
-) -> Result<(), RunError> {
+/// Checks windows.
+pub(crate) fn check_windows(settings: &Settings) -> Result<(), RunError> {
     for (what, size, largest) in
         [("smoothing", settings.smoothing_px, MAX_SMOOTHING_PX), ("median", settings.median_px, 7)]
     {
@@ -122,6 +118,16 @@ pub(crate) fn check_settings(
             return Err(RunError::Window { what, size, largest });
         }
     }
+    Ok(())
+}
+
+/// Checks windows and that the operators fit the optics.
+pub(crate) fn check_settings(
+    operators: &Operators,
+    optics: &Optics,
+    settings: &Settings,
+) -> Result<(), RunError> {
+    check_windows(settings)?;
     let [operators_px, optics_px] = [operators.max_blur_px(), optics.max_blur_px()];
     let difference = (operators_px / optics_px - 1.0).abs();
     if difference > BLUR_TOLERANCE {
@@ -244,8 +250,8 @@ fn saturated(
 }
 
 impl Input<'_> {
-    /// Warnings about the input.
-    pub(crate) fn warnings(&self, operators: &Operators, optics: &Optics) -> Vec<Warning> {
+    /// Warnings about the pixels.
+    pub(crate) fn pixel_warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if self.not_finite > 0 {
             warnings.push(Warning::NotFinite { pixels: self.not_finite });
@@ -253,6 +259,12 @@ impl Input<'_> {
         if self.saturated > 0 {
             warnings.push(Warning::Saturated { fraction: self.saturated as f64 / self.far.len() as f64 });
         }
+        warnings
+    }
+
+    /// Warnings about the input.
+    pub(crate) fn warnings(&self, operators: &Operators, optics: &Optics) -> Vec<Warning> {
+        let mut warnings = self.pixel_warnings();
         let psf = operators.request().psf;
         if psf != optics.psf() {
             warnings.push(Warning::PsfMismatch { operators: psf, optics: optics.psf() });
@@ -260,9 +272,9 @@ impl Input<'_> {
         warnings
     }
 
-    /// Whether some pixels are not finite or saturated.
-    pub(crate) fn has_holes(&self) -> bool {
-        self.bad.is_some()
+    /// The pixels that are not finite or saturated, if there are any.
+    pub(crate) fn bad(&self) -> Option<&Array2<bool>> {
+        self.bad.as_ref()
     }
 
     /// `[I2 - I1, I2 + I1]` of one pixel, normalised; 0 where it is not finite.
@@ -275,7 +287,7 @@ impl Input<'_> {
     /// The pixels whose depth a bad pixel takes part in, if there are any.
     pub(crate) fn invalid(&self, operators: &Operators, settings: &Settings) -> Option<Array2<bool>> {
         let reach = 2 * (operators.kernel_size() / 2) + settings.smoothing_px / 2;
-        self.bad.as_ref().map(|bad| crate::metrics::dilate_square(bad, reach))
+        self.bad().map(|bad| crate::metrics::dilate_square(bad, reach))
     }
 }
 

@@ -244,7 +244,7 @@ impl Tile {
             difference_part,
             sum_part,
         );
-        if input.has_holes() {
+        if input.bad().is_some() {
             // Holes are filled with the middle value; whatever they touch is taken out again later.
             for value in difference_part.iter_mut().chain(sum_part) {
                 if !value.is_finite() {

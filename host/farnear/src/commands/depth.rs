@@ -1,5 +1,9 @@
 //! `farnear depth`: a depth map from a far- and a near-focused image.
 
+mod method;
+mod noise;
+mod results;
+
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -8,29 +12,28 @@ use std::{
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use farnear_capture::{
-    aside::Aside,
-    image_file::{Samples, encode_png, read_grey},
+    image_file::{Samples, read_grey},
     record::CAPTURE_FILE,
 };
 use farnear_depth::{
-    baselines,
     corrections::Correction,
-    operators::Operators,
-    optics::Optics,
-    run::{DepthMap, MAX_SMOOTHING_PX, Settings, Warning, depth_from_pair},
+    run::{DepthMap, MAX_SMOOTHING_PX, Settings, Warning},
 };
 use ndarray::Array2;
 use serde::Serialize;
 
 use crate::{
-    files::{self, map, mesh},
-    picture, report,
+    files,
+    report::{self, Usage},
 };
+use method::{Method, Prepared, method};
+use noise::{CameraNoise, Source, Uncertainty};
+use results::Results;
 
 /// Compute a depth map from a far- and a near-focused image.
 ///
 /// Writes depth.npy and depth.tiff (mm, NaN = no value), depth.png (16 bit), confidence.npy (0 to 1), mesh.ply, view.png
-/// (a picture with a scale) and depth.toml (what made them).
+/// (a picture with a scale), depth.toml (what made them) and, if asked, uncertainty.npy (mm).
 #[derive(Args)]
 #[command(after_help = "Example: farnear depth far.png near.png --optics optics.toml --out depth/")]
 pub struct Arguments {
@@ -51,9 +54,14 @@ pub struct Arguments {
     /// Correction saved by `farnear calibrate correction`, applied to the map.
     #[arg(long, value_name = "FILE")]
     correction: Option<PathBuf>,
-    /// Fill regions without texture with the surface of what surrounds them (ro only).
+    /// Fill regions without texture with the surface of what surrounds them.
     #[arg(long)]
     fill: bool,
+    /// Write uncertainty.npy too: the standard deviation of each depth in mm, for noise that is estimated from the pair
+    /// or follows from the camera, --uncertainty=camera:full_well_e=20000,read_noise_e=12 (and bits=12 where the file has
+    /// more); ro only.
+    #[arg(long, value_name = "NOISE", num_args = 0..=1, require_equals = true, default_missing_value = "estimated")]
+    uncertainty: Option<CameraNoise>,
     /// Side of the window over which coefficients are summed, in pixels: odd, 1 to 63.
     #[arg(long, value_name = "PX", default_value_t = 7, value_parser = odd_up_to::<MAX_SMOOTHING_PX>)]
     smooth: usize,
@@ -78,6 +86,8 @@ struct Figures {
     height: usize,
     median_mm: f64,
     low_texture_fraction: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uncertainty: Option<Uncertainty>,
     warnings: Vec<String>,
 }
 
@@ -88,70 +98,6 @@ const MAX_MEDIAN_PX: usize = 7;
 fn odd_up_to<const LARGEST: usize>(text: &str) -> Result<usize, String> {
     let side = text.parse().ok().filter(|side| side % 2 == 1 && (1..=LARGEST).contains(side));
     side.ok_or_else(|| format!("a window's side is an odd whole number from 1 to {LARGEST}"))
-}
-
-/// How depth is computed.
-#[derive(Clone, Copy)]
-enum Method {
-    RationalOperators,
-    Baseline(baselines::Method),
-}
-
-fn method(text: &str) -> Result<Method, String> {
-    if text == "ro" {
-        return Ok(Method::RationalOperators);
-    }
-    let baseline = text.parse().map(Method::Baseline);
-    baseline.map_err(|_| "expected ro, subbarao, subbarao-fourier or favaro".to_owned())
-}
-
-/// A method with what it needs.
-enum Prepared {
-    RationalOperators(Box<Operators>),
-    Baseline(baselines::Method),
-}
-
-impl Prepared {
-    fn new(arguments: &Arguments, optics: &Optics) -> Result<Self> {
-        match (arguments.method, arguments.operators.as_deref()) {
-            (Method::RationalOperators, asked) => {
-                Ok(Self::RationalOperators(Box::new(files::operators::find(asked, optics)?)))
-            }
-            (Method::Baseline(method), Some(_)) => bail!("--method {method} uses no --operators"),
-            (Method::Baseline(method), None) if arguments.fill => {
-                bail!("--method {method} cannot --fill; ro can")
-            }
-            (Method::Baseline(method), None) => Ok(Self::Baseline(method)),
-        }
-    }
-
-    fn name(&self) -> &'static str {
-        match self {
-            Self::RationalOperators(_) => "ro",
-            Self::Baseline(method) => method.name(),
-        }
-    }
-
-    fn operators(&self) -> Option<&Operators> {
-        match self {
-            Self::RationalOperators(operators) => Some(operators),
-            Self::Baseline(_) => None,
-        }
-    }
-
-    fn depth(
-        &self,
-        far: &Array2<f32>,
-        near: &Array2<f32>,
-        optics: &Optics,
-        settings: &Settings,
-    ) -> Result<DepthMap> {
-        let (far, near) = (far.view(), near.view());
-        Ok(match self {
-            Self::RationalOperators(operators) => depth_from_pair(far, near, operators, optics, settings)?,
-            Self::Baseline(method) => baselines::depth_from_pair(*method, far, near, optics, settings)?,
-        })
-    }
 }
 
 /// Corrects a map; what lies beyond the correction loses depth and confidence alike.
@@ -165,30 +111,10 @@ fn correct(depth: &mut DepthMap, correction: &Correction) -> Result<()> {
     Ok(())
 }
 
-/// The content of `depth.toml`: what made the map.
-#[derive(Serialize)]
-struct Sidecar<'a> {
-    format: u32,
-    made_by: String,
-    far: String,
-    near: String,
-    units: &'static str,
-    warnings: &'a [String],
-    /// How depth.png's codes stand for mm; code 0 = no value.
-    png: map::Scale,
-    method: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    correction: Option<String>,
-    settings: Settings,
-    optics: Optics,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    operators: Option<&'a Operators>,
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let optics = files::optics::of_pair(arguments.optics.as_deref(), &arguments.far)?;
-    let [far, near] = read_pair(&arguments.far, &arguments.near)?;
+    let ([far, near], samples) = read_pair(&arguments.far, &arguments.near)?;
     if far == near {
         bail!(
             "{} and {} hold the same image: depth needs one focused far and one focused near",
@@ -196,7 +122,10 @@ pub fn run(arguments: Arguments) -> Result<()> {
             arguments.near.display()
         );
     }
-    let method = Prepared::new(&arguments, &optics)?;
+    let method = Prepared::new(arguments.method, arguments.operators.as_deref(), &optics)?;
+    if arguments.uncertainty.is_some() && method.operators().is_none() {
+        return Err(Usage(format!("--uncertainty is known of ro, not of --method {}", method.name())).into());
+    }
     let correction = arguments.correction.as_deref().map(files::correction::read).transpose()?;
     if let Some(correction) = &correction {
         correction.check_range(&optics.working_range())?;
@@ -212,6 +141,14 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let mut depth = method
         .depth(&far, &near, &optics, &settings)
         .with_context(|| format!("{} and {}", arguments.far.display(), arguments.near.display()))?;
+    let deviation = match (arguments.uncertainty, method.operators()) {
+        (Some(noise), Some(operators)) => {
+            let source =
+                Source { pair: [&far, &near], samples, operators, optics: &optics, settings: &settings };
+            Some(noise::deviation(noise, &source, &depth, correction.as_ref())?)
+        }
+        _ => None,
+    };
     if let Some(correction) = &correction {
         correct(&mut depth, correction)?;
     }
@@ -230,7 +167,19 @@ pub fn run(arguments: Arguments) -> Result<()> {
         eprintln!("warning: {warning}");
     }
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.far));
-    write(&out, &arguments, &depth, &far, &method, &optics, &warnings)?;
+    let results = Results {
+        far: &arguments.far,
+        near: &arguments.near,
+        picture: &far,
+        depth: &depth,
+        deviation: deviation.as_ref(),
+        method: &method,
+        settings,
+        optics: &optics,
+        correction: arguments.correction.as_deref(),
+        warnings: &warnings,
+    };
+    results.write(&out)?;
     eprintln!("wrote {}", out.display());
     let (height, width) = depth.depth_mm.dim();
     let figures = Figures {
@@ -239,13 +188,15 @@ pub fn run(arguments: Arguments) -> Result<()> {
         height,
         median_mm: report::rounded(median(&depth.depth_mm), 3),
         low_texture_fraction: report::rounded(depth.low_texture_fraction, 6),
+        uncertainty: deviation.map(|(_, found)| found),
         warnings,
     };
     report::print(&figures, arguments.json)
 }
 
-/// The images' pixels, which must mean the same: integers of any depth share one scale, float files have their own.
-fn read_pair(far: &Path, near: &Path) -> Result<[Array2<f32>; 2]> {
+/// The images' pixels, which must mean the same (integers of any depth share one scale, float files have their own), and
+/// the coarser kind of samples.
+fn read_pair(far: &Path, near: &Path) -> Result<([Array2<f32>; 2], Samples)> {
     let (far_image, near_image) = (read_grey(far)?, read_grey(near)?);
     if (far_image.samples == Samples::Float) != (near_image.samples == Samples::Float) {
         bail!(
@@ -256,7 +207,11 @@ fn read_pair(far: &Path, near: &Path) -> Result<[Array2<f32>; 2]> {
             near_image.samples
         );
     }
-    Ok([far_image.pixels, near_image.pixels])
+    let samples = match (far_image.samples, near_image.samples) {
+        (Samples::Integer(a), Samples::Integer(b)) => Samples::Integer(a.min(b)),
+        (samples, _) => samples,
+    };
+    Ok(([far_image.pixels, near_image.pixels], samples))
 }
 
 /// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near:
@@ -277,48 +232,6 @@ fn name_of(path: &Path) -> String {
 fn default_folder(far: &Path) -> PathBuf {
     let folder = far.parent().unwrap_or(Path::new(""));
     if folder.join(CAPTURE_FILE).exists() { folder.to_path_buf() } else { folder.join("depth") }
-}
-
-fn write(
-    out: &Path,
-    arguments: &Arguments,
-    depth: &DepthMap,
-    far: &Array2<f32>,
-    method: &Prepared,
-    optics: &Optics,
-    warnings: &[String],
-) -> Result<()> {
-    let aside = Aside::into_folder(out)?;
-    let map = depth.depth_mm.view();
-    let (codes, png) = map::codes(map);
-    let sidecar = Sidecar {
-        format: 1,
-        made_by: concat!("farnear ", env!("CARGO_PKG_VERSION")).into(),
-        far: name_of(&arguments.far),
-        near: name_of(&arguments.near),
-        units: "mm",
-        warnings,
-        png,
-        method: method.name(),
-        correction: arguments.correction.as_deref().map(name_of),
-        // The number of threads changes nothing in the result.
-        settings: Settings {
-            smoothing_px: arguments.smooth,
-            median_px: arguments.median,
-            fill: arguments.fill,
-            ..Settings::default()
-        },
-        optics: *optics,
-        operators: method.operators(),
-    };
-    aside.write("depth.npy", &map::npy(map)?)?;
-    aside.write("depth.tiff", &map::tiff(map)?)?;
-    aside.write("depth.png", &encode_png(codes.view(), 16).map_err(anyhow::Error::msg)?)?;
-    aside.write("confidence.npy", &map::npy(depth.confidence.view())?)?;
-    aside.write("mesh.ply", &mesh::ply(map, far.view(), optics))?;
-    aside.write("view.png", &picture::view_png(map, depth.confidence.view())?)?;
-    aside.write("depth.toml", toml::to_string(&sidecar)?.as_bytes())?;
-    Ok(aside.finish()?)
 }
 
 /// Median of the values that there are, NaN where there are none.

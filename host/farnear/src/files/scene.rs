@@ -1,0 +1,77 @@
+//! Scenes by name or from a scene file with its maps.
+//!
+//! A scene file is TOML; files that it names lie relative to it:
+//! ```toml
+//! depth = "bust.npy"      # depths in mm (.npy or float TIFF), stretched over the image; or: scene = "cone"
+//! texture = "bricks.png"  # any picture that `farnear depth` reads; or: "sand" (also without the line), "fractal"
+//! contrast = 0.3          # standard deviation of sand or fractal, whose mean is 1
+//! ```
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use anyhow::{Context, Result, bail};
+use farnear_capture::image_file::read_grey;
+use farnear_scene::{Scene, SceneError, SceneFile};
+
+use super::map;
+
+/// A scene as an argument names it.
+#[derive(Clone, Debug)]
+pub enum SceneArgument {
+    /// `cone`, `plane:900,contrast=0.3`, ...
+    Named(Box<Scene>),
+    /// A scene file.
+    File(PathBuf),
+}
+
+impl FromStr for SceneArgument {
+    type Err = SceneError;
+
+    /// What ends with `.toml` or exists is a file, everything else a name.
+    fn from_str(text: &str) -> Result<Self, SceneError> {
+        let path = Path::new(text);
+        let ending = path.extension().unwrap_or_default();
+        if ending.eq_ignore_ascii_case("toml") || path.is_file() {
+            return Ok(Self::File(path.to_path_buf()));
+        }
+        Ok(Self::Named(Box::new(text.parse()?)))
+    }
+}
+
+impl SceneArgument {
+    /// The scene, with its maps.
+    ///
+    /// # Errors
+    /// Which file cannot be read, or what in it makes no scene.
+    pub fn read(self) -> Result<Scene> {
+        match self {
+            Self::Named(scene) => Ok(*scene),
+            Self::File(path) => read(&path).with_context(|| format!("the scene {}", path.display())),
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Scene> {
+    let text = fs::read_to_string(path).context("cannot read it")?;
+    let file = SceneFile::parse(&text)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let depth_mm = file.depth.as_ref().map(|name| map::read(&folder.join(name))).transpose()?;
+    let texture = match &file.texture {
+        Some(name) => {
+            let picture = folder.join(name);
+            if !picture.is_file() {
+                bail!(
+                    "texture = \"{name}\" is neither sand nor fractal, and there is no file {}",
+                    picture.display()
+                );
+            }
+            Some(read_grey(&picture)?.pixels)
+        }
+        None => None,
+    };
+    Ok(file.into_scene(depth_mm, texture)?)
+}
