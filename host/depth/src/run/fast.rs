@@ -132,6 +132,8 @@ pub(crate) struct Tile {
     sums: Plane,
     alpha: Plane,
     scratch: Plane,
+    /// Sorted columns of the median's windows.
+    sorted: Plane,
 }
 
 impl Tile {
@@ -161,6 +163,7 @@ impl Tile {
             sums: Plane::new(4 * BLOCK, full),
             alpha: Plane::new(median, full),
             scratch: Plane::new(3, full),
+            sorted: Plane::new(median, full),
         }
     }
 
@@ -277,7 +280,7 @@ impl Tile {
         }
         if let Some(at) = row.checked_sub(self.median - 1) {
             let rows: [&[f32]; 7] = std::array::from_fn(|i| self.alpha.row(i.min(self.median - 1)));
-            simd::median_row(job.backend, &rows[..self.median], job.depth_of, depth, width);
+            simd::median_row(job.backend, &rows[..self.median], &mut self.sorted, job.depth_of, depth, width);
             copy(&depth[..width], &mut maps.depth_mm, at);
         }
     }

@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
-use crate::run::cubic::{SLOPE_FLOOR, STEPS};
+use crate::run::cubic::{LEAST_T, SLOPE_FLOOR, START, STEPS};
 use crate::run::{MAX_ALPHA, confidence};
 
 /// Texture energy that stands for none: keeps divisions finite, far below any real one (images are normalised).
@@ -277,22 +277,31 @@ fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, wi
         4 * y + 4 <= sums.rows()
             && width + Plane::PADDING <= stride
             && window - 1 + 32 <= Plane::PADDING
-            && 48 <= Plane::PADDING
+            && 64 < Plane::PADDING
     );
     let [alpha, texture, misfit] = [&mut *output.alpha, output.texture, output.misfit];
     assert!([&*alpha, texture, misfit].iter().all(|row| width + Plane::PADDING <= row.len()));
     let [alpha, texture, misfit] = [alpha.as_mut_ptr(), texture.as_mut_ptr(), misfit.as_mut_ptr()];
     let base = sums.all()[4 * y * stride..].as_ptr();
-    // Two vectors at a time: each waits for its own divisions and steps, the other fills the gaps.
-    for x in (0..width).step_by(2 * L::N) {
-        // SAFETY: x < width, so reads stay below x + N + max(window - 1 + N, 32) <= width + PADDING, asserted to lie in the
-        // row, and so do the 2 N numbers that are written; the output rows are as long.
-        unsafe {
+    // SAFETY: four rows of `stride` numbers begin at `base`; x < width, so reads stay below x + N + max(window - 1 + N, 3 N + 1) <=
+    // width + PADDING, asserted to lie in the row, and so do the 2 N numbers that are written; the output rows are as long.
+    unsafe {
+        let mut channels = [
+            Channel::<L>::new(base),
+            Channel::<L>::new(base.add(stride)),
+            Channel::<L>::new(base.add(2 * stride)),
+            Channel::<L>::new(base.add(3 * stride)),
+        ];
+        // Two vectors at a time: each waits for its own estimates and steps, the other fills the gaps.
+        for x in (0..width).step_by(2 * L::N) {
             let mut window_sums = [[L::splat(0.0); 4]; 2];
             for half in 0..2 {
                 for c in 0..4 {
-                    let p = base.add(c * stride + x + half * L::N);
-                    window_sums[half][c] = if window == 7 { sum_of_seven(p) } else { sum_of(p, window) };
+                    window_sums[half][c] = if window == 7 {
+                        channels[c].sum_of_seven(x + half * L::N)
+                    } else {
+                        sum_of(base.add(c * stride + x + half * L::N), window)
+                    };
                 }
             }
             let results = [root_and_misfit(window_sums[0]), root_and_misfit(window_sums[1])];
@@ -306,13 +315,45 @@ fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, wi
     }
 }
 
-/// # Safety
-/// 32 numbers must be readable at `p`.
-#[inline(always)]
-unsafe fn sum_of_seven<L: Lanes>(p: *const f32) -> L {
-    // SAFETY: the caller's promise.
-    let [a, b, c, d, e, f, g]: [L; 7] = unsafe { L::taps(p) };
-    a.add(b).add(c.add(d)).add(e.add(f).add(g))
+/// Window sums over seven columns, vector after vector: sums of two are shared between neighbouring lanes and vectors,
+/// so that four additions make a sum of seven.
+struct Channel<L> {
+    row: *const f32,
+    here: L,
+    next: L,
+    /// Each lane of `here` plus the one after.
+    pairs: L,
+}
+
+impl<L: Lanes> Channel<L> {
+    /// # Safety
+    /// 3 N numbers must be readable at `row`.
+    #[inline(always)]
+    unsafe fn new(row: *const f32) -> Self {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let [here, next] = [L::load(row), L::load(row.add(L::N))];
+            Self { row, here, next, pairs: here.add(L::beside::<1>(row, here, next)) }
+        }
+    }
+
+    /// The sums that begin in the vector at `x`; `x` must grow by `N` from call to call, from 0.
+    ///
+    /// # Safety
+    /// 3 N + 1 numbers must be readable at `x`.
+    #[inline(always)]
+    unsafe fn sum_of_seven(&mut self, x: usize) -> L {
+        let p = self.row.wrapping_add(x);
+        // SAFETY: the caller's promise.
+        unsafe {
+            let after_next = L::load(p.add(2 * L::N));
+            let next_pairs = self.next.add(L::beside::<1>(p.add(L::N), self.next, after_next));
+            let four = self.pairs.add(self.pairs.after::<2>(next_pairs));
+            let three = self.pairs.after::<4>(next_pairs).add(L::beside::<6>(p, self.here, self.next));
+            [self.here, self.next, self.pairs] = [self.next, after_next, next_pairs];
+            four.add(three)
+        }
+    }
 }
 
 /// # Safety
@@ -333,22 +374,27 @@ unsafe fn sum_of<L: Lanes>(p: *const f32, window: usize) -> L {
 #[inline(always)]
 fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
     let [one, three] = [L::splat(1.0), L::splat(3.0)];
-    let inverse = one.div(c1.max(L::splat(TINY)));
+    let inverse = c1.max(L::splat(TINY)).reciprocal();
     let signed_ratio = c0.mul(inverse);
     let ratio = signed_ratio.abs();
     let cubic = c3.mul(inverse);
     let three_cubic = cubic.mul(three);
     let limit = L::splat(0.0).sub(three_cubic).max(L::splat(3e-6)).inverse_root().min(L::splat(MAX_ALPHA));
-    let mut alpha = ratio.min(limit);
-    for _ in 0..=STEPS {
+    let t = cubic.mul(ratio).mul(ratio).max(L::splat(LEAST_T));
+    let [a1, a2, b1, b2] = START;
+    let above = L::splat(a2).mul_add(t, L::splat(a1)).mul_add(t, one);
+    let below = L::splat(b2).mul_add(t, L::splat(b1)).mul_add(t, one);
+    // An estimate suffices: Newton's steps correct it.
+    let mut alpha = ratio.mul(above).mul(below.reciprocal_estimate()).min(limit);
+    for _ in 0..STEPS {
         let square = alpha.mul(alpha);
-        // An estimate of the step's divisor suffices: the value it corrects is exact.
+        // As here: the value that the divisor's estimate scales is exact.
         let slope = three_cubic.mul_add(square, one).max(L::splat(SLOPE_FLOOR));
         let value = cubic.mul(square).mul_add(alpha, alpha.sub(ratio));
-        alpha = alpha.sub(value.mul(slope.reciprocal_estimate())).min(limit);
+        alpha = value.neg_mul_add(slope.reciprocal_estimate(), alpha);
     }
-    let left_over = energy.sub(c0.mul(signed_ratio)).mul(inverse).max(L::splat(0.0));
-    [alpha.with_sign_of(c0), left_over]
+    let left_over = c0.neg_mul_add(signed_ratio, energy).mul(inverse).max(L::splat(0.0));
+    [alpha.min(limit).with_sign_of(c0), left_over]
 }
 
 dispatch! {
