@@ -168,13 +168,20 @@ fn range(pixels: &[f32], backend: Backend) -> Extremes {
     range
 }
 
-/// The range of each row of an image.
-fn ranges(image: &[f32], width: usize, backend: Backend, threads: usize) -> Vec<Extremes> {
-    let rows = (image.len() / width).div_ceil(threads);
+/// Rows whose range is found together: enough pixels to make the start and the end of the loop cheap.
+const RANGE_ROWS: usize = 8;
+
+/// The ranges of both images for each [`RANGE_ROWS`] rows.
+fn ranges(images: [&[f32]; 2], width: usize, backend: Backend, threads: usize) -> Vec<[Extremes; 2]> {
+    let block = RANGE_ROWS * width;
+    let of_blocks = |(far, near)| [range(far, backend), range(near, backend)];
+    let [far, near] = images;
     if threads == 1 {
-        return image.chunks(width).map(|row| range(row, backend)).collect();
+        return far.chunks(block).zip(near.chunks(block)).map(of_blocks).collect();
     }
-    image.par_chunks(width).with_min_len(rows).map(|row| range(row, backend)).collect()
+    let together = far.len().div_ceil(block).div_ceil(threads);
+    let blocks = far.par_chunks(block).zip(near.par_chunks(block));
+    blocks.with_min_len(together).map(of_blocks).collect()
 }
 
 fn scan<'a>(
@@ -185,10 +192,13 @@ fn scan<'a>(
     threads: usize,
 ) -> Result<Input<'a>, RunError> {
     let height = far.len() / width;
-    let of_rows = [far, near].map(|image| ranges(image, width, backend, threads));
-    let whole = of_rows.each_ref().map(|rows| {
-        rows.iter().fold(Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true }, |a, b| {
-            Extremes { low: a.low.min(b.low), high: a.high.max(b.high), finite: a.finite && b.finite }
+    let of_blocks = ranges([far, near], width, backend, threads);
+    let nothing = Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true };
+    let whole = [0, 1].map(|image| {
+        of_blocks.iter().map(|block| block[image]).fold(nothing, |a, b| Extremes {
+            low: a.low.min(b.low),
+            high: a.high.max(b.high),
+            finite: a.finite && b.finite,
         })
     });
     if whole.iter().any(|r| r.low > r.high) {
@@ -207,7 +217,7 @@ fn scan<'a>(
         })
     });
     let count = |mask: &Option<Array2<bool>>| mask.as_ref().map_or(0, |m| m.iter().filter(|m| **m).count());
-    let saturated_mask = saturated([far, near], &of_rows, high, width);
+    let saturated_mask = saturated([far, near], &of_blocks, high, width);
     let [not_finite, saturated] = [count(&not_finite_mask), count(&saturated_mask)];
     let bad = match (not_finite_mask, saturated_mask) {
         (Some(a), Some(b)) => Some(a | b),
@@ -221,18 +231,20 @@ fn scan<'a>(
 /// The pixels of flat patches (2x2 and more) at the largest value, if there are so many that it cannot be chance.
 fn saturated(
     images: [&[f32]; 2],
-    of_rows: &[Vec<Extremes>; 2],
+    of_blocks: &[[Extremes; 2]],
     high: f32,
     width: usize,
 ) -> Option<Array2<bool>> {
     let pixels = images[0].len();
     let enough = (SATURATED * pixels as f64).max(4.0) as usize;
-    let at_top = |image: &[f32], ranges: &[Extremes]| -> usize {
-        // Only rows that reach the largest value can have such pixels; in 32 bits the loop is done in vectors.
-        let in_row = |row: &[f32]| row.iter().map(|v| u32::from(*v >= high)).sum::<u32>() as usize;
-        image.chunks(width).zip(ranges).filter(|(_, r)| r.high >= high).map(|(row, _)| in_row(row)).sum()
-    };
-    if images.iter().zip(of_rows).map(|(image, ranges)| at_top(image, ranges)).sum::<usize>() < enough {
+    // Only blocks that reach the largest value can have such pixels; in 32 bits the loop is done in vectors.
+    let at_top = |pixels: &[f32]| pixels.iter().map(|v| u32::from(*v >= high)).sum::<u32>() as usize;
+    let mut count = 0;
+    for (image, pixels_of_image) in images.into_iter().enumerate() {
+        let blocks = pixels_of_image.chunks(RANGE_ROWS * width).zip(of_blocks);
+        count += blocks.filter(|(_, r)| r[image].high >= high).map(|(block, _)| at_top(block)).sum::<usize>();
+    }
+    if count < enough {
         return None;
     }
     let mut marked = Array2::from_elem((pixels / width, width), false);

@@ -30,7 +30,7 @@ pub(crate) fn root(c0: f32, c1: f32, c3: f32) -> f32 {
     let limit = (1.0 / (3.0 * (-cubic).max(1e-6))).sqrt().min(MAX_ALPHA);
     let t = (cubic * ratio * ratio).max(LEAST_T);
     let [a1, a2, b1, b2] = START;
-    let mut alpha = (ratio * ((a2 * t + a1) * t + 1.0) / ((b2 * t + b1) * t + 1.0)).min(limit);
+    let mut alpha = ratio * ((a2 * t + a1) * t + 1.0) / ((b2 * t + b1) * t + 1.0);
     for _ in 0..STEPS {
         let square = alpha * alpha;
         let slope = (3.0 * cubic * square + 1.0).max(SLOPE_FLOOR);

@@ -16,25 +16,33 @@ const RIM_CONFIDENCE: f32 = 0.5;
 /// Fills the rim of `width_px` pixels; at most to the middle of a small map.
 pub(super) fn fill(map: &mut DepthMap, width_px: usize) {
     let (height, width) = map.depth_mm.dim();
-    let inside = |i: usize, n: usize| {
-        let rim = width_px.min((n - 1) / 2);
-        i.clamp(rim, n - 1 - rim)
+    let rim = |n: usize| width_px.min((n - 1) / 2);
+    let (Some(depths), Some(confidences)) = (map.depth_mm.as_slice_mut(), map.confidence.as_slice_mut())
+    else {
+        unreachable!("maps are made in standard layout");
     };
-    let mut fill = |y: usize, x: usize| {
-        let source = (inside(y, height), inside(x, width));
-        if source == (y, x) || map.depth_mm[(y, x)].is_nan() {
-            return;
+    // Top and bottom first: the rows they copy from are then still untouched.
+    let (first, last) = (rim(height), height - 1 - rim(height));
+    for y in (0..first).chain(last + 1..height) {
+        let source = if y < first { first } else { last };
+        for x in 0..width {
+            let from = source * width + x.clamp(rim(width), width - 1 - rim(width));
+            copy(depths, confidences, from, y * width + x);
         }
-        map.depth_mm[(y, x)] = map.depth_mm[source];
-        map.confidence[(y, x)] = RIM_CONFIDENCE * map.confidence[source];
-    };
-    let rim = width_px.min(width);
-    for y in 0..height {
-        if inside(y, height) == y {
-            (0..rim).chain(width - rim..width).for_each(|x| fill(y, x));
-        } else {
-            (0..width).for_each(|x| fill(y, x));
+    }
+    for y in first..=last {
+        for x in (0..rim(width)).chain(width - rim(width)..width) {
+            let from = y * width + x.clamp(rim(width), width - 1 - rim(width));
+            copy(depths, confidences, from, y * width + x);
         }
+    }
+}
+
+/// Copies a pixel to one that has a depth.
+fn copy(depths: &mut [f32], confidences: &mut [f32], from: usize, to: usize) {
+    if !depths[to].is_nan() {
+        depths[to] = depths[from];
+        confidences[to] = RIM_CONFIDENCE * confidences[from];
     }
 }
 

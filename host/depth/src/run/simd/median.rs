@@ -238,9 +238,7 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
             without_most::<L, SIDE, 2>(&ranks[4], &mut rest, 5);
             [kept[14], kept[15]] = [rest[8], rest[9]];
             let middle = without_extremes(&ranks[3]);
-            for i in 0..5 {
-                rest[8 + i] = middle[1 + i];
-            }
+            rest[8..13].copy_from_slice(&middle[1..6]);
             forget!(L, kept, rest: 16 15 14 13 12 11 10 9 8 7 6 5 4 3)
         }
     }

@@ -20,32 +20,37 @@ pub(crate) struct Extremes {
 }
 
 dispatch! {
-    /// Smallest and largest value of `row`.
-    fn extremes(row: &[f32]) -> Extremes = extremes_generic
+    /// Smallest and largest of `values`.
+    fn extremes(values: &[f32]) -> Extremes = extremes_generic
 }
 
 #[inline(always)]
-fn extremes_generic<L: Lanes>(row: &[f32]) -> Extremes {
-    let [mut low, mut high] = [L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY)];
-    let mut poison = L::splat(0.0);
-    let whole = row.len() / L::N * L::N;
-    for x in (0..whole).step_by(L::N) {
-        // SAFETY: x + N <= row.len().
-        let value = unsafe { L::load(row.as_ptr().add(x)) };
-        low = low.min(value);
-        high = high.max(value);
-        // 0 times a number is 0, times NaN or infinity NaN.
-        poison = value.mul_add(L::splat(0.0), poison);
+fn extremes_generic<L: Lanes>(values: &[f32]) -> Extremes {
+    // Four of each, so that none waits for itself.
+    let [mut low, mut high] = [[L::splat(f32::INFINITY); 4], [L::splat(f32::NEG_INFINITY); 4]];
+    let mut poison = [L::splat(0.0); 4];
+    let whole = values.len() / (4 * L::N) * 4 * L::N;
+    for x in (0..whole).step_by(4 * L::N) {
+        for i in 0..4 {
+            // SAFETY: x + 4 N <= values.len().
+            let value = unsafe { L::load(values.as_ptr().add(x + i * L::N)) };
+            low[i] = low[i].min(value);
+            high[i] = high[i].max(value);
+            // 0 times a number is 0, times NaN or infinity NaN.
+            poison[i] = value.mul_add(L::splat(0.0), poison[i]);
+        }
     }
-    let [lows, highs, poisons] = [low.to_array(), high.to_array(), poison.to_array()];
+    let low = low[0].min(low[1]).min(low[2].min(low[3])).to_array();
+    let high = high[0].max(high[1]).max(high[2].max(high[3])).to_array();
+    let poison = poison[0].add(poison[1]).add(poison[2].add(poison[3])).to_array();
     let mut result = Extremes { low: f32::INFINITY, high: f32::NEG_INFINITY, finite: true };
-    for value in lows[..L::N].iter().chain(&highs[..L::N]).chain(&row[whole..]) {
+    for value in low[..L::N].iter().chain(&high[..L::N]).chain(&values[whole..]) {
         if value.is_finite() {
             result.low = result.low.min(*value);
             result.high = result.high.max(*value);
         }
     }
-    result.finite = poisons[..L::N].iter().all(|p| *p == 0.0) && row[whole..].iter().all(|v| v.is_finite());
+    result.finite = poison[..L::N].iter().all(|p| *p == 0.0) && values[whole..].iter().all(|v| v.is_finite());
     result
 }
 
@@ -292,10 +297,9 @@ fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, wi
             Channel::<L>::new(base.add(2 * stride)),
             Channel::<L>::new(base.add(3 * stride)),
         ];
-        // Two vectors at a time: each waits for its own estimates and steps, the other fills the gaps.
-        for x in (0..width).step_by(2 * L::N) {
+        for x in (0..width).step_by(L::INTERLEAVED * L::N) {
             let mut window_sums = [[L::splat(0.0); 4]; 2];
-            for half in 0..2 {
+            for half in 0..L::INTERLEAVED {
                 for c in 0..4 {
                     window_sums[half][c] = if window == 7 {
                         channels[c].sum_of_seven(x + half * L::N)
@@ -304,8 +308,11 @@ fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, wi
                     };
                 }
             }
-            let results = [root_and_misfit(window_sums[0]), root_and_misfit(window_sums[1])];
-            for half in 0..2 {
+            let mut results = [[L::splat(0.0); 2]; 2];
+            for half in 0..L::INTERLEAVED {
+                results[half] = root_and_misfit(window_sums[half]);
+            }
+            for half in 0..L::INTERLEAVED {
                 let at = x + half * L::N;
                 results[half][0].store(alpha.add(at));
                 window_sums[half][0].store(texture.add(at));
@@ -385,7 +392,7 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
     let above = L::splat(a2).mul_add(t, L::splat(a1)).mul_add(t, one);
     let below = L::splat(b2).mul_add(t, L::splat(b1)).mul_add(t, one);
     // An estimate suffices: Newton's steps correct it.
-    let mut alpha = ratio.mul(above).mul(below.reciprocal_estimate()).min(limit);
+    let mut alpha = ratio.mul(above).mul(below.reciprocal_estimate());
     for _ in 0..STEPS {
         let square = alpha.mul(alpha);
         // As here: the value that the divisor's estimate scales is exact.
@@ -398,19 +405,77 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
 }
 
 dispatch! {
-    /// Texture to confidence in place; returns the numbers of low-texture pixels and of pixels without any confidence.
+    /// Texture to confidence in place ([`confidence::confidence`]); returns the numbers of low-texture pixels and of pixels
+    /// without any confidence. At most 2^24 pixels.
     fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] = confidence_generic
 }
 
 #[inline(always)]
 fn confidence_generic<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] {
+    assert!(texture.len() == misfit.len() && texture.len() <= 1 << 24);
     let threshold = confidence::LOW_TEXTURE * scale;
-    // Counted in 32 bits, so that the loop is done in vectors; a band has fewer pixels than that.
-    let [mut low, mut without] = [0_u32; 2];
-    for (texture, misfit) in texture.iter_mut().zip(misfit) {
-        low += u32::from(*texture < threshold);
-        *texture = confidence::confidence(*texture, *misfit, scale);
-        without += u32::from(*texture <= 0.0);
+    let least = confidence::NO_TEXTURE * scale;
+    let [mut low, mut with] = [L::splat(0.0); 2];
+    let whole = texture.len() / L::N * L::N;
+    for x in (0..whole).step_by(L::N) {
+        // SAFETY: x + N <= the length of both.
+        unsafe {
+            let energy = L::load(texture.as_ptr().add(x));
+            let misfit = L::load(misfit.as_ptr().add(x));
+            low = low.add(energy.one_where_less(L::splat(threshold)));
+            let any = L::splat(least).one_where_less(energy);
+            with = with.add(any);
+            let divisor = energy.add(L::splat(threshold));
+            let divisor = divisor.mul_add(misfit, divisor).max(L::splat(TINY));
+            any.mul(energy).mul(divisor.reciprocal()).store(texture.as_mut_ptr().add(x));
+        }
     }
-    [low as usize, without as usize]
+    let [low, with] = [low.to_array(), with.to_array()];
+    let [mut low, mut with] = [&low[..L::N], &with[..L::N]].map(|counts| counts.iter().sum::<f32>() as usize);
+    for (texture, misfit) in texture[whole..].iter_mut().zip(&misfit[whole..]) {
+        low += usize::from(*texture < threshold);
+        *texture = confidence::confidence(*texture, *misfit, scale);
+        with += usize::from(*texture > 0.0);
+    }
+    [low, texture.len() - with]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::Backend;
+
+    #[test]
+    fn rows_of_confidence_agree_with_the_formula() {
+        let texture: Vec<f32> =
+            (0..83).map(|i| if i % 7 == 0 { 0.0 } else { 1e-9 * 1.5_f32.powi(i) }).collect();
+        let misfit: Vec<f32> = (0..83).map(|i| 0.3 * (i % 11) as f32).collect();
+        for scale in [0.0, 1e-3, 5.0] {
+            for backend in Backend::available() {
+                let mut found = texture.clone();
+                let [low, without] = confidence_row(backend, &mut found, &misfit, scale);
+                assert_eq!(low, texture.iter().filter(|t| **t < 0.05 * scale).count());
+                assert_eq!(without, found.iter().filter(|c| **c == 0.0).count());
+                for ((texture, misfit), found) in texture.iter().zip(&misfit).zip(&found) {
+                    let expected = confidence::confidence(*texture, *misfit, scale);
+                    assert!((found - expected).abs() < 1e-6, "{backend:?} {texture}: {found} {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn extremes_know_what_is_not_finite() {
+        let mut values: Vec<f32> = (0..150).map(|i| ((i * 37) % 150) as f32 - 20.0).collect();
+        for backend in Backend::available() {
+            assert_eq!(extremes(backend, &values), Extremes { low: -20.0, high: 129.0, finite: true });
+        }
+        for at in [3, 149] {
+            values[at] = f32::NAN;
+            for backend in Backend::available() {
+                assert!(!extremes(backend, &values).finite, "{backend:?} {at}");
+            }
+            values[at] = 0.0;
+        }
+    }
 }
