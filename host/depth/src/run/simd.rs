@@ -17,7 +17,7 @@ mod rows;
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use convolve::{Taps, convolve};
+pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
 pub(crate) use median::median_row;
 pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,

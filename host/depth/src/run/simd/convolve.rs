@@ -31,14 +31,22 @@ impl Taps {
     }
 }
 
+/// Most rows that are fed at a time.
+pub(crate) const MAX_ROWS: usize = 8;
+
 dispatch! {
-    /// Feeds the first `rows` rows of `input`; writes as many rows of `width` columns to `output` from its row `first`
-    /// on. The output lags behind by `size - 1` rows: the first ones after a reset are unfinished and to be dropped.
-    fn convolve(taps: &mut Taps, input: &Plane, output: &mut Plane, first: usize, rows: usize, width: usize) = by_size
+    /// Feeds rows of `input`, at most [`MAX_ROWS`]; writes as many rows of `width` columns to `output`, whose last vector may
+    /// reach beyond the width. The output lags behind by `size - 1` rows: the first ones after a reset are unfinished and
+    /// to be dropped. Input rows must be [`READ_BEYOND`] numbers longer than the width.
+    fn convolve_rows(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) = by_size
 }
 
-#[inline(always)]
-fn by_size<L: Lanes>(
+/// Numbers beyond the width that are read in each row: 32 from the start of its last vector on.
+pub(crate) const READ_BEYOND: usize = 31;
+
+/// As [`convolve_rows`] for the first `rows` rows of `input`, to rows of `output` from `first` on.
+pub(crate) fn convolve(
+    backend: crate::run::Backend,
     taps: &mut Taps,
     input: &Plane,
     output: &mut Plane,
@@ -46,16 +54,29 @@ fn by_size<L: Lanes>(
     rows: usize,
     width: usize,
 ) {
-    assert!(rows <= input.rows() && first + rows <= output.rows() && taps.pending.rows() + 1 == taps.size);
-    for plane in [input, output, &taps.pending] {
-        // A vector starts below `width`, reads 2 N <= 32 numbers and stays in the row's padding.
-        assert!(width + Plane::PADDING <= plane.stride());
+    let mut input_rows: [&[f32]; MAX_ROWS] = [&[]; MAX_ROWS];
+    for (y, row) in input_rows[..rows].iter_mut().enumerate() {
+        *row = input.row(y);
     }
+    let mut output_rows: [&mut [f32]; MAX_ROWS] = Default::default();
+    let stride = output.stride();
+    let planes = output.all_mut()[first * stride..].chunks_exact_mut(stride);
+    output_rows[..rows].iter_mut().zip(planes).for_each(|(to, row)| *to = row);
+    convolve_rows(backend, taps, &input_rows[..rows], &mut output_rows[..rows], width);
+}
+
+#[inline(always)]
+fn by_size<L: Lanes>(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) {
+    assert!(input.len() <= MAX_ROWS && output.len() == input.len() && taps.pending.rows() + 1 == taps.size);
+    // Vectors start at multiples of N below `width`.
+    let vectors = width.next_multiple_of(L::N);
+    assert!(input.iter().all(|row| width + READ_BEYOND <= row.len() && vectors - L::N + 32 <= row.len()));
+    assert!(output.iter().all(|row| vectors <= row.len()) && vectors <= taps.pending.stride());
     match taps.size {
-        5 => walk::<L, 5, 3>(taps, input, output, first, rows, width),
-        7 => walk::<L, 7, 4>(taps, input, output, first, rows, width),
-        9 => walk::<L, 9, 5>(taps, input, output, first, rows, width),
-        11 => walk::<L, 11, 6>(taps, input, output, first, rows, width),
+        5 => walk::<L, 5, 3>(taps, input, output, width),
+        7 => walk::<L, 7, 4>(taps, input, output, width),
+        9 => walk::<L, 9, 5>(taps, input, output, width),
+        11 => walk::<L, 11, 6>(taps, input, output, width),
         // `Kernel` has no other size.
         _ => unreachable!("kernel size {}", taps.size),
     }
@@ -65,10 +86,8 @@ fn by_size<L: Lanes>(
 #[inline(always)]
 fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
     taps: &mut Taps,
-    input: &Plane,
-    output: &mut Plane,
-    first: usize,
-    rows: usize,
+    input: &[&[f32]],
+    output: &mut [&mut [f32]],
     width: usize,
 ) {
     let r = FOLDED - 1;
@@ -79,13 +98,15 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
         octant[i] = L::splat(taps.octant[i]);
     }
     let pending_stride = taps.pending.stride();
-    let [input_stride, output_stride] = [input.stride(), output.stride()];
+    let mut rows = [(std::ptr::null::<f32>(), std::ptr::null_mut::<f32>()); MAX_ROWS];
+    for y in 0..input.len() {
+        rows[y] = (input[y].as_ptr(), output[y].as_mut_ptr());
+    }
+    let rows = &rows[..input.len()];
     let pending_base = taps.pending.all_mut().as_mut_ptr();
-    let input_base = input.all().as_ptr();
-    let output_base = output.all_mut().as_mut_ptr();
     for x in (0..width).step_by(L::N) {
-        // SAFETY: x < width and `by_size` asserted width + 32 <= stride for all planes, so the N numbers at x (2 N <= 32
-        // for the taps) lie in the row; row indices are below the planes' rows, asserted there.
+        // SAFETY: x is a multiple of N below the width, and `by_size` asserted that from there on 32 numbers lie in each row
+        // of input and N in each row of output and of `pending`, which has SIZE - 1 rows.
         unsafe {
             let pending = pending_base.add(x);
             // The first output row that is not finished comes first. A row of input is added to all of them, which at
@@ -94,8 +115,8 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
             for i in 0..SIZE - 1 {
                 sums[i] = L::load(pending.add(i * pending_stride));
             }
-            for y in 0..rows {
-                let columns: [L; SIZE] = L::taps(input_base.add(y * input_stride + x));
+            for (from, to) in rows {
+                let columns: [L; SIZE] = L::taps(from.add(x));
                 let mut folded = [columns[r]; FOLDED];
                 for i in 1..FOLDED {
                     folded[i] = columns[r - i].add(columns[r + i]);
@@ -107,7 +128,7 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
                         products[dy] = octant[index(dy, dx)].mul_add(folded[dx], products[dy]);
                     }
                 }
-                sums[0].add(products[r]).store(output_base.add((first + y) * output_stride + x));
+                sums[0].add(products[r]).store(to.add(x));
                 let mut moved = [L::splat(0.0); SIZE];
                 for i in 1..SIZE {
                     moved[i - 1] = sums[i].add(products[i.abs_diff(r)]);
