@@ -4,6 +4,8 @@
 //! machine's own `python3` has; nothing is installed. A peer runs once before and once after our own benches and its
 //! better time counts, so that a machine that slows down in between does not flatter us.
 
+mod people;
+
 use std::{
     fmt::Write as _,
     fs,
@@ -15,7 +17,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::Value;
 
-use crate::run::{ROOT, cargo, finish, output, step, target_folder};
+use crate::run::{ROOT, cargo, output, step, target_folder};
 
 /// The project's own peer.
 const PEER_SCRIPT: &str = "host/depth/benches/peer_opencv.py";
@@ -25,15 +27,26 @@ const SIZE: (usize, usize) = (640, 480);
 /// What to time.
 #[derive(Args)]
 pub struct Arguments {
-    /// Also run the same chain on numpy and OpenCV and print the ratios; needs python3 with both.
+    /// Also run the same on numpy and OpenCV, and on scikit-learn, and print the ratios; needs python3 with them.
     #[arg(long)]
     peers: bool,
-    /// Another peer script, called as `python3 FILE far near`, that prints one JSON object with `chain_ms`.
+    /// Other peer scripts that print one JSON object. A script whose text names FEATURES is called as `python3 FILE
+    /// FEATURES.npy` and gives `isomap_ms`, `rbf_training_ms` and `embedding_ms`; others as `python3 FILE far near` and give `chain_ms`.
     #[arg(long, value_name = "FILE")]
-    peer_script: Option<PathBuf>,
+    peer_script: Vec<PathBuf>,
+    /// Only one half: depth or people.
+    #[arg(long, value_name = "HALF", conflicts_with = "write")]
+    only: Option<Half>,
     /// Write the page docs/speed.md from the figures.
     #[arg(long)]
     write: bool,
+}
+
+/// One half of the host's mathematics.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Half {
+    Depth,
+    People,
 }
 
 /// One line of our benches.
@@ -55,56 +68,63 @@ struct Peer {
 
 /// Runs the benches and prints the figures.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let mut scripts = Vec::new();
-    if arguments.peers {
-        scripts.push(ROOT.join(PEER_SCRIPT));
+    let (mut with_features, mut with_pair) = (Vec::new(), Vec::new());
+    for script in &arguments.peer_script {
+        let text = fs::read_to_string(script).with_context(|| format!("cannot read {}", script.display()))?;
+        if text.contains("FEATURES") { &mut with_features } else { &mut with_pair }.push(script.clone());
     }
-    scripts.extend(arguments.peer_script.clone());
+    let mut page = String::new();
+    if arguments.only != Some(Half::People) {
+        page = depth(arguments.peers, with_pair)?;
+        println!("\n{page}");
+    }
+    if arguments.only != Some(Half::Depth) {
+        let section = people::run(arguments.peers, &with_features)?;
+        println!("\n{section}");
+        page = page + "\n" + &section;
+    }
+    if arguments.write {
+        let file = ROOT.join("docs/speed.md");
+        fs::write(&file, page_of(&page)).with_context(|| format!("cannot write {}", file.display()))?;
+        println!("wrote {}", file.display());
+    }
+    Ok(())
+}
+
+/// Times of host/depth as tables.
+fn depth(peers: bool, mut scripts: Vec<PathBuf>) -> Result<String> {
+    if peers {
+        scripts.insert(0, ROOT.join(PEER_SCRIPT));
+    }
     if !scripts.is_empty() {
-        python_is_ready()?;
+        modules(&["numpy", "cv2"])?;
     }
     let pair = if scripts.is_empty() { None } else { Some(random_pair()?) };
-    let peers = |when: &str| -> Result<Vec<Peer>> {
+    let all = |when: &str| -> Result<Vec<Peer>> {
         let Some(pair) = &pair else { return Ok(Vec::new()) };
         step(&format!("peers, {when} our own benches"));
         scripts.iter().map(|script| time_peer(script, pair)).collect()
     };
-    let before = peers("before")?;
-
+    let before = all("before")?;
     step("host/depth");
     let bench = ["bench", "--locked", "--package", "farnear-depth", "--bench", "run_time"];
-    let text = output(cargo(bench).env("FARNEAR_JSON", "1"))?;
-    let rows = text.lines().filter(|line| line.starts_with('{')).map(row).collect::<Result<Vec<_>>>()?;
+    let rows = rows(&output(cargo(bench).env("FARNEAR_JSON", "1"))?)?;
     if rows.is_empty() {
         bail!("the benches of host/depth printed no figures");
     }
-
-    let after = peers("after")?;
-    let peers: Vec<Peer> = before.into_iter().zip(after).map(|(a, b)| better(a, b)).collect();
-    let tables = tables(&rows, &peers);
-    println!("\n{tables}");
-    if arguments.write {
-        let page = ROOT.join("docs/speed.md");
-        fs::write(&page, page_of(&tables)).with_context(|| format!("cannot write {}", page.display()))?;
-        println!("wrote {}", page.display());
-    }
-
-    if !ROOT.join("host/activity/benches").is_dir() {
-        return Ok(());
-    }
-    step("host/activity");
-    finish(&mut cargo(["bench", "--locked", "--package", "farnear-activity", "--benches"]))
+    let peers: Vec<Peer> = before.into_iter().zip(all("after")?).map(|(a, b)| better(a, b)).collect();
+    Ok(tables(&rows, &peers))
 }
 
-/// Fails with what is missing unless python3, numpy and OpenCV are there.
-fn python_is_ready() -> Result<()> {
-    let advice =
-        "the peers need python3 with numpy and opencv-python-headless; without them run `cargo xtask bench`";
-    for module in ["sys", "numpy", "cv2"] {
+/// Fails with what is missing unless python3 is there with these modules.
+fn modules(names: &[&str]) -> Result<()> {
+    let advice = "the peers need python3 with numpy, opencv-python-headless, scipy and scikit-learn; without them run \
+                  `cargo xtask bench`";
+    for module in ["sys"].iter().chain(names) {
         let found = Command::new("python3").args(["-c", &format!("import {module}")]).output();
         match found {
             Err(error) => bail!("cannot start python3 ({error}): {advice}"),
-            Ok(found) if !found.status.success() && module == "sys" => bail!("python3 fails: {advice}"),
+            Ok(found) if !found.status.success() && *module == "sys" => bail!("python3 fails: {advice}"),
             Ok(found) if !found.status.success() => bail!("python3 has no module {module}: {advice}"),
             Ok(_) => {}
         }
@@ -159,6 +179,11 @@ fn better(a: Peer, b: Peer) -> Peer {
         convolution_ms: a.convolution_ms.zip(b.convolution_ms).map(|(a, b)| least(a, b)),
         ..a
     }
+}
+
+/// The figures among what a bench printed.
+fn rows(text: &str) -> Result<Vec<Row>> {
+    text.lines().filter(|line| line.starts_with('{')).map(row).collect()
 }
 
 fn row(line: &str) -> Result<Row> {
@@ -219,7 +244,7 @@ fn page_of(tables: &str) -> String {
     format!(
         "# Speed\n\nWritten by `cargo xtask bench --peers --write` on {model}, {threads} hardware threads. Times are of this machine; \
          ratios travel better. A ratio above 1 means that ours is faster.\n\n\
-         `chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
+         ## Depth\n\n`chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
          confidence. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
          allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n{tables}"
     )

@@ -61,13 +61,22 @@ pub fn from_sources(graph: &Graph, sources: &[usize]) -> Array2<f32> {
     let arch = pulp::Arch::new();
     let mut all = Array2::<f32>::zeros((sources.len(), n));
     if let Some(rows) = all.as_slice_mut() {
-        rows.par_chunks_mut(LANES * n.max(1)).zip(sources.par_chunks(LANES)).for_each(|(rows, sources)| {
+        // Sources that lie together have paths alike, so that what one lane has settled seldom has to be looked at for another.
+        let mut rank = vec![0_u32; n];
+        for (place, &node) in (0..).zip(&order) {
+            rank[node as usize] = place;
+        }
+        let mut jobs: Vec<(usize, &mut [f32])> =
+            sources.iter().copied().zip(rows.chunks_mut(n.max(1))).collect();
+        jobs.sort_by_key(|(source, _)| rank[*source]);
+        jobs.par_chunks_mut(LANES).for_each(|jobs| {
+            let together: Vec<usize> = jobs.iter().map(|(source, _)| *source).collect();
             let mut distance = vec![[f32::INFINITY; LANES]; n];
-            for (lane, &source) in sources.iter().enumerate() {
+            for (lane, &source) in together.iter().enumerate() {
                 distance[source][lane] = 0.0;
             }
-            arch.dispatch(|| relax(graph, &order, &mut distance));
-            for (lane, row) in rows.chunks_mut(n).enumerate() {
+            arch.dispatch(|| relax(graph, &order, &together, &mut distance));
+            for (lane, (_, row)) in jobs.iter_mut().enumerate() {
                 for (out, lanes) in row.iter_mut().zip(&distance) {
                     *out = lanes[lane];
                 }
@@ -77,15 +86,25 @@ pub fn from_sources(graph: &Graph, sources: &[usize]) -> Array2<f32> {
     all
 }
 
-/// Sweeps forth and back until nothing changes.
+/// Sweeps forth and back until nothing changes. A node is looked at only where one of its neighbours has changed since.
 #[inline(always)]
-fn relax(graph: &Graph, order: &[u32], distance: &mut [[f32; LANES]]) {
+fn relax(graph: &Graph, order: &[u32], sources: &[usize], distance: &mut [[f32; LANES]]) {
+    let mut stale = vec![false; distance.len()];
+    for &source in sources {
+        for (other, _) in graph.edges(source) {
+            stale[other] = true;
+        }
+    }
     let mut settle = |node: u32| {
         let node = node as usize;
+        if !stale[node] {
+            return false;
+        }
+        stale[node] = false;
         let range = graph.offsets[node] as usize..graph.offsets[node + 1] as usize;
         let before = distance[node];
         let mut best = before;
-        for (&other, &length) in graph.targets[range.clone()].iter().zip(&graph.lengths[range]) {
+        for (&other, &length) in graph.targets[range.clone()].iter().zip(&graph.lengths[range.clone()]) {
             let from = &distance[other as usize];
             for lane in 0..LANES {
                 let through = from[lane] + length;
@@ -98,6 +117,9 @@ fn relax(graph: &Graph, order: &[u32], distance: &mut [[f32; LANES]]) {
         }
         if changed {
             distance[node] = best;
+            for &other in &graph.targets[range] {
+                stale[other as usize] = true;
+            }
         }
         changed
     };

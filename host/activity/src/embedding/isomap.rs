@@ -2,11 +2,13 @@
 //!
 //! `B = -1/2 J D^2 J` of the squared path lengths D^2, coordinates are the leading eigenvectors times the square roots of their
 //! eigenvalues. With K = N - 1 every pair is an edge and the result is PCA's exactly; the thesis used that, so it is offered
-//! ([`Neighbourhood::Nearest`] with N - 1) but a small K is what makes it Isomap. O(N^2 (d + K)) time, 12 N^2 bytes.
+//! ([`Neighbourhood::Nearest`] with N - 1) but a small K is what makes it Isomap. O(N^2 (d + K)) time, 8 N^2 bytes.
 
 use super::geodesic::all_pairs;
 use super::neighbours::{Graph, Neighbourhood};
 use super::{EmbeddingError, check, spectral};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 
@@ -38,14 +40,19 @@ pub fn isomap(
     Ok(Isomap { coordinates, eigenvalues, geodesics })
 }
 
+/// Residual of a pair over the largest eigenvalue: what single precision can give, far below what the graph is worth.
+const TOLERANCE: f64 = 1e-5;
+
 /// Classical multidimensional scaling of a symmetric matrix of distances.
 pub(super) fn classical_scaling(
     distances: &Array2<f32>,
     dimensions: usize,
 ) -> Result<(Array2<f32>, Vec<f64>), EmbeddingError> {
     let n = distances.nrows();
-    let centred = double_centred(distances);
-    let (values, vectors) = spectral::leading(&centred, n, dimensions);
+    let (values, vectors) = leading(distances, dimensions).unwrap_or_else(|| {
+        let centred = double_centred(distances);
+        spectral::positive(spectral::whole(MatRef::from_row_major_slice(&centred, n, n)), dimensions)
+    });
     if values.len() < dimensions {
         return Err(EmbeddingError::TooFewDimensions { found: values.len(), asked: dimensions });
     }
@@ -54,25 +61,40 @@ pub(super) fn classical_scaling(
     Ok((coordinates, values))
 }
 
+/// The leading pairs of `-1/2 J D^2 J`, which is never formed: the squared distances stay in single precision, half the memory that
+/// every product has to read, and J only takes the mean off vectors.
+fn leading(distances: &Array2<f32>, dimensions: usize) -> Option<spectral::Pairs> {
+    let n = distances.nrows();
+    let mut squared = vec![0.0_f32; n * n];
+    squared.par_chunks_mut(n.max(1)).zip(distances.outer_iter().into_par_iter()).for_each(|(out, row)| {
+        out.iter_mut().zip(row).for_each(|(out, d)| *out = d * d);
+    });
+    let squared = MatRef::from_row_major_slice(&squared, n, n);
+    let without_mean = |block: &mut Mat<f64>| {
+        for k in 0..block.ncols() {
+            let mean = block.col(k).iter().sum::<f64>() / n as f64;
+            block.col_mut(k).iter_mut().for_each(|v| *v -= mean);
+        }
+    };
+    spectral::leading_of(n, dimensions, TOLERANCE, |block| {
+        let mut centred = block.clone();
+        without_mean(&mut centred);
+        let single = Mat::<f32>::from_fn(n, centred.ncols(), |i, k| centred[(i, k)] as f32);
+        let mut product = Mat::<f32>::zeros(n, centred.ncols());
+        matmul(product.as_mut(), Accum::Replace, squared, &single, -0.5, Par::rayon(0));
+        let mut product = Mat::<f64>::from_fn(n, centred.ncols(), |i, k| f64::from(product[(i, k)]));
+        without_mean(&mut product);
+        product
+    })
+}
+
 /// `-1/2 J D^2 J`, row-major.
 fn double_centred(distances: &Array2<f32>) -> Vec<f64> {
     let n = distances.nrows();
-    let mut centred = vec![0.0_f64; n * n];
-    let means: Vec<f64> = centred
-        .par_chunks_mut(n)
-        .enumerate()
-        .map(|(i, out)| {
-            let mut sum = 0.0;
-            for (out, &d) in out.iter_mut().zip(distances.row(i)) {
-                let squared = f64::from(d) * f64::from(d);
-                *out = squared;
-                sum += squared;
-            }
-            sum / n as f64
-        })
-        .collect();
+    let mut centred: Vec<f64> = distances.iter().map(|&d| f64::from(d).powi(2)).collect();
+    let means: Vec<f64> = centred.chunks(n.max(1)).map(|row| row.iter().sum::<f64>() / n as f64).collect();
     let mean = means.iter().sum::<f64>() / n as f64;
-    centred.par_chunks_mut(n).zip(&means).for_each(|(row, row_mean)| {
+    centred.par_chunks_mut(n.max(1)).zip(&means).for_each(|(row, row_mean)| {
         for (value, column_mean) in row.iter_mut().zip(&means) {
             *value = -0.5 * (*value - row_mean - column_mean + mean);
         }

@@ -126,3 +126,16 @@ pub(crate) fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2
 pub(crate) fn squared_norms(samples: ArrayView2<f32>) -> Vec<f32> {
     samples.rows().into_iter().map(|row| row.iter().map(|v| v * v).sum()).collect()
 }
+
+/// Squared distance in eight partial sums, so that it vectorises.
+#[inline(always)]
+pub(crate) fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for k in 0..8 {
+            sums[k] += (a[k] - b[k]) * (a[k] - b[k]);
+        }
+    }
+    let rest = a.chunks_exact(8).remainder().iter().zip(b.chunks_exact(8).remainder());
+    sums.iter().sum::<f32>() + rest.map(|(a, b)| (a - b) * (a - b)).sum::<f32>()
+}

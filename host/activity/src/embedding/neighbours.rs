@@ -3,7 +3,7 @@
 //! Squared distances come in blocks from one matrix product (`|a|^2 + |b|^2 - 2 a.b`), never all at once; the few that become
 //! edges are recomputed from the samples, so that nearly equal samples do not suffer from cancellation. O(N^2 d) flops, O(N K) memory.
 
-use super::{EmbeddingError, squared_norms, times_transposed};
+use super::{EmbeddingError, squared_distance, squared_norms, times_transposed};
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -57,28 +57,33 @@ impl Graph {
                 found: k,
             });
         }
+        let samples = samples.as_standard_layout();
+        let samples = samples.view();
         let norms = squared_norms(samples);
+        let (arch, width) = (pulp::Arch::new(), samples.ncols());
+        let values = samples.as_slice().unwrap_or_default();
+        let row = |i: usize| values.get(i * width..(i + 1) * width).unwrap_or_default();
         let mut edges: Vec<(u32, u32, f32)> = Vec::with_capacity(n * 16);
         for start in (0..n).step_by(BLOCK) {
             let rows = start..(start + BLOCK).min(n);
             let products = times_transposed(samples.slice(s![rows.clone(), ..]), samples);
-            let found: Vec<Vec<u32>> = rows
-                .clone()
+            let found: Vec<Vec<(u32, u32, f32)>> = rows
                 .into_par_iter()
                 .map(|i| {
                     let product = products.row(i - start);
                     let squared: Vec<f32> =
                         product.iter().zip(&norms).map(|(p, norm)| norm - 2.0 * p).collect();
+                    let own = row(i);
                     pick(&squared, norms[i], i, neighbourhood)
+                        .into_iter()
+                        .map(|j| {
+                            let squared = arch.dispatch(|| squared_distance(own, row(j as usize)));
+                            (i as u32, j, squared.sqrt())
+                        })
+                        .collect()
                 })
                 .collect();
-            for (i, neighbours) in rows.zip(found) {
-                for j in neighbours {
-                    let other = samples.row(j as usize);
-                    let squared: f32 = samples.row(i).iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum();
-                    edges.push((i as u32, j, squared.sqrt()));
-                }
-            }
+            found.into_iter().for_each(|part| edges.extend(part));
         }
         Ok(Self::from_edges(n, &edges))
     }

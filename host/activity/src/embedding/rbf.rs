@@ -5,7 +5,7 @@
 //! in [0, 0.7] 0.03 to 0.1 do best (the thesis' 1e-4 is for pixels). Training is O(N^3 / 3); embedding one frame is one pass over the
 //! centres, kept as 16-bit fixed point so that 1500 x 360 fit a core's cache: some 15 us, error far below 1e-3 of the range.
 
-use super::{EmbeddingError, check, squared_norms, times_transposed};
+use super::{EmbeddingError, check, squared_distance, squared_norms, times_transposed};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
@@ -163,19 +163,6 @@ impl Rbf {
             }
         }
     }
-}
-
-/// Squared distance in eight partial sums, so that it vectorises.
-#[inline(always)]
-fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; 8];
-    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
-        for k in 0..8 {
-            sums[k] += (a[k] - b[k]) * (a[k] - b[k]);
-        }
-    }
-    let rest = a.chunks_exact(8).remainder().iter().zip(b.chunks_exact(8).remainder());
-    sums.iter().sum::<f32>() + rest.map(|(a, b)| (a - b) * (a - b)).sum::<f32>()
 }
 
 /// A sample in fixed point, in runs filled up with zeros.
