@@ -12,6 +12,8 @@ use farnear_activity::recognition::model::{ModelError, Recogniser, RecogniserSet
 use farnear_activity::recognition::space::{PatternKind, SpaceSettings};
 use farnear_activity::silhouette::view::{Canvas, draw, extent, views_round};
 use farnear_activity::synthetic::activities::{clips, performance};
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 
 /// A small space: enough to recognise, quick to train.
 fn small(mode: Mode) -> SpaceSettings {
@@ -121,4 +123,43 @@ fn live_answers_settle_on_what_is_done_and_windows_cover_a_recording() {
     let track = &people[0].views;
     let stretches = windows(&recogniser, track, 16, 8).expect("windows");
     assert_eq!((stretches[0].from, stretches.last().map(|s| s.to)), (0, Some(track[0].frames())));
+}
+
+/// A model whose body was changed at some places, with a checksum that holds again.
+fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
+    const HEADER: usize = 28;
+    let mut bytes = bytes.to_vec();
+    for &(at, value) in places {
+        let at = HEADER + at % (bytes.len() - HEADER);
+        bytes[at] = value;
+    }
+    let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes[HEADER..]);
+    bytes[24..28].copy_from_slice(&sum.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn crafted_models_with_good_checksums_are_refused_or_answer_but_never_panic() {
+    let (people, recogniser) = trained();
+    let bytes = recogniser.to_bytes().expect("encoded");
+    let mut runner = TestRunner::new(ProptestConfig {
+        failure_persistence: None,
+        ..ProptestConfig::with_cases(cases(150))
+    });
+    // Settings, names and lengths stand at the front, where most damage goes.
+    let place = prop_oneof![3 => 0..200_usize, 1 => 0..bytes.len()];
+    let damage = proptest::collection::vec((place, any::<u8>()), 1..6);
+    runner
+        .run(&damage, |places| {
+            if let Ok(model) = Recogniser::from_bytes(&tampered(&bytes, &places)) {
+                let _ = model.recognise(&people[0].views);
+            }
+            Ok(())
+        })
+        .expect("no panic");
+}
+
+/// Cases of a property: few in every test run, as many as asked for when fuzzing.
+fn cases(usual: u32) -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

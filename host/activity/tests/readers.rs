@@ -105,7 +105,7 @@ fn damaged_recordings_never_panic() {
     // The header and parameter blocks decide everything: damage is aimed there.
     let motion = motion[..motion.len().min(60_000)].to_vec();
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
-        cases: 300,
+        cases: cases(300),
         failure_persistence: None,
         ..ProptestConfig::default()
     });
@@ -129,7 +129,7 @@ fn damaged_recordings_never_panic() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(256), failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn any_bytes_and_text_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..2000), text in "\\PC{0,300}") {
         let _ = matlab::read(&bytes);
@@ -152,4 +152,71 @@ fn unknown_markers_are_named() {
         .expect_err("no such suit");
     assert!(error.to_string().contains("LFHD") && error.to_string().contains("plug-in-gait"), "{error}");
     assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
+}
+
+/// Cases of a property: few in every test run, as many as asked for when fuzzing.
+fn cases(usual: u32) -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+/// A whole small C3D file: one marker, two frames of floating-point data, its label and unit.
+fn small_c3d() -> Vec<u8> {
+    let mut bytes = vec![0_u8; 4 * 512];
+    bytes[..2].copy_from_slice(&[2, 0x50]);
+    for (word, value) in [(2, 1_u16), (3, 0), (4, 1), (5, 2), (9, 4)] {
+        bytes[2 * (word - 1)..2 * word].copy_from_slice(&value.to_le_bytes());
+    }
+    bytes[12..16].copy_from_slice(&(-1.0_f32).to_le_bytes());
+    bytes[20..24].copy_from_slice(&100.0_f32.to_le_bytes());
+    let mut parameters = vec![1, 0x50, 2, 84];
+    let entry = |parameters: &mut Vec<u8>, name: &str, group: i8, body: &[u8], last: bool| {
+        parameters.extend([name.len() as u8, group as u8]);
+        parameters.extend(name.as_bytes());
+        let next = if last { 0 } else { 2 + body.len() as u16 };
+        parameters.extend(next.to_le_bytes());
+        parameters.extend(body);
+    };
+    entry(&mut parameters, "POINT", -1, &[0], false);
+    entry(&mut parameters, "LABELS", 1, &[0xff, 2, 4, 1, b'L', b'A', b'S', b'I', 0], false);
+    entry(&mut parameters, "UNITS", 1, &[0xff, 2, 2, 1, b'm', b'm', 0], true);
+    bytes[512..512 + parameters.len()].copy_from_slice(&parameters);
+    for (i, value) in [1.0_f32, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, -1.0].into_iter().enumerate() {
+        bytes[1536 + 4 * i..1540 + 4 * i].copy_from_slice(&value.to_le_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn a_small_c3d_file_is_read_as_written() {
+    let read = c3d::read(&small_c3d()).expect("a C3D file");
+    assert_eq!((read.names, read.rate_hz), (vec!["LASI".to_owned()], 100.0));
+    assert_eq!(read.frames, vec![vec![Some([1.0, 2.0, 3.0])], vec![None]]);
+}
+
+const TRC: &str = "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumMarkers\tUnits\n100\t2\tm\nFrame#\tTime\tA\t\t\tB\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0\t0.1\t0.2\t0.3\t\t\t\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
+const CSV: &str = "frame,A_x,A_y,A_z,B_x,B_y,B_z\n1,1,2,3,,,\n2,4,5,6,7,8,9\n";
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(256), failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn damaged_small_recordings_are_read_or_refused(
+        places in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        cut in any::<prop::sample::Index>(),
+    ) {
+        let damaged = |source: &[u8]| {
+            let mut bytes = source.to_vec();
+            for (at, value) in &places {
+                let at = at.index(bytes.len());
+                bytes[at] = *value;
+            }
+            bytes
+        };
+        let bytes = damaged(&small_c3d());
+        let _ = c3d::read(&bytes);
+        let _ = c3d::read(&bytes[..cut.index(bytes.len())]);
+        let text = String::from_utf8_lossy(&damaged(TRC.as_bytes())).into_owned();
+        let _ = trc::read(&text, true);
+        let text = String::from_utf8_lossy(&damaged(CSV.as_bytes())).into_owned();
+        let _ = csv::read(&text);
+    }
 }

@@ -4,8 +4,8 @@
 //!   down are cut by length. It removes much and takes a good part of the person with it when the run is broken by the legs.
 //! - `hybrid`: shadows that lie sideways (|sin eta| < 0.45) get the run-point cut over +-3 degrees, and a half-plane through the
 //!   feet where that would take more than 60 % of the silhouette; others get the half-plane at once. The half-plane's edge is the
-//!   bisector of body and shadow. A shadow that points away lies behind the person and cannot be told apart without colour:
-//!   such frames are cut as well as it goes and flagged.
+//!   bisector of body and shadow; where the shadow points away only a strip of ground as wide as a person is cut. A shadow behind
+//!   the person cannot be told apart without colour: such frames are cut as well as it goes and flagged.
 //!
 //! Angles are tried on the outline ([`super::envelope`]), so a cut on 640 x 480 costs a fraction of a millisecond.
 
@@ -57,6 +57,8 @@ pub struct CutReport {
     pub trustworthy: bool,
 }
 
+/// Sine of eta up to which a shadow counts as lying sideways.
+pub const SIDEWAYS: f64 = 0.45;
 /// Smoothing window of the lower edge's gradient, columns.
 const GRADIENT_WINDOW: usize = 9;
 
@@ -103,7 +105,7 @@ pub fn remove(
     };
     let left = crate::mask::area(out.view());
     let removed_fraction = 1.0 - left as f64 / outline.area as f64;
-    let away = shadow.eta_rad.sin() < -0.45;
+    let away = shadow.eta_rad.sin() < -SIDEWAYS;
     Ok((
         out,
         CutReport {
@@ -175,7 +177,7 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
 /// The default method; gives the angle used and whether the half-plane was.
 fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> (f64, bool) {
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
-    let sideways = shadow.eta_rad.sin().abs() < 0.45;
+    let sideways = shadow.eta_rad.sin().abs() < SIDEWAYS;
     if sideways {
         let best = (-3..=3)
             .map(|i| shadow.beta_rad + f64::from(i).to_radians())
@@ -190,7 +192,33 @@ fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) 
         }
     }
     half_plane(mask, out, shadow);
+    if shadow.eta_rad.sin() < -SIDEWAYS {
+        give_back_the_body(mask, out, outline, shadow);
+    }
     (shadow.beta_rad, true)
+}
+
+/// Where the shadow points away, the half-plane takes the near side of the upper body with it. The shadow lies on a strip of ground
+/// from the feet to its tip, as wide as a person: what the half-plane took beside that strip is the body's again.
+fn give_back_the_body(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) {
+    /// Of the stature: a person with their arms and stride.
+    const HALF_WIDTH: f64 = 0.17;
+    /// Of the stature: the head is round, its shadow reaches beyond that of its top.
+    const BEYOND: f64 = 0.04;
+    let half_width = HALF_WIDTH * shadow.height_px;
+    let (sin, cos) = shadow.eta_rad.sin_cos();
+    let length = shadow.m_px[0].hypot(shadow.m_px[1]) + BEYOND * shadow.height_px;
+    let (top, bottom, left, right) = outline.bounds;
+    for y in top..=bottom {
+        for x in left..=right {
+            if !mask[[y, x]] || out[[y, x]] {
+                continue;
+            }
+            let (dx, dy) = (x as f64 - shadow.foot_px[0], y as f64 - shadow.foot_px[1]);
+            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            out[[y, x]] = across.abs() > half_width || along > length;
+        }
+    }
 }
 
 /// Clears the shadow's side of the bisector through the feet.

@@ -12,6 +12,7 @@ use farnear_activity::{
     },
     shadow::{
         CameraFile, CutReport, Method,
+        cut::SIDEWAYS,
         projection::{ShadowError, on_ground},
         remove, subject_of,
         uncertainty::propagate,
@@ -25,8 +26,6 @@ use crate::{commands::sun::Moment, masks, report};
 
 /// Above this share of a silhouette removed the cut is doubted, 0 to 1.
 const MUCH: f64 = 0.6;
-/// Sine of eta below which the shadow lies behind the subject.
-const BEHIND: f64 = -0.45;
 
 /// Takes a person's shadow off masks: the sun's place and the camera's tell where the shadow falls.
 ///
@@ -238,7 +237,7 @@ fn doubts(cut: &CutReport, sun: SunPosition) -> Vec<&'static str> {
     /// Below this the shadow is so long that its direction in the picture hangs on small errors.
     const LOW_DEG: f64 = 8.0;
     let found = [
-        (cut.shadow.eta_rad.sin() < BEHIND, "shadow-behind"),
+        (cut.shadow.eta_rad.sin() < -SIDEWAYS, "shadow-behind"),
         (cut.shadow.shortened, "shadow-leaves-picture"),
         (cut.removed_fraction > MUCH, "much-removed"),
         (sun.elevation_deg < LOW_DEG, "low-sun"),
