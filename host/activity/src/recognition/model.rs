@@ -9,7 +9,8 @@ use crate::embedding::EmbeddingError;
 use crate::embedding::descriptor::Scaling;
 use crate::evaluation::choice::{Chosen, Views, choose, joined, names};
 use crate::evaluation::experiment::Experiment;
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, ArrayView1};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Everything that is chosen for a recogniser.
@@ -183,7 +184,7 @@ impl Recogniser {
         lengths.sort_unstable();
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
-            far: unknown_beyond(&patterns),
+            far: unknown_beyond(&space, &all, clips.len(), &patterns, sharpness)?,
             settings: RecogniserSettings {
                 scaling,
                 space: space.settings.clone(),
@@ -230,7 +231,7 @@ impl Recogniser {
         let pattern = pattern(&self.space, views, self.settings.sharpness)?;
         let shares = self.classifier.shares(pattern.view());
         let (best, confidence) = self.classifier.best(pattern.view());
-        let strangeness = nearest(&self.patterns, &pattern, None) / self.far.max(1e-9);
+        let strangeness = nearest(self.patterns.rows().into_iter(), &pattern) / self.far.max(1e-9);
         Ok(Answer {
             activity: (strangeness <= 1.0).then(|| self.activities[best].clone()),
             confidence,
@@ -276,17 +277,44 @@ fn pattern(space: &Space, views: &[Track], sharpness: f32) -> Result<Array1<f32>
     Ok(joined(&patterns, &(0..patterns.len()).collect::<Vec<_>>()))
 }
 
-/// Squared distance to the nearest pattern but `except`.
-fn nearest(patterns: &Array2<f32>, query: &Array1<f32>, except: Option<usize>) -> f32 {
-    let others = patterns.rows().into_iter().enumerate().filter(|(i, _)| Some(*i) != except);
-    others
-        .map(|(_, row)| row.iter().zip(query).map(|(a, b)| (a - b) * (a - b)).sum())
+/// Squared distance to the nearest of some patterns.
+fn nearest<'a>(patterns: impl Iterator<Item = ArrayView1<'a, f32>>, query: &Array1<f32>) -> f32 {
+    patterns
+        .map(|row| row.iter().zip(query).map(|(a, b)| (a - b) * (a - b)).sum())
         .fold(f32::INFINITY, f32::min)
 }
 
-/// Beyond this squared distance to every training pattern nothing is known: half as far again as the strangest of them lies
-/// from its nearest other.
-fn unknown_beyond(patterns: &Array2<f32>) -> f32 {
-    let apart = (0..patterns.nrows()).map(|i| nearest(patterns, &patterns.row(i).to_owned(), Some(i)));
-    1.5 * apart.filter(|d| d.is_finite()).fold(0.0_f32, f32::max)
+/// Share of what was trained on that must count as known when somebody new does it.
+const KNOWN: f64 = 0.99;
+
+/// Beyond this squared distance to every training pattern nothing is known. Whole clips and their halves (a running answer has seen a
+/// part only) are compared with all other subjects' patterns, as somebody new would be; with a single subject, with their
+/// other clips. `clips` are followed by their mirrors, if those train too, and `patterns` are in the same order.
+fn unknown_beyond(
+    space: &Space,
+    clips: &[&Clip],
+    originals: usize,
+    patterns: &Array2<f32>,
+    sharpness: f32,
+) -> Result<f32, ModelError> {
+    let alone = clips.iter().all(|clip| clip.subject == clips[0].subject);
+    let apart: Result<Vec<Vec<f32>>, ModelError> = (0..originals)
+        .into_par_iter()
+        .map(|i| {
+            let clip = clips[i];
+            let other = |j: usize| if alone { j % originals != i } else { clips[j].subject != clip.subject };
+            let others =
+                || patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
+            let half = clip.views.iter().map(Track::frames).min().unwrap_or(0).div_ceil(2);
+            let mut found = vec![nearest(others(), &patterns.row(i).to_owned())];
+            for part in clip.windows(half) {
+                found.push(nearest(others(), &pattern(space, &part.views, sharpness)?));
+            }
+            Ok(found)
+        })
+        .collect();
+    let mut apart: Vec<f32> = apart?.into_iter().flatten().filter(|d| d.is_finite()).collect();
+    apart.sort_by(f32::total_cmp);
+    let place = (KNOWN * apart.len().saturating_sub(1) as f64).round() as usize;
+    Ok(apart.get(place).copied().unwrap_or(f32::INFINITY))
 }

@@ -1,5 +1,6 @@
 //! `farnear silhouettes`: masks of a person.
 
+mod bodies;
 mod markers;
 mod video;
 
@@ -16,6 +17,8 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Source {
+    Skeletons(bodies::Skeletons),
+    Synthetic(bodies::Synthetic),
     Markers(markers::Arguments),
     Video(video::Arguments),
 }
@@ -23,6 +26,8 @@ enum Source {
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.source {
+        Source::Skeletons(arguments) => bodies::skeletons(&arguments),
+        Source::Synthetic(arguments) => bodies::synthetic(&arguments),
         Source::Markers(arguments) => markers::run(&arguments),
         Source::Video(arguments) => video::run(&arguments),
     }

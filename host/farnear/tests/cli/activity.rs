@@ -1,21 +1,15 @@
 //! `farnear activity` on synthetic people: training, recognition in masks and video, evaluation, and what is refused.
 
-use std::{fs, sync::LazyLock};
+use std::{fs, path::Path, sync::LazyLock};
 
-use farnear_activity::{
-    silhouette::view::{Canvas, View, draw, extent},
-    synthetic::activities::{ACTIVITIES, performance},
-};
 use image::{GrayImage, Luma};
 use serde_json::Value;
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
-/// Walking, crouching and digging.
-const CHOSEN: [usize; 3] = [0, 2, 9];
 const SUBJECTS: usize = 4;
 
-/// Masks of four people at three activities from two views, and a file of samples; made once for all tests.
+/// Masks of four people walking, crouching and digging from two views, and a file of samples; made once for all tests.
 struct People {
     folder: Folder,
     samples: String,
@@ -23,30 +17,23 @@ struct People {
 
 static PEOPLE: LazyLock<People> = LazyLock::new(|| {
     let folder = Folder::new();
-    let mut samples = String::new();
-    for (subject, activity) in (0..SUBJECTS).flat_map(|s| CHOSEN.map(|a| (s, a))) {
-        let bodies = performance(subject, activity, 0, 6.0);
-        for view in 1..=2 {
-            let name = format!("p{subject}-{}-{view}", ACTIVITIES[activity]);
-            let seen = View { gamma_deg: 45.0 * f64::from(view), ..View::default() };
-            let reach: Vec<_> = bodies.iter().flat_map(|body| extent(body, &seen)).collect();
-            let canvas = Canvas::fitting(&reach, 25.0, 2).expect("finite");
-            fs::create_dir(folder.path(&name)).expect("a folder");
-            for (frame, body) in bodies.iter().enumerate() {
-                let mask = draw(body, &seen, &canvas);
-                let (height, width) = mask.dim();
-                let level = |x, y| Luma([if mask[[y as usize, x as usize]] { 255_u8 } else { 0 }]);
-                GrayImage::from_fn(width as u32, height as u32, level)
-                    .save(folder.path(&format!("{name}/f{frame}.png")))
-                    .expect("a picture");
-            }
-            samples += &format!(
-                "[[sample]]\nmasks = \"{name}\"\nsubject = \"p{subject}\"\nactivity = \"{}\"\nview = {view}\n",
-                ACTIVITIES[activity]
-            );
-        }
-    }
-    let samples = folder.file("samples.toml", samples);
+    let out = folder.text("people");
+    let count = SUBJECTS.to_string();
+    let made = figures(
+        farnear(&[
+            "silhouettes",
+            "synthetic",
+            "--subjects",
+            &count,
+            "--activities",
+            "walk,crouch,dig",
+            "--views",
+            "2",
+        ])
+        .args(["--rate-hz", "6", "--mm-per-px", "25", "--out", &out, "--json"]),
+    );
+    assert_eq!((number(&made, "performances"), number(&made, "views")), (12.0, 2.0));
+    let samples = folder.text("people/samples.toml");
     People { folder, samples }
 });
 
@@ -55,15 +42,16 @@ impl People {
         self.folder.text(name)
     }
 
+    /// The masks of a performance.
+    fn masks(&self, name: &str, view: u32) -> String {
+        self.folder.text(&format!("people/{name}-1/view{view}"))
+    }
+
     /// The samples of which `keep` holds, as a file of their own beside the others.
     fn only(&self, name: &str, keep: impl Fn(&str) -> bool) -> String {
         let all = fs::read_to_string(&self.samples).expect("samples");
-        let kept: String = all
-            .split_inclusive("view = 1\n")
-            .flat_map(|part| part.split_inclusive("view = 2\n"))
-            .filter(|sample| keep(sample))
-            .collect();
-        self.folder.file(name, kept)
+        let kept: String = all.split_inclusive("\n\n").filter(|sample| keep(sample)).collect();
+        self.folder.file(&format!("people/{name}"), kept)
     }
 }
 
@@ -105,8 +93,8 @@ fn unseen_people_are_recognised_and_the_results_are_whole() {
 #[test]
 fn other_samples_can_be_learned_from_but_never_the_same_people() {
     let people = &*PEOPLE;
-    let one = people.only("p0.toml", |sample| sample.contains("\"p0\""));
-    let others = people.only("others.toml", |sample| !sample.contains("\"p0\""));
+    let one = people.only("p0.toml", |sample| sample.contains("\"p00\""));
+    let others = people.only("others.toml", |sample| !sample.contains("\"p00\""));
     let evaluate = |test: &str, more: &[&str]| {
         let mut command = farnear(&["activity", "evaluate", test, "--no-search", "--json"]);
         command.args(more);
@@ -117,10 +105,10 @@ fn other_samples_can_be_learned_from_but_never_the_same_people() {
     // Leaving p0 out of the training on everybody is the same training.
     let left_out = figures(&mut evaluate(&one, &["--train", &people.samples, "--leave-one-subject-out"]));
     assert_eq!(found["confusion"], left_out["confusion"]);
-    fails(&mut evaluate(&one, &["--train", &people.samples]), 1, &["`p0`", "--leave-one-subject-out"]);
+    fails(&mut evaluate(&one, &["--train", &people.samples]), 1, &["`p00`", "--leave-one-subject-out"]);
     fails(&mut evaluate(&one, &["--leave-one-subject-out"]), 1, &["at least 3 subjects", "1"]);
     fails(&mut evaluate(&one, &[]), 2, &["--leave-one-subject-out", "--train"]);
-    let lame = people.only("lame.toml", |sample| !sample.contains("p2-dig-2"));
+    let lame = people.only("lame.toml", |sample| !sample.contains("p02-dig-1/view2"));
     fails(
         &mut evaluate(&lame, &["--leave-one-subject-out", "--views", "fused"]),
         1,
@@ -145,7 +133,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
         "--json",
     ]));
     assert_eq!((number(&trained, "clips"), number(&trained, "views")), (24.0, 1.0));
-    let masks = people.text("p1-dig-1");
+    let masks = people.masks("p01-dig", 1);
     let recognise = ["activity", "recognise", &masks, "--model", &model];
     let (lines, _) = succeeds(&mut farnear(&recognise));
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
@@ -179,10 +167,11 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
     // The same person walking in a video: dark before a light wall. (At a dozen pixels across the spade of the digger is
     // cleaned away.)
     fs::create_dir(people.folder.path("video")).expect("a folder");
-    let count = fs::read_dir(people.folder.path("p1-walk-1")).expect("a folder").count();
+    let count = fs::read_dir(people.masks("p01-walk", 1)).expect("a folder").count();
     for frame in 0..count + 12 {
-        let name = format!("p1-walk-1/f{}.png", frame.saturating_sub(12));
-        let mask = image::open(people.folder.path(&name)).expect("a mask").into_luma8();
+        let name = format!("frame_{:06}.png", frame.saturating_sub(12) + 1);
+        let mask =
+            image::open(Path::new(&people.masks("p01-walk", 1)).join(name)).expect("a mask").into_luma8();
         let picture = GrayImage::from_fn(mask.width(), mask.height(), |x, y| {
             let noise = ((frame as u32 * 7919 + y * 104_729 + x * 1_299_709) % 7) as u8;
             let person = frame >= 12 && mask[(x, y)].0[0] > 0;
@@ -200,7 +189,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
 
     let fused = people.text("fused.fnm");
     succeeds(&mut farnear(&["activity", "train", &people.samples, "--out", &fused, "--no-search"]));
-    let second = people.text("p1-dig-2");
+    let second = people.masks("p01-dig", 2);
     fails(&mut farnear(&["activity", "recognise", &masks, "--model", &fused]), 1, &["fused.fnm", "2 views"]);
     let both =
         figures(&mut farnear(&["activity", "recognise", &masks, &second, "--model", &fused, "--json"]));
@@ -264,7 +253,7 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
         [("format.fnm", 8), ("descriptor.fnm", 12), ("body.fnm", bytes.len() / 2)]
             .map(|(name, at)| changed(name, at));
     let cut = people.folder.file("cut.fnm", &bytes[..bytes.len() / 2]);
-    let masks = people.text("p1-dig-1");
+    let masks = people.masks("p01-dig", 1);
     let shapes = shapes.display().to_string();
     for (view, model, phrases) in [
         (&masks, &format, vec!["format.fnm", "format version 5", "train it again"]),
@@ -284,15 +273,23 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     };
     for (name, text, phrases) in [
         ("no.toml", String::new(), vec!["no.toml", "[[sample]]"]),
-        ("one.toml", sample("p0-dig-1", "dig"), vec!["one.toml", "two activities"]),
-        ("absent.toml", sample("p9", "dig"), vec!["p9", "no such"]),
+        ("one.toml", sample("people/p00-dig-1/view1", "dig"), vec!["one.toml", "two activities"]),
+        ("absent.toml", sample("p99", "dig"), vec!["p99", "no such"]),
         ("blank.toml", sample("empty", "dig"), vec!["empty", "all 1 masks are empty"]),
         ("mixed.toml", sample("mixed", "dig"), vec!["51x40", "50x40"]),
-        ("kinds.toml", sample("p0-dig-1", "dig") + &sample("shapes", "lie"), vec!["full frames", "100x100"]),
-        ("typo.toml", sample("p0-dig-1", "dig").replace("subject", "person"), vec!["typo.toml", "person"]),
+        (
+            "kinds.toml",
+            sample("people/p00-dig-1/view1", "dig") + &sample("shapes", "lie"),
+            vec!["full frames", "100x100"],
+        ),
+        (
+            "typo.toml",
+            sample("people/p00-dig-1/view1", "dig").replace("subject", "person"),
+            vec!["typo.toml", "person"],
+        ),
         (
             "twice.toml",
-            (sample("p0-dig-1", "dig") + "clip = \"x\"\n").repeat(2),
+            (sample("people/p00-dig-1/view1", "dig") + "clip = \"x\"\n").repeat(2),
             vec!["twice.toml", "clip `x`", "view 1 twice"],
         ),
     ] {
@@ -300,4 +297,35 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
         fails(&mut farnear(&["activity", "train", &file, "--out", &out]), 1, &phrases);
     }
     assert!(!people.folder.path("new.fnm").exists());
+}
+
+#[test]
+fn skeletons_of_a_public_set_become_people_to_train_on() {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../../shared/data/skeletons/Florence_3D_Action_Skeletons.mat"
+    );
+    let folder = Folder::new();
+    let out = folder.text("people");
+    let wrong = folder.file("wrong.mat", "MATLAB 5.0 MAT-file, or so it says");
+    let draw = |file: &str, set: &str| {
+        let mut command = farnear(&["silhouettes", "skeletons", file, "--set", set, "--out", &out, "--json"]);
+        command.args(["--views", "1", "--mm-per-px", "40"]);
+        command
+    };
+    fails(&mut draw(&wrong, "florence"), 1, &["wrong.mat"]);
+    if !Path::new(file).is_file() {
+        println!("skipped: no shared data");
+        return;
+    }
+    fails(&mut draw(file, "utkinect"), 1, &["Florence", "[3, 15, 27]", "[3, 20, frames]"]);
+    let made = figures(&mut draw(file, "florence"));
+    assert_eq!(
+        (number(&made, "performances"), number(&made, "subjects"), number(&made, "activities")),
+        (215.0, 10.0, 9.0)
+    );
+    let samples = folder.text("people/samples.toml");
+    let evaluate = ["activity", "evaluate", &samples, "--leave-one-subject-out", "--no-search", "--json"];
+    let found = figures(farnear(&evaluate).args(["--mode", "ordered"]));
+    assert!(number(&found, "accuracy") > 0.6 && number(&found, "clips") == 215.0, "{found}");
 }

@@ -27,6 +27,8 @@ const COMMANDS: &[&[&str]] = &[
     &["shadow", "score"],
     &["silhouettes"],
     &["silhouettes", "markers"],
+    &["silhouettes", "skeletons"],
+    &["silhouettes", "synthetic"],
     &["silhouettes", "video"],
     &["activity"],
     &["activity", "train"],
@@ -93,6 +95,7 @@ fn bad_usage_ends_with_2() {
             vec!["silhouettes", "markers", "a.c3d", "--template", "x", "--out", "y", "--views", "0"],
             vec!["72"],
         ),
+        (vec!["silhouettes", "synthetic", "--out", "x", "--activities", "sing"], vec!["sing", "walk, drop"]),
         (vec!["completions", "cmd"], vec!["cmd", "bash"]),
     ] {
         fails(&mut farnear(&arguments), 2, &phrases);

@@ -349,7 +349,8 @@ fn recording(path: &Path, up: Option<Up>) -> Result<Markers> {
     Ok(read)
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+/// A size that a picture can have a pixel for.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (0.1..=1000.0).contains(&value) => Ok(value),
         _ => Err("expected a number from 0.1 to 1000".into()),
