@@ -53,6 +53,16 @@ impl Processor {
     /// # Errors
     /// As [`super::depth_from_pair`]; the map of the pair before is lost then.
     pub fn run(&mut self, far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<&DepthMap, RunError> {
+        if self.settings.thread_count() > 1 {
+            // From within the pool: each of the parallel stages would otherwise have to wake it anew.
+            rayon::scope(|_| self.run_here(far, near))?;
+        } else {
+            self.run_here(far, near)?;
+        }
+        Ok(&self.map)
+    }
+
+    fn run_here(&mut self, far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<(), RunError> {
         let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
         let threads = self.settings.thread_count();
         let input = check::check(&far, &near, self.backend, threads)?;
@@ -88,7 +98,7 @@ impl Processor {
         }
         self.map.warnings = input.warnings(&self.operators, &self.optics);
         self.map.warnings.extend(check::after(&self.map, &self.optics));
-        Ok(&self.map)
+        Ok(())
     }
 
     /// The map of the last pair.

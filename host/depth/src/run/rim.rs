@@ -23,27 +23,44 @@ pub(super) fn fill(map: &mut DepthMap, width_px: usize) {
     };
     // Top and bottom first: the rows they copy from are then still untouched.
     let (first, last) = (rim(height), height - 1 - rim(height));
+    let (left, right) = (rim(width), width - 1 - rim(width));
+    let inner = left..right + 1;
+    let source_row = [first, last].map(|y| {
+        let row = y * width..(y + 1) * width;
+        (depths[row.clone()].to_vec(), confidences[row].to_vec())
+    });
     for y in (0..first).chain(last + 1..height) {
-        let source = if y < first { first } else { last };
-        for x in 0..width {
-            let from = source * width + x.clamp(rim(width), width - 1 - rim(width));
-            copy(depths, confidences, from, y * width + x);
+        let (from_depths, from_confidences) = &source_row[usize::from(y > last)];
+        let row = y * width..(y + 1) * width;
+        let (depths, confidences) = (&mut depths[row.clone()], &mut confidences[row]);
+        for x in (0..left).chain(right + 1..width) {
+            let from = x.clamp(left, right);
+            take(&mut depths[x], &mut confidences[x], from_depths[from], from_confidences[from]);
+        }
+        // Slices of one length, so that the loop is done in vectors.
+        let to = depths[inner.clone()].iter_mut().zip(&mut confidences[inner.clone()]);
+        let from = from_depths[inner.clone()].iter().zip(&from_confidences[inner.clone()]);
+        for ((depth, confidence), (from_depth, from_confidence)) in to.zip(from) {
+            take(depth, confidence, *from_depth, *from_confidence);
         }
     }
     for y in first..=last {
-        for x in (0..rim(width)).chain(width - rim(width)..width) {
-            let from = y * width + x.clamp(rim(width), width - 1 - rim(width));
-            copy(depths, confidences, from, y * width + x);
+        let row = y * width..(y + 1) * width;
+        let (depths, confidences) = (&mut depths[row.clone()], &mut confidences[row]);
+        for (outside, from) in [(0..left, left), (right + 1..width, right)] {
+            let (from_depth, from_confidence) = (depths[from], confidences[from]);
+            for x in outside {
+                take(&mut depths[x], &mut confidences[x], from_depth, from_confidence);
+            }
         }
     }
 }
 
-/// Copies a pixel to one that has a depth.
-fn copy(depths: &mut [f32], confidences: &mut [f32], from: usize, to: usize) {
-    if !depths[to].is_nan() {
-        depths[to] = depths[from];
-        confidences[to] = RIM_CONFIDENCE * confidences[from];
-    }
+/// Gives a pixel that has a depth that of another one.
+fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence: f32) {
+    let has = !depth.is_nan();
+    *confidence = if has { RIM_CONFIDENCE * from_confidence } else { *confidence };
+    *depth = if has { from_depth } else { *depth };
 }
 
 #[cfg(test)]
