@@ -56,6 +56,8 @@ struct Row {
     threads: u64,
     min_ms: f64,
     median_ms: f64,
+    /// Floating-point operations as if nothing were shared between the taps of a kernel, and those really done.
+    flop: Option<[f64; 2]>,
 }
 
 /// A peer's times: minimum and median of each.
@@ -195,6 +197,7 @@ fn row(line: &str) -> Result<Row> {
             threads: json["threads"].as_u64()?,
             min_ms: json["min_ms"].as_f64()?,
             median_ms: json["median_ms"].as_f64()?,
+            flop: json["flop"].as_f64().zip(json["executed_flop"].as_f64()).map(<[f64; 2]>::from),
         })
     };
     read().with_context(|| format!("not a bench's line: {line}"))
@@ -204,9 +207,10 @@ fn row(line: &str) -> Result<Row> {
 fn tables(rows: &[Row], peers: &[Peer]) -> String {
     let mut text =
         String::from("| what | vector unit | threads | min ms | median ms |\n|---|---|--:|--:|--:|\n");
-    for Row { name, backend, threads, min_ms, median_ms } in rows {
+    for Row { name, backend, threads, min_ms, median_ms, .. } in rows {
         let _ = writeln!(text, "| {name} | {backend} | {threads} | {min_ms:.3} | {median_ms:.3} |");
     }
+    text.push_str(&shares_of_peak(rows));
     if peers.is_empty() {
         return text;
     }
@@ -224,7 +228,7 @@ fn tables(rows: &[Row], peers: &[Peer]) -> String {
                 _ => None,
             };
             let Some([min, median]) = theirs else { continue };
-            let Row { name, backend, threads, min_ms, median_ms } = row;
+            let Row { name, backend, threads, min_ms, median_ms, .. } = row;
             let (of_min, of_median) = (min / min_ms, median / median_ms);
             let against = &peer.name;
             let _ = writeln!(
@@ -232,6 +236,29 @@ fn tables(rows: &[Row], peers: &[Peer]) -> String {
                 "| {name} | {backend} | {threads} | {against} | {of_min:.2} | {of_median:.2} |"
             );
         }
+    }
+    text
+}
+
+/// The core's peak and what else has its operations counted, as parts of it; by minima.
+fn shares_of_peak(rows: &[Row]) -> String {
+    let mut text = String::new();
+    for row in rows {
+        let peak = rows.iter().find(|peak| peak.name == "fma_peak" && peak.backend == row.backend);
+        let (Some([plain, executed]), Some(peak)) = (row.flop, peak) else { continue };
+        let Some([peak_flop, _]) = peak.flop else { continue };
+        if text.is_empty() {
+            text.push_str("\n| what | vector unit | GFLOP/s | of the peak | executed GFLOP/s | of the peak |\n|---|---|--:|--:|--:|--:|\n");
+        }
+        // 1e-6: operations per millisecond to GFLOP/s.
+        let [plain, executed] = [plain, executed].map(|flop| 1e-6 * flop / row.min_ms);
+        let [of_plain, of_executed] =
+            [plain, executed].map(|rate| 100.0 * rate / (1e-6 * peak_flop / peak.min_ms));
+        let Row { name, backend, .. } = row;
+        let _ = writeln!(
+            text,
+            "| {name} | {backend} | {plain:.1} | {of_plain:.0} % | {executed:.1} | {of_executed:.0} % |"
+        );
     }
     text
 }
@@ -245,8 +272,14 @@ fn page_of(tables: &str) -> String {
         "# Speed\n\nWritten by `cargo xtask bench --peers --write` on {model}, {threads} hardware threads. Times are of this machine; \
          ratios travel better. A ratio above 1 means that ours is faster.\n\n\
          ## Depth\n\n`chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
-         confidence. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
-         allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n{tables}"
+         confidence. `chain_640x480_side_by_side` is the time per pair when four chains of one thread each run at once: nothing is \
+         shared, so this is the least that four threads can take on this machine. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
+         allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n\
+         `fma_peak` is a loop of independent multiply-adds in registers: what one core can do. The 7x7 convolution is counted \
+         twice: with 49 multiply-adds per pixel, as its definition says, and with what is executed: the kernels are eight-fold \
+         symmetric, so 12 multiply-adds, 4 products and 10 sums suffice ([`convolve.rs`](../host/depth/src/run/simd/convolve.rs)). \
+         It can therefore exceed the peak. Executed multiply-adds and sums have units of their own on many processors, so a share \
+         below 100 % need not mean that the core waits.\n\n{tables}"
     )
 }
 
@@ -263,6 +296,25 @@ mod tests {
         let peer = peer("p.py", &format!("warming up\n{THEIRS}\n")).unwrap();
         let text = tables(&[row(OURS).unwrap()], &[peer]);
         assert!(text.contains("| chain_640x480 | avx2 | 1 | p.py | 3.00 | 2.80 |"), "{text}");
+    }
+
+    #[test]
+    fn shares_are_of_the_peak_of_the_same_vector_unit() {
+        let line = |name: &str, backend: &str, ms: f64, flop: f64, executed: f64| {
+            let text = format!(
+                r#"{{"name": "{name}", "backend": "{backend}", "threads": 1, "min_ms": {ms}, "median_ms": {ms}, "flop": {flop}, "executed_flop": {executed}}}"#
+            );
+            row(&text).unwrap()
+        };
+        let rows = [
+            line("fma_peak", "avx512", 1.0, 100e6, 100e6),
+            line("fma_peak", "avx2", 1.0, 50e6, 50e6),
+            line("convolution_7x7", "avx2", 2.0, 80e6, 30e6),
+            row(OURS).unwrap(),
+        ];
+        let text = tables(&rows, &[]);
+        assert!(text.contains("| convolution_7x7 | avx2 | 40.0 | 80 % | 15.0 | 30 % |"), "{text}");
+        assert!(text.contains("| fma_peak | avx512 | 100.0 | 100 % | 100.0 | 100 % |"), "{text}");
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! Times of the run time, of one convolution and of the operator designs, in milliseconds: minimum and median.
 //!
+//! Where the floating-point operations are known (`flop`: two for each tap of a kernel as if nothing were shared between taps;
+//! `executed_flop`: what is really done), `fma_peak` tells what the core could do: multiply-adds in registers.
+//!
 //! `cargo bench -p farnear-depth [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The images are random: only
 //! the time is of interest. Timings are no tests: nothing here can fail.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
@@ -48,15 +51,60 @@ fn time<T>(runs: usize, mut run: impl FnMut() -> T) -> [f64; 2] {
     [ms[0], ms[ms.len() / 2]]
 }
 
-fn report(name: &str, backend: Option<Backend>, threads: usize, [min, median]: [f64; 2]) {
+/// Floating-point operations of a run, and those left once what is shared is done once.
+struct Flop {
+    plain: f64,
+    executed: f64,
+}
+
+fn report(name: &str, backend: Option<Backend>, threads: usize, [min, median]: [f64; 2], flop: Option<Flop>) {
     let backend = backend.map_or("-".to_owned(), |b| format!("{b:?}").to_lowercase());
     if std::env::var_os("FARNEAR_JSON").is_some() {
+        let flop = flop.map_or(String::new(), |flop| {
+            format!(", \"flop\": {:.0}, \"executed_flop\": {:.0}", flop.plain, flop.executed)
+        });
         println!(
-            "{{\"name\": \"{name}\", \"backend\": \"{backend}\", \"threads\": {threads}, \"min_ms\": {min:.4}, \"median_ms\": {median:.4}}}"
+            "{{\"name\": \"{name}\", \"backend\": \"{backend}\", \"threads\": {threads}, \"min_ms\": {min:.4}, \"median_ms\": {median:.4}{flop}}}"
         );
     } else {
-        println!("{name:<28} {backend:<9} threads {threads}  min {min:9.3} ms  median {median:9.3} ms");
+        let flop = flop.map_or(String::new(), |flop| {
+            let [plain, executed] = [flop.plain, flop.executed].map(|flop| 1e-6 * flop / min);
+            format!("  {plain:.0} GFLOP/s, executed {executed:.0}")
+        });
+        println!("{name:<28} {backend:<9} threads {threads}  min {min:9.3} ms  median {median:9.3} ms{flop}");
     }
+}
+
+/// Time per pair when as many chains of one thread each as there are threads run at the same time: nothing is shared, so no
+/// chain on several threads can be faster than this.
+fn side_by_side(threads: usize, rounds: usize, chain: impl Fn(&mut dyn FnMut()) + Sync) -> [f64; 2] {
+    const PAIRS: usize = 10;
+    let barrier = std::sync::Barrier::new(threads);
+    let times = std::sync::Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                let mut pairs = 0;
+                let mut start = Instant::now();
+                chain(&mut || {
+                    if pairs % PAIRS == 0 {
+                        // The slowest ends a round; whoever comes last writes it down.
+                        if barrier.wait().is_leader() && pairs > PAIRS {
+                            let ms = 1e3 * start.elapsed().as_secs_f64();
+                            times.lock().unwrap().push(ms / (PAIRS * threads) as f64);
+                        }
+                        barrier.wait();
+                        start = Instant::now();
+                    }
+                    pairs += 1;
+                });
+            });
+        }
+    });
+    let mut times = times.into_inner().unwrap();
+    assert!(times.len() >= rounds, "{} rounds", times.len());
+    times.sort_by(f64::total_cmp);
+    [times[0], times[times.len() / 2]]
 }
 
 fn main() {
@@ -71,6 +119,17 @@ fn main() {
     let vga = [1, 2].map(|seed| random_image(480, 640, seed));
 
     for backend in Backend::available() {
+        if wanted("fma_peak") {
+            const ROUNDS: u32 = 20_000;
+            let flop = backend.multiply_adds(1) as f64 * f64::from(ROUNDS);
+            report(
+                "fma_peak",
+                Some(backend),
+                1,
+                time(200, || backend.multiply_adds(ROUNDS)),
+                Some(Flop { plain: flop, executed: flop }),
+            );
+        }
         if wanted("convolution_7x7") {
             let kernel: &Kernel = operators.prefilter();
             let mut output = Array2::zeros(vga[0].dim());
@@ -78,14 +137,29 @@ fn main() {
                 "convolution_7x7",
                 Some(backend),
                 1,
-                time(60, || convolve(vga[0].view(), kernel, backend, output.view_mut())),
+                time(200, || convolve(vga[0].view(), kernel, backend, output.view_mut())),
+                // Per pixel 49 multiply-adds; folded, 12 of them, 4 products and 10 sums.
+                Some(Flop { plain: 98.0 * vga[0].len() as f64, executed: 38.0 * vga[0].len() as f64 }),
             );
         }
         for threads in [1, 4] {
             if wanted("chain_640x480") {
                 let settings = Settings { threads, backend: Some(backend), ..Settings::default() };
-                report("chain_640x480", Some(backend), threads, chain(40, &vga, &settings));
+                report("chain_640x480", Some(backend), threads, chain(200, &vga, &settings), None);
             }
+        }
+        if wanted("chain_640x480_side_by_side") {
+            const THREADS: usize = 4;
+            const ROUNDS: usize = 20;
+            let settings = Settings { threads: 1, backend: Some(backend), ..Settings::default() };
+            let times = side_by_side(THREADS, ROUNDS, |lap| {
+                let mut processor = Processor::new(&operators, &optics_pill, &settings).unwrap();
+                for _ in 0..(ROUNDS + 2) * 10 + 1 {
+                    lap();
+                    black_box(processor.run(vga[0].view(), vga[1].view()).unwrap().low_texture_fraction);
+                }
+            });
+            report("chain_640x480_side_by_side", Some(backend), THREADS, times, None);
         }
     }
     for median_px in [5, 7] {
@@ -95,7 +169,8 @@ fn main() {
                 &format!("chain_median_{median_px}"),
                 Some(Backend::best()),
                 1,
-                chain(20, &vga, &settings),
+                chain(40, &vga, &settings),
+                None,
             );
         }
     }
@@ -112,7 +187,7 @@ fn main() {
             &Settings::default(),
         )
         .unwrap();
-        report("fill_640x480", None, 1, time(20, || fill_low_texture(&mut map.clone(), low.view())));
+        report("fill_640x480", None, 1, time(20, || fill_low_texture(&mut map.clone(), low.view())), None);
     }
     if wanted("uncertainty_640x480") {
         let settings = Settings::default();
@@ -125,13 +200,14 @@ fn main() {
                 standard_deviation_mm(far, near, &operators, &optics_pill, &settings, Noise::Estimated)
                     .unwrap()
             }),
+            None,
         );
     }
     if wanted("chain_4000x3000") {
         let large = [1, 2].map(|seed| random_image(3000, 4000, seed));
         for threads in [1, 4] {
             let settings = Settings { threads, ..Settings::default() };
-            report("chain_4000x3000", Some(Backend::best()), threads, chain(5, &large, &settings));
+            report("chain_4000x3000", Some(Backend::best()), threads, chain(9, &large, &settings), None);
         }
     }
     let designs = [
@@ -147,7 +223,7 @@ fn main() {
         let request = Request { family, design: design_by, ..Request::for_optics(&optics(psf)) };
         let name = format!("design_{}_{}", request.family, request.design);
         if wanted(&name) {
-            report(&name, None, 1, time(5, || design(&request)));
+            report(&name, None, 1, time(9, || design(&request)), None);
         }
     }
 }

@@ -13,6 +13,7 @@
 mod convolve;
 mod lanes;
 mod median;
+mod peak;
 mod rows;
 
 use serde::{Deserialize, Serialize};
