@@ -103,13 +103,18 @@ impl Job<'_> {
         let full = strip + 2 * radius;
         let [mut input, mut result] = [full, strip].map(|width| Plane::new(BLOCK, width));
         let mut taps = Taps::new(self.kernel, strip);
+        // Columns of the image among those needed, and their place in the copy.
+        let inside = columns.start.saturating_sub(radius)..(columns.end + radius).min(self.width);
+        let at = inside.start + radius - columns.start..inside.end + radius - columns.start;
         let inputs = self.height + 2 * radius;
         for begin in (0..inputs).step_by(BLOCK) {
             let rows = BLOCK.min(inputs - begin);
             for y in 0..rows {
                 let source = self.source_row(begin + y);
-                for (x, value) in input.row_mut(y)[..full].iter_mut().enumerate() {
-                    *value = source[reflect((columns.start + x) as isize - radius as isize, self.width)];
+                let row = &mut input.row_mut(y)[..full];
+                row[at.clone()].copy_from_slice(&source[inside.clone()]);
+                for x in (0..at.start).chain(at.end..full) {
+                    row[x] = source[reflect((columns.start + x) as isize - radius as isize, self.width)];
                 }
             }
             simd::convolve(self.backend, &mut taps, &input, &mut result, 0, rows, strip);
