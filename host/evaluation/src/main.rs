@@ -3,7 +3,8 @@
 //! Measures how near depth maps come to the truth and writes `docs/accuracy.md` with its pictures: rendered scenes under
 //! every point spread function and noise, wrong point spread functions, corrections of the elliptical distortion on
 //! depths that taught nothing, calibration. Where real pairs and focal stacks are at hand their figures go to
-//! `docs/accuracy-real.md`.
+//! `docs/accuracy-real.md`. What [`people`] measures - activities recognised, shadows taken off, the sun - goes to
+//! `docs/activity.md`.
 //!
 //! Everything is seeded and no clock enters, so that two runs on one kind of processor write the same bytes.
 //! One part per file in [`parts`]; [`rig`] renders and compares, [`page`] writes Markdown, [`chart`] and [`panels`]
@@ -13,6 +14,7 @@ mod chart;
 mod page;
 mod panels;
 mod parts;
+mod people;
 mod rig;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -51,23 +53,38 @@ fn run(arguments: &Arguments) -> Result<()> {
     chart::register_font()?;
     let images = arguments.docs.join("images");
     std::fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
-    let known = parts::RENDERED.iter().map(|(name, _)| *name).chain(["real"]).collect::<Vec<_>>();
+    let of_people = people::PARTS.iter().map(|(name, _)| *name);
+    let known =
+        parts::RENDERED.iter().map(|(name, _)| *name).chain(["real"]).chain(of_people).collect::<Vec<_>>();
     if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
         bail!("no part is called {unknown:?}, there are {}", known.join(", "));
     }
     let wanted = |name: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
 
-    let mut page = Page::new(&images, parts::INTRODUCTION);
-    for (name, measure) in parts::RENDERED {
-        if wanted(name) {
-            eprintln!("{name}");
-            measure(&mut page).with_context(|| format!("measuring {name}"))?;
+    if parts::RENDERED.iter().any(|(name, _)| wanted(name)) {
+        let mut page = Page::new(&images, parts::INTRODUCTION);
+        for (name, measure) in parts::RENDERED {
+            if wanted(name) {
+                eprintln!("{name}");
+                measure(&mut page).with_context(|| format!("measuring {name}"))?;
+            }
         }
+        finish(page, arguments, "accuracy.md")?;
     }
-    finish(page, arguments, "accuracy.md")?;
 
     let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
     let data = arguments.data.clone().unwrap_or_else(beside);
+    if people::PARTS.iter().any(|(name, _)| wanted(name)) {
+        let mut page = Page::new(&images, people::INTRODUCTION);
+        let data = people::data::Data(data.clone());
+        for (name, measure) in people::PARTS {
+            if wanted(name) {
+                eprintln!("{name}");
+                measure(&mut page, &data).with_context(|| format!("measuring {name}"))?;
+            }
+        }
+        finish(page, arguments, "activity.md")?;
+    }
     if !wanted("real") {
         return Ok(());
     }

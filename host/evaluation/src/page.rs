@@ -29,6 +29,16 @@ impl Page {
         self.text.push_str(&format!("\n## {heading}\n"));
     }
 
+    /// A heading of the third level.
+    pub fn subheading(&mut self, heading: &str) {
+        self.text.push_str(&format!("\n### {heading}\n"));
+    }
+
+    /// Markdown as it is, such as a table that somebody else wrote.
+    pub fn block(&mut self, markdown: &str) {
+        self.text.push_str(&format!("\n{}\n", markdown.trim_end()));
+    }
+
     /// A paragraph.
     pub fn paragraph(&mut self, text: &str) {
         self.text.push_str(&format!("\n{}\n", text.trim()));

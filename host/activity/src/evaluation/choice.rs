@@ -79,7 +79,8 @@ pub fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
 }
 
 /// Chooses space, sharpness and classifier for training clips that all have the same views. Labels are indices into `classes`.
-/// With fewer than two subjects nothing can be held out, and the first of everything is taken.
+/// With fewer than two subjects nothing can be held out, and the first of everything is taken. Right answers of all arrangements of views
+/// count together: one choice that serves them all rests on more trials than one for each.
 ///
 /// # Errors
 /// A space that cannot be learned.
@@ -87,7 +88,7 @@ pub fn choose(
     clips: &[&Clip],
     classes: &[String],
     experiment: &Experiment,
-    views: Views,
+    views: &[Views],
 ) -> Result<Chosen, EmbeddingError> {
     let subjects = names(clips.iter().map(|clip| &clip.subject));
     let folds = experiment.inner_folds.clamp(2, subjects.len().max(2));
@@ -98,7 +99,10 @@ pub fn choose(
         group: clips.iter().map(|clip| place(&subjects, &clip.subject) % folds).collect(),
         classes: classes.len(),
         folds,
-        arrangements: views.arrangements(clips.first().map_or(0, |clip| clip.views.len())),
+        arrangements: {
+            let seen = clips.first().map_or(0, |clip| clip.views.len());
+            views.iter().flat_map(|views| views.arrangements(seen)).collect()
+        },
         experiment,
     };
     let mut galleries = Galleries::default();
@@ -223,7 +227,9 @@ pub(super) fn gathered(patterns: &[Vec<Array1<f32>>], chosen: &[usize]) -> Array
     rows(&patterns.iter().map(|views| joined(views, chosen)).collect::<Vec<_>>())
 }
 
-/// The patterns of some views, one after the other.
+/// The patterns of some views, one after the other, over the square root of their number: the product of two joined patterns is the mean
+/// of the views' products, so that a classifier's cost means the same for one view and for many.
 pub(crate) fn joined(views: &[Array1<f32>], chosen: &[usize]) -> Array1<f32> {
-    chosen.iter().flat_map(|&view| views[view].iter().copied()).collect()
+    let scale = 1.0 / (chosen.len().max(1) as f32).sqrt();
+    chosen.iter().flat_map(|&view| views[view].iter().map(move |v| scale * v)).collect()
 }

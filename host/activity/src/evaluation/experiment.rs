@@ -17,6 +17,8 @@ pub enum Sweep {
     Gamma(Vec<f32>),
     /// Members per dimension of the thesis' grid, or centres of a codebook.
     Pattern(Vec<PatternKind>),
+    /// [`SpaceSettings::residuals`]; without effect on the thesis' grid.
+    Residuals(Vec<usize>),
     /// [`Weights::box_weight`].
     BoxWeight(Vec<f32>),
     /// [`Weights::relative_weight`].
@@ -49,6 +51,10 @@ impl Sweep {
             Self::Gamma(_) if base.layout == Layout::Pca => Vec::new(),
             Self::Gamma(values) => values.iter().map(|&gamma| with(&|s| s.gamma = gamma)).collect(),
             Self::Pattern(values) => values.iter().map(|kind| with(&|s| s.pattern = kind.clone())).collect(),
+            Self::Residuals(_) if matches!(base.pattern, PatternKind::Thesis(_)) => Vec::new(),
+            Self::Residuals(values) => {
+                values.iter().map(|&residuals| with(&|s| s.residuals = residuals)).collect()
+            }
             Self::MotionWeight(_) if base.mode == Mode::OrderFree => Vec::new(),
             Self::BoxWeight(values) => weighted(values, |w, value| w.box_weight = value),
             Self::RelativeWeight(values) => weighted(values, |w, value| w.relative_weight = value),
@@ -94,6 +100,7 @@ impl Experiment {
         Self {
             sweeps: vec![
                 Sweep::BoxWeight(vec![1.0, 3.0, 6.0, 12.0]),
+                Sweep::Residuals(vec![0, 32]),
                 Sweep::MotionWeight(vec![0.5, 1.0, 2.0]),
                 Sweep::Layout(vec![(Layout::Pca, 20), (Layout::Pca, 10), (Layout::Isomap(12), 6)]),
                 Sweep::Gamma(vec![0.03, 0.1, 0.3, 1.0]),

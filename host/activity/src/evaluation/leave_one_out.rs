@@ -155,12 +155,14 @@ fn one_fold(
     let (train_labels, test_labels): (Vec<usize>, Vec<usize>) =
         (train.iter().map(label).collect(), test.iter().map(label).collect());
     let mut outcome = Outcome::empty(classes);
-    for &arrangement in arrangements {
-        if arrangement == Views::Fused && views == 1 && arrangements.contains(&Views::Each) {
-            continue;
-        }
-        let chosen = choose(train, classes, experiment, arrangement)?;
-        let tested = patterns_of(&chosen.space, &vectors_of(&chosen.space, test)?, chosen.sharpness);
+    let doubled = |&arrangement: &Views| {
+        arrangement == Views::Fused && views == 1 && arrangements.contains(&Views::Each)
+    };
+    let asked: Vec<Views> =
+        arrangements.iter().copied().filter(|arrangement| !doubled(arrangement)).collect();
+    let chosen = choose(train, classes, experiment, &asked)?;
+    let tested = patterns_of(&chosen.space, &vectors_of(&chosen.space, test)?, chosen.sharpness);
+    for arrangement in asked {
         let confusion = if arrangement == Views::Each { &mut outcome.each } else { &mut outcome.fused };
         for joint in arrangement.arrangements(views) {
             let training = gathered(&chosen.patterns, &joint);

@@ -3,9 +3,11 @@
 //! Typical frames are k-means centres of the training frames (in place of the thesis' grid, whose cells grow with the power of the
 //! dimensions). Each frame is shared out over the centres by a Gaussian of its distance; the shares are averaged over the clip and
 //! square-rooted, which makes the straight product of two patterns the Bhattacharyya coefficient. The average does not know the
-//! order of frames. An ordered pattern adds the same over the clip's halves and thirds.
+//! order of frames. An ordered pattern adds the same over the clip's halves and thirds. A second, smaller codebook may add its
+//! [`super::residuals`].
 
 use super::frames::Mode;
+use super::residuals::residuals;
 use crate::embedding::rbf::exp_negative;
 use crate::embedding::{squared_norms, times_transposed};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
@@ -20,6 +22,8 @@ pub struct Codebook {
     pub centres: Array2<f32>,
     /// Mean squared distance of training frames to their nearest centre.
     pub spread: f32,
+    /// A smaller codebook whose residuals are part of the pattern.
+    pub residual: Option<Box<Codebook>>,
 }
 
 /// Frames drawn for the clustering at most.
@@ -54,16 +58,7 @@ impl Codebook {
         }
         let mut spread = 0.0;
         for _ in 0..ROUNDS {
-            let assigned: Vec<(usize, f32)> = sample
-                .outer_iter()
-                .into_par_iter()
-                .map(|frame| {
-                    centres.rows().into_iter().enumerate().fold((0, f32::INFINITY), |best, (m, centre)| {
-                        let d = squared(frame, centre);
-                        if d < best.1 { (m, d) } else { best }
-                    })
-                })
-                .collect();
+            let assigned = assigned(sample, &centres);
             let mut sums = Array2::<f32>::zeros(centres.dim());
             let mut counts = vec![0_u32; centres.nrows()];
             for ((m, _), frame) in assigned.iter().zip(sample.rows()) {
@@ -75,7 +70,20 @@ impl Codebook {
             }
             spread = assigned.iter().map(|(_, d)| d).sum::<f32>() / n.max(1) as f32;
         }
-        Self { centres, spread }
+        Self { centres, spread, residual: None }
+    }
+
+    /// The same with the residuals of another `size` centres in its patterns; 0 leaves them out.
+    #[must_use]
+    pub fn with_residuals(mut self, frames: ArrayView2<f32>, size: usize, seed: u64) -> Self {
+        self.residual = (size > 0).then(|| Box::new(Self::train(frames, size, seed)));
+        self
+    }
+
+    /// Numbers in a pattern.
+    pub fn pattern_width(&self, mode: Mode) -> Option<usize> {
+        let residual = self.residual.as_ref().map_or(0, |book| book.centres.len());
+        self.centres.nrows().checked_mul(segments(mode).len())?.checked_add(residual)
     }
 
     /// The frames' shares over the centres (frames x M): each row adds up to 1. `sharpness` scales the Gaussians' exponent
@@ -117,12 +125,34 @@ impl Codebook {
             let weight = 1.0 / (of as f32 * (to - from).max(1) as f32);
             out.mapv_inplace(|v| (v * weight).sqrt());
         }
+        if let Some(book) = &self.residual {
+            let parts = [pattern.view(), residuals(book, frames, sharpness).view()].map(|part| part.to_vec());
+            pattern = parts.concat().into();
+        }
         pattern
     }
 }
 
+/// The nearest centre of every frame and the squared distance to it.
+fn assigned(frames: ArrayView2<f32>, centres: &Array2<f32>) -> Vec<(usize, f32)> {
+    let (lengths, norms) = (squared_norms(frames), squared_norms(centres.view()));
+    let products = times_transposed(frames, centres.view());
+    products
+        .outer_iter()
+        .into_par_iter()
+        .zip(lengths)
+        .map(|(products, length)| {
+            let distances = products.iter().zip(&norms).map(|(product, norm)| norm - 2.0 * product);
+            let (nearest, distance) = distances
+                .enumerate()
+                .fold((0, f32::INFINITY), |best, (m, d)| if d < best.1 { (m, d) } else { best });
+            (nearest, (distance + length).max(0.0))
+        })
+        .collect()
+}
+
 /// The parts of a clip that a pattern holds: (which, of how many).
-pub(super) fn segments(mode: Mode) -> &'static [(usize, usize)] {
+fn segments(mode: Mode) -> &'static [(usize, usize)] {
     match mode {
         Mode::OrderFree => &[(0, 1)],
         Mode::Ordered => &[(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3)],

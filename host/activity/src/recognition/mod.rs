@@ -9,5 +9,6 @@ pub mod live;
 pub mod model;
 pub mod model_file;
 pub mod occupancy;
+pub mod residuals;
 pub mod space;
 pub mod svc;

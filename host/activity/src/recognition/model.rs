@@ -175,7 +175,7 @@ impl Recogniser {
             if experiment.mirror { clips.iter().map(Clip::mirrored).collect() } else { Vec::new() };
         let all: Vec<&Clip> = clips.iter().chain(&mirrors).collect();
         let Chosen { space, sharpness, classifier: kind, inner_accuracy, patterns } =
-            choose(&all, &activities, experiment, Views::Fused)?;
+            choose(&all, &activities, experiment, &[Views::Fused])?;
         let order: Vec<usize> = (0..views).collect();
         let patterns = rows(&patterns.iter().map(|of_views| joined(of_views, &order)).collect::<Vec<_>>());
         let labels: Vec<usize> =

@@ -189,7 +189,11 @@ impl Recogniser {
                     |boxes: usize| 2 * dimensions + boxes + if ordered { dimensions + boxes } else { 0 };
                 let found = book.centres.ncols();
                 fits(found == width(0) || found == width(BOX_NUMBERS), "the codebook's width")?;
-                book.centres.nrows().checked_mul(super::codebook::segments(self.settings.space.mode).len())
+                if let Some(residual) = &book.residual {
+                    let same = residual.centres.ncols() == found && residual.residual.is_none();
+                    fits(same, "the width of the residuals' centres")?;
+                }
+                book.pattern_width(self.settings.space.mode)
             }
         };
         let width = of_view.and_then(|width| width.checked_mul(self.views)).unwrap_or(usize::MAX);

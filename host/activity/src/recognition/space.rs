@@ -53,6 +53,8 @@ pub struct SpaceSettings {
     pub ridge: f64,
     /// How a clip becomes a pattern.
     pub pattern: PatternKind,
+    /// Centres whose residuals a codebook's patterns hold too; 0 for none, without effect on the thesis' grid.
+    pub residuals: usize,
     /// Whether the order of frames counts.
     pub mode: Mode,
     /// Parts of a frame's vector against one another.
@@ -70,6 +72,7 @@ impl Default for SpaceSettings {
             gamma: 0.1,
             ridge: 1e-3,
             pattern: PatternKind::Codebook(200),
+            residuals: 32,
             mode: Mode::OrderFree,
             weights: Weights::default(),
             seed: 1,
@@ -232,7 +235,8 @@ impl Galleries {
                     tracks.par_iter().map(|track| space.vectors(track)).collect();
                 let vectors = vectors?;
                 let frames = stacked(vectors.iter().map(|v| v.view()));
-                Pattern::Codebook(Codebook::train(frames.view(), *size, settings.seed))
+                let book = Codebook::train(frames.view(), *size, settings.seed);
+                Pattern::Codebook(book.with_residuals(frames.view(), settings.residuals, settings.seed))
             }
         };
         Ok(space)

@@ -1,0 +1,138 @@
+//! How many dimensions silhouettes need: residual variance of Isomap beside principal components, and landmark Isomap
+//! beside the whole; like Li 2014, section 9.3.1.
+
+use anyhow::Result;
+use farnear_activity::embedding::{
+    descriptor::Scaling, isomap::isomap, landmark::landmark_isomap, neighbours::Neighbourhood, pca::Pca,
+};
+use farnear_activity::synthetic::activities::clips;
+use ndarray::{Array2, ArrayView2, Axis, concatenate};
+use rayon::prelude::*;
+
+use crate::{
+    chart::{self, Curve},
+    page::Page,
+};
+
+/// Silhouettes laid out.
+const GALLERY: usize = 1500;
+const PEOPLE: usize = 6;
+const NEIGHBOURS: usize = 12;
+const DIMENSIONS: usize = 10;
+const LANDMARKS: [usize; 3] = [50, 150, 500];
+
+pub fn measure(page: &mut Page) -> Result<()> {
+    page.heading("How many dimensions");
+    page.paragraph(&format!(
+        "{GALLERY} silhouettes of {PEOPLE} synthetic people at all activities in four views, laid out by Isomap with {NEIGHBOURS} neighbours and by principal components. Residual variance is 1 - R2 between \
+         the distances of the layout and the distances it is meant to keep (Tenenbaum et al. 2000): path lengths along the \
+         neighbour graph for Isomap, straight ones for principal components. Isomap with all {} others as neighbours, as Li (2014) ran it, is the second curve exactly.",
+        GALLERY - 1
+    ));
+    let people = clips(PEOPLE, 4, 8.0, Scaling::default());
+    let all: Vec<ArrayView2<f32>> =
+        people.iter().flat_map(|clip| &clip.views).map(|view| view.descriptors.view()).collect();
+    let all = concatenate(Axis(0), &all)?;
+    let rows: Vec<usize> = (0..GALLERY).map(|i| (2 * i + 1) * all.nrows() / (2 * GALLERY)).collect();
+    let gallery = all.select(Axis(0), &rows);
+
+    let whole = isomap(gallery.view(), Neighbourhood::Nearest(NEIGHBOURS), DIMENSIONS)?;
+    let principal = Pca::fit(gallery.view(), DIMENSIONS)?.transform(gallery.view())?;
+    let straight = distances(gallery.view());
+    let isomap_curve = residuals(whole.coordinates.view(), &whole.geodesics);
+    let pca_curve = residuals(principal.view(), &straight);
+    let pca_paths = residuals(principal.view(), &whole.geodesics);
+    let landmarks = LANDMARKS
+        .iter()
+        .map(|&count| {
+            let found =
+                landmark_isomap(gallery.view(), Neighbourhood::Nearest(NEIGHBOURS), count, DIMENSIONS)?;
+            Ok((count, residuals(found.coordinates.view(), &whole.geodesics)))
+        })
+        .collect::<Result<Vec<_>>>()?;
+
+    let curve = |name: &str, values: &[f64]| Curve {
+        name: name.into(),
+        points: values.iter().enumerate().map(|(k, value)| (k as f64 + 1.0, *value)).collect(),
+    };
+    let curves = [
+        curve("Isomap, path lengths", &isomap_curve),
+        curve("PCA, straight distances", &pca_curve),
+        curve("PCA, path lengths", &pca_paths),
+    ];
+    let png = chart::lines("Residual variance", "dimensions", "1 - R2", &curves)?;
+    page.picture(
+        "activity-residual-variance.png",
+        &png,
+        "Residual variance over dimensions for Isomap and PCA",
+    )?;
+    let shown = [0, 1, 2, 3, 5, 9];
+    let cells = |values: &[f64]| shown.map(|k| format!("{:.4}", values[k])).to_vec();
+    let mut rows: Vec<Vec<String>> = [
+        ("Isomap, path lengths".to_owned(), &isomap_curve),
+        ("PCA, straight distances".to_owned(), &pca_curve),
+        ("PCA, path lengths".to_owned(), &pca_paths),
+    ]
+    .into_iter()
+    .map(|(name, values)| std::iter::once(name).chain(cells(values)).collect())
+    .collect();
+    for (count, values) in &landmarks {
+        let name = format!("landmark Isomap, {count} landmarks, path lengths");
+        rows.push(std::iter::once(name).chain(cells(values)).collect());
+    }
+    let head: Vec<String> =
+        std::iter::once("layout".to_owned()).chain(shown.map(|k| format!("{} dim.", k + 1))).collect();
+    page.table(1, &head, &rows);
+    Ok(())
+}
+
+/// Straight distances of all rows.
+fn distances(rows: ArrayView2<f32>) -> Array2<f32> {
+    let n = rows.nrows();
+    let values: Vec<f32> = (0..n * n)
+        .into_par_iter()
+        .map(|at| {
+            let (a, b) = (rows.row(at / n), rows.row(at % n));
+            a.iter().zip(b).map(|(p, q)| (p - q) * (p - q)).sum::<f32>().sqrt()
+        })
+        .collect();
+    Array2::from_shape_vec((n, n), values).unwrap_or_default()
+}
+
+/// Residual variance of the first 1, 2, ... columns of `coordinates` against `distances`.
+fn residuals(coordinates: ArrayView2<f32>, distances: &Array2<f32>) -> Vec<f64> {
+    let (n, dimensions) = coordinates.dim();
+    (1..=dimensions)
+        .into_par_iter()
+        .map(|used| {
+            let [mut sx, mut sy, mut sxx, mut syy, mut sxy, mut count] = [0.0_f64; 6];
+            for i in 0..n {
+                for j in 0..i {
+                    let squared: f32 =
+                        (0..used).map(|k| (coordinates[[i, k]] - coordinates[[j, k]]).powi(2)).sum();
+                    let (x, y) = (f64::from(squared.sqrt()), f64::from(distances[[i, j]]));
+                    sx += x;
+                    sy += y;
+                    sxx += x * x;
+                    syy += y * y;
+                    sxy += x * y;
+                    count += 1.0;
+                }
+            }
+            let covariance = sxy - sx * sy / count;
+            1.0 - covariance * covariance / ((sxx - sx * sx / count) * (syy - sy * sy / count))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_keeps_all_distances_leaves_nothing_and_a_projection_leaves_some() {
+        let points = Array2::from_shape_fn((40, 2), |(i, k)| ((i * (7 + 5 * k)) % 11) as f32);
+        let found = residuals(points.view(), &distances(points.view()));
+        assert!(found[1].abs() < 1e-9 && found[0] > 0.1, "{found:?}");
+    }
+}

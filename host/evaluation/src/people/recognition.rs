@@ -1,0 +1,210 @@
+//! Leave-one-subject-out on every set: accuracies with intervals, what was chosen, confusion matrices; like Li 2014, tables 9.1 to 9.3.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result};
+use farnear_activity::{
+    evaluation::{
+        choice::Views,
+        confusion::{Confusion, wilson},
+        experiment::{Experiment, Sweep},
+        leave_one_out::{Choice, Outcome, leave_one_subject_out},
+    },
+    recognition::{classifier::ClassifierKind, frames::Mode, space::Layout, space::PatternKind},
+};
+
+use super::{
+    data::Data,
+    matrix,
+    sets::{self, Set},
+};
+use crate::page::Page;
+
+/// The methods that are reported apart.
+pub const METHODS: [Method; 5] = [
+    Method { name: "thesis", classifier: "k-NN", kind: Kind::Thesis },
+    Method { name: "order-free", classifier: "k-NN", kind: Kind::Neighbours(Mode::OrderFree) },
+    Method { name: "order-free", classifier: "SVC", kind: Kind::Vectors(Mode::OrderFree) },
+    Method { name: "ordered", classifier: "k-NN", kind: Kind::Neighbours(Mode::Ordered) },
+    Method { name: "ordered", classifier: "SVC", kind: Kind::Vectors(Mode::Ordered) },
+];
+
+/// A way to recognise.
+#[derive(Clone, Copy)]
+pub struct Method {
+    name: &'static str,
+    classifier: &'static str,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Thesis,
+    Neighbours(Mode),
+    Vectors(Mode),
+}
+
+impl Method {
+    fn experiment(self, set: &Set) -> Experiment {
+        let weights = [Sweep::BoxWeight(vec![1.0, 3.0, 6.0, 12.0]), Sweep::Residuals(vec![0, 32])];
+        let experiment = match self.kind {
+            Kind::Thesis => Experiment::thesis(),
+            Kind::Neighbours(mode) => {
+                Experiment { sweeps: weights.to_vec(), ..Experiment::searched(mode).with_neighbours() }
+            }
+            Kind::Vectors(mode) => {
+                let more = [
+                    Sweep::MotionWeight(vec![0.5, 1.0, 2.0]),
+                    Sweep::RelativeWeight(vec![0.0, 1.0, 2.0]),
+                    Sweep::Layout(vec![(Layout::Pca, 20), (Layout::Isomap(12), 6)]),
+                ];
+                Experiment { sweeps: weights.into_iter().chain(more).collect(), ..Experiment::searched(mode) }
+            }
+        };
+        Experiment { mirror: experiment.mirror && set.mirror, ..experiment }
+    }
+
+    /// What is asked of it: one view and fused, per cent.
+    fn asked(self, set: &Set) -> [Option<f64>; 2] {
+        match self.kind {
+            Kind::Vectors(Mode::OrderFree) => [set.asked[0], set.asked[1]],
+            Kind::Vectors(Mode::Ordered) => [set.asked[2], set.asked[3]],
+            Kind::Thesis | Kind::Neighbours(_) => [None, None],
+        }
+    }
+}
+
+pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
+    page.heading("Recognition, leaving one subject out");
+    page.paragraph(
+        "Of every subject's clips nothing is seen before they are recognised: layout, weights, codebook, residuals, sharpness and the classifier's parameter are chosen by cross-validation over the \
+         other subjects' clips, anew for each left-out subject. *thesis* is Li's 0/1 grid over three Isomap dimensions with nearest neighbours; *order-free* keeps his promise that shuffling \
+         the frames changes nothing; *ordered* knows how silhouettes move. *One view* counts the answers of all views, each recognised by itself; *fused* is one answer from all views. In brackets the 95 % interval \
+         (Wilson) for as many independent trials as there are clips: the views of a clip are not independent, the clips of a subject not quite.",
+    );
+    let (sets, missing) = sets::all(data)?;
+    for name in missing {
+        page.paragraph(&format!("Skipped: {name} is not at hand."));
+    }
+    for set in &sets {
+        eprintln!("  {}", set.name);
+        measure_set(page, set).with_context(|| set.name)?;
+    }
+    Ok(())
+}
+
+fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
+    let views = set.clips.first().map_or(0, |clip| clip.views.len());
+    page.subheading(set.name);
+    page.paragraph(&format!("{} {} clips.", set.about, set.clips.len()));
+    let outcomes = METHODS
+        .iter()
+        .map(|method| {
+            let outcome = leave_one_subject_out(&set.clips, &method.experiment(set), Clone::clone)?;
+            Ok((*method, outcome))
+        })
+        .collect::<Result<Vec<(Method, Outcome)>>>()?;
+    let mut head = vec!["mode", "classifier", "one view, %", "asked for"];
+    if views > 1 {
+        head.extend(["four views fused, %", "asked for"]);
+    }
+    let rows: Vec<Vec<String>> = outcomes
+        .iter()
+        .map(|(method, outcome)| {
+            let asked = method.asked(set).map(|a| a.map_or_else(|| "-".into(), |a| format!("{a:.0}")));
+            let [one, several] = asked;
+            let mut row =
+                vec![method.name.into(), method.classifier.into(), accuracy(&outcome.each, set), one];
+            if views > 1 {
+                row.extend([accuracy(&outcome.fused, set), several]);
+            }
+            row
+        })
+        .collect();
+    page.table(2, &head, &rows);
+    for (method, outcome) in &outcomes {
+        if !matches!(method.kind, Kind::Neighbours(_)) {
+            page.paragraph(&format!("{}, chosen: {}.", method.name, chosen(&outcome.chosen, views)));
+        }
+    }
+    let shown = |kind: Kind| {
+        outcomes.iter().find(|(method, _)| method.kind == kind).map(|(_, outcome)| &outcome.fused)
+    };
+    let (Some(free), Some(ordered)) =
+        (shown(Kind::Vectors(Mode::OrderFree)), shown(Kind::Vectors(Mode::Ordered)))
+    else {
+        return Ok(());
+    };
+    let png = matrix::pictures(&[("order-free, SVC", free), ("ordered, SVC", ordered)])?;
+    let seen = if views > 1 { "four views fused" } else { "one view" };
+    page.picture(
+        &format!("activity-{}.png", set.short),
+        &png,
+        &format!("{}: confusion in per cent of what was done (rows), {seen}", set.name),
+    )?;
+    page.paragraph(&format!("Order-free, SVC, {seen}, in per cent of what was done (rows):"));
+    page.block(&free.to_markdown());
+    Ok(())
+}
+
+/// An accuracy in per cent and its interval.
+fn accuracy(confusion: &Confusion, set: &Set) -> String {
+    let (low, high) = interval(confusion, set);
+    format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
+}
+
+/// Wilson's interval for as many trials as there are independent clips.
+fn interval(confusion: &Confusion, set: &Set) -> (f64, f64) {
+    // A set that holds its mirrors has every performance twice.
+    let trials = set.clips.len() / if set.mirror { 1 } else { 2 };
+    let right = (confusion.accuracy() * trials as f64).round();
+    wilson(right as u32, trials as u32, 1.96)
+}
+
+/// How often each value was chosen for fused views.
+fn chosen(choices: &[Choice], views: usize) -> String {
+    let wanted = if views > 1 { Views::Fused } else { Views::Each };
+    let choices: Vec<&Choice> = choices.iter().filter(|choice| choice.views == wanted).collect();
+    let mut parts = Vec::new();
+    let mut tell = |name: &str, value: &dyn Fn(&Choice) -> String| {
+        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+        for choice in &choices {
+            *counts.entry(value(choice)).or_default() += 1;
+        }
+        let mut counts: Vec<(String, usize)> =
+            counts.into_iter().filter(|(value, _)| !value.is_empty()).collect();
+        counts.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
+        if !counts.is_empty() {
+            let text: Vec<String> =
+                counts.iter().map(|(value, count)| format!("{value} ({count})")).collect();
+            parts.push(format!("{name} {}", text.join(", ")));
+        }
+    };
+    let thesis = |choice: &Choice| matches!(choice.space.pattern, PatternKind::Thesis(_));
+    let unless_thesis = |choice: &Choice, text: String| if thesis(choice) { String::new() } else { text };
+    tell("layout", &|choice| match choice.space.layout {
+        Layout::Isomap(least) => {
+            format!("Isomap {least} to {} dimensions, gamma {}", choice.space.dimensions, choice.space.gamma)
+        }
+        Layout::Pca => format!("PCA to {} dimensions", choice.space.dimensions),
+    });
+    tell("pattern", &|choice| match &choice.space.pattern {
+        PatternKind::Thesis(bins) => bins.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x "),
+        PatternKind::Codebook(size) => format!("codebook of {size}"),
+    });
+    tell("residuals", &|choice| unless_thesis(choice, choice.space.residuals.to_string()));
+    tell("box weight", &|choice| unless_thesis(choice, choice.space.weights.box_weight.to_string()));
+    tell("relative weight", &|choice| {
+        unless_thesis(choice, choice.space.weights.relative_weight.to_string())
+    });
+    tell("motion weight", &|choice| {
+        let moves = choice.space.mode == Mode::Ordered && !thesis(choice);
+        if moves { choice.space.weights.motion_weight.to_string() } else { String::new() }
+    });
+    tell("sharpness", &|choice| unless_thesis(choice, choice.sharpness.to_string()));
+    tell("classifier", &|choice| match choice.classifier {
+        ClassifierKind::Knn(k) => format!("k = {k}"),
+        ClassifierKind::Svc(cost) => format!("cost {cost}"),
+    });
+    parts.join("; ")
+}

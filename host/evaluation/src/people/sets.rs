@@ -1,0 +1,120 @@
+//! The sets of clips that recognition is measured on.
+
+use anyhow::{Context, Result};
+use farnear_activity::{
+    embedding::descriptor::Scaling,
+    evaluation::skeleton_clips::{florence, utkinect},
+    recognition::clip::{Clip, Track},
+    synthetic::activities,
+};
+use rayon::prelude::*;
+
+use super::{
+    data::{Data, numbered_files},
+    strips,
+};
+
+/// Synthetic people, and frames per second of their clips.
+pub const PEOPLE: usize = 21;
+pub const RATE_HZ: f64 = 8.0;
+/// Views of sets that are drawn from bodies.
+pub const VIEWS: usize = 4;
+
+/// Clips under a name.
+pub struct Set {
+    /// For headings.
+    pub name: &'static str,
+    /// For file names.
+    pub short: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// The clips.
+    pub clips: Vec<Clip>,
+    /// Whether mirrors of training clips train too; a set that holds its mirrors needs none.
+    pub mirror: bool,
+    /// Asked for, per cent: order-free in one view and fused, ordered in one view and fused.
+    pub asked: [Option<f64>; 4],
+}
+
+/// All sets that can be had, and the names of those that cannot.
+pub fn all(data: &Data) -> Result<(Vec<Set>, Vec<&'static str>)> {
+    let scaling = Scaling::default();
+    let mut sets = vec![synthetic()];
+    let mut missing = Vec::new();
+    match data.bytes("skeletons/UTKinect_Skeletons.mat")? {
+        Some(bytes) => sets.push(Set {
+            name: "UTKinect",
+            short: "utkinect",
+            about: "UTKinect-Action3D (Xia et al. 2012): 10 activities, 10 subjects, two repetitions; measured joints dressed with capsules and drawn from \
+                    four views, 90 deg apart.",
+            clips: utkinect(&bytes, VIEWS, scaling).context("UTKinect")?,
+            mirror: true,
+            asked: [Some(74.0), Some(84.0), Some(84.0), Some(93.0)],
+        }),
+        None => missing.push("UTKinect"),
+    }
+    match data.bytes("skeletons/Florence_3D_Action_Skeletons.mat")? {
+        Some(bytes) => sets.push(Set {
+            name: "Florence",
+            short: "florence",
+            about: "Florence 3D Actions (Seidenari et al. 2013): 9 activities, 10 subjects; measured joints dressed and drawn likewise.",
+            clips: florence(&bytes, VIEWS, scaling).context("Florence")?,
+            mirror: true,
+            asked: [Some(70.0), Some(79.0), Some(77.0), Some(85.0)],
+        }),
+        None => missing.push("Florence"),
+    }
+    match weizmann(data)? {
+        Some(set) => sets.push(set),
+        None => missing.push("Weizmann"),
+    }
+    Ok((sets, missing))
+}
+
+/// 21 people at the activities of table 7.1.
+pub fn synthetic() -> Set {
+    Set {
+        name: "Synthetic people",
+        short: "synthetic",
+        about: "The 10 activities of Li (2014), table 7.1, by 21 seeded people of different build, habits, tempo and handedness, once each; capsule bodies drawn from \
+                four views, 90 deg apart, the first 45 deg off the path.",
+        clips: activities::clips(PEOPLE, VIEWS, RATE_HZ, Scaling::default()),
+        mirror: true,
+        asked: [Some(95.0), Some(98.0), Some(95.0), Some(98.0)],
+    }
+}
+
+/// Folders of the strips and what is done in them.
+const WEIZMANN: [(&str, &str); 4] = [("0", "wave one"), ("1", "wave two"), ("3", "jack"), ("4", "bend")];
+/// Strips of one subject, mirrors too, have numbers that share this quotient.
+const STRIPS_PER_SUBJECT: u64 = 8;
+
+fn weizmann(data: &Data) -> Result<Option<Set>> {
+    let Some(folder) = data.path("weizmann4") else { return Ok(None) };
+    let mut files = Vec::new();
+    for (name, activity) in WEIZMANN {
+        for (number, path) in numbered_files(&folder.join(name))? {
+            files.push((number, activity, path));
+        }
+    }
+    let clips = files
+        .into_par_iter()
+        .map(|(number, activity, path)| {
+            let masks = strips::masks(&strips::read(&path)?);
+            Ok(Clip {
+                subject: format!("w{}", number / STRIPS_PER_SUBJECT),
+                activity: activity.into(),
+                views: vec![Track::from_masks(&masks, Scaling::default(), true)],
+            })
+        })
+        .collect::<Result<Vec<_>>>()?;
+    Ok(Some(Set {
+        name: "Weizmann strips",
+        short: "weizmann",
+        about: "Four actions of the Weizmann set (Blank et al. 2005) by five subjects as strips of 64 x 64 video frames, segmented here (a colour model of the wall per row). Every clip is there once more as its mirror image; \
+                both have the same subject, so that they are never split between training and test. Intervals count a clip and its mirror as one.",
+        clips,
+        mirror: false,
+        asked: [Some(97.0), None, Some(97.0), None],
+    }))
+}
