@@ -11,6 +11,7 @@
 #![allow(clippy::needless_range_loop)] // Indexed loops on purpose: see `Lanes` on closures.
 
 mod convolve;
+mod lags;
 mod lanes;
 mod median;
 mod peak;
@@ -19,6 +20,7 @@ mod rows;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
+pub(crate) use lags::{Lag, lagged_products};
 pub(crate) use median::median_row;
 pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
