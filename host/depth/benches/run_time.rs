@@ -176,8 +176,9 @@ fn main() {
     }
     if wanted("fill_640x480") {
         // A map with 20 discs of 30 px without texture.
-        let low = Array2::from_shape_fn((480, 640), |(y, x)| {
-            (y % 120).abs_diff(60).pow(2) + (x % 128).abs_diff(64).pow(2) < 900
+        let texture = Array2::from_shape_fn((480, 640), |(y, x)| {
+            let inside = (y % 120).abs_diff(60).pow(2) + (x % 128).abs_diff(64).pow(2) < 900;
+            if inside { 0.0 } else { 1.0 }
         });
         let map = farnear_depth::run::depth_from_pair(
             vga[0].view(),
@@ -187,7 +188,13 @@ fn main() {
             &Settings::default(),
         )
         .unwrap();
-        report("fill_640x480", None, 1, time(20, || fill_low_texture(&mut map.clone(), low.view())), None);
+        report(
+            "fill_640x480",
+            None,
+            1,
+            time(20, || fill_low_texture(&mut map.clone(), texture.view(), 9)),
+            None,
+        );
     }
     if wanted("uncertainty_640x480") {
         let settings = Settings::default();

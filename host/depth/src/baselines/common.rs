@@ -72,7 +72,7 @@ impl Pair {
     pub(super) fn finish(&self, evidence: Evidence, optics: &Optics, settings: &Settings) -> DepthMap {
         let Evidence { alpha, mut texture, misfit, reach_px } = evidence;
         let mut alpha = alpha;
-        let mut low_texture = settings.fill.then(|| confidence::low_texture(texture.view()));
+        let mut energy = settings.fill.then(|| texture.clone());
         if let Some(holes) = &self.holes {
             let near_holes = dilate_square(holes, reach_px);
             Zip::from(&mut alpha).and(&mut texture).and(&near_holes).for_each(|alpha, texture, near_hole| {
@@ -80,8 +80,8 @@ impl Pair {
                     (*alpha, *texture) = (f32::NAN, 0.0);
                 }
             });
-            if let Some(low_texture) = &mut low_texture {
-                Zip::from(low_texture).and(&near_holes).for_each(|low, near_hole| *low &= !near_hole);
+            if let Some(energy) = &mut energy {
+                confidence::withhold(energy, &near_holes);
             }
         }
         let scale = confidence::texture_scale(texture.view());
@@ -97,8 +97,8 @@ impl Pair {
         });
         let warnings = self.warnings.clone();
         let mut map = DepthMap { depth_mm, confidence: values, low_texture_fraction, warnings };
-        if let Some(low_texture) = low_texture {
-            fill_low_texture(&mut map, low_texture.view());
+        if let Some(energy) = energy {
+            fill_low_texture(&mut map, energy.view(), reach_px);
         }
         // A baseline's own bias may carry much of a scene beyond the near focus.
         let beyond =

@@ -1,14 +1,14 @@
-//! The cubic surface of Li 2014, eq. 6.16, fitted robustly and with no more terms than the samples support.
+//! The surface that is fitted to a margin: a polynomial of up to third order, from as wide a margin as agrees with it.
+//!
+//! Wide margins hold more samples and tell curvature from noise: in the middle of a disc of radius R the standard deviation of
+//! a quadratic surface is about eight times less with a margin as wide as R than with one of R / 4. But the farther away,
+//! the less a cubic follows the surface, and other surfaces come in. So the margin is widened by factors of three as long as
+//! the wider fit explains the nearest samples as well as the fit to the nearest did (their robust spread grows by no more
+//! than [`TOLERANCE`]).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{SMatrix, SVector};
 
 use super::Sample;
-
-/// Terms of the plane, the quadratic and the cubic surface: 1, x, y, x^2, y^2, x^3, y^3.
-const TERMS: [usize; 3] = [3, 5, 7];
-
-/// Neighbouring samples share their smoothing window (7x7): this many count as one.
-const SAMPLES_PER_INDEPENDENT: f64 = 49.0;
 
 /// Fewest samples for any fit.
 const MIN_SAMPLES: usize = 12;
@@ -17,100 +17,158 @@ const MIN_SAMPLES: usize = 12;
 const HUBER: f64 = 1.345;
 
 /// Rounds of reweighting.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 3;
 
-/// At most about this many samples are used; more only repeat each other.
-const MAX_SAMPLES: usize = 800;
+/// Width of the narrowest margin that a fit is compared on, px.
+const NARROW_PX: usize = 7;
+
+/// By how much the spread of the nearest samples may grow when the margin is widened.
+const TOLERANCE: f64 = 1.25;
 
 /// A fitted surface.
 pub(super) struct Surface {
-    centre: [f64; 2],
-    scale: f64,
+    frame: Frame,
     coefficients: Vec<f64>,
     /// Depths of the margin, beyond which the surface is not trusted by more than their spread.
     limits: [f64; 2],
 }
 
-fn terms(y: f64, x: f64) -> [f64; 7] {
-    [1.0, x, y, x * x, y * y, x * x * x, y * y * y]
+/// Coordinates within [-1, 1].
+#[derive(Clone, Copy)]
+struct Frame {
+    centre: [f64; 2],
+    scale: f64,
 }
 
-impl Surface {
-    /// Fits the samples; none if there are too few.
-    pub fn fit(samples: &[Sample]) -> Option<Self> {
-        if samples.len() < MIN_SAMPLES {
-            return None;
-        }
-        let step = samples.len().div_ceil(MAX_SAMPLES);
-        let samples: Vec<Sample> = samples.iter().copied().step_by(step).collect();
+impl Frame {
+    fn of(samples: &[Sample]) -> Self {
         let n = samples.len() as f64;
         let mean = |of: fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>() / n;
         let centre = [mean(|s| s.y), mean(|s| s.x)];
         let reach = |s: &Sample| (s.y - centre[0]).abs().max((s.x - centre[1]).abs());
-        let scale = samples.iter().map(reach).fold(1.0, f64::max);
-        let rows: Vec<[f64; 7]> =
-            samples.iter().map(|s| terms((s.y - centre[0]) / scale, (s.x - centre[1]) / scale)).collect();
-        let independent = (n * step as f64 / SAMPLES_PER_INDEPENDENT).max(1.0);
-        let (_, coefficients) = TERMS
+        Self { centre, scale: samples.iter().map(reach).fold(1.0, f64::max) }
+    }
+
+    fn terms(self, y: f64, x: f64) -> [f64; 10] {
+        let [y, x] = [(y - self.centre[0]) / self.scale, (x - self.centre[1]) / self.scale];
+        [1.0, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y]
+    }
+}
+
+impl Surface {
+    /// Fits the samples, which come nearest first; none if there are too few.
+    pub fn fit(samples: &[Sample]) -> Option<Self> {
+        let within = |width_px: usize| &samples[..samples.partition_point(|s| s.distance_px <= width_px)];
+        let widest = samples.last()?.distance_px;
+        let mut width_px = NARROW_PX;
+        let mut best: Option<(Self, f64)> = None;
+        loop {
+            if let Some(surface) = Self::fit_all(within(width_px)) {
+                let spread = surface.spread_mm(within(NARROW_PX));
+                match &best {
+                    // Nothing nearer than 1 um is told apart.
+                    Some((_, narrow)) if spread > TOLERANCE * narrow.max(1e-3) => break,
+                    Some((_, narrow)) => best = Some((surface, narrow.max(1e-3))),
+                    None => best = Some((surface, spread)),
+                }
+            }
+            if width_px >= widest {
+                break;
+            }
+            width_px *= 3;
+        }
+        best.map(|(surface, _)| surface)
+    }
+
+    /// Fits all of the samples with as many terms as they support: plane, quadratic or cubic.
+    fn fit_all(samples: &[Sample]) -> Option<Self> {
+        if samples.len() < MIN_SAMPLES {
+            return None;
+        }
+        let frame = Frame::of(samples);
+        let rows: Vec<[f64; 10]> = samples.iter().map(|s| frame.terms(s.y, s.x)).collect();
+        let independent = samples.iter().map(|s| s.independent).sum::<f64>().max(1.0);
+        let fits = [
+            fit_robustly::<3>(&rows, samples),
+            fit_robustly::<6>(&rows, samples),
+            fit_robustly::<10>(&rows, samples),
+        ];
+        let (_, coefficients) = fits
             .into_iter()
-            .filter_map(|count| {
-                let (coefficients, variance) = fit_robustly(&rows, &samples, count)?;
+            .flatten()
+            .map(|(coefficients, variance)| {
+                let count = coefficients.len();
+                // Bayesian information criterion.
                 let information =
                     independent * variance.max(1e-12).ln() + count as f64 * independent.ln().max(1.0);
-                Some((information, coefficients))
+                (information, coefficients)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let depths = || samples.iter().map(|s| s.depth_mm);
         let [low, high] =
             [depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max)];
-        let limits = [low - (high - low), high + (high - low)];
-        Some(Self { centre, scale, coefficients, limits })
+        Some(Self { frame, coefficients, limits: [low - (high - low), high + (high - low)] })
+    }
+
+    /// Robust standard deviation of the samples about the surface, mm.
+    fn spread_mm(&self, samples: &[Sample]) -> f64 {
+        deviation(samples.iter().map(|s| s.depth_mm - self.value(s.y, s.x)).collect())
+    }
+
+    fn value(&self, y: f64, x: f64) -> f64 {
+        self.frame.terms(y, x).iter().zip(&self.coefficients).map(|(t, c)| t * c).sum()
     }
 
     /// Depth at a pixel, mm.
     pub fn depth_mm(&self, y: usize, x: usize) -> f32 {
-        let row = terms((y as f64 - self.centre[0]) / self.scale, (x as f64 - self.centre[1]) / self.scale);
-        let depth: f64 = row.iter().zip(&self.coefficients).map(|(t, c)| t * c).sum();
-        depth.clamp(self.limits[0], self.limits[1]) as f32
+        self.value(y as f64, x as f64).clamp(self.limits[0], self.limits[1]) as f32
     }
 }
 
-/// Coefficients of the first `count` terms and the robust variance of the residuals; none if the samples do not
-/// determine them.
-fn fit_robustly(rows: &[[f64; 7]], samples: &[Sample], count: usize) -> Option<(Vec<f64>, f64)> {
-    let mut weights: Vec<f64> = samples.iter().map(|s| s.confidence).collect();
+/// The median absolute deviation from 0 as the standard deviation of a normal distribution, which is 1.4826 of it.
+fn deviation(mut residuals: Vec<f64>) -> f64 {
+    residuals.iter_mut().for_each(|r| *r = r.abs());
+    let middle = residuals.len() / 2;
+    if residuals.is_empty() {
+        return 0.0;
+    }
+    1.4826 * *residuals.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Coefficients of the first `N` terms and the robust variance of the residuals; none if the samples do not determine
+/// them.
+fn fit_robustly<const N: usize>(rows: &[[f64; 10]], samples: &[Sample]) -> Option<(Vec<f64>, f64)> {
+    let rows = || rows.iter().map(|row| *row.first_chunk::<N>().unwrap_or(&[0.0; N]));
+    let mut weights: Vec<f64> = samples.iter().map(|s| s.weight).collect();
     let mut result = None;
     for _ in 0..ROUNDS {
-        let mut normal = DMatrix::<f64>::zeros(count, count);
-        let mut rhs = DVector::<f64>::zeros(count);
-        for ((row, sample), weight) in rows.iter().zip(samples).zip(&weights) {
-            for i in 0..count {
-                rhs[i] += weight * row[i] * sample.depth_mm;
-                for j in 0..=i {
-                    normal[(i, j)] += weight * row[i] * row[j];
-                }
+        let mut normal = [[0.0; N]; N];
+        let mut rhs = [0.0; N];
+        for ((row, sample), weight) in rows().zip(samples).zip(&weights) {
+            for i in 0..N {
+                let weighted = weight * row[i];
+                rhs[i] += weighted * sample.depth_mm;
+                normal[i].iter_mut().zip(&row).for_each(|(sum, term)| *sum += weighted * term);
             }
         }
         // A hair of ridge: coordinates are within [-1, 1], so this is far below any real term.
-        for i in 0..count {
-            normal[(i, i)] *= 1.0 + 1e-10;
-        }
-        let coefficients = normal.cholesky()?.solve(&rhs);
-        let residuals: Vec<f64> = rows
-            .iter()
+        (0..N).for_each(|i| normal[i][i] *= 1.0 + 1e-10);
+        let normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
+        let coefficients = normal.cholesky()?.solve(&SVector::from(rhs));
+        // Residuals of samples that weigh less are larger: measured by what each should be.
+        let outlying: Vec<f64> = rows()
             .zip(samples)
-            .map(|(row, s)| s.depth_mm - row.iter().zip(coefficients.iter()).map(|(t, c)| t * c).sum::<f64>())
+            .map(|(row, s)| {
+                let value: f64 = row.iter().zip(coefficients.iter()).map(|(t, c)| t * c).sum();
+                (s.depth_mm - value).abs() * (s.weight / s.independent).sqrt()
+            })
             .collect();
-        let mut sorted: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-        let middle = sorted.len() / 2;
-        // The median absolute deviation of a normal distribution is 1 / 1.4826 of its standard deviation.
-        let deviation = 1.4826 * *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-        for ((weight, residual), sample) in weights.iter_mut().zip(&residuals).zip(samples) {
-            let factor =
-                if residual.abs() <= HUBER * deviation { 1.0 } else { HUBER * deviation / residual.abs() };
-            *weight = sample.confidence * factor;
+        let spread = deviation(outlying.clone());
+        let limit = (HUBER * spread).max(f64::MIN_POSITIVE);
+        for ((weight, outlying), sample) in weights.iter_mut().zip(&outlying).zip(samples) {
+            *weight = sample.weight / (outlying / limit).max(1.0);
         }
-        result = Some((coefficients.as_slice().to_vec(), deviation * deviation));
+        result = Some((coefficients.as_slice().to_vec(), spread * spread));
     }
     result
 }

@@ -298,9 +298,14 @@ impl Input<'_> {
 
     /// The pixels whose depth a bad pixel takes part in, if there are any.
     pub(crate) fn invalid(&self, operators: &Operators, settings: &Settings) -> Option<Array2<bool>> {
-        let reach = 2 * (operators.kernel_size() / 2) + settings.smoothing_px / 2;
+        let reach = reach_px(operators, settings);
         self.bad().map(|bad| crate::metrics::dilate_square(bad, reach))
     }
+}
+
+/// How far the evidence of a pixel reaches: pre-filter, operator and smoothing window.
+pub(crate) fn reach_px(operators: &Operators, settings: &Settings) -> usize {
+    2 * (operators.kernel_size() / 2) + settings.smoothing_px / 2
 }
 
 /// Confidence from which a pixel has a say in whether the pair looks swapped.

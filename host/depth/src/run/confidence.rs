@@ -9,7 +9,7 @@
 //!
 //! Cost: O(1) per pixel; the median is taken over at most some 10,000 pixels on a regular grid.
 
-use ndarray::{Array2, ArrayView2, Ix2, SliceInfo, SliceInfoElem, s};
+use ndarray::{Array2, ArrayView2, Ix2, SliceInfo, SliceInfoElem, Zip, s};
 
 /// Texture energy relative to its median below which a pixel counts as low texture.
 pub const LOW_TEXTURE: f32 = 0.05;
@@ -48,8 +48,11 @@ pub fn confidence(texture: f32, misfit: f32, scale: f32) -> f32 {
     }
 }
 
-/// The pixels whose texture energy is below [`LOW_TEXTURE`] times its median.
-pub fn low_texture(texture: ArrayView2<f32>) -> Array2<bool> {
-    let threshold = LOW_TEXTURE * texture_scale(texture);
-    texture.mapv(|t| t < threshold)
+/// Marks pixels whose texture says nothing, for they are invalid.
+pub(crate) fn withhold(texture: &mut Array2<f32>, invalid: &Array2<bool>) {
+    Zip::from(texture).and(invalid).for_each(|texture, invalid| {
+        if *invalid {
+            *texture = f32::NAN;
+        }
+    });
 }

@@ -87,14 +87,18 @@ impl Processor {
                 misfit: self.misfit.view_mut(),
             },
         );
-        let low_texture = self.settings.fill.then(|| confidence::low_texture(self.map.confidence.view()));
+        let mut texture = self.settings.fill.then(|| self.map.confidence.clone());
         finish(&mut self.map, &self.misfit, self.backend, threads);
         if let Some(invalid) = input.invalid(&self.operators, &self.settings) {
             job.repair(&mut self.map, &invalid);
+            if let Some(texture) = &mut texture {
+                confidence::withhold(texture, &invalid);
+            }
         }
         rim::fill(&mut self.map, self.operators.kernel_size());
-        if let Some(low_texture) = low_texture {
-            fill_low_texture(&mut self.map, low_texture.view());
+        if let Some(texture) = texture {
+            let reach_px = check::reach_px(&self.operators, &self.settings);
+            fill_low_texture(&mut self.map, texture.view(), reach_px);
         }
         self.map.warnings = input.warnings(&self.operators, &self.optics);
         self.map.warnings.extend(check::after(&self.map, &self.optics));

@@ -41,8 +41,10 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
         "Focal stacks of {STACK} slices made from the HCI 4D light fields (as published with Ashfaq & Mahmood, Pattern Recognition 170, 2026, 112112), of which \
          slices {} and {} are taken as a pair. Their optics and PSF are not known and the pair's blur is far beyond what the operators are made for, so \
          only the order of depths is judged: Spearman's rank correlation with the given depth over pixels of confidence {LEAST_CONFIDENCE} or \
-         more. Pill-box, smoothing 15, median 7. The sign is the same throughout: the given maps grow towards the camera, or the slices begin near; \
-         the magnitude is what counts.",
+         more. Pill-box, smoothing 15, median 7. Neither the stacks nor the maps say which way they count, so it is measured: the last column is the rank \
+         correlation of the given map with the number of the slice in which each place is sharpest (variation over 15x15 pixels, all {STACK} slices, the same \
+         pixels). It is positive, so given values rise with the slice of best focus; later slices are taken as focused nearer, where depth in mm is less, and \
+         -1 would be perfect.",
         SLICES[0], SLICES[1]
     ));
     let mut names: Vec<PathBuf> = std::fs::read_dir(folder)?
@@ -56,12 +58,19 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
             let name = scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let slice = |number: usize| scene.join(format!("{name}{number}.png"));
             let depth = matlab_depth(&scene.join(format!("{name}D.mat")))?;
-            let (rank, part) = judge(&slice(SLICES[0]), &slice(SLICES[1]), &depth)
-                .with_context(|| format!("the stack {name}"))?;
-            Ok(vec![name, format!("{rank:.3}"), format!("{:.1}", 100.0 * part)])
+            let about = || format!("the stack {name}");
+            let judged = judge(&slice(SLICES[0]), &slice(SLICES[1]), &depth).with_context(about)?;
+            let sharpest = sharpest((1..=STACK).map(|number| (number, slice(number)))).with_context(about)?;
+            let reference = judged.against(&sharpest, &depth);
+            Ok(vec![
+                name,
+                format!("{:.3}", judged.rank),
+                format!("{:.1}", 100.0 * judged.part),
+                format!("{reference:.3}"),
+            ])
         })
         .collect::<Result<Vec<_>>>()?;
-    page.table(1, &["scene", "rank correlation", "pixels judged, %"], &rows);
+    page.table(1, &["scene", "rank correlation", "pixels judged, %", "given map with sharpest slice"], &rows);
     Ok(())
 }
 
@@ -70,22 +79,8 @@ fn measure_phone(page: &mut Page, folder: &Path) -> Result<()> {
     const PHONE_SLICES: [usize; 2] = [10, 16];
     page.heading("Phone focal stack");
     let slice = |number: usize| folder.join(format!("{number}.jpg"));
-    let mut best: Option<(Array2<f32>, Array2<f32>)> = None;
-    for number in 1..=PHONE_STACK {
-        let sharpness = sharpness(&read_grey(&slice(number))?.pixels);
-        let Some((most, index)) = &mut best else {
-            let first = Array2::from_elem(sharpness.dim(), number as f32);
-            best = Some((sharpness, first));
-            continue;
-        };
-        Zip::from(most).and(index).and(&sharpness).for_each(|most, index, sharpness| {
-            if sharpness > most {
-                (*most, *index) = (*sharpness, number as f32);
-            }
-        });
-    }
-    let Some((_, reference)) = best else { bail!("no slices in {}", folder.display()) };
-    let (rank, part) = judge(&slice(PHONE_SLICES[0]), &slice(PHONE_SLICES[1]), &reference)?;
+    let reference = sharpest((1..=PHONE_STACK).map(|number| (number, slice(number))))?;
+    let Judged { rank, part, .. } = judge(&slice(PHONE_SLICES[0]), &slice(PHONE_SLICES[1]), &reference)?;
     page.paragraph(&format!(
         "{PHONE_STACK} slices of a hand-held phone (github.com/iSarmad/Depth-From-Defocus-Matlab), neither telecentric nor aligned and without a given depth. \
          Slices {} and {} as a pair against depth from focus, the slice in which each place is sharpest (variation over 15x15 pixels): rank correlation \
@@ -97,8 +92,44 @@ fn measure_phone(page: &mut Page, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Rank correlation of the pair's depth with the given one, and the part of the pixels that was judged.
-fn judge(far: &Path, near: &Path, given: &Array2<f32>) -> Result<(f64, f64)> {
+/// For each place the number of the slice in which it is sharpest.
+fn sharpest(slices: impl Iterator<Item = (usize, PathBuf)>) -> Result<Array2<f32>> {
+    let mut best: Option<(Array2<f32>, Array2<f32>)> = None;
+    for (number, path) in slices {
+        let sharpness = sharpness(&read_grey(&path)?.pixels);
+        let Some((most, index)) = &mut best else {
+            let first = Array2::from_elem(sharpness.dim(), number as f32);
+            best = Some((sharpness, first));
+            continue;
+        };
+        Zip::from(most).and(index).and(&sharpness).for_each(|most, index, sharpness| {
+            if sharpness > most {
+                (*most, *index) = (*sharpness, number as f32);
+            }
+        });
+    }
+    Ok(best.context("a stack without slices")?.1)
+}
+
+/// How a pair's depth agrees with a given one.
+struct Judged {
+    /// Rank correlation.
+    rank: f64,
+    /// Part of the pixels that was judged.
+    part: f64,
+    /// Which ones.
+    confident: Array2<bool>,
+}
+
+impl Judged {
+    /// Rank correlation of two other maps over the same pixels.
+    fn against(&self, a: &Array2<f32>, b: &Array2<f32>) -> f64 {
+        let both = a.iter().zip(b).zip(&self.confident).filter(|(_, confident)| **confident);
+        rank_correlation(&both.map(|((a, b), _)| (*a, *b)).collect::<Vec<_>>())
+    }
+}
+
+fn judge(far: &Path, near: &Path, given: &Array2<f32>) -> Result<Judged> {
     let optics = rig::optics("pillbox")?;
     let operators = Operators::for_optics(&optics)?;
     let (far, near) = (read_grey(far)?.pixels, read_grey(near)?.pixels);
@@ -106,13 +137,14 @@ fn judge(far: &Path, near: &Path, given: &Array2<f32>) -> Result<(f64, f64)> {
     if map.depth_mm.dim() != given.dim() {
         bail!("images of {:?} and a depth of {:?} (height, width)", map.depth_mm.dim(), given.dim());
     }
-    let mut pairs = Vec::new();
-    Zip::from(&map.depth_mm).and(&map.confidence).and(given).for_each(|depth, confidence, given| {
-        if *confidence >= LEAST_CONFIDENCE && depth.is_finite() && given.is_finite() {
-            pairs.push((*depth, *given));
-        }
-    });
-    Ok((rank_correlation(&pairs), pairs.len() as f64 / given.len() as f64))
+    let confident =
+        Zip::from(&map.depth_mm).and(&map.confidence).and(given).map_collect(|depth, confidence, given| {
+            *confidence >= LEAST_CONFIDENCE && depth.is_finite() && given.is_finite()
+        });
+    let count = confident.iter().filter(|confident| **confident).count();
+    let mut judged = Judged { rank: f64::NAN, part: count as f64 / given.len() as f64, confident };
+    judged.rank = judged.against(&map.depth_mm, given);
+    Ok(judged)
 }
 
 /// The first map of a MATLAB file.
