@@ -1,4 +1,4 @@
-//! Measures the accuracy and writes the accuracy pages, by the program in host/evaluation.
+//! Measures the accuracy and writes docs/accuracy.md and docs/activity.md, by the program in host/evaluation.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use crate::run::{ROOT, cargo, finish, step};
 /// What to measure.
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder with real pairs and focal stacks; without it the folder beside the repository where tests look for them.
+    /// Folder with real pairs, focal stacks, skeletons and silhouettes; without it the folder beside the repository where tests look for them.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Only these parts, such as `planes` or `corrections`; printed, no page is written.
@@ -20,7 +20,7 @@ pub struct Arguments {
 
 /// Runs the evaluation.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    step("render, measure, write docs/accuracy.md");
+    step("render, measure, write docs/accuracy.md and docs/activity.md");
     let mut command = cargo(["run", "--release", "--locked", "--package", "farnear-evaluation", "--"]);
     command.arg("--docs").arg(ROOT.join("docs"));
     if let Some(data) = &arguments.data {

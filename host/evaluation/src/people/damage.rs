@@ -1,6 +1,6 @@
 //! Silhouettes as bad as segmentation makes them: heads and limbs cut off, holes, ragged outlines; seeded.
 
-use farnear_activity::mask::{BoundingBox, Mask};
+use farnear_activity::mask::{BoundingBox, Mask, bits::BitMask};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -63,18 +63,13 @@ fn broken(mask: &Mask, bounds: BoundingBox, rng: &mut ChaCha8Rng) -> Mask {
 }
 
 fn ragged(mask: &Mask, rng: &mut ChaCha8Rng) -> Mask {
-    const REACH_PX: isize = 2;
+    const REACH_PX: usize = 2;
     const CHANCE: f64 = 0.3;
-    let (rows, columns) = mask.dim();
-    let at = |row: isize, column: isize| {
-        let inside = row >= 0 && column >= 0 && (row as usize) < rows && (column as usize) < columns;
-        inside && mask[[row as usize, column as usize]]
-    };
-    Mask::from_shape_fn(mask.dim(), |(row, column)| {
-        let here = mask[[row, column]];
-        let mut around = (-REACH_PX..=REACH_PX).flat_map(|y| (-REACH_PX..=REACH_PX).map(move |x| (y, x)));
-        let near = around.any(|(y, x)| at(row as isize + y, column as isize + x) != here);
-        here != (near && rng.random_bool(CHANCE))
+    let grown = BitMask::pack(mask.view()).dilated(REACH_PX).unpack();
+    let shrunk = BitMask::pack(mask.view()).eroded(REACH_PX).unpack();
+    Mask::from_shape_fn(mask.dim(), |at| {
+        let near = grown[at] && !shrunk[at];
+        mask[at] != (near && rng.random_bool(CHANCE))
     })
 }
 

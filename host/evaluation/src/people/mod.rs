@@ -21,8 +21,11 @@ use data::Data;
 type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
 
 /// In the order of the page.
-pub const PARTS: [Part; 6] = [
-    ("recognition", recognition::measure),
+pub const PARTS: [Part; 9] = [
+    ("synthetic-people", |page, _| recognition::measure(page)),
+    ("utkinect", |page, data| recognition::measure_real(page, data, sets::utkinect, "UTKinect")),
+    ("florence", |page, data| recognition::measure_real(page, data, sets::florence, "Florence")),
+    ("weizmann", |page, data| recognition::measure_real(page, data, sets::weizmann, "the Weizmann strips")),
     ("robustness", |page, _| robustness::measure(page)),
     ("broken-silhouettes", broken::measure),
     ("layout", |page, _| layout::measure(page)),

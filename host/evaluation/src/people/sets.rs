@@ -1,9 +1,9 @@
 //! The sets of clips that recognition is measured on.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use farnear_activity::{
     embedding::descriptor::Scaling,
-    evaluation::skeleton_clips::{florence, utkinect},
+    evaluation::skeleton_clips,
     recognition::clip::{Clip, Track},
     synthetic::activities,
 };
@@ -36,39 +36,34 @@ pub struct Set {
     pub asked: [Option<f64>; 4],
 }
 
-/// All sets that can be had, and the names of those that cannot.
-pub fn all(data: &Data) -> Result<(Vec<Set>, Vec<&'static str>)> {
-    let scaling = Scaling::default();
-    let mut sets = vec![synthetic()];
-    let mut missing = Vec::new();
-    match data.bytes("skeletons/UTKinect_Skeletons.mat")? {
-        Some(bytes) => sets.push(Set {
-            name: "UTKinect",
-            short: "utkinect",
-            about: "UTKinect-Action3D (Xia et al. 2012): 10 activities, 10 subjects, two repetitions; measured joints dressed with capsules and drawn from \
-                    four views, 90 deg apart.",
-            clips: utkinect(&bytes, VIEWS, scaling).context("UTKinect")?,
-            mirror: true,
-            asked: [Some(74.0), Some(84.0), Some(84.0), Some(93.0)],
-        }),
-        None => missing.push("UTKinect"),
-    }
-    match data.bytes("skeletons/Florence_3D_Action_Skeletons.mat")? {
-        Some(bytes) => sets.push(Set {
-            name: "Florence",
-            short: "florence",
-            about: "Florence 3D Actions (Seidenari et al. 2013): 9 activities, 10 subjects; measured joints dressed and drawn likewise.",
-            clips: florence(&bytes, VIEWS, scaling).context("Florence")?,
-            mirror: true,
-            asked: [Some(70.0), Some(79.0), Some(77.0), Some(85.0)],
-        }),
-        None => missing.push("Florence"),
-    }
-    match weizmann(data)? {
-        Some(set) => sets.push(set),
-        None => missing.push("Weizmann"),
-    }
-    Ok((sets, missing))
+/// Reads a set, where it is at hand.
+pub type Read = fn(&Data) -> Result<Option<Set>>;
+
+/// Ten activities from joints that a depth sensor measured.
+pub fn utkinect(data: &Data) -> Result<Option<Set>> {
+    let Some(bytes) = data.bytes("skeletons/UTKinect_Skeletons.mat")? else { return Ok(None) };
+    Ok(Some(Set {
+        name: "UTKinect",
+        short: "utkinect",
+        about: "UTKinect-Action3D (Xia et al. 2012): 10 activities, 10 subjects, two repetitions; measured joints dressed with capsules and drawn from \
+                four views, 90 deg apart.",
+        clips: skeleton_clips::utkinect(&bytes, VIEWS, Scaling::default())?,
+        mirror: true,
+        asked: [Some(74.0), Some(84.0), Some(84.0), Some(93.0)],
+    }))
+}
+
+/// Nine activities likewise.
+pub fn florence(data: &Data) -> Result<Option<Set>> {
+    let Some(bytes) = data.bytes("skeletons/Florence_3D_Action_Skeletons.mat")? else { return Ok(None) };
+    Ok(Some(Set {
+        name: "Florence",
+        short: "florence",
+        about: "Florence 3D Actions (Seidenari et al. 2013): 9 activities, 10 subjects; measured joints dressed and drawn likewise.",
+        clips: skeleton_clips::florence(&bytes, VIEWS, Scaling::default())?,
+        mirror: true,
+        asked: [Some(70.0), Some(79.0), Some(77.0), Some(85.0)],
+    }))
 }
 
 /// 21 people at the activities of table 7.1.
@@ -89,7 +84,8 @@ const WEIZMANN: [(&str, &str); 4] = [("0", "wave one"), ("1", "wave two"), ("3",
 /// Strips of one subject, mirrors too, have numbers that share this quotient.
 const STRIPS_PER_SUBJECT: u64 = 8;
 
-fn weizmann(data: &Data) -> Result<Option<Set>> {
+/// Four actions from video.
+pub fn weizmann(data: &Data) -> Result<Option<Set>> {
     let Some(folder) = data.path("weizmann4") else { return Ok(None) };
     let mut files = Vec::new();
     for (name, activity) in WEIZMANN {
