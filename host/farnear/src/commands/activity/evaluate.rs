@@ -219,5 +219,5 @@ fn seconds_per_frame(clips: &[Clip], experiment: Experiment, folders: &[PathBuf]
         }
         Ok(best)
     })?;
-    Ok(best / frames.max(1) as f64)
+    Ok(report::rounded(best / frames.max(1) as f64, 7))
 }
