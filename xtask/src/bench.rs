@@ -272,8 +272,9 @@ fn page_of(tables: &str) -> String {
         "# Speed\n\nWritten by `cargo xtask bench --peers --write` on {model}, {threads} hardware threads. Times are of this machine; \
          ratios travel better. A ratio above 1 means that ours is faster.\n\n\
          ## Depth\n\n`chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
-         confidence. `chain_640x480_side_by_side` is the time per pair when four chains of one thread each run at once: nothing is \
-         shared, so this is the least that four threads can take on this machine. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
+         confidence. `chain_640x480_side_by_side` is the time per pair when four chains of one thread each run at once and share \
+         nothing: its ratio to one thread alone is what this machine gives to four threads, whatever the program does; other load on \
+         the machine lowers it. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
          allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n\
          `fma_peak` is a loop of independent multiply-adds in registers: what one core can do. The 7x7 convolution is counted \
          twice: with 49 multiply-adds per pixel, as its definition says, and with what is executed: the kernels are eight-fold \
