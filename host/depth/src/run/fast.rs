@@ -21,8 +21,9 @@ use crate::operators::Operators;
 /// Rows that go through a stage at a time.
 const BLOCK: usize = simd::SEVEN_BLOCK;
 
-/// Widest tile: its rows of all stages fit the second-level cache.
-const MAX_TILE_PX: usize = 704;
+/// Widest tile: its rows of all stages fit a second-level cache of 1 MB; narrower ones would break the images' rows, and thereby
+/// the processor's reading ahead, more often.
+const MAX_TILE_PX: usize = 1024;
 
 /// Shortest band worth a thread: its halo of some 20 rows is computed twice.
 const MIN_BAND_PX: usize = 48;
