@@ -131,6 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
     check_subjects(arguments, &subjects, learned)?;
+    arguments.method.announce();
     let experiment = arguments.method.experiment();
     let outcome = train_on_others(learned, &test, &experiment, &[views])?;
     let confusion = if views == Views::Each { outcome.each } else { outcome.fused };

@@ -1,5 +1,7 @@
 //! How activities are told apart: the flags that training and evaluation share.
 
+use std::io::IsTerminal;
+
 use clap::{Args, ValueEnum};
 use farnear_activity::{
     evaluation::experiment::Experiment,
@@ -49,6 +51,15 @@ impl Method {
             _ => experiment,
         };
         if self.no_search { experiment.fixed() } else { experiment }
+    }
+
+    /// Says on a terminal what takes so long.
+    pub fn announce(&self) {
+        if !self.no_search && std::io::stderr().is_terminal() {
+            eprintln!(
+                "choosing settings by cross-validation over the subjects (--no-search takes the defaults) ..."
+            );
+        }
     }
 
     /// Its name among figures.

@@ -84,6 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(length) => clips.iter().flat_map(|clip| clip.windows(length as usize)).collect(),
         None => clips,
     };
+    arguments.method.announce();
     let experiment = arguments.method.experiment();
     let (model, inner_accuracy) =
         Recogniser::train_searched(&clips, &experiment, SCALING).with_context(|| format!("{shown}"))?;
