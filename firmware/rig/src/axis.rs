@@ -2,7 +2,7 @@
 //!
 //! The position is what the timer counted, in pulses; the encoder is compared with it all the time. A reported
 //! count may lag by up to the running segment (a 1 ms segment at full speed is 40 pulses), so the encoder must lie
-//! between the counted pulses and the end of the running segment, give or take [`CoarseSettings::following`].
+//! between the counted pulses and the end of the running segment, give or take [`StepperSettings::following`].
 //!
 //! Two ways to stop: [`Axis::stop`] brakes along the ramp; a fault aborts, which takes at most 1 ms. Either way
 //! the pulses are counted, so the position is known after it. A motion is over when the timer is idle.
@@ -11,9 +11,9 @@ use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
 use heapless::Deque;
 
-use crate::io::{Inputs, Outputs, Segment, StepperState, TICK_US};
+use crate::io::{MotorInputs, MotorOutputs, Segment, StepperState, TICK_US};
 use crate::ramp::{Ramp, RampLimits};
-use crate::settings::CoarseSettings;
+use crate::settings::StepperSettings;
 use crate::steps;
 
 /// Segments that may be under way at once: those that wait in the board and the one that runs.
@@ -50,7 +50,7 @@ enum Motion {
 /// The coarse axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
-    settings: CoarseSettings,
+    settings: StepperSettings,
     state: PositionState,
     motion: Motion,
     away: bool,
@@ -68,10 +68,12 @@ pub(crate) struct Axis {
     counted_of_oldest: u32,
     target: Nanometres,
     fault: Option<Failure>,
+    home_closed: bool,
+    far_closed: bool,
 }
 
 impl Axis {
-    pub(crate) const fn new(settings: CoarseSettings) -> Self {
+    pub(crate) const fn new(settings: StepperSettings) -> Self {
         Self {
             settings,
             state: PositionState::Unknown,
@@ -88,7 +90,19 @@ impl Axis {
             counted_of_oldest: 0,
             target: Nanometres(0),
             fault: None,
+            home_closed: false,
+            far_closed: false,
         }
+    }
+
+    /// Whether the home switch was closed at the last tick.
+    pub(crate) const fn home_closed(&self) -> bool {
+        self.home_closed
+    }
+
+    /// Whether the far switch was closed at the last tick.
+    pub(crate) const fn far_closed(&self) -> bool {
+        self.far_closed
     }
 
     /// What is known of the position.
@@ -184,8 +198,9 @@ impl Axis {
     }
 
     /// Reads the board; finds faults.
-    pub(crate) fn sense(&mut self, inputs: &Inputs) {
-        self.encoder = inputs.encoder_coarse_counts;
+    pub(crate) fn sense(&mut self, inputs: &MotorInputs) {
+        self.encoder = inputs.encoder_counts;
+        (self.home_closed, self.far_closed) = (inputs.home_switch, inputs.far_switch);
         let progressed = self.count(&inputs.stepper);
         if let Motion::Aborting { ticks } = &mut self.motion {
             *ticks += 1;
@@ -209,7 +224,7 @@ impl Axis {
     }
 
     /// Orders the board; feeds the timer.
-    pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut Outputs) {
+    pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut MotorOutputs) {
         outputs.enable = self.enabled;
         outputs.direction_away = self.away;
         match &mut self.motion {
@@ -257,7 +272,7 @@ impl Axis {
             && stepper.idle
     }
 
-    fn find_fault(&mut self, inputs: &Inputs, progressed: bool) -> Option<Failure> {
+    fn find_fault(&mut self, inputs: &MotorInputs, progressed: bool) -> Option<Failure> {
         if let Some(error) = self.following_error() {
             return Some(Failure::Following { error });
         }
@@ -340,7 +355,7 @@ impl Axis {
 }
 
 /// Hands a segment over and remembers it. There is room in both: the caller has looked.
-fn feed(outstanding: &mut Deque<u16, OUTSTANDING>, outputs: &mut Outputs, segment: Segment) {
+fn feed(outstanding: &mut Deque<u16, OUTSTANDING>, outputs: &mut MotorOutputs, segment: Segment) {
     if outputs.segments.push(segment).is_ok() {
         let _ = outstanding.push_back(segment.pulses);
     }

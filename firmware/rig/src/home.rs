@@ -12,7 +12,7 @@ use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
 
 use crate::axis::{Axis, HomeSwitch};
-use crate::settings::CoarseSettings;
+use crate::settings::StepperSettings;
 use crate::steps;
 
 /// Where homing is.
@@ -46,7 +46,7 @@ impl Homing {
     pub(crate) fn tick(
         &mut self,
         axis: &mut Axis,
-        settings: &CoarseSettings,
+        settings: &StepperSettings,
         home_switch: bool,
     ) -> Option<Result<Nanometres, Failure>> {
         let awaited = match self.phase {
@@ -84,7 +84,7 @@ impl Homing {
         None
     }
 
-    fn enter(&mut self, phase: Phase, axis: &mut Axis, settings: &CoarseSettings) {
+    fn enter(&mut self, phase: Phase, axis: &mut Axis, settings: &StepperSettings) {
         (self.phase, self.edge) = (phase, None);
         let (way, speed) = match phase {
             Phase::Begin => (0, settings.home_approach_speed),

@@ -49,5 +49,5 @@ mod shaper;
 mod stage;
 mod steps;
 
-pub use identity::Identity;
+pub use identity::{Identity, LastWords};
 pub use rig::Rig;

@@ -58,7 +58,7 @@ enum Phase {
     /// On the way, settling, or waiting for the camera.
     Positioning,
     /// Waiting for the strobe of this trigger; the positions are those of the trigger.
-    Exposing { number: u32, coarse: Nanometres, fine: Nanometres },
+    Exposing { number: u32, coarse: Nanometres, fine: Nanometres, lens: Nanometres },
 }
 
 /// A program under way.
@@ -128,16 +128,16 @@ impl Run {
                     if camera.is_ready(now) {
                         let number = camera.trigger(self.shot.exposure, now);
                         let (coarse, fine) = (stage.coarse.measured(), self.positioning.mean_fine());
-                        self.phase = Phase::Exposing { number, coarse, fine };
+                        self.phase = Phase::Exposing { number, coarse, fine, lens: stage.lens.measured() };
                     }
                     Progress::default()
                 }
             },
-            Phase::Exposing { number, coarse, fine } => match camera.result(number) {
+            Phase::Exposing { number, coarse, fine, lens } => match camera.result(number) {
                 None => Progress::default(),
                 Some(Err(NoAnswer)) => Progress { taken: None, end: Some(Err(Failure::NoStrobe)) },
                 Some(Ok(edges)) => {
-                    let record = self.record(number, coarse, fine, &edges);
+                    let record = self.record(number, (coarse, fine, lens), &edges);
                     self.exposures = self.exposures.saturating_add(1);
                     self.phase = Phase::Positioning;
                     Progress { taken: Some(record), end: self.next(shots, stage, settings, now).map(Ok) }
@@ -167,7 +167,12 @@ impl Run {
         None
     }
 
-    fn record(&self, number: u32, coarse: Nanometres, fine: Nanometres, edges: &ExposureEdges) -> ShotRecord {
+    fn record(
+        &self,
+        number: u32,
+        (coarse, fine, lens): (Nanometres, Nanometres, Nanometres),
+        edges: &ExposureEdges,
+    ) -> ShotRecord {
         ShotRecord {
             index: self.index,
             repeat: self.repeat,
@@ -176,6 +181,7 @@ impl Run {
             asked: self.shot.target,
             coarse,
             fine,
+            lens,
             settle: self.settle.unwrap_or_default(),
             trigger: edges.trigger,
             strobe_start: edges.strobe_start,

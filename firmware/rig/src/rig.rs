@@ -5,26 +5,26 @@
 
 use farnear_protocol::frame::{self, Encoded, Kind};
 use farnear_protocol::message::{
-    Axis, Capabilities, EventKind, Failure, Hello, Limits, PositionState, Request, RequestError, Response,
-    SCHEMA_KEY, Shot, ShotFault, Status,
+    Axis, Capabilities, EventKind, Failure, Hello, Limits, PositionState, ProgramState, ProgramStatus,
+    Request, RequestError, Response, SCHEMA_KEY, Shot, ShotFault, Status,
 };
-use farnear_protocol::{BoardMicros, Nanometres, PROTOCOL_CURRENT, PROTOCOL_MIN};
-use heapless::{String, Vec};
+use farnear_protocol::{BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT, PROTOCOL_MIN};
+use heapless::String;
 
 use crate::camera::Camera;
 use crate::events::Events;
 use crate::home::Homing;
 use crate::identity::Identity;
-use crate::io::{Inputs, Outputs};
+use crate::io::{Inputs, MEMORY_BYTES, MotorOutputs, Outputs};
 use crate::program::{Run, SHOTS_MAX, Shots};
 use crate::session::{Incoming, Session};
-use crate::settings::{COARSE_STEP_PM, Settings};
+use crate::settings::{STEP_PM, Settings};
 use crate::stage::{Positioning, Stage, limits, since};
 
 /// Long work.
 #[derive(Clone, Debug)]
 enum Work {
-    Home(Homing),
+    Home(Axis, Homing),
     Move {
         axis: Axis,
         target: Nanometres,
@@ -62,6 +62,7 @@ pub struct Rig {
     stage: Stage,
     camera: Camera,
     shots: Shots,
+    armed: u8,
     active: Option<Active>,
     events: Events,
     session: Session,
@@ -73,8 +74,15 @@ const _: () = assert!(size_of::<Rig>() <= 16 * 1024);
 
 impl Rig {
     /// The rig of `docs/rig.md`, just reset, at `now`.
-    pub fn new(identity: Identity, now: BoardMicros) -> Self {
+    /// `memory` is what the FRAM holds, `None` where none answers.
+    pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
+        let _ = memory;
         Self::with_settings(identity, Settings::DEFAULT, now)
+    }
+
+    /// The number of this boot.
+    pub const fn boot(&self) -> u32 {
+        self.identity.boot
     }
 
     /// A rig with other numbers.
@@ -87,6 +95,7 @@ impl Rig {
             stage: Stage::new(&settings),
             camera: Camera::new(settings.camera),
             shots: Shots::new(),
+            armed: 0,
             active: None,
             events,
             session: Session::new(identity.boot),
@@ -125,11 +134,11 @@ impl Rig {
         self.advance(now);
         let mut outputs = Outputs {
             piezo_dac: 0,
-            enable: false,
-            direction_away: false,
-            abort_steps: false,
-            segments: Vec::new(),
+            coarse: MotorOutputs::default(),
+            lens: MotorOutputs::default(),
             trigger: self.camera.take_order(),
+            listen: false,
+            memory: None,
             reset: self.reset_is_due(now),
         };
         self.stage.act(inputs, &mut outputs);
@@ -151,19 +160,24 @@ impl Rig {
                 self.reboot.get_or_insert(Reboot { request: id, asked: now, quiet_since: None });
                 Ok(Response::Accepted)
             }
-            Request::Home { axis } => self.home(*axis, id),
-            Request::Move { axis, target } => self.go(*axis, *target, id, now),
+            Request::Home { axis, .. } => self.home(*axis, id),
+            Request::Move { axis, target, .. } => self.go(*axis, *target, id, now),
             Request::LoadShot { index, shot } => self.load_shot(*index, shot),
-            Request::RunProgram { shots } => self.run_program(*shots, id, now),
+            Request::RunProgram { .. } => self.run_program(id, now),
+            Request::ArmProgram { shots } => {
+                self.armed = *shots;
+                Ok(Response::Accepted)
+            }
+            _ => Err(RequestError::NoSuchRoutine),
         }
     }
 
     fn home(&mut self, axis: Axis, request: u32) -> Result<Response, RequestError> {
         self.must_be_free()?;
-        if axis != Axis::SensorCoarse {
+        if axis == Axis::SensorFine {
             return Err(RequestError::CannotHome { axis });
         }
-        self.active = Some(Active { request, work: Work::Home(Homing::new()) });
+        self.active = Some(Active { request, work: Work::Home(axis, Homing::new()) });
         Ok(Response::Accepted)
     }
 
@@ -194,7 +208,8 @@ impl Rig {
         Ok(Response::Accepted)
     }
 
-    fn run_program(&mut self, count: u8, request: u32, now: BoardMicros) -> Result<Response, RequestError> {
+    fn run_program(&mut self, request: u32, now: BoardMicros) -> Result<Response, RequestError> {
+        let count = self.armed;
         self.must_be_free()?;
         if usize::from(count) > SHOTS_MAX {
             return Err(RequestError::Shot { index: count, reason: ShotFault::Index });
@@ -249,18 +264,25 @@ impl Rig {
     fn advance(&mut self, now: BoardMicros) {
         // Whatever runs: a coarse axis that was pushed, stalled or met a switch ends it. Without work nobody is
         // told but whoever asks for the status.
-        if self.stage.is_still()
-            && let Some(reason) = self.stage.coarse.take_fault()
-        {
-            self.end_early(Some(Axis::SensorCoarse), reason);
+        if self.stage.is_still() {
+            if let Some(reason) = self.stage.coarse.take_fault() {
+                self.end_early(Some(Axis::SensorCoarse), reason);
+            }
+            if let Some(reason) = self.stage.lens.take_fault() {
+                self.end_early(Some(Axis::Lens), reason);
+            }
         }
         let Some(Active { request, work }) = &mut self.active else { return };
         let request = *request;
         match work {
-            Work::Home(homing) => {
-                let axis = Axis::SensorCoarse;
-                let home_switch = self.stage.home_switch;
-                match homing.tick(&mut self.stage.coarse, &self.settings.coarse, home_switch) {
+            Work::Home(axis, homing) => {
+                let axis = *axis;
+                let (stepper, settings) = match axis {
+                    Axis::Lens => (&mut self.stage.lens, &self.settings.lens),
+                    _ => (&mut self.stage.coarse, &self.settings.coarse),
+                };
+                let home_switch = stepper.home_closed();
+                match homing.tick(stepper, settings, home_switch) {
                     None => {}
                     Some(Ok(shift)) => self.finish(now, EventKind::Homed { request, axis, shift }),
                     Some(Err(reason)) => self.end_early(Some(axis), reason),
@@ -339,32 +361,53 @@ impl Rig {
             boot: self.identity.boot,
             reset_cause: self.identity.reset_cause,
             emulated: self.identity.emulated,
-            capabilities: Capabilities { sensor_coarse: true, sensor_fine: true, strobe: true },
+            capabilities: Capabilities {
+                sensor_coarse: true,
+                sensor_fine: true,
+                strobe: true,
+                lens: true,
+                memory: false,
+                emergency_stop: false,
+            },
             limits: Limits {
                 datum: self.settings.datum,
                 coarse_min: self.settings.coarse.min,
                 coarse_max: self.settings.coarse.max,
-                coarse_step_pm: COARSE_STEP_PM,
+                coarse_step_pm: STEP_PM,
                 fine_min: self.settings.fine.min,
                 fine_max: self.settings.fine.max,
                 shots_max: SHOTS_MAX as u8,
                 exposure_min: self.settings.camera.exposure_min,
                 exposure_max: self.settings.camera.exposure_max,
+                lens_min: self.settings.lens.min,
+                lens_max: self.settings.lens.max,
+                lens_step_pm: STEP_PM,
+                distance_min: Nanometres(0),
+                silence_min: Micros(100_000),
+                silence_max: Micros(60_000_000),
+                row_pixels_max: 1024,
             },
         }
     }
 
     fn status(&self, now: BoardMicros) -> Status {
+        let active = self.active.as_ref().map(|active| active.request);
         Status {
             time: now,
-            coarse: self.stage.status(Axis::SensorCoarse),
-            fine: self.stage.status(Axis::SensorFine),
-            home_switch: self.stage.home_switch,
-            far_switch: self.stage.far_switch,
-            active: self.active.as_ref().map(|active| active.request),
+            coarse: self.stage.status(Axis::SensorCoarse, active),
+            fine: self.stage.status(Axis::SensorFine, active),
+            lens: self.stage.status(Axis::Lens, active),
+            home_switch: self.stage.coarse.home_closed(),
+            far_switch: self.stage.coarse.far_closed(),
+            lens_home_switch: self.stage.lens.home_closed(),
+            lens_far_switch: self.stage.lens.far_closed(),
+            emergency_stop: false,
+            supply_low: false,
+            alarm: None,
+            program: ProgramStatus { state: ProgramState::Idle, shots: self.armed, index: 0, exposures: 0 },
             next_event: self.events.next_number(),
             triggers: self.camera.triggers(),
-            steps: self.stage.coarse.total_pulses(),
+            steps: self.stage.coarse.total_pulses() + self.stage.lens.total_pulses(),
             link: self.session.counters(),
         }
     }

@@ -14,7 +14,9 @@ pub struct Settings {
     /// Distance from the lens' principal plane to the sensor at coarse 0 and fine 0.
     pub datum: Nanometres,
     /// The stepper and screw of stage A.
-    pub coarse: CoarseSettings,
+    pub coarse: StepperSettings,
+    /// The stepper and screw of stage B.
+    pub lens: StepperSettings,
     /// The piezo of stage A.
     pub fine: FineSettings,
     /// The camera's timing.
@@ -25,7 +27,7 @@ pub struct Settings {
 
 /// Stepper, screw, encoder and switches.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct CoarseSettings {
+pub struct StepperSettings {
     /// Smallest position.
     pub min: Nanometres,
     /// Largest position.
@@ -112,51 +114,56 @@ pub const SETTLE_WINDOW_MAX: Nanometres = Nanometres(100_000);
 /// Longest settle dwell a shot may ask for: a second, 5000 samples of the gauge.
 pub const SETTLE_DWELL_MAX: Micros = Micros(1_000_000);
 
-/// Coarse distance per STEP pulse in picometres: 0.5 mm screw, 200 full steps of 16 microsteps.
-pub const COARSE_STEP_PM: u32 = 156_250;
+/// Distance of a stepper axis per STEP pulse in picometres: 0.5 mm screw, 200 full steps of 16 microsteps.
+pub const STEP_PM: u32 = 156_250;
+
+/// Both steppers of `docs/rig.md`.
+const STEPPER: StepperSettings = StepperSettings {
+    min: Nanometres(0),
+    // The micrometer's travel; the far switch sits beyond it.
+    max: Nanometres(13_000_000),
+    // 6.25 mm/s: 13 mm in 2.2 s, and 750 rpm, where such a motor still has torque at 24 V.
+    speed: 40_000,
+    // 4 mm/s: stops within 0.18 mm of the switch, inside its over-travel of 0.5 mm.
+    home_search_speed: 25_600,
+    // 1 mm/s: stops within 0.01 mm, so that the switch opens only just.
+    home_leave_speed: 6_400,
+    // 0.16 mm/s, a pulse a millisecond: a fifth of a pulse per control tick when the switch is read.
+    home_approach_speed: 1_000,
+    // 62 full steps per second, far below any motor's pull-in rate; also the slowest segment of 1 ms.
+    start_speed: 1_000,
+    // 50 mm/s2: 0.39 mm of ramp to full speed, a tenth of what the motor's torque allows.
+    acceleration: 320_000,
+    // The travel, both switches' over-travel and some more.
+    home_search: Nanometres(14_500_000),
+    // Over-travel 0.5 mm plus the switch's own hysteresis.
+    home_leave: Nanometres(1_500_000),
+    // More than the switch's hysteresis is not needed, its edge was just crossed: room for the ramp.
+    home_clearance: Nanometres(50_000),
+    // Clearance, ramp and the switch's hysteresis.
+    home_approach: Nanometres(500_000),
+    // A micro-switch opens up to 0.2 mm behind where it closes.
+    home_zone: Nanometres(300_000),
+    // A stalled motor slips by four full steps (10 um) at a time; load angle and latency stay below 4 um.
+    following: Nanometres(6_000),
+    // Encoder count and microstep leave 0.2 um; 1 um is what the coarse axis promises.
+    settle_window: Nanometres(1_000),
+    settle_dwell: Micros(2_000),
+    settle_deadline: Micros(500_000),
+    // The driver's charge pump and current regulation are up after a few milliseconds.
+    enable_delay: Micros(10_000),
+    // A segment lasts 1 ms at most.
+    pulse_deadline: Micros(10_000),
+};
 
 impl Settings {
     /// The rig of `docs/rig.md`.
     pub const DEFAULT: Self = Self {
         // The thesis' lens (f = 50 mm) needs 52.8 to 53.0 mm (Li 2014, chapter 4): 5.9 mm into the travel.
         datum: Nanometres(47_000_000),
-        coarse: CoarseSettings {
-            min: Nanometres(0),
-            // The micrometer's travel; the far switch sits beyond it.
-            max: Nanometres(13_000_000),
-            // 6.25 mm/s: 13 mm in 2.2 s, and 750 rpm, where such a motor still has torque at 24 V.
-            speed: 40_000,
-            // 4 mm/s: stops within 0.18 mm of the switch, inside its over-travel of 0.5 mm.
-            home_search_speed: 25_600,
-            // 1 mm/s: stops within 0.01 mm, so that the switch opens only just.
-            home_leave_speed: 6_400,
-            // 0.16 mm/s, a pulse a millisecond: a fifth of a pulse per control tick when the switch is read.
-            home_approach_speed: 1_000,
-            // 62 full steps per second, far below any motor's pull-in rate; also the slowest segment of 1 ms.
-            start_speed: 1_000,
-            // 50 mm/s2: 0.39 mm of ramp to full speed, a tenth of what the motor's torque allows.
-            acceleration: 320_000,
-            // The travel, both switches' over-travel and some more.
-            home_search: Nanometres(14_500_000),
-            // Over-travel 0.5 mm plus the switch's own hysteresis.
-            home_leave: Nanometres(1_500_000),
-            // More than the switch's hysteresis is not needed, its edge was just crossed: room for the ramp.
-            home_clearance: Nanometres(50_000),
-            // Clearance, ramp and the switch's hysteresis.
-            home_approach: Nanometres(500_000),
-            // A micro-switch opens up to 0.2 mm behind where it closes.
-            home_zone: Nanometres(300_000),
-            // A stalled motor slips by four full steps (10 um) at a time; load angle and latency stay below 4 um.
-            following: Nanometres(6_000),
-            // Encoder count and microstep leave 0.2 um; 1 um is what the coarse axis promises.
-            settle_window: Nanometres(1_000),
-            settle_dwell: Micros(2_000),
-            settle_deadline: Micros(500_000),
-            // The driver's charge pump and current regulation are up after a few milliseconds.
-            enable_delay: Micros(10_000),
-            // A segment lasts 1 ms at most.
-            pulse_deadline: Micros(10_000),
-        },
+        coarse: STEPPER,
+        // The same mechanics as stage A.
+        lens: STEPPER,
         fine: FineSettings {
             // 5 um at each end of the 200 um stroke are kept for the loop: hysteresis and creep move the ends of
             // the free stroke, and a saturated amplifier cannot damp the resonance.

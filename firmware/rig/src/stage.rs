@@ -1,4 +1,4 @@
-//! Stage A: its coarse and its fine axis, sensed and driven together, and the way to one position on either.
+//! Both stages: two steppers and a piezo, sensed and driven together, and the way to one position on any of them.
 
 use farnear_protocol::message::{Axis as AxisName, AxisStatus, Failure, PositionState};
 use farnear_protocol::{BoardMicros, Micros, Nanometres};
@@ -9,36 +9,34 @@ use crate::piezo::Piezo;
 use crate::settings::Settings;
 use crate::settle::Settle;
 
-/// Both axes.
+/// All axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Stage {
     pub(crate) coarse: Axis,
+    pub(crate) lens: Axis,
     pub(crate) fine: Piezo,
-    pub(crate) home_switch: bool,
-    pub(crate) far_switch: bool,
 }
 
 impl Stage {
     pub(crate) const fn new(settings: &Settings) -> Self {
         Self {
             coarse: Axis::new(settings.coarse),
+            lens: Axis::new(settings.lens),
             fine: Piezo::new(settings.fine),
-            home_switch: false,
-            far_switch: false,
         }
     }
 
     /// Reads the board.
     pub(crate) fn sense(&mut self, inputs: &Inputs) {
-        self.home_switch = inputs.home_switch;
-        self.far_switch = inputs.far_switch;
-        self.coarse.sense(inputs);
+        self.coarse.sense(&inputs.coarse);
+        self.lens.sense(&inputs.lens);
         self.fine.sense(inputs.gauge_code);
     }
 
     /// Orders the board.
     pub(crate) fn act(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
-        self.coarse.act(&inputs.stepper, outputs);
+        self.coarse.act(&inputs.coarse.stepper, &mut outputs.coarse);
+        self.lens.act(&inputs.lens.stepper, &mut outputs.lens);
         outputs.piezo_dac = self.fine.act();
     }
 
@@ -46,6 +44,7 @@ impl Stage {
     pub(crate) const fn measured(&self, axis: AxisName) -> Nanometres {
         match axis {
             AxisName::SensorCoarse => self.coarse.measured(),
+            AxisName::Lens => self.lens.measured(),
             AxisName::SensorFine => self.fine.measured(),
         }
     }
@@ -54,28 +53,31 @@ impl Stage {
     pub(crate) const fn state(&self, axis: AxisName) -> PositionState {
         match axis {
             AxisName::SensorCoarse => self.coarse.state(),
+            AxisName::Lens => self.lens.state(),
             AxisName::SensorFine => PositionState::Homed,
         }
     }
 
     /// For the status answer.
-    pub(crate) fn status(&self, axis: AxisName) -> AxisStatus {
+    pub(crate) fn status(&self, axis: AxisName, request: Option<u32>) -> AxisStatus {
         let (asked, moving) = match axis {
             AxisName::SensorCoarse => (self.coarse.target(), !self.coarse.is_still()),
+            AxisName::Lens => (self.lens.target(), !self.lens.is_still()),
             AxisName::SensorFine => (self.fine.target(), !self.fine.arrived()),
         };
-        AxisStatus { state: self.state(axis), asked, measured: self.measured(axis), moving }
+        AxisStatus { state: self.state(axis), asked, measured: self.measured(axis), moving, request }
     }
 
     /// Ends all motion: the stepper brakes, the piezo stays where it is.
     pub(crate) fn stop(&mut self) {
         self.coarse.stop();
+        self.lens.stop();
         self.fine.hold();
     }
 
     /// Whether no stepper pulse comes any more.
     pub(crate) const fn is_still(&self) -> bool {
-        self.coarse.is_still()
+        self.coarse.is_still() && self.lens.is_still()
     }
 }
 
@@ -83,6 +85,7 @@ impl Stage {
 pub(crate) const fn limits(settings: &Settings, axis: AxisName) -> (Nanometres, Nanometres) {
     match axis {
         AxisName::SensorCoarse => (settings.coarse.min, settings.coarse.max),
+        AxisName::Lens => (settings.lens.min, settings.lens.max),
         AxisName::SensorFine => (settings.fine.min, settings.fine.max),
     }
 }
@@ -113,6 +116,10 @@ impl Positioning {
                 stage.coarse.go(target);
                 (settings.coarse.settle_deadline, None)
             }
+            AxisName::Lens => {
+                stage.lens.go(target);
+                (settings.lens.settle_deadline, None)
+            }
             AxisName::SensorFine => {
                 stage.fine.go(target);
                 (settings.fine.settle_deadline, Some(now))
@@ -126,6 +133,7 @@ impl Positioning {
     pub(crate) const fn plain(settings: &Settings, axis: AxisName) -> (Nanometres, Micros) {
         match axis {
             AxisName::SensorCoarse => (settings.coarse.settle_window, settings.coarse.settle_dwell),
+            AxisName::Lens => (settings.lens.settle_window, settings.lens.settle_dwell),
             AxisName::SensorFine => (settings.fine.settle_window, settings.fine.settle_dwell),
         }
     }
@@ -136,6 +144,12 @@ impl Positioning {
         let at_rest = match self.axis {
             AxisName::SensorCoarse => {
                 if !stage.coarse.is_still() {
+                    return None;
+                }
+                true
+            }
+            AxisName::Lens => {
+                if !stage.lens.is_still() {
                     return None;
                 }
                 true
