@@ -1,16 +1,16 @@
 //! Taking a pair: home where needed, bring the coarse stage near, expose far and near by piezo.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use farnear_protocol::message::{Axis, PositionState, Shot, ShotRecord};
+use farnear_protocol::message::{Axis, Limits, Shot, ShotRecord, TriggerMode};
 use farnear_protocol::units::{Micros, Nanometres};
 
 use crate::camera::{Camera, CameraError, Image};
 use crate::client::Client;
-use crate::describe::{state_name, um};
+use crate::describe::um;
 use crate::error::ClientError;
-use crate::plan::{PlanError, SensorPair, approach_for, coarse_for, fine_for};
+use crate::plan::{PlanError, SensorPair, coarse_for, fine_for};
+use crate::ready::{base_nm, base_when_homed_nm, ensure_homed};
 use crate::work::Moved;
 
 /// Longest single wait for an image, so that an interruption by the user is seen soon.
@@ -115,17 +115,22 @@ pub enum CaptureError {
 
 /// Takes a pair. `say` is told in words what is being done.
 pub fn capture_pair(
-    client: &mut Client,
+    client: &Client,
     camera: &mut dyn Camera,
     sensor: &SensorPair,
     exposures: &Exposures,
     say: &mut dyn FnMut(&str),
 ) -> Result<Pair, CaptureError> {
     let limits = client.hello().limits;
-    let target = coarse_for(sensor, &limits)?;
-    let coarse = bring_coarse_to(client, target, say)?;
-    let fine_far = fine_for(sensor.far_mm, coarse.measured, &limits)?;
-    let fine_near = fine_for(sensor.near_mm, coarse.measured, &limits)?;
+    // Before anything moves: what the stage cannot reach is said at once.
+    coarse_for(sensor, base_when_homed_nm(client, &client.status()?), &limits)?;
+    ensure_homed(client, say)?;
+    let base = base_nm(client, &client.status()?);
+    let target = coarse_for(sensor, base, &limits)?;
+    say(&format!("moving the coarse stage to {:.3} um", um(target)));
+    let coarse = client.move_to(Axis::SensorCoarse, target)?;
+    let fine_far = fine_for(sensor.far_mm, base, coarse.measured, &limits)?;
+    let fine_near = fine_for(sensor.near_mm, base, coarse.measured, &limits)?;
     let shot = |target| Shot {
         axis: Axis::SensorFine,
         target,
@@ -133,17 +138,16 @@ pub fn capture_pair(
         settle_window: exposures.settle_window,
         settle_dwell: exposures.settle_dwell,
         repeat: 1,
+        mode: TriggerMode::Hardware,
     };
     say(&format!("exposing far (piezo at {:.3} um) and near ({:.3} um)", um(fine_far), um(fine_near)));
     camera.arm()?;
     let mut asked = [sensor.far_mm, sensor.near_mm].into_iter();
     let mut taken = Vec::new();
-    let interrupt = client.interrupt_flag();
-    client.run_program(&[shot(fine_far), shot(fine_near)], |record| -> Result<(), CaptureError> {
-        let image = wait_for_image(camera, record, exposures.image_wait, interrupt.as_deref())?;
+    client.run_shots(&[shot(fine_far), shot(fine_near)], |record| -> Result<(), CaptureError> {
+        let image = wait_for_image(client, camera, record, exposures.image_wait)?;
         if let Some(sensor_asked_mm) = asked.next() {
-            let measured = i64::from(limits.datum.0) + i64::from(record.coarse.0) + i64::from(record.fine.0);
-            let sensor_measured_mm = measured as f64 / 1e6;
+            let sensor_measured_mm = sensor_mm(record, &limits);
             taken.push(Taken { image, sensor_asked_mm, sensor_measured_mm, record: *record });
         }
         Ok(())
@@ -166,18 +170,28 @@ pub fn capture_pair(
     Ok(Pair { far, near, coarse })
 }
 
-fn wait_for_image(
+/// Sensor distance from the lens' principal plane at an exposure, by encoders and gauge, in mm.
+pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
+    let parts = [limits.datum, record.coarse, record.fine, record.lens];
+    parts.iter().map(|part| f64::from(part.0)).sum::<f64>() / 1e6
+}
+
+/// The image of an exposure, waiting at most `allowed` for it, or until the user interrupts.
+///
+/// # Errors
+/// [`CaptureError`].
+pub fn wait_for_image(
+    client: &Client,
     camera: &mut dyn Camera,
     record: &ShotRecord,
     allowed: Duration,
-    interrupt: Option<&AtomicBool>,
 ) -> Result<Image, CaptureError> {
     let until = Instant::now() + allowed;
     loop {
         let left = until.saturating_duration_since(Instant::now());
         match camera.image(record, left.min(SLICE)) {
             Err(CameraError::Late { camera, trigger_number, .. }) => {
-                if interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                if client.interrupted() {
                     let during = "waiting for the camera's image".into();
                     return Err(ClientError::Interrupted { during }.into());
                 }
@@ -188,23 +202,4 @@ fn wait_for_image(
             result => return Ok(result?),
         }
     }
-}
-
-/// Homes the coarse stage unless it is homed, and moves it, from the home side, to `target`.
-fn bring_coarse_to(
-    client: &mut Client,
-    target: Nanometres,
-    say: &mut dyn FnMut(&str),
-) -> Result<Moved, ClientError> {
-    let state = client.status()?.coarse.state;
-    if state != PositionState::Homed {
-        say(&format!("homing the stage (its position is {})", state_name(state)));
-        client.home(Axis::SensorCoarse)?;
-    }
-    let limits = client.hello().limits;
-    if let Some(before) = approach_for(target, &client.status()?, &limits) {
-        client.move_to(Axis::SensorCoarse, before)?;
-    }
-    say(&format!("moving the coarse stage to {:.3} um", um(target)));
-    client.move_to(Axis::SensorCoarse, target)
 }

@@ -17,7 +17,7 @@ use crate::pair::{Pair, Taken};
 /// Name of the record in a capture folder.
 pub const CAPTURE_FILE: &str = "capture.toml";
 /// Version of the record's layout.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// The content of `capture.toml`.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
@@ -47,8 +47,11 @@ pub struct CaptureRecord {
 /// Where the stage stood.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct StageRecord {
-    /// Sensor distance at coarse 0 and fine 0.
+    /// Sensor distance with all axes at 0.
     pub datum_mm: f64,
+    /// Where the lens stage's encoder said it was.
+    #[serde(default)]
+    pub lens_measured_um: f64,
     /// Where the coarse stage was sent.
     pub coarse_asked_um: f64,
     /// Where its encoder said it came to.
@@ -180,6 +183,7 @@ pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> 
         time: circumstances.time,
         stage: StageRecord {
             datum_mm: um(hello.limits.datum) / 1000.0,
+            lens_measured_um: um(pair.far.record.lens),
             coarse_asked_um: um(pair.coarse.asked),
             coarse_measured_um: um(pair.coarse.measured),
             moving_us: pair.moving_us(),
