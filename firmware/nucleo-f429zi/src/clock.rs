@@ -17,6 +17,8 @@ use farnear_protocol::BoardMicros;
 
 use crate::registers;
 
+/// Clock of the core.
+pub const SYSCLK_HZ: u32 = 168_000_000;
 /// Clock of the timers on APB1 (TIM2 to TIM7).
 pub const APB1_TIMER_HZ: u32 = 84_000_000;
 /// Clock of the timers on APB2 (TIM1, TIM8).
@@ -46,6 +48,14 @@ pub fn start() -> Peripherals {
         registers::unpend(Interrupt::TIM5);
         peripherals
     })
+}
+
+/// Lets the core count its cycles.
+pub fn start_cycle_counter() {
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+    }
 }
 
 // Each log line carries the board's time.

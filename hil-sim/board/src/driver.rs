@@ -328,7 +328,7 @@ impl Driver {
     /// Whether the chip was reset since the last look.
     fn note_resets(&mut self, session: &Session<RigBoard>, at: VirtualNanos) {
         let resets = session.resets().len();
-        if self.powered != !session.unpowered() {
+        if self.powered == session.unpowered() {
             self.powered = !session.unpowered();
             self.wiring.board_reset(at);
             self.lockstep.reset(at.0);
