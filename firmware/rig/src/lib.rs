@@ -30,24 +30,28 @@
 #[cfg(test)]
 extern crate std;
 
-mod axis;
+mod alarms;
 mod camera;
+mod correction;
 pub mod events;
 pub mod gains;
-mod home;
 pub mod identity;
 pub mod io;
 mod matrix;
+mod memory;
+mod motion;
 mod piezo;
 pub mod program;
-mod ramp;
+mod progress;
+mod report;
+mod requests;
 mod rig;
 pub mod session;
 pub mod settings;
-mod settle;
 mod shaper;
-mod stage;
-mod steps;
+mod silence;
+mod sky;
+mod work;
 
 pub use identity::{Identity, LastWords};
 pub use rig::Rig;

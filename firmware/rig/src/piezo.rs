@@ -49,6 +49,7 @@ pub(crate) struct Piezo {
     code: u16,
     measured: Nanometres,
     gauge_missing_ticks: u32,
+    failed: bool,
 }
 
 impl Piezo {
@@ -62,6 +63,7 @@ impl Piezo {
             code: 0,
             measured: Nanometres(0),
             gauge_missing_ticks: 0,
+            failed: false,
         }
     }
 
@@ -80,8 +82,23 @@ impl Piezo {
         self.gauge_missing_ticks == 0
     }
 
+    /// Takes other numbers; nothing moves.
+    pub(crate) const fn apply(&mut self, settings: FineSettings) {
+        self.settings = settings;
+    }
+
+    /// The lowest position on the way that is under way.
+    pub(crate) fn lowest(&self) -> Nanometres {
+        if self.control.is_some() || self.closing { self.measured.min(self.target) } else { self.measured }
+    }
+
+    /// Whether the gauge failed while the loop needed it; given once.
+    pub(crate) const fn take_failure(&mut self) -> bool {
+        core::mem::replace(&mut self.failed, false)
+    }
+
     /// Whether the gauge has been silent or saturated for too long.
-    pub(crate) const fn gauge_failed(&self) -> bool {
+    const fn gauge_failed(&self) -> bool {
         self.gauge_missing_ticks as u64 * TICK_US as u64 > self.settings.gauge_deadline.0 as u64
     }
 
@@ -122,6 +139,7 @@ impl Piezo {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
             if self.gauge_failed() {
+                self.failed |= self.closing || self.control.is_some();
                 (self.control, self.closing) = (None, false);
             }
             return;

@@ -11,7 +11,7 @@ use farnear_protocol::{
 use proptest::prelude::*;
 
 fn fine(nm: i32) -> Request {
-    Request::Move { axis: Axis::SensorFine, target: Nanometres(nm) }
+    bench::go(Axis::SensorFine, nm)
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn a_host_that_does_not_listen_loses_events_but_no_answers() {
 #[test]
 fn a_reboot_stops_answers_and_then_resets() {
     let mut bench = Bench::homed();
-    let id = bench.accepted(&Request::Move { axis: Axis::SensorCoarse, target: Nanometres(9_000_000) });
+    let id = bench.accepted(&bench::go(Axis::SensorCoarse, 9_000_000));
     bench.run_ms(400);
     let asked = bench.now;
     let reboot = bench.accepted(&Request::Reboot);
@@ -163,9 +163,9 @@ fn a_reboot_stops_answers_and_then_resets() {
     let end = bench.end_of(id);
     assert!(matches!(end, EventKind::Failed { reason: Failure::Stopped, .. }), "{end:?}");
     assert_eq!(bench.ask(&fine(20_000)).1, Err(RequestError::Busy { request: reboot }));
-    let edges = bench.hardware.edges;
+    let edges = bench.hardware.coarse.edges;
     bench.run_ms(30);
-    assert_eq!(bench.hardware.edges, edges);
+    assert_eq!(bench.hardware.coarse.edges, edges);
     let reset = bench.reset_at.expect("it resets");
     assert!((135_000..180_000).contains(&(reset - asked)), "{} us", reset - asked);
 }
@@ -202,7 +202,7 @@ fn requests() -> impl Strategy<Value = Request> {
         6 => (axis(), nm()).prop_map(|(axis, target)| Request::Move { axis, target }),
         1 => Just(Request::Stop),
         4 => (0u8..70, shot).prop_map(|(index, shot)| Request::LoadShot { index: index % 5 * (1 + index / 64 * 60), shot }),
-        3 => (0u8..5).prop_map(|shots| Request::RunProgram { shots }),
+        3 => (0u8..5).prop_map(|shots| RUN),
         1 => any::<u32>().prop_map(|number| Request::ReadEvent { number: number % 40 }),
     ]
 }
@@ -226,8 +226,8 @@ proptest! {
         bench.accepted(&Request::Stop);
         bench.run_ms(250);
         // Half a millimetre of over-travel belongs to homing; moves stay inside 0 to 13 mm.
-        prop_assert!(bench.hardware.leftmost >= -3_200 && bench.hardware.rightmost <= 83_201);
-        prop_assert!(bench.hardware.closest_edges_us > 24.9);
+        prop_assert!(bench.hardware.coarse.leftmost >= -3_200 && bench.hardware.coarse.rightmost <= 83_201);
+        prop_assert!(bench.hardware.coarse.closest_edges_us > 24.9);
         prop_assert_eq!(bench.status().active, None);
         for id in begun {
             let ends = bench.events.iter().filter(|(_, event)| bench::ends(&event.kind, id)).count();
@@ -311,5 +311,5 @@ fn a_million_random_byte_strings_do_nothing() {
     assert!(bench.answers.is_empty(), "nobody guesses a CRC-32 in a million tries: {:?}", bench.answers);
     let status = bench.status();
     assert!(status.link.bad_frames > 900_000 && status.link.frames == 1);
-    assert_eq!((bench.hardware.edges, bench.hardware.dac), (0, 0));
+    assert_eq!((bench.hardware.coarse.edges, bench.hardware.dac), (0, 0));
 }

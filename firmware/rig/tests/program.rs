@@ -10,7 +10,7 @@ const FAR: i32 = 20_000;
 const NEAR: i32 = 176_270;
 
 fn fine(nm: i32) -> Request {
-    Request::Move { axis: Axis::SensorFine, target: Nanometres(nm) }
+    bench::go(Axis::SensorFine, nm)
 }
 
 fn shot(nm: i32) -> Shot {
@@ -32,7 +32,7 @@ fn load(bench: &mut Bench, shots: &[Shot]) {
 
 fn run(bench: &mut Bench, shots: u8) -> (Vec<ShotRecord>, EventKind) {
     bench.events.clear();
-    let end = bench.work(&Request::RunProgram { shots });
+    let end = bench.work(&RUN);
     let taken = bench.events.iter().filter_map(|(_, event)| match &event.kind {
         EventKind::ShotDone { shot, .. } => Some(*shot),
         _ => None,
@@ -51,7 +51,7 @@ fn the_piezo_moves_without_homing_and_settles_in_15_ms() {
         assert!((bench.hardware.piezo_nm - f64::from(target)).abs() <= 50.0);
         assert!(bench.now - start <= 15_000, "{} us with its dwell", bench.now - start);
     }
-    assert_eq!(bench.hardware.edges, 0);
+    assert_eq!(bench.hardware.coarse.edges, 0);
     assert_eq!(bench.status().coarse.state, PositionState::Unknown);
 }
 
@@ -89,7 +89,7 @@ fn the_camera_is_given_its_read_out_time() {
         assert!((10_500..11_000).contains(&pause), "{pause} us: as early as allowed, not earlier");
     }
     // Also over the end of a program, and over a stop in the middle of an exposure.
-    let id = bench.accepted(&Request::RunProgram { shots: 2 });
+    let id = bench.accepted(&RUN);
     while bench.hardware.triggers.len() < 7 {
         bench.tick();
     }
@@ -155,17 +155,17 @@ fn impossible_shots_and_programs_are_refused() {
         (65, 65, ShotFault::Index),
         (255, 255, ShotFault::Index),
     ] {
-        let (_, answer) = bench.ask(&Request::RunProgram { shots });
+        let (_, answer) = bench.ask(&RUN);
         assert_eq!(answer, Err(RequestError::Shot { index, reason }));
     }
     let coarse = Shot { axis: Axis::SensorCoarse, target: Nanometres(0), ..shot(0) };
     load(&mut bench, &[shot(FAR), coarse]);
     let unhomed = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Unknown };
-    assert_eq!(bench.ask(&Request::RunProgram { shots: 2 }).1, Err(unhomed));
-    let request = bench.accepted(&Request::RunProgram { shots: 1 });
+    assert_eq!(bench.ask(&RUN).1, Err(unhomed));
+    let request = bench.accepted(&RUN);
     let (_, busy) = bench.ask(&Request::LoadShot { index: 0, shot: shot(FAR) });
     assert_eq!(busy, Err(RequestError::Busy { request }));
-    assert_eq!(bench.hardware.edges, 0);
+    assert_eq!(bench.hardware.coarse.edges, 0);
 }
 
 #[test]
@@ -203,9 +203,9 @@ fn what_breaks_in_a_program_is_named_and_the_next_run_works() {
 fn a_pushed_stage_ends_a_program_of_the_other_axis() {
     let mut bench = Bench::homed();
     load(&mut bench, &[Shot { repeat: 100, ..shot(FAR) }]);
-    let id = bench.accepted(&Request::RunProgram { shots: 1 });
+    let id = bench.accepted(&RUN);
     bench.run_ms(100);
-    bench.hardware.microsteps -= 64;
+    bench.hardware.coarse.turn(-64);
     let end = bench.end_of(id);
     let EventKind::Failed { axis: Some(Axis::SensorCoarse), reason: Failure::Following { .. }, .. } = end
     else {
