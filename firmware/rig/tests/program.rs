@@ -2,10 +2,13 @@
 
 mod bench;
 
-use bench::Bench;
-use farnear_protocol::message::{Axis, EventKind, Failure, PositionState, Shot, ShotFault, ShotRecord};
+use bench::{Bench, SILENCE};
+use farnear_protocol::message::{
+    Axis, EventKind, Failure, PositionState, ProgramState, Shot, ShotFault, ShotRecord, TriggerMode,
+};
 use farnear_protocol::{Micros, Nanometres, Request, RequestError};
 
+const RUN: Request = Request::RunProgram { silence: SILENCE };
 const FAR: i32 = 20_000;
 const NEAR: i32 = 176_270;
 
@@ -21,6 +24,7 @@ fn shot(nm: i32) -> Shot {
         settle_window: Nanometres(50),
         settle_dwell: Micros(2_000),
         repeat: 1,
+        mode: TriggerMode::Hardware,
     }
 }
 
@@ -32,6 +36,7 @@ fn load(bench: &mut Bench, shots: &[Shot]) {
 
 fn run(bench: &mut Bench, shots: u8) -> (Vec<ShotRecord>, EventKind) {
     bench.events.clear();
+    bench.accepted(&Request::ArmProgram { shots });
     let end = bench.work(&RUN);
     let taken = bench.events.iter().filter_map(|(_, event)| match &event.kind {
         EventKind::ShotDone { shot, .. } => Some(*shot),
@@ -155,13 +160,16 @@ fn impossible_shots_and_programs_are_refused() {
         (65, 65, ShotFault::Index),
         (255, 255, ShotFault::Index),
     ] {
-        let (_, answer) = bench.ask(&RUN);
+        let (_, answer) = bench.ask(&Request::ArmProgram { shots });
         assert_eq!(answer, Err(RequestError::Shot { index, reason }));
     }
     let coarse = Shot { axis: Axis::SensorCoarse, target: Nanometres(0), ..shot(0) };
     load(&mut bench, &[shot(FAR), coarse]);
     let unhomed = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Unknown };
-    assert_eq!(bench.ask(&RUN).1, Err(unhomed));
+    assert_eq!(bench.ask(&Request::ArmProgram { shots: 2 }).1, Err(unhomed));
+    let idle = RequestError::Program { state: ProgramState::Idle };
+    assert_eq!(bench.ask(&RUN).1, Err(idle));
+    bench.accepted(&Request::ArmProgram { shots: 1 });
     let request = bench.accepted(&RUN);
     let (_, busy) = bench.ask(&Request::LoadShot { index: 0, shot: shot(FAR) });
     assert_eq!(busy, Err(RequestError::Busy { request }));
@@ -179,6 +187,9 @@ fn what_breaks_in_a_program_is_named_and_the_next_run_works() {
         assert!(bench.now - start < 400_000, "within its deadline");
         bench.hardware.faults = bench::hardware::Faults::default();
         bench.run_ms(5);
+        if bench.alarm().is_some() {
+            bench.clear();
+        }
         let (taken, after) = run(&mut bench, 2);
         assert!(
             matches!(after, EventKind::ProgramDone { exposures: 2, .. }) && taken.len() == 2,
@@ -203,6 +214,7 @@ fn what_breaks_in_a_program_is_named_and_the_next_run_works() {
 fn a_pushed_stage_ends_a_program_of_the_other_axis() {
     let mut bench = Bench::homed();
     load(&mut bench, &[Shot { repeat: 100, ..shot(FAR) }]);
+    bench.accepted(&Request::ArmProgram { shots: 1 });
     let id = bench.accepted(&RUN);
     bench.run_ms(100);
     bench.hardware.coarse.turn(-64);
