@@ -6,6 +6,8 @@
 //!   end, and the board's events and log.
 //! - [`camera`], [`image_file`], [`aside`]: images, their files, and files that are whole or not there.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, where the axes go for a pair, taking it, and the folder it is kept in.
+//! - [`expose`], [`focus`], [`sequence`]: programs with a camera: finding the focus, focus stacks, programs from a file.
+//! - [`board_correction`]: depth correction by the board's own mathematics.
 //! - [`timing`]: how long the host waits, and why.
 //! - [`error`], [`describe`]: what can go wrong, in words.
 //!
@@ -19,11 +21,14 @@
 //! ```
 
 pub mod aside;
+pub mod board_correction;
 pub mod camera;
 pub mod client;
 pub mod describe;
 pub mod error;
 mod events;
+pub mod expose;
+pub mod focus;
 mod handshake;
 pub mod image_file;
 mod link;
@@ -33,6 +38,7 @@ pub mod plan;
 pub mod ready;
 pub mod record;
 mod requests;
+pub mod sequence;
 pub mod stream;
 pub mod timing;
 pub mod transport;

@@ -17,7 +17,7 @@ use farnear_capture::plan::SensorPair;
 use farnear_capture::record::{Circumstances, begin_folder, finish_folder, read_record, record_of};
 use farnear_capture::{Client, ClientError};
 use farnear_protocol::camera::FrameHeader;
-use farnear_protocol::message::ShotRecord;
+use farnear_protocol::message::{ShotRecord, TriggerMode};
 use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
 use ndarray::Array2;
 use peer::{Faults, Peer};
@@ -31,7 +31,10 @@ impl Camera for Numbered {
     fn kind(&self) -> &'static str {
         "numbered"
     }
-    fn arm(&mut self) -> Result<(), CameraError> {
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         Ok(())
     }
     fn image(&mut self, shot: &ShotRecord, _: Duration) -> Result<Image, CameraError> {

@@ -13,7 +13,7 @@ mod requests;
 
 use farnear_protocol::{
     BoardMicros, Log, Micros, Nanometres, Request,
-    camera::{Control, FrameHeader},
+    camera::{Control, FREE_RUNNING, FrameHeader},
     frame::{Header, Kind, encode},
     message::*,
 };
@@ -83,4 +83,10 @@ fn camera_endpoint() {
     let mut buffer = [0; 16];
     let control = postcard::to_slice(&Control::AdvanceMicros(300), &mut buffer).expect("fits");
     assert_eq!(control, [0, 0xac, 2]);
+    let (shot_id, exposure, period) = (7, Micros(5_000), Micros(20_000));
+    let expose = postcard::to_slice(&Control::Expose { shot_id, exposure }, &mut buffer).expect("fits");
+    assert_eq!(expose, [1, 7, 0x88, 0x27]);
+    let free_run = postcard::to_slice(&Control::FreeRun { period, exposure }, &mut buffer).expect("fits");
+    assert_eq!(free_run, [2, 0xa0, 0x9c, 1, 0x88, 0x27]);
+    assert_eq!(FREE_RUNNING, u32::MAX);
 }
