@@ -36,7 +36,6 @@ pub(crate) enum AxisWork {
 
 /// Work on all axes.
 #[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
 pub(crate) enum WholeWork {
     Program(Run),
     /// Ends with this once everything stands.

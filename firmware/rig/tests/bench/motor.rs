@@ -11,7 +11,7 @@ pub const STEP_UM: f64 = 0.15625;
 /// The far switch closes here.
 pub const FAR_SWITCH_UM: f64 = 13_150.0;
 /// Way between closing and opening of the home switch.
-pub const HOME_HYSTERESIS_UM: f64 = 20.0;
+pub const HOME_HYSTERESIS_UM: f64 = 2.0;
 /// The screw's play in microsteps: 4.06 um.
 pub const PLAY: i64 = 26;
 
