@@ -30,6 +30,7 @@
 mod axis;
 mod camera;
 mod clock;
+mod clock_tree;
 mod control;
 mod encoder;
 mod link;

@@ -77,7 +77,9 @@ pub enum Command {
 pub struct StageReport {
     /// Where it really is, micrometres from its true home edge.
     pub position_um: f64,
-    /// Where its driver believes the rotor, less where it is, microsteps.
+    /// Where its driver's sequencer stands, microsteps from the true home edge: exactly what STEP and DIR said.
+    pub microsteps: i64,
+    /// That, less where the rotor is.
     pub lost_microsteps: f64,
     /// Rising edges on its STEP pin since power-on.
     pub step_edges: u64,
@@ -215,12 +217,13 @@ impl Driver {
     }
 
     fn stage_report(&self, name: StageName) -> StageReport {
-        let (position_um, lost_microsteps) = with_plant(&self.plant, |plant| {
+        let (position_um, microsteps, lost_microsteps) = with_plant(&self.plant, |plant| {
             let stage = plant.stage(name);
-            (stage.position_um(), stage.lost_microsteps())
+            (stage.position_um(), stage.microsteps(), stage.lost_microsteps())
         });
         StageReport {
             position_um,
+            microsteps,
             lost_microsteps,
             step_edges: self.wiring.step_edges(name),
             last_step_ns: self.wiring.last_step_ns(name),

@@ -9,6 +9,7 @@
 //! - [`board`], [`chips`], [`memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
 //! - [`camera`], [`eye`]: when the camera exposes, and what it sees.
 //! - [`driver`], [`lockstep`]: when virtual time passes.
+//! - [`mod@count`]: instructions of the on-board routines.
 //! - [`hands`], [`faults`], [`trace`]: what can be done to a rig, what can be broken, and what can be watched.
 //!
 //! # Time
@@ -19,6 +20,7 @@
 pub mod board;
 pub mod camera;
 pub mod chips;
+pub mod count;
 pub mod driver;
 pub mod endpoint;
 pub mod error;

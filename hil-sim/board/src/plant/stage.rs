@@ -102,6 +102,11 @@ impl Stage {
         self.screw.stage_um()
     }
 
+    /// Where the driver's sequencer stands, microsteps from the true home edge.
+    pub fn microsteps(&self) -> i64 {
+        self.motor.field()
+    }
+
     /// Steps that the motor has lost: where the driver believes the rotor, less where it is, microsteps.
     pub fn lost_microsteps(&self) -> f64 {
         self.motor.field() as f64 - self.motor.rotor()
