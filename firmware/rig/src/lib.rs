@@ -31,6 +31,7 @@
 extern crate std;
 
 mod alarms;
+mod calibrate;
 mod camera;
 mod correction;
 pub mod events;

@@ -3,10 +3,9 @@
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Axis, EventKind, Failure, RecordName};
 
-use crate::motion::axis::Stepper;
+use crate::calibrate::Step;
 use crate::program::Progress;
 use crate::rig::Rig;
-use crate::settings::StepperSettings;
 use crate::work::{AXES, AxisWork, WholeWork};
 
 impl Rig {
@@ -22,7 +21,7 @@ impl Rig {
         let Some(mut active) = self.works.on(axis).take() else { return };
         let request = active.request;
         let end = match &mut active.work {
-            AxisWork::Home(homing) => match self.stepper(axis) {
+            AxisWork::Home(homing) => match self.stage.with_numbers(axis, &self.settings) {
                 None => None, // only steppers are homed
                 Some((stepper, settings)) => match homing.tick(stepper, settings) {
                     None => None,
@@ -58,15 +57,6 @@ impl Rig {
         }
     }
 
-    /// A stepper axis with its numbers.
-    fn stepper(&mut self, axis: Axis) -> Option<(&mut Stepper, &StepperSettings)> {
-        match axis {
-            Axis::SensorCoarse => Some((&mut self.stage.coarse, &self.settings.coarse)),
-            Axis::Lens => Some((&mut self.stage.lens, &self.settings.lens)),
-            Axis::SensorFine => None,
-        }
-    }
-
     fn advance_whole(&mut self, now: BoardMicros) {
         let Some(mut active) = self.works.whole.take() else { return };
         let request = active.request;
@@ -97,6 +87,23 @@ impl Rig {
                     }
                 }
             }
+            WholeWork::Calibration(routine) => match routine.tick(&mut self.stage, &self.settings) {
+                Step::On => None,
+                Step::Set(key, value) => {
+                    match self.values.set(key, value) {
+                        Ok(()) => self.apply_settings(),
+                        Err(_) => {
+                            active.work = WholeWork::Ending { axis: None, reason: Failure::Implausible };
+                        }
+                    }
+                    None
+                }
+                Step::Done(result) => Some(EventKind::Calibrated { request, result }),
+                Step::Failed(axis, reason) => {
+                    active.work = WholeWork::Ending { axis: Some(axis), reason };
+                    None
+                }
+            },
             WholeWork::Ending { axis, reason } if self.stage.steppers_still() => {
                 Some(EventKind::Failed { request, axis: *axis, reason: *reason })
             }

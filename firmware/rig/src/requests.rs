@@ -3,10 +3,11 @@
 use farnear_maths::clsf::Columns;
 use farnear_protocol::message::{
     Alarm, Axis, CorrectionFault, EventKind, Failure, PositionState, RecordName, Request, RequestError,
-    Response, SettingKey, Shot, ShotFault,
+    Response, Routine, SettingKey, Shot, ShotFault,
 };
 use farnear_protocol::{BoardMicros, Micros, Nanometres};
 
+use crate::calibrate::Calibrating;
 use crate::motion::axis::Stepper;
 use crate::motion::home::Homing;
 use crate::motion::positioning::Positioning;
@@ -44,7 +45,7 @@ impl Rig {
             Request::RunProgram { silence } => self.run_program((id, *silence), now),
             Request::PauseProgram => self.pause_program(),
             Request::ResumeProgram => self.resume_program(now),
-            Request::Calibrate { .. } => Err(RequestError::NoSuchRoutine),
+            Request::Calibrate { routine, silence } => self.calibrate(*routine, (id, *silence)),
             Request::ReadAlarm { number } => self.alarms.read(*number).map(Response::Alarm),
             Request::ClearAlarm { number } => self.clear_alarm(*number, now),
             Request::ReadSetting { key } => Ok(Response::Setting(self.values.setting(*key))),
@@ -197,6 +198,17 @@ impl Rig {
             }
             _ => Err(RequestError::Program { state: self.program_status().state }),
         }
+    }
+
+    fn calibrate(&mut self, routine: Routine, (request, silence): (u32, Micros)) -> Answer {
+        let work = Calibrating::new(routine).ok_or(RequestError::NoSuchRoutine)?;
+        self.may_move(silence)?;
+        self.all_must_be_free()?;
+        if let Some(axis) = work.stepper() {
+            self.must_not_come_close(axis, Nanometres(0))?;
+        }
+        self.works.whole = Some(Active { request, silence, work: WholeWork::Calibration(work) });
+        Ok(Response::Accepted)
     }
 
     fn clear_alarm(&mut self, number: u32, now: BoardMicros) -> Answer {

@@ -65,6 +65,8 @@ pub struct StepperSettings {
     pub home_clearance: Nanometres,
     /// Longest exact approach.
     pub home_approach: Nanometres,
+    /// Way from where the home switch closes to where it opens again, of its data sheet.
+    pub home_hysteresis: Nanometres,
     /// The home switch may be closed up to this position.
     pub home_zone: Nanometres,
     /// Backlash of the screw, 0 = moves come from both sides.
@@ -176,6 +178,8 @@ const STEPPER: StepperSettings = StepperSettings {
     home_clearance: Nanometres(50_000),
     // Clearance, ramp and the switch's hysteresis.
     home_approach: Nanometres(500_000),
+    // A precision switch (Baumer My-Com class); a snap-action one has 0.1 mm.
+    home_hysteresis: Nanometres(2_000),
     // A micro-switch opens up to 0.2 mm behind where it closes.
     home_zone: Nanometres(300_000),
     // Encoder count and microstep leave 0.2 um; 1 um is what the coarse axis promises.

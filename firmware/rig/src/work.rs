@@ -6,6 +6,7 @@
 use farnear_protocol::message::{Axis, Failure};
 use farnear_protocol::{Micros, Nanometres};
 
+use crate::calibrate::Calibrating;
 use crate::motion::home::Homing;
 use crate::motion::positioning::Positioning;
 use crate::program::Run;
@@ -38,6 +39,7 @@ pub(crate) enum AxisWork {
 #[derive(Clone, Debug)]
 pub(crate) enum WholeWork {
     Program(Run),
+    Calibration(Calibrating),
     /// Ends with this once everything stands.
     Ending {
         axis: Option<Axis>,

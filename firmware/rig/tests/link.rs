@@ -2,7 +2,7 @@
 
 mod bench;
 
-use bench::{BOOT, Bench, SILENCE};
+use bench::{BOOT, Bench};
 use farnear_protocol::frame::{self, Header, Kind};
 use farnear_protocol::message::{Axis, EventKind, Failure, ResetCause, SCHEMA_KEY};
 use farnear_protocol::{

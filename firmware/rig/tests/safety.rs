@@ -53,7 +53,7 @@ fn every_stop_ends_the_pulses_within_a_millisecond_and_is_latched() {
         (|bench| bench.hardware.faults.emergency_stop = true, Alarm::EmergencyStop),
         (|bench| bench.hardware.faults.supply_low = true, Alarm::SupplyLow),
         (|bench| bench.hardware.faults.link_overflow = true, Alarm::QueueOverflow),
-        (|bench| drop(bench.accepted(&Request::Halt)), Alarm::Halt),
+        (|bench| assert!(bench.ask(&Request::Halt).1.is_ok()), Alarm::Halt),
     ];
     for (stop, alarm) in breaks {
         let mut bench = Bench::both_homed();

@@ -29,12 +29,7 @@ impl Positioning {
         (window, dwell): (Nanometres, Micros),
         now: BoardMicros,
     ) -> Self {
-        let stepper = match axis {
-            Axis::SensorCoarse => Some((&mut stage.coarse, &settings.coarse)),
-            Axis::Lens => Some((&mut stage.lens, &settings.lens)),
-            Axis::SensorFine => None,
-        };
-        let (deadline, waiting_since) = match stepper {
+        let (deadline, waiting_since) = match stage.with_numbers(axis, settings) {
             Some((stepper, settings)) => {
                 stepper.go(target);
                 (settings.settle_deadline, None)

@@ -6,7 +6,7 @@ use farnear_protocol::message::{Axis, AxisStatus, PositionState};
 use crate::io::{Inputs, Outputs};
 use crate::motion::axis::Stepper;
 use crate::piezo::Piezo;
-use crate::settings::Settings;
+use crate::settings::{Settings, StepperSettings};
 
 /// All axes.
 #[derive(Clone, Debug)]
@@ -60,6 +60,19 @@ impl Stage {
         match axis {
             Axis::SensorCoarse => Some(&mut self.coarse),
             Axis::Lens => Some(&mut self.lens),
+            Axis::SensorFine => None,
+        }
+    }
+
+    /// A stepper axis to be moved, with its numbers.
+    pub(crate) const fn with_numbers<'s>(
+        &mut self,
+        axis: Axis,
+        settings: &'s Settings,
+    ) -> Option<(&mut Stepper, &'s StepperSettings)> {
+        match axis {
+            Axis::SensorCoarse => Some((&mut self.coarse, &settings.coarse)),
+            Axis::Lens => Some((&mut self.lens, &settings.lens)),
             Axis::SensorFine => None,
         }
     }
