@@ -42,7 +42,7 @@ impl Plant {
         Self {
             part,
             // After a descent from the top each play hangs at its upper edge: that corner of the loop is 0.
-            plays: core::array::from_fn(|i| [Self::STROKE * (i as f64 + 0.5) / 12.0; 2].into()),
+            plays: core::array::from_fn(|i| [Self::STROKE * (i as f64 + 1.0) / 24.0; 2].into()),
             crept: [0.0; 5],
             drive: 0.0,
             position: 0.0,
@@ -73,8 +73,8 @@ impl Plant {
 
     fn run(&mut self, steps: usize) {
         let command = f64::from(self.code) / 65_535.0 * Self::STROKE;
-        // Six plays of weight w widen the loop by the sum of 2 w r = 6 w * stroke / 2.
-        let weight = self.part.hysteresis / 3.0;
+        // Six plays of weight w, up to a quarter of the stroke, widen the loop by the sum of 2 w r = 1.75 w * stroke.
+        let weight = self.part.hysteresis / 1.75;
         let h = 10e-6;
         for _ in 0..steps {
             self.drive += (command - self.drive) * (1.0 - (-h / Self::AMPLIFIER_S).exp());
