@@ -271,11 +271,9 @@ impl Rig {
         AXES.into_iter().try_for_each(|axis| self.must_be_free(axis))
     }
 
-    /// No stepper moves, and no program or calibration runs: what takes longer than a tick harms nobody.
+    /// Nothing moves: what takes longer than a tick harms nobody.
     fn must_stand(&self) -> Result<(), RequestError> {
-        let stepping =
-            [Axis::SensorCoarse, Axis::Lens].into_iter().find_map(|axis| self.works.request_on(axis));
-        match stepping.or(self.works.whole.as_ref().map(|active| active.request)) {
+        match self.works.any() {
             Some(request) => Err(RequestError::Busy { request }),
             None => Ok(()),
         }
