@@ -71,6 +71,11 @@ impl Scenery {
         .find_map(|(flag, given)| given.then_some(flag))
     }
 
+    /// The same before another scene.
+    pub fn with_scene(&self, scene: String) -> Self {
+        Self { scene: Some(scene), ..self.clone() }
+    }
+
     /// Everything that was left open, decided; as it stands in a capture's record.
     pub fn decided(&self, psf: Psf) -> SimulationRecord {
         SimulationRecord {
