@@ -3,7 +3,7 @@
 use std::{
     fs,
     io::Write,
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -41,9 +41,9 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let table = arguments.elf.as_ref().map(|path| read_table(path)).transpose()?;
+    let table = arguments.elf.as_deref().map(read_table).transpose()?;
     let mut printer = Printer { decoder: table.as_ref().map(Table::new_stream_decoder), lines: 0 };
-    if arguments.seconds.is_some_and(|seconds| !(seconds >= 0.0 && seconds < 1e9)) {
+    if arguments.seconds.is_some_and(|seconds| !(0.0..1e9).contains(&seconds)) {
         bail!(report::Usage("--seconds must be a positive time".into()));
     }
     let mut rig = arguments.target.connect(None)?;
@@ -67,7 +67,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     Ok(())
 }
 
-fn read_table(path: &PathBuf) -> Result<Table> {
+fn read_table(path: &Path) -> Result<Table> {
     let elf = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     match Table::parse(&elf) {
         Ok(Some(table)) => Ok(table),

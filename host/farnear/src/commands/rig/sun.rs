@@ -219,14 +219,17 @@ fn shadow_on_host(unix_seconds: i64, place: &Place, sun: &Sun, asked: &ShadowQue
 }
 
 /// An answer as bits, so that even two NaN are compared.
-fn bits(answer: &SunAnswer) -> (u32, u32, Option<(u8, [u32; 3], bool)>) {
-    let shadow = answer.shadow.map(|shadow| match shadow {
-        ShadowAnswer::Angle { beta_deg, sigma_beta_deg, mirrored, length_m, reliability } => {
-            (reliability as u8, [beta_deg.to_bits(), sigma_beta_deg.to_bits(), length_m.to_bits()], mirrored)
+fn bits(answer: &SunAnswer) -> [u32; 7] {
+    let shadow = match answer.shadow {
+        None => [0; 5],
+        Some(ShadowAnswer::Angle { beta_deg, sigma_beta_deg, mirrored, length_m, reliability }) => {
+            let kind = 1 + reliability as u32 * 2 + u32::from(mirrored);
+            [kind, beta_deg.to_bits(), sigma_beta_deg.to_bits(), length_m.to_bits(), 0]
         }
-        ShadowAnswer::SunTooLow => (10, [0; 3], false),
-        ShadowAnswer::SunOverhead => (11, [0; 3], false),
-        ShadowAnswer::Senseless => (12, [0; 3], false),
-    });
-    (answer.elevation_deg.to_bits(), answer.azimuth_deg.to_bits(), shadow)
+        Some(ShadowAnswer::SunTooLow) => [0, 0, 0, 0, 1],
+        Some(ShadowAnswer::SunOverhead) => [0, 0, 0, 0, 2],
+        Some(ShadowAnswer::Senseless) => [0, 0, 0, 0, 3],
+    };
+    let [a, b, c, d, e] = shadow;
+    [answer.elevation_deg.to_bits(), answer.azimuth_deg.to_bits(), a, b, c, d, e]
 }
