@@ -164,12 +164,19 @@ impl StepperSettings {
         self.min = Nanometres(values.get(min));
         self.max = Nanometres(values.get(max));
         self.speed = pulses(values.get(speed), 1_000);
+        // A rig that was told to go slowly also homes slowly.
+        self.home_search_speed = smaller(self.home_search_speed, self.speed);
+        self.home_leave_speed = smaller(self.home_leave_speed, self.speed);
         self.acceleration = pulses(values.get(acceleration), 1_000_000);
         self.jerk = pulses(values.get(jerk), 1_000_000);
         self.backlash = Nanometres(values.get(backlash));
         self.following = Nanometres(values.get(following));
         self
     }
+}
+
+const fn smaller(a: u32, b: u32) -> u32 {
+    if a < b { a } else { b }
 }
 
 /// A length in units of `pm` picometres as pulses; the ranges keep it positive and within 32 bits.
@@ -197,6 +204,15 @@ mod tests {
         let stepper = settings.coarse;
         assert_eq!((stepper.speed, stepper.acceleration, stepper.jerk), (40_000, 320_000, 10_240_000));
         assert_eq!(settings.coarse, settings.lens);
+    }
+
+    #[test]
+    fn a_slow_rig_homes_slowly() {
+        let mut values = Values::DEFAULT;
+        values.set(SettingKey::LensSpeedNmPerS, 500_000).expect("within its range");
+        let settings = Settings::DEFAULT.with(&values);
+        assert_eq!((settings.lens.home_search_speed, settings.lens.home_leave_speed), (3_200, 3_200));
+        assert_eq!(settings.coarse.home_search_speed, Settings::DEFAULT.coarse.home_search_speed);
     }
 
     #[test]
