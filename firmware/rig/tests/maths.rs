@@ -208,3 +208,17 @@ fn nothing_is_calculated_while_something_moves() {
     }
     bench.accepted(&Request::OpenCorrection(info(CorrectionForm::Full)));
 }
+
+#[test]
+fn ticks_that_catch_up_after_a_long_calculation_do_not_shake_the_piezo() {
+    let mut bench = Bench::new(700.0);
+    bench.work(&go(Axis::SensorFine, 120_000));
+    for _ in 0..5 {
+        bench.catch_up(22);
+        for _ in 0..200 {
+            bench.tick();
+            let off = bench.hardware.piezo_nm - 120e3;
+            assert!(off.abs() <= 50.0, "{off} nm");
+        }
+    }
+}

@@ -133,7 +133,7 @@ impl Hardware {
     }
 
     /// The piezo: 200 Hz, damping 0.03, by steps of 10 us.
-    fn swing(&mut self) {
+    pub fn swing(&mut self) {
         if self.faults.piezo_dead {
             return;
         }
