@@ -11,7 +11,7 @@ use crate::events::Events;
 use crate::identity::{Identity, LastWords};
 use crate::io::{Inputs, MEMORY_BYTES, MemoryWrite, MotorOutputs, Outputs};
 use crate::memory::contents::{Contents, Restored};
-use crate::memory::record::{self, Found};
+use crate::memory::record::{self, Found, RECORDS};
 use crate::memory::store::Store;
 use crate::motion::since;
 use crate::motion::stage::Stage;
@@ -56,13 +56,21 @@ pub struct Rig {
     in_motion_stored: u8,
     pub(crate) emergency_stop: bool,
     pub(crate) supply_low: bool,
+    untold: Option<Untold>,
+}
+
+/// What there is to say at the start.
+#[derive(Clone, Copy, Debug)]
+struct Untold {
+    found: Option<[Found; RECORDS]>,
+    in_motion: u8,
 }
 
 /// What the rig may take of a board's memory.
 const _: () = assert!(size_of::<Rig>() <= 36 * 1024);
 
 impl Rig {
-    /// The rig of `docs/rig.md`, just reset, at `now`. `memory` is what the FRAM holds, `None` where none answers.
+    /// The rig of `docs/rig.md`, just reset, at `now`: 25 KiB, best made in static memory. `memory` is what the FRAM holds, `None` where none answers.
     pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
         Self::with_parts(identity, Settings::DEFAULT, memory, now)
     }
@@ -80,7 +88,12 @@ impl Rig {
         let boot = counters.boots.saturating_add(1).max(identity.boot);
         counters.boots = boot;
         let settings = parts.with(&values);
-        let mut rig = Self {
+        let mut events = Events::new();
+        events.push(now, EventKind::Started { cause: identity.reset_cause });
+        let mut store = memory.map_or_else(Store::absent, Store::new);
+        store.mark(RecordName::Counters);
+        // Nothing is done to the rig here: it is made where the caller wants it, and not on the stack first.
+        Self {
             identity,
             boot,
             values,
@@ -92,39 +105,40 @@ impl Rig {
             alarms,
             silence: Silence::new(now),
             correction: Correction::new(correction),
-            events: Events::new(),
+            events,
             session: Session::new(boot),
             reboot: None,
-            store: memory.map_or_else(Store::absent, Store::new),
+            store,
             counters,
             in_motion: 0,
             in_motion_stored: 0,
             emergency_stop: false,
             supply_low: false,
-        };
-        rig.events.push(now, EventKind::Started { cause: identity.reset_cause });
-        rig.store.mark(RecordName::Counters);
-        if let Some(memory) = memory {
-            rig.tell_of_records(memory, now);
+            untold: Some(Untold { found: memory.map(record::find_all), in_motion }),
         }
-        rig.tell_of_last_boot(in_motion, now);
-        rig
     }
 
-    /// Says which records were damaged.
-    fn tell_of_records(&mut self, memory: &[u8; MEMORY_BYTES], now: BoardMicros) {
-        for record in record::ALL {
-            match record::find(memory, record) {
-                Found::Good { sequence, repaired: true, .. } => {
-                    self.counters.repaired = self.counters.repaired.saturating_add(1);
-                    self.events.push(now, EventKind::RecordRepaired { record, sequence });
-                }
-                Found::Lost => {
-                    self.store.mark(record);
-                    self.alarm(Alarm::RecordLost { record }, now);
-                }
-                Found::Good { .. } | Found::Blank => {}
+    /// Says, before anything else is done, how the last boot ended and what the memory held.
+    fn begin(&mut self, now: BoardMicros) {
+        let Some(Untold { found, in_motion }) = self.untold.take() else { return };
+        for (record, found) in record::ALL.into_iter().zip(found.into_iter().flatten()) {
+            self.tell_of_record(record, found, now);
+        }
+        self.tell_of_last_boot(in_motion, now);
+    }
+
+    /// Says whether a record was damaged.
+    fn tell_of_record(&mut self, record: RecordName, found: Found, now: BoardMicros) {
+        match found {
+            Found::Good { sequence, repaired: true, .. } => {
+                self.counters.repaired = self.counters.repaired.saturating_add(1);
+                self.events.push(now, EventKind::RecordRepaired { record, sequence });
             }
+            Found::Lost => {
+                self.store.mark(record);
+                self.alarm(Alarm::RecordLost { record }, now);
+            }
+            Found::Good { .. } | Found::Blank => {}
         }
     }
 
@@ -163,6 +177,7 @@ impl Rig {
     /// Takes one byte from the link. At the end of a request the request is carried out or begun, and its answer
     /// waits in [`Self::transmit`].
     pub fn receive(&mut self, byte: u8, now: BoardMicros) {
+        self.begin(now);
         let frames = self.session.counters().frames;
         let incoming = self.session.receive(byte);
         if self.session.counters().frames != frames {
@@ -186,6 +201,7 @@ impl Rig {
     /// One control tick; call it [`crate::io::TICK_HZ`] times a second and carry its outputs out at once.
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let now = inputs.now;
+        self.begin(now);
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
         self.stage.sense(inputs);
         self.camera.sense(inputs);

@@ -150,6 +150,11 @@ pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
     }
 }
 
+/// Looks for all records, in the order of [`ALL`].
+pub(crate) fn find_all(memory: &[u8; MEMORY_BYTES]) -> [Found; RECORDS] {
+    ALL.map(|record| find(memory, record))
+}
+
 /// A block of a copy.
 pub(crate) fn block(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize, block: usize) -> Block {
     at(memory, address(record, copy) + (1 + block) * BLOCK)
