@@ -120,7 +120,7 @@ impl Hardware {
 /// Runs the rig for ever.
 pub async fn run(
     mut hardware: Hardware,
-    mut rig: Rig,
+    rig: &mut Rig,
     watchdog: Peri<'static, IWDG>,
     led: Peri<'static, PB0>,
 ) -> ! {
@@ -144,7 +144,7 @@ pub async fn run(
         underrun = dry;
         let outputs = rig.tick(&inputs);
         hardware.apply(&outputs);
-        hardware.speak(&mut rig);
+        hardware.speak(rig);
         if outputs.reset {
             hardware.reset().await;
         }

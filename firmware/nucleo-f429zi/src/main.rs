@@ -49,6 +49,7 @@ use embassy_stm32::{
 };
 use embassy_time::{Duration, block_for};
 use farnear_rig::{Identity, Rig, io::MEMORY_BYTES};
+use static_cell::StaticCell;
 
 use crate::{
     axis::{Axis, Switches},
@@ -64,6 +65,17 @@ use crate::{
 
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);
+
+/// The rig with what its memory holds, and whether there is a memory. Not inside `main`, whose variables would have a
+/// place of their own for ever, and moved ones several.
+#[inline(never)]
+fn start(identity: Identity, memory: &mut Memory) -> (&'static mut Rig, bool) {
+    static RIG: StaticCell<Rig> = StaticCell::new();
+    block_for(MEMORY_STARTS);
+    let mut records = [0; MEMORY_BYTES];
+    let remembers = memory.is_there() && memory.read(&mut records);
+    (RIG.init_with(|| Rig::new(identity, remembers.then_some(&records), clock::now())), remembers)
+}
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -105,10 +117,7 @@ async fn main(spawner: Spawner) {
         Err(fault) => error!("no place for the sending task: {}", defmt::Debug2Format(&fault)),
     }
     let mut memory = Memory::new(p.SPI4, p.PE2, p.PE5, p.PE6, p.PE4);
-    block_for(MEMORY_STARTS);
-    let mut records = [0; MEMORY_BYTES];
-    let remembers = memory.is_there() && memory.read(&mut records);
-    let rig = Rig::new(identity, remembers.then_some(&records), clock::now());
+    let (rig, remembers) = start(identity, &mut memory);
     info!("boot {}, emulated: {}, memory: {}", rig.boot(), identity.emulated, remembers);
 
     let hardware = Hardware {

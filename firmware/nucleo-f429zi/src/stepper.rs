@@ -124,10 +124,7 @@ impl StepTimer {
             w.set_ossi(vals::Ossi::IDLE_LEVEL);
         });
         timer.sr().write(|w| w.0 = 0);
-        timer.dier().write(|w| {
-            w.set_uie(true);
-            w.set_bie(true);
-        });
+        timer.dier().write(|w| w.set_uie(true));
         registers::enable_interrupt(self.update, Priority::P0);
         registers::enable_interrupt(self.brake, Priority::P0);
     }
@@ -155,6 +152,11 @@ impl StepTimer {
                 queue.broken = true;
                 return;
             }
+            timer.sr().write(|w| {
+                w.0 = u32::MAX;
+                w.set_bif(0, false);
+            });
+            timer.dier().modify(|w| w.set_bie(true));
         }
         timer.cr1().modify(|w| w.set_cen(true));
     }
@@ -177,9 +179,10 @@ impl StepTimer {
     /// The emergency stop's circuit has opened; STEP is low already.
     fn broke(&self) {
         self.registers.cr1().modify(|w| w.set_cen(false));
+        // Its flag stays while the circuit is open, so it is heard once, until the next start.
+        self.registers.dier().modify(|w| w.set_bie(false));
         self.registers.sr().write(|w| {
             w.0 = u32::MAX;
-            w.set_bif(0, false);
             w.set_uif(false);
         });
         self.with(|queue| {

@@ -13,9 +13,7 @@ use rigless::{
     time::VirtualNanos,
 };
 
-use crate::{
-    board::RigBoard, chips::SharedPlant, error::SimError, plant::Plant, serial::Line,
-};
+use crate::{board::RigBoard, chips::SharedPlant, error::SimError, plant::Plant, serial::Line};
 
 /// Where the counting program lays its routines and its counts.
 const ROUTINES: &str = "FARNEAR_ROUTINES";
@@ -77,8 +75,9 @@ impl Counting {
     fn read(&self, host: &mut dyn Host) -> Vec<Count> {
         (0..self.number)
             .map(|i| {
-                let [name, name_length, unit, unit_length, units] =
-                    std::array::from_fn(|field| word(host, self.routines + i * ROUTINE_BYTES + 4 * field as u64));
+                let [name, name_length, unit, unit_length, units] = std::array::from_fn(|field| {
+                    word(host, self.routines + i * ROUTINE_BYTES + 4 * field as u64)
+                });
                 Count {
                     routine: text(host, name, name_length),
                     unit: text(host, unit, unit_length),

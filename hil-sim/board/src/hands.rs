@@ -18,6 +18,8 @@ use crate::{
 
 /// What cortex-m-rt paints the stack with before the program runs.
 const STACK_PAINT: u64 = 0xcccc_cccc;
+/// Where the firmware's stack lies, see its `memory.x`: first address and length.
+pub const STACK: (u64, u64) = (0x2000_0000, 128 << 10);
 /// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 2.93 V).
 const LOW_SUPPLY_MV: u32 = 2800;
 
@@ -189,10 +191,9 @@ impl Hands<'_, '_> {
         let _ = Memory::write(self.host, address, Width::W32, u64::from(value));
     }
 
-    /// The largest depth that the firmware's stack has had since the reset, bytes; its stack has the core's own memory
-    /// to itself, and start-up code paints it.
+    /// The largest depth that the firmware's stack has had since the reset, bytes; start-up code paints it.
     pub fn stack_depth(&mut self) -> u64 {
-        let (begin, length) = RAM[1];
+        let (begin, length) = STACK;
         let painted = (begin..begin + length)
             .step_by(4)
             .take_while(|address| Memory::read(self.host, *address, Width::W32).ok() == Some(STACK_PAINT));

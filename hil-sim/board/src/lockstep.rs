@@ -193,7 +193,8 @@ impl Lockstep {
         self.asked.clear();
         self.paused = None;
         self.waits_for_host = false;
-        self.starting = Some(now_ns + BOOT_NS);
+        // One that is reset again and again before it has started is waited for only once.
+        self.starting.get_or_insert(now_ns + BOOT_NS);
     }
 
     /// Whether the board owes something at this moment.

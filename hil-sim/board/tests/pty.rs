@@ -219,7 +219,10 @@ fn garbage_comes_first_and_the_port_goes_away_in_mid_move() {
     std::fs::write(&faults, "garbage = [1, 255, 0, 66, 7]\nunplug_after_ms = 1000\n").expect("can write");
     let program = Program::start(&["--faults", faults.to_str().expect("text")]);
     let mut client = Client::open(&program.port);
-    assert_eq!(client.ask(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE }), Ok(Response::Accepted));
+    assert_eq!(
+        client.ask(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE }),
+        Ok(Response::Accepted)
+    );
     let deadline = Instant::now() + PATIENCE;
     let mut bytes = [0; 64];
     let gone = loop {

@@ -5,7 +5,7 @@ mod common;
 use common::{Bench, SILENCE, go};
 use farnear_protocol::{
     EventKind, Nanometres, Request, RequestError,
-    message::{Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
+    message::{Alarm, Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
 };
 use farnear_sim::{board::SpiChip, plant::StageName};
 
@@ -42,7 +42,10 @@ fn homing_finds_the_edge_and_moves_reach_their_target() {
 fn a_stall_is_seen_and_loses_the_position() {
     let mut bench = Bench::new(3);
     bench.home();
-    bench.rig.reach_in(|hands| hands.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true))).expect("runs");
+    bench
+        .rig
+        .reach_in(|hands| hands.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true)))
+        .expect("runs");
     let end = bench.move_to(Axis::SensorCoarse, Nanometres(2_000_000));
     assert!(
         matches!(end, EventKind::Failed { reason: Failure::Following { .. }, .. }),
@@ -82,6 +85,7 @@ fn a_cut_gauge_and_a_dead_drive_end_a_fine_move() {
     let end = bench.carry_out(&go(50_000));
     assert!(matches!(end, EventKind::Failed { reason: Failure::Gauge, .. }), "{end:?}");
     bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Gauge, false)).expect("runs");
+    bench.clear(|alarm| *alarm == Alarm::Gauge);
     let end = bench.carry_out(&go(50_000));
     assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
     bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Dac, true)).expect("runs");

@@ -8,7 +8,7 @@ use cortex_m::peripheral::SCB;
 use super::retained::{Last, leave};
 
 /// The stack, see `memory.x`: a fault with the stack pointer this close to its lower end, or below, is an overflow.
-const STACK_LOWEST: u32 = 0x1000_0000;
+const STACK_LOWEST: u32 = 0x2000_0000;
 const STACK_MARGIN: u32 = 128;
 /// Words of a stacked exception frame before the program counter.
 const FRAME_PC: u32 = 6;

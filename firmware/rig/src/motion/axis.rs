@@ -376,6 +376,10 @@ impl Stepper {
     }
 
     fn find_fault(&mut self, inputs: &MotorInputs, progressed: bool) -> Option<Failure> {
+        if matches!(self.motion, Motion::Still) && self.state != PositionState::Homed {
+            // Nobody relies on its place, and after an abort at speed the motor swings for a while.
+            self.follow_encoder();
+        }
         if let Some(error) = self.following_error() {
             return Some(Failure::Following { error });
         }

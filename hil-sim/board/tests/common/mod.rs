@@ -25,7 +25,9 @@ pub type Answer = Result<Response, RequestError>;
 
 /// The frame of a request.
 pub fn request_frame(id: u32, boot: u32, request: &Request) -> Vec<u8> {
-    encode(Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot }, request).expect("requests fit").to_vec()
+    encode(Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot }, request)
+        .expect("requests fit")
+        .to_vec()
 }
 
 /// The answer that a frame carries, if it is one.
@@ -144,7 +146,10 @@ impl Bench {
     }
 
     /// Looks at something in the rig.
-    pub fn peek<T: Send + 'static>(&mut self, look: impl FnOnce(&mut Hands<'_, '_>) -> T + Send + 'static) -> T {
+    pub fn peek<T: Send + 'static>(
+        &mut self,
+        look: impl FnOnce(&mut Hands<'_, '_>) -> T + Send + 'static,
+    ) -> T {
         let (tell, told) = std::sync::mpsc::channel();
         self.hands(move |hands| tell.send(look(hands)).expect("somebody waits"));
         told.recv().expect("the rig runs")
@@ -206,4 +211,9 @@ pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32
         repeat: 1,
         mode: TriggerMode::Hardware,
     }
+}
+
+/// How much of something a test does: what the environment says (`cargo xtask campaign` says more), or else this.
+pub fn amount<T: std::str::FromStr>(variable: &str, else_this: T) -> T {
+    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(else_this)
 }
