@@ -251,6 +251,22 @@ fn a_push_at_rest_loses_the_position() {
     assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
 }
 
+#[test]
+fn a_motor_that_rolls_on_after_an_abort_is_no_further_alarm() {
+    let mut bench = Bench::homed();
+    bench.accepted(&go(9_000_000));
+    bench.run_ms(300);
+    bench.accepted(&Request::Halt);
+    bench.run_ms(3);
+    bench.hardware.coarse.turn(512); // two turns of the field
+    bench.run_ms(5);
+    assert_eq!(bench.alarm(), Some(Alarm::Halt));
+    bench.clear();
+    assert_eq!(bench.alarm(), None);
+    assert!((f64::from(bench.status().coarse.measured.0) / 1e3 - bench.hardware.position_um()).abs() < 0.4);
+    assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20))]
 

@@ -380,7 +380,12 @@ impl Stepper {
             // Nobody relies on its place, and after an abort at speed the motor swings for a while.
             self.follow_encoder();
         }
-        if let Some(error) = self.following_error() {
+        let resting = matches!(self.motion, Motion::Still | Motion::Preparing { .. });
+        if resting && self.state != PositionState::Homed {
+            // Nothing is known that could be lost: a motor that was stopped from full speed rolls on, and one that gets
+            // its current back is pulled to the next phase.
+            self.follow_encoder();
+        } else if let Some(error) = self.following_error() {
             return Some(Failure::Following { error });
         }
         if inputs.driver_fault && self.enabled && !matches!(self.motion, Motion::Preparing { .. }) {
