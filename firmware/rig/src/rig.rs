@@ -202,6 +202,10 @@ impl Rig {
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let now = inputs.now;
         self.begin(now);
+        if inputs.emergency_stop && !self.emergency_stop {
+            // The hardware has emptied the step queues: that is this stop, and no fault of the timers.
+            self.stage.abort();
+        }
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
         self.stage.sense(inputs);
         self.camera.sense(inputs);

@@ -125,6 +125,8 @@ fn stops(
         let after = bench.report();
         assert!(after.step_edges() > before.step_edges() || !counts, "it was moving");
         worst_us = worst_us.max(after.last_step_ns().saturating_sub(before.now_ns) / 1000);
+        let alarms = bench.events[events..].iter().filter(|event| matches!(event.kind, EventKind::Alarm(_)));
+        assert_eq!(alarms.count(), 1, "one cause, one alarm: {:?}", &bench.events[events..]);
         let failed = bench.events[events..].iter().filter(|event| {
             matches!(
                 event.kind,
