@@ -207,9 +207,11 @@ impl Rig {
             self.stage.abort();
         }
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
+        // First: an open circuit has cut the pulses, which is no fault of the step timers then.
+        self.watch_inputs(inputs);
         self.stage.sense(inputs);
         self.camera.sense(inputs);
-        self.watch(inputs);
+        self.watch(now);
         self.advance(now);
         self.remember_motion();
         let mut outputs = Outputs {
@@ -226,8 +228,8 @@ impl Rig {
         outputs
     }
 
-    /// Looks for everything that must stop the rig.
-    fn watch(&mut self, inputs: &Inputs) {
+    /// Looks for what must stop the rig in what the board reads.
+    fn watch_inputs(&mut self, inputs: &Inputs) {
         let now = inputs.now;
         if inputs.emergency_stop {
             self.alarm(Alarm::EmergencyStop, now);
@@ -238,6 +240,10 @@ impl Rig {
         if inputs.link_overflow {
             self.alarm(Alarm::QueueOverflow, now);
         }
+    }
+
+    /// Looks for what must stop the rig in what the axes and the host do.
+    fn watch(&mut self, now: BoardMicros) {
         for axis in AXES {
             let fault = self.stage.stepper_mut(axis).and_then(|stepper| stepper.take_fault());
             if let Some(alarm) = fault.and_then(|fault| alarms::of_fault(axis, fault)) {

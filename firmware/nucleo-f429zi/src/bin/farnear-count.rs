@@ -427,7 +427,7 @@ impl Motor {
 
     fn run(&mut self, outputs: &MotorOutputs) {
         self.away = outputs.direction_away;
-        if outputs.abort_steps {
+        if outputs.abort_steps && !self.queue.is_empty() {
             fail();
         }
         for segment in &outputs.segments {

@@ -328,6 +328,7 @@ impl Stepper {
             Motion::Still => {}
             Motion::Aborting { .. } => outputs.abort_steps = true,
             Motion::Preparing { ramp, ticks } => {
+                outputs.abort_steps = true; // forgets an underrun from before
                 *ticks = ticks.saturating_sub(1);
                 if *ticks == 0 && self.permitted {
                     self.motion = Motion::Stepping { ramp: ramp.clone(), quiet_ticks: 0 };
@@ -376,10 +377,6 @@ impl Stepper {
     }
 
     fn find_fault(&mut self, inputs: &MotorInputs, progressed: bool) -> Option<Failure> {
-        if matches!(self.motion, Motion::Still) && self.state != PositionState::Homed {
-            // Nobody relies on its place, and after an abort at speed the motor swings for a while.
-            self.follow_encoder();
-        }
         let resting = matches!(self.motion, Motion::Still | Motion::Preparing { .. });
         if resting && self.state != PositionState::Homed {
             // Nothing is known that could be lost: a motor that was stopped from full speed rolls on, and one that gets

@@ -54,6 +54,7 @@ pub struct Motor {
     home_closed: bool,
     away: bool,
     pub enabled: bool,
+    was_cut: bool,
 }
 
 impl Motor {
@@ -75,6 +76,7 @@ impl Motor {
             home_closed: stage <= 0,
             away: false,
             enabled: false,
+            was_cut: false,
         }
     }
 
@@ -122,6 +124,13 @@ impl Motor {
                 segment.last = true;
             }
         }
+        if cut && !self.was_cut {
+            // The break input stops the timer, which looks like a queue that ran dry.
+            self.underrun |= !self.queue.is_empty() || self.running.is_some();
+            self.queue.clear();
+            self.running = None;
+        }
+        self.was_cut = cut;
         for segment in &outputs.segments {
             assert!(self.enabled, "steps for a driver without current");
             assert!(self.queue.len() < QUEUE, "more segments than there is room for");
