@@ -81,8 +81,8 @@ fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
         return;
     }
     let folder = Folder::new();
-    // Homing takes some 2 s of the board's time, both exposures lie at 2.76 s and 2.78 s.
-    for milliseconds in [300, 2_770] {
+    // Homing takes some 4 s of the board's time, both exposures lie at 5.365 s and 5.385 s.
+    for milliseconds in [300, 5_375] {
         let faults = format!("unplug_after_ms = {milliseconds}");
         fails(&mut capture(&folder, Some(&faults), "out"), 1, &["went away while", "check its cable"]);
         assert_eq!(folder.listing(), ["faults.toml"]);

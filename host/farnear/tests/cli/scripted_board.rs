@@ -130,6 +130,7 @@ fn settings_and_counters_are_read_and_changed() {
 #[test]
 fn a_checklist_without_hands_stops_at_what_fails() {
     let (port, peer) = plug_in(Faults::default());
+    peer.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().expect("a short version");
     let images = Folder::new();
     let camera = format!("folder:{}", images.text(""));
     let check =
