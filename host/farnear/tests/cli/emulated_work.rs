@@ -58,7 +58,8 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     let folder = Folder::new();
     // Near the focus: pictures from afar take the simulator long to draw.
     let out = folder.text("stack");
-    let stack = ["sequence", "--axis", "coarse", "--from", "5790", "--to", "5830", "--steps", "3", "--out", &out];
+    let stack =
+        ["sequence", "--axis", "coarse", "--from", "5790", "--to", "5830", "--steps", "3", "--out", &out];
     let found = figures(on_the_rig(&stack).args(["--optics", rig_optics(), "--json"]));
     assert_eq!(number(&found, "exposures"), 3.0);
     assert!(number(&found, "largest_error_um") <= 1.0, "{found}");
