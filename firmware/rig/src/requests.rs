@@ -234,7 +234,7 @@ impl Rig {
 
     /// Takes changed settings over, and has them kept.
     pub(crate) fn apply_settings(&mut self) {
-        self.settings = self.settings.with(&self.values);
+        self.settings = self.parts.with(&self.values);
         self.stage.apply(&self.settings);
         self.camera.apply(self.settings.camera);
         self.shots.arm(0); // it was checked with other numbers

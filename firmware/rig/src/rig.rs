@@ -35,7 +35,8 @@ pub(crate) struct Reboot {
 pub struct Rig {
     pub(crate) identity: Identity,
     pub(crate) boot: u32,
-    /// The settings by key, and all numbers with them.
+    /// What the rig is made of, the settings by key, and all numbers with them.
+    pub(crate) parts: Settings,
     pub(crate) values: Values,
     pub(crate) settings: Settings,
     pub(crate) stage: Stage,
@@ -96,6 +97,7 @@ impl Rig {
         Self {
             identity,
             boot,
+            parts,
             values,
             settings,
             stage: Stage::new(&settings),
@@ -202,10 +204,6 @@ impl Rig {
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let now = inputs.now;
         self.begin(now);
-        if inputs.emergency_stop && !self.emergency_stop {
-            // The hardware has emptied the step queues: that is this stop, and no fault of the timers.
-            self.stage.abort();
-        }
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
         // First: an open circuit has cut the pulses, which is no fault of the step timers then.
         self.watch_inputs(inputs);

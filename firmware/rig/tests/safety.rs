@@ -310,3 +310,22 @@ fn a_board_without_memory_works_and_says_so() {
     assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
     assert!(matches!(bench.work(&go(Axis::SensorCoarse, 50_000)), EventKind::MoveDone { .. }));
 }
+
+#[test]
+fn a_slow_rig_homes_slowly_and_a_fast_one_fast_again() {
+    let mut bench = Bench::new(9_000.0);
+    let mut times = Vec::new();
+    for value in [6_250_000, 800_000, 6_250_000] {
+        let key = SettingKey::CoarseSpeedNmPerS;
+        assert!(bench.ask(&Request::WriteSetting { key, value }).1.is_ok());
+        bench.hardware.coarse.turn(57_600 - bench.hardware.coarse.microsteps);
+        bench.run_ms(1);
+        if bench.alarm().is_some() {
+            bench.clear(); // it was homed, and pushed
+        }
+        let start = bench.now;
+        assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+        times.push((bench.now - start) / 100_000);
+    }
+    assert!(times[1] > 2 * times[0] && times[2] == times[0], "{times:?} tenths of a second");
+}
