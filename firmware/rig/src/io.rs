@@ -8,6 +8,10 @@
 //! The inputs of a tick already reflect the outputs of the tick before: segments handed over count as queued,
 //! so [`StepperState::idle`] is false, and an ordered abort has emptied the queue.
 //!
+//! The emergency stop is read after the step timers: a circuit that opens between the two readings must not look like a timer
+//! that ran dry. Ticks that make up for lost time (a long calculation) may follow each other at once; the piezo's loop
+//! leaves those out.
+//!
 //! # Step pulses
 //! A [`Segment`] is some pulses of equal spacing. An advanced timer plays one from its repetition counter (8 bit:
 //! 256 pulses) while the next waits in the preload registers; one-pulse mode is on whenever no next one waits.
@@ -66,7 +70,7 @@ pub struct StepperState {
     pub pulses: u32,
     /// No segment runs and none waits.
     pub idle: bool,
-    /// The timer ran dry after a segment without [`Segment::last`]. Stays set until [`Outputs::abort_steps`].
+    /// The timer ran dry after a segment without [`Segment::last`]. Stays set until [`MotorOutputs::abort_steps`].
     pub underrun: bool,
     /// Segments that can be handed over in this tick.
     pub room: u8,
@@ -153,7 +157,8 @@ pub struct MotorOutputs {
     /// tick before the first segment.
     pub direction_away: bool,
     /// Empty the segment queue and let the motor stop with the running segment; clears
-    /// [`StepperState::underrun`]. Never together with new `segments`.
+    /// [`StepperState::underrun`]. Never together with new `segments`. Also ordered, of a motor that stands, before it
+    /// sets off.
     pub abort_steps: bool,
     /// New segments, to be played in this order behind those that wait; never more than
     /// [`StepperState::room`].

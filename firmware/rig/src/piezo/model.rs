@@ -99,6 +99,7 @@ impl Lag {
 
     /// What it would be after this command.
     pub(crate) fn ahead(&self, command: i32) -> i32 {
+        let command = command.clamp(0, STROKE); // no other can be played
         self.hysteresis(command, &self.moved(command)).saturating_add(self.creep)
     }
 

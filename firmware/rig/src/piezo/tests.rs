@@ -138,13 +138,16 @@ fn holding_a_moving_piezo_ends_the_move() {
 
 #[test]
 fn any_gauge_keeps_the_loop_in_bounds() {
-    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    let blind = Settings::DEFAULT.fine;
+    let worst = FineSettings { hysteresis_ppm: 300_000, creep_ppm_per_decade: 100_000, ..blind };
+    let (mut blind, mut worst) = (Piezo::new(blind), Piezo::new(worst));
     let mut random = 1u64;
-    for tick in 0..200_000 {
+    for tick in 0..400_000 {
+        let piezo = if tick % 2 == 0 { &mut blind } else { &mut worst };
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         let wild = (random >> 40) as u32 & GAUGE_CODE_MAX;
         piezo.sense(Some(wild.clamp(1, GAUGE_CODE_MAX - 1)));
-        if tick % 100 == 0 {
+        if tick % 101 == 0 {
             piezo.go(Nanometres((random >> 33) as i32 % 200_000));
         }
         piezo.act(); // overflow checks are on

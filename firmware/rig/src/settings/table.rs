@@ -67,6 +67,16 @@ impl Values {
                 restored.0[key as usize] = value;
             }
         }
+        for (low, high) in [
+            (SettingKey::CoarseMinNm, SettingKey::CoarseMaxNm),
+            (SettingKey::LensMinNm, SettingKey::LensMaxNm),
+            (SettingKey::FineMinNm, SettingKey::FineMaxNm),
+        ] {
+            if restored.get(low) > restored.get(high) {
+                restored.0[low as usize] = range(low).0;
+                restored.0[high as usize] = range(high).0;
+            }
+        }
         restored
     }
 
