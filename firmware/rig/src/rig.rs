@@ -264,6 +264,7 @@ impl Rig {
         self.counters.alarms = self.counters.alarms.saturating_add(1);
         self.events.push(now, EventKind::Alarm(record));
         self.store.mark(RecordName::Alarms);
+        self.store.mark(RecordName::Counters);
         self.stage.abort();
         self.camera.give_up();
         let number = record.number;

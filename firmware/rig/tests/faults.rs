@@ -5,7 +5,9 @@ mod bench;
 
 use bench::motor::MotorFaults;
 use bench::{Bench, SILENCE, ends, go, home};
-use farnear_protocol::message::{Axis, EventKind, Failure, PositionState, ResetCause, Routine};
+use farnear_protocol::message::{
+    Alarm, Axis, EventKind, Failure, PositionState, ResetCause, Routine, SettingKey,
+};
 use farnear_protocol::{Request, RequestError};
 use proptest::prelude::*;
 
@@ -88,6 +90,55 @@ fn deeds() -> impl Strategy<Value = Deed> {
         1 => Just(Deed::PowerCycle),
         1 => (-200..200i64).prop_map(Deed::Push),
     ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn power_lost_in_the_middle_of_a_write_loses_no_record_and_no_motion(
+        ticks in prop_oneof![0u64..5, 40..70u64, 300..2_000u64], tear in 0usize..64, setting in any::<bool>()) {
+        let mut bench = Bench::both_homed();
+        bench.run_ms(5);
+        if setting {
+            let key = SettingKey::CameraReadoutUs;
+            let written = bench.ask(&Request::WriteSetting { key, value: 20_000 }).1;
+            prop_assert!(written.is_ok());
+        }
+        let edges = bench.hardware.coarse.edges;
+        bench.accepted(&go(Axis::SensorCoarse, 1_000_000));
+        for _ in 0..ticks {
+            bench.tick();
+        }
+        // Then the next write is torn, or none comes for a while.
+        bench.tear = Some(tear);
+        for _ in 0..20 {
+            bench.tick();
+            if bench.torn {
+                break;
+            }
+        }
+        let moved = bench.hardware.coarse.edges > edges;
+        let rests = bench.events.iter().any(|(_, event)| matches!(event.kind, EventKind::MoveDone { .. }));
+        bench.tear = None;
+        bench.restart(1, ResetCause::PowerOn);
+        bench.tick();
+        let latched = bench.alarm();
+        let lost = matches!(latched, Some(Alarm::RecordLost { .. }));
+        prop_assert!(!lost, "{:?}", latched);
+        if moved && !rests {
+            let interrupted = Alarm::MotionInterrupted { axis: Axis::SensorCoarse };
+            prop_assert_eq!(latched, Some(interrupted));
+            prop_assert_eq!(bench.status().coarse.state, PositionState::Lost);
+        }
+        // Whatever was torn is mended by the next write.
+        bench.run_ms(20);
+        bench.restart(1, ResetCause::PowerOn);
+        bench.tick();
+        let repaired =
+            bench.events.iter().any(|(_, event)| matches!(event.kind, EventKind::RecordRepaired { .. }));
+        prop_assert!(!repaired);
+    }
 }
 
 proptest! {

@@ -6,7 +6,8 @@
 //! ```
 //! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two copies, one behind the
 //! other, and a place of its own from address 0 up. The copy with the newer sequence number counts; the other is the one that is
-//! written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and the one before untouched.
+//! written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and the one before untouched. A
+//! record's first write is of both copies, one after the other.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use farnear_protocol::message::RecordName;
@@ -144,9 +145,9 @@ pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
         }
         [Copy::Good { sequence }, other] => Found::Good { copy: 0, sequence, repaired: other == Copy::Bad },
         [other, Copy::Good { sequence }] => Found::Good { copy: 1, sequence, repaired: other == Copy::Bad },
-        // The very first write was torn: there was nothing to lose.
-        [Copy::Blank, Copy::Blank] => Found::Blank,
-        [..] => Found::Lost,
+        // The first write is of both copies, so a blank one says that it was torn: there was nothing to lose.
+        [Copy::Blank, _] | [_, Copy::Blank] => Found::Blank,
+        [Copy::Bad, Copy::Bad] => Found::Lost,
     }
 }
 

@@ -11,11 +11,13 @@ use crate::io::{MEMORY_BYTES, MEMORY_CHUNK, MemoryWrite};
 use crate::memory::record::{self, ALL, BLOCK, Block, Checksum, Found, RECORDS};
 
 /// The next write of a record.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Slot {
     sequence: u32,
     copy: usize,
     changed: bool,
+    /// Neither copy is good: the first write is followed by that of the other copy.
+    fresh: bool,
 }
 
 /// A copy being written.
@@ -38,7 +40,8 @@ pub(crate) struct Store {
 impl Store {
     /// No memory: nothing is ever written.
     pub(crate) const fn absent() -> Self {
-        Self { fitted: false, slots: [Slot { sequence: 0, copy: 0, changed: false }; RECORDS], job: None }
+        let slot = Slot { sequence: 0, copy: 0, changed: false, fresh: true };
+        Self { fitted: false, slots: [slot; RECORDS], job: None }
     }
 
     /// A memory, with what was found of each record.
@@ -46,7 +49,8 @@ impl Store {
         let mut store = Self { fitted: true, ..Self::absent() };
         for (slot, record) in store.slots.iter_mut().zip(ALL) {
             if let Found::Good { copy, sequence, repaired } = record::find(memory, record) {
-                *slot = Slot { sequence: sequence.wrapping_add(1), copy: 1 - copy, changed: repaired };
+                let sequence = sequence.wrapping_add(1);
+                *slot = Slot { sequence, copy: 1 - copy, changed: repaired, fresh: false };
             }
         }
         store
@@ -91,7 +95,8 @@ impl Store {
         let mut bytes = Vec::new();
         if job.next == record::blocks(record) {
             let _ = bytes.extend_from_slice(&job.checksum.finish(job.header)); // a block fits a chunk
-            *slot = Slot { sequence: slot.sequence.wrapping_add(1), copy: 1 - slot.copy, changed: false };
+            let sequence = slot.sequence.wrapping_add(1);
+            *slot = Slot { sequence, copy: 1 - slot.copy, changed: slot.fresh, fresh: false };
             return Some((write(address, bytes), Some(record)));
         }
         let first = job.next;

@@ -48,6 +48,9 @@ pub struct Bench {
     /// The FRAM.
     pub memory: Box<[u8; MEMORY_BYTES]>,
     boot: u32,
+    /// The next write to the FRAM ends after this many bytes; whether one has.
+    pub tear: Option<usize>,
+    pub torn: bool,
     pub now: u64,
     pub next_id: u32,
     decoder: Decoder,
@@ -75,6 +78,8 @@ impl Bench {
             rig,
             hardware: Hardware::new(position_um),
             memory,
+            tear: None,
+            torn: false,
             now: 0,
             next_id: 100,
             decoder: Decoder::new(),
@@ -128,7 +133,9 @@ impl Bench {
         self.hardware.run(&outputs, self.now);
         if let Some(write) = &outputs.memory {
             let at = usize::from(write.address);
-            self.memory[at..at + write.bytes.len()].copy_from_slice(&write.bytes);
+            let written = self.tear.take().map_or(write.bytes.len(), |bytes| bytes.min(write.bytes.len()));
+            self.torn |= written < write.bytes.len();
+            self.memory[at..at + written].copy_from_slice(&write.bytes[..written]);
         }
         if outputs.reset {
             self.reset_at.get_or_insert(self.now);
