@@ -279,13 +279,17 @@ impl Owner {
         self.news.tell(&News::Broken(error.clone()));
         self.events.arrived.clear();
         self.still_there = false;
+        // A board that was reset is there; one that was unplugged takes a while.
+        let pause = if matches!(broken, Break::Gone(_)) { RECONNECT } else { Duration::ZERO };
+        self.next_attempt = Instant::now() + pause;
         self.last_break = Some(broken.clone());
         self.broken = Some(broken);
-        self.next_attempt = Instant::now();
     }
 
     fn try_again_when_due(&mut self) {
-        if Instant::now() >= self.next_attempt {
+        // The port of a simulator that has ended may be anybody's next.
+        let nobodys = matches!(self.broken, Some(Break::Gone(_))) && self.session.hello.emulated;
+        if !nobodys && Instant::now() >= self.next_attempt {
             // It is tried again, for as long as anybody holds a handle.
             let _ = self.reconnect();
         }

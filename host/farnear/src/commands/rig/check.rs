@@ -7,8 +7,6 @@ mod hands;
 mod moving;
 mod resting;
 
-use std::io::{BufRead, Write};
-
 use anyhow::{Result, bail};
 use clap::Args;
 use farnear_capture::Client;
@@ -18,7 +16,7 @@ use super::{
     Connected, Target,
     camera::{self, CameraArguments},
 };
-use crate::report;
+use crate::{prompt, report};
 
 /// Walk through the bring-up of a rig: link, identity, memory, switches, emergency stop, encoders, first move, homing,
 /// piezo, camera.
@@ -103,24 +101,17 @@ impl Checkup<'_> {
 
     /// Asks the user to do something and waits for Enter.
     fn ask(&self, what: &str) -> Result<()> {
-        eprint!("   {what}, then press Enter: ");
-        std::io::stderr().flush()?;
-        let mut line = String::new();
-        if std::io::stdin().lock().read_line(&mut line)? == 0 {
-            bail!("nobody answers (the input has ended); use --no-hands to pass over what needs hands");
-        }
-        Ok(())
+        self.answer(&format!("   {what}, then press Enter: ")).map(|_| ())
     }
 
     /// Asks a question and takes everything but an n for yes.
     fn yes(&self, question: &str) -> Result<bool> {
-        eprint!("   {question} [Y/n] ");
-        std::io::stderr().flush()?;
-        let mut line = String::new();
-        if std::io::stdin().lock().read_line(&mut line)? == 0 {
-            bail!("nobody answers (the input has ended); use --no-hands to pass over what needs hands");
-        }
-        Ok(!line.trim().to_lowercase().starts_with('n'))
+        let answer = self.answer(&format!("   {question} [Y/n] "))?;
+        Ok(!answer.trim().to_lowercase().starts_with('n'))
+    }
+
+    fn answer(&self, question: &str) -> Result<String> {
+        prompt::ask(question, "use --no-hands to pass over what needs hands", || self.client().interrupted())
     }
 }
 

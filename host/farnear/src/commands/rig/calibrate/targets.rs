@@ -2,9 +2,11 @@
 
 use std::{
     fs,
-    io::{BufRead, Write},
     path::{Path, PathBuf},
-    sync::{Arc, atomic::AtomicBool},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use anyhow::{Context, Result, bail};
@@ -29,6 +31,7 @@ use crate::{
         listen_for_interruption,
     },
     files::{self, map},
+    prompt,
     report::{self, Usage},
 };
 
@@ -162,22 +165,17 @@ impl Series<'_> {
     }
 
     fn prompt(&self, number: usize, count: usize, true_mm: f64) -> Result<()> {
-        eprint!(
-            "place the flat target {true_mm} mm before the lens ({} of {count}), square to it, and press Enter: ",
+        let place = format!(
+            "place the flat target {true_mm} mm before the lens ({} of {count}), square to it",
             number + 1
         );
-        std::io::stderr().flush()?;
         if self.arguments.no_prompt {
-            eprintln!();
+            eprintln!("{place}");
             return Ok(());
         }
-        let mut line = String::new();
-        if std::io::stdin().lock().read_line(&mut line)? == 0 {
-            bail!(
-                "nobody is there to place the target (the input has ended); use --no-prompt if it moves by itself"
-            );
-        }
-        Ok(())
+        let nobody = "use --no-prompt if the target moves by itself";
+        let interrupted = || self.interrupted.load(Ordering::Relaxed);
+        prompt::ask(&format!("{place}, and press Enter: "), nobody, interrupted).map(|_| ())
     }
 
     /// Captures a pair and computes its depth into a folder of its own.
