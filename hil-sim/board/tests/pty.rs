@@ -3,6 +3,7 @@
 mod common;
 
 use std::{
+    collections::VecDeque,
     io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
     path::Path,
@@ -68,6 +69,8 @@ impl Program {
 struct Client {
     port: Box<dyn SerialPort>,
     decoder: Decoder,
+    /// Bytes that came behind what was waited for.
+    rest: VecDeque<u8>,
     boot: u32,
     next: u32,
 }
@@ -78,7 +81,7 @@ impl Client {
             .timeout(Duration::from_millis(100))
             .open()
             .expect("the pty opens");
-        let mut client = Self { port, decoder: Decoder::new(), boot: 0, next: 0 };
+        let mut client = Self { port, decoder: Decoder::new(), rest: VecDeque::new(), boot: 0, next: 0 };
         match client.ask(&Request::Hello) {
             Ok(Response::Hello(hello)) => client.boot = hello.boot,
             other => panic!("no hello but {other:?}"),
@@ -91,13 +94,15 @@ impl Client {
         let deadline = Instant::now() + PATIENCE;
         let mut bytes = [0; 256];
         while Instant::now() < deadline {
-            let count = match self.port.read(&mut bytes) {
+            let read = if self.rest.is_empty() { self.port.read(&mut bytes) } else { Ok(0) };
+            let count = match read {
                 Ok(count) => count,
                 Err(error) if error.kind() == std::io::ErrorKind::TimedOut => 0,
                 Err(error) => panic!("the port failed: {error}"),
             };
-            for byte in &bytes[..count] {
-                if let Some(Ok(packet)) = self.decoder.push(*byte)
+            self.rest.extend(&bytes[..count]);
+            while let Some(byte) = self.rest.pop_front() {
+                if let Some(Ok(packet)) = self.decoder.push(byte)
                     && let Some(found) = wanted(&packet)
                 {
                     return found;
