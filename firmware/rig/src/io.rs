@@ -8,9 +8,9 @@
 //! The inputs of a tick already reflect the outputs of the tick before: segments handed over count as queued,
 //! so [`StepperState::idle`] is false, and an ordered abort has emptied the queue.
 //!
-//! The emergency stop is read after the step timers: a circuit that opens between the two readings must not look like a timer
-//! that ran dry. Ticks that make up for lost time (a long calculation) may follow each other at once; the piezo's loop
-//! leaves those out.
+//! The emergency stop is read after the step timers: a circuit that opens between the two readings must not look
+//! like a timer that ran dry. Ticks that make up for lost time (a long calculation) may follow each other at once;
+//! the piezo's loop leaves those out.
 //!
 //! # Step pulses
 //! A [`Segment`] is some pulses of equal spacing. An advanced timer plays one from its repetition counter (8 bit:
@@ -19,9 +19,9 @@
 //! segment end stops the motor within a millisecond, with an exact count.
 //!
 //! # Memory
-//! At the start the binary reads the first [`MEMORY_BYTES`] of the FRAM and hands them to [`crate::Rig::new`]; later it
-//! writes what [`Outputs::memory`] orders, at most [`MEMORY_CHUNK`] bytes a tick, before the next tick. The rig relies
-//! on it: the mark that an axis moves lies in the memory before the first STEP pulse.
+//! At the start the binary reads the first [`MEMORY_BYTES`] of the FRAM and hands them to [`crate::Rig::new`];
+//! later it writes what [`Outputs::memory`] orders, at most [`MEMORY_CHUNK`] bytes a tick, before the next tick.
+//! The rig relies on it: the mark that an axis moves lies in the memory before the first STEP pulse.
 //! [`crate::Rig::boot`] is then the number of this boot; the binary keeps it in its retained RAM.
 
 use farnear_protocol::{BoardMicros, Micros};
@@ -131,8 +131,8 @@ pub struct Inputs {
     pub link_overflow: bool,
     /// The edges of the last ordered exposure, given once, in the first tick after all three are known.
     pub exposure: Option<ExposureEdges>,
-    /// An exposure that began while [`Outputs::listen`] was set, given once, in the first tick after its end. The latest
-    /// one where several ended since the tick before.
+    /// An exposure that began while [`Outputs::listen`] was set, given once, in the first tick after its end. The
+    /// latest one where several ended since the tick before.
     pub strobe: Option<StrobeEdges>,
 }
 
@@ -157,8 +157,8 @@ pub struct MotorOutputs {
     /// tick before the first segment.
     pub direction_away: bool,
     /// Empty the segment queue and let the motor stop with the running segment; clears
-    /// [`StepperState::underrun`]. Never together with new `segments`. Also ordered, of a motor that stands, before it
-    /// sets off.
+    /// [`StepperState::underrun`]. Never together with new `segments`. Also ordered, of a motor that stands, before
+    /// it sets off.
     pub abort_steps: bool,
     /// New segments, to be played in this order behind those that wait; never more than
     /// [`StepperState::room`].

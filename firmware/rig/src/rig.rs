@@ -71,7 +71,8 @@ struct Untold {
 const _: () = assert!(size_of::<Rig>() <= 36 * 1024);
 
 impl Rig {
-    /// The rig of `docs/rig.md`, just reset, at `now`: 25 KiB, best made in static memory. `memory` is what the FRAM holds, `None` where none answers.
+    /// The rig of `docs/rig.md`, just reset, at `now`: 25 KiB, best made in static memory. `memory` is what the
+    /// FRAM holds, `None` where none answers.
     pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
         Self::with_parts(identity, Settings::DEFAULT, memory, now)
     }

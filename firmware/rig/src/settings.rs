@@ -1,7 +1,8 @@
 //! The rig's numbers: every value that depends on the parts, with its unit and its reason.
 //!
 //! [`Settings::DEFAULT`] describes the rig of `docs/rig.md`. What the host may change, and the memory keeps, are
-//! [`Values`]; [`Settings::with`] puts them in. A `Settings` is a plain value that the rig is given, so another rig changes nothing else.
+//! [`Values`]; [`Settings::with`] puts them in. A `Settings` is a plain value that the rig is given, so another rig
+//! changes nothing else.
 
 mod table;
 

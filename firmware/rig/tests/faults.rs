@@ -1,5 +1,5 @@
-//! Any sequence of requests on hardware that breaks at any moment, power included: nothing panics, everything ends once, and a
-//! repaired rig can always be brought back to work.
+//! Any sequence of requests on hardware that breaks at any moment, power included: nothing panics, everything ends
+//! once, and a repaired rig can always be brought back to work.
 
 mod bench;
 

@@ -1,8 +1,9 @@
 //! The backlash of a screw, measured at the home switch, which the stage itself actuates.
 //!
-//! Going down the stage closes the switch, going up it opens it again a known way farther: what the motor turns beyond
-//! that is the play. Each round closes and opens the switch once, a pulse a millisecond. The encoder on the
-//! motor's shaft says where the motor is at the edges. Afterwards the axis is homed anew, because position 0 depends on the backlash.
+//! Going down the stage closes the switch, going up it opens it again a known way farther: what the motor turns
+//! beyond that is the play. Each round closes and opens the switch once, a pulse a millisecond. The encoder on the
+//! motor's shaft says where the motor is at the edges. Afterwards the axis is homed anew, because position 0
+//! depends on the backlash.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};

@@ -4,10 +4,10 @@
 //! ```text
 //! header: magic "fnR1" | record u8 | version u8 | blocks u8 | 0 | sequence u32 | CRC-32 | 0...
 //! ```
-//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two copies, one behind the
-//! other, and a place of its own from address 0 up. The copy with the newer sequence number counts; the other is the one that is
-//! written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and the one before untouched. A
-//! record's first write is of both copies, one after the other.
+//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two copies, one behind
+//! the other, and a place of its own from address 0 up. The copy with the newer sequence number counts; the other
+//! is the one that is written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and
+//! the one before untouched. A record's first write is of both copies, one after the other.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use farnear_protocol::message::RecordName;

@@ -61,6 +61,8 @@ pub(crate) struct Stepper {
     away: bool,
     purpose: Purpose,
     enabled: bool,
+    /// How long the driver has been on.
+    enabled_ticks: u32,
     /// The first pulse may be given: the memory knows that the axis moves.
     permitted: bool,
     /// Where the motion goes on to, when the axis has gone back far enough to come from below.
@@ -94,6 +96,7 @@ impl Stepper {
             away: true,
             purpose: Purpose::Move,
             enabled: false,
+            enabled_ticks: 0,
             permitted: true,
             then: None,
             slack: u32::MAX,
@@ -224,7 +227,7 @@ impl Stepper {
         };
         let limits = RampLimits { start_speed: settings.start_speed, speed: self.speed, acceleration, jerk };
         // One tick at least, so that DIR is stable before STEP.
-        let ticks = if self.enabled { 1 } else { settings.enable_delay.0 / TICK_US + 1 };
+        let ticks = (settings.enable_delay.0 / TICK_US + 1).saturating_sub(self.enabled_ticks).max(1);
         self.enabled = true;
         self.motion = Motion::Preparing { ramp: Ramp::new(way.unsigned_abs(), limits), ticks };
     }
@@ -323,6 +326,7 @@ impl Stepper {
     /// Orders the board; feeds the timer.
     pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut MotorOutputs) {
         outputs.enable = self.enabled;
+        self.enabled_ticks = if self.enabled { self.enabled_ticks.saturating_add(1) } else { 0 };
         outputs.direction_away = self.away;
         match &mut self.motion {
             Motion::Still => {}
