@@ -1,7 +1,7 @@
 //! Finding the sensor distance of the best focus.
 //!
-//! *Coarse*: at each place of the stepper the piezo takes three images, 190 um of travel apart at most. How their focus
-//! measures differ tells on which side the focus lies and about how far away ([`model`]), so the stepper goes there
+//! *Coarse*: at each place of the stepper the piezo takes three images, 190 um of travel apart at most. How their spectra
+//! differ tells on which side the focus lies and about how far away ([`model`]), so the stepper goes there
 //! directly instead of sweeping the whole range. *Fine*: a sweep by piezo around the estimate, and the tip of the parabola
 //! through the largest measures ([`farnear_depth::focus_measure::peak`]). All images are taken by exposure programs.
 //!
@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use farnear_depth::focus_measure::{FocusError, FocusMeasure, peak};
 use farnear_depth::optics::Optics;
+use farnear_depth::psf::Psf;
 use farnear_protocol::message::{Axis, Limits, Shot, ShotRecord, TriggerMode};
 use farnear_protocol::units::{Micros, Nanometres};
 use ndarray::{Array2, s};
@@ -22,14 +23,8 @@ use crate::client::Client;
 use crate::describe::um;
 use crate::error::ClientError;
 use crate::expose::{CaptureError, expose};
-use model::{Sample, estimate};
+use model::{Spectrum, estimate};
 
-/// Images are binned by this for the estimate from afar: blur of many pixels, and little noise.
-const BIN_FAR: usize = 8;
-/// And by this once the focus is near.
-const BIN_NEAR: usize = 2;
-/// Estimates nearer than this are made from images binned less.
-const NEAR_NM: f64 = 300_000.0;
 /// Places of the stepper before the search is given up.
 const PLACES_MAX: usize = 8;
 /// The estimate is good enough for the fine sweep when it lies so near to the middle of what was looked at.
@@ -163,8 +158,6 @@ pub fn find_focus(
         base_nm: i64::from(limits.datum.0) + i64::from(status.lens.measured.0),
         coarse: status.coarse.measured,
         fine: status.fine.measured,
-        far: Vec::new(),
-        near: Vec::new(),
         exposures: 0,
     };
     let start = f64::from(search.coarse.0) + f64::from(search.fine.0);
@@ -194,8 +187,6 @@ struct Search<'a> {
     /// Where the axes stood at the last exposure.
     coarse: Nanometres,
     fine: Nanometres,
-    far: Vec<Sample>,
-    near: Vec<Sample>,
     exposures: usize,
 }
 
@@ -263,15 +254,16 @@ impl Search<'_> {
             }
             shots.push(self.shot(Axis::SensorFine, Nanometres(self.middle()), SETTLE));
             shots.push(self.shot(Axis::SensorFine, last, SETTLE));
-            for (record, image) in self.take(&shots)? {
-                let place = f64::from(record.coarse.0) + f64::from(record.fine.0);
-                for (samples, bin) in [(&mut self.far, BIN_FAR), (&mut self.near, BIN_NEAR)] {
-                    let value = self.settings.measure.of(binned(&image, bin).view())?;
-                    samples.push(Sample { place, value });
-                }
-            }
+            let spectra: Vec<Spectrum> = self
+                .take(&shots)?
+                .iter()
+                .map(|(record, image)| {
+                    Spectrum::of(image, f64::from(record.coarse.0) + f64::from(record.fine.0))
+                })
+                .collect();
             let looked_at = f64::from(self.coarse.0) + f64::from(self.middle());
-            let around = self.estimate((start - reach, start + reach));
+            let estimated = estimate(&spectra, self.blur_per_nm()).ok_or_else(|| self.not_found(start))?;
+            let around = estimated.clamp(start - reach, start + reach);
             say(&format!(
                 "at {:.3} mm: the focus seems to be {:+.0} um away",
                 self.mm(looked_at),
@@ -291,17 +283,14 @@ impl Search<'_> {
         Err(self.not_found(start))
     }
 
-    fn estimate(&self, range: (f64, f64)) -> f64 {
-        // Where the blur's radius is half a (binned) pixel, sharpness no longer rises much.
-        let width = |bin: usize| bin as f64 * self.optics.f_number() * self.optics.pixel_um() * 1e3;
-        let around = estimate(&self.far, width(BIN_FAR), range);
-        let close: Vec<Sample> =
-            self.near.iter().copied().filter(|sample| (sample.place - around).abs() < NEAR_NM).collect();
-        if close.len() < 3 {
-            return around;
-        }
-        let near = (around - NEAR_NM, around + NEAR_NM);
-        estimate(&close, width(BIN_NEAR), (near.0.max(range.0), near.1.min(range.1)))
+    /// Standard deviation of the blur in pixels, per nanometre from focus.
+    fn blur_per_nm(&self) -> f64 {
+        let k = match self.optics.psf() {
+            Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
+            // Of a disc of radius R the standard deviation along an axis is R / 2.
+            Psf::PillBox => 0.5,
+        };
+        k / (2.0 * self.optics.f_number() * self.optics.pixel_um() * 1e3)
     }
 
     /// Sweeps the piezo around a position. Gives the best position and the sweep.
