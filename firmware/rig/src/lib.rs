@@ -30,7 +30,7 @@
 //! stops the rig is named, latched, and survives the loss of power. Not a goal: speed of the link; images do not
 //! come this way.
 //!
-//! Cost, counted on the emulated board at one instruction per cycle: a tick takes 1,300 instructions at rest, 2,700
+//! Cost, counted on the emulated board at one instruction per cycle: a tick takes 1,600 instructions at rest, 2,900
 //! with the piezo's loop closed, and at most 7,100 with both steppers in their ramps besides, of the 33,600 between
 //! two ticks at 168 MHz; the last byte of a move request 9,900, the start 46,000. Mathematics may take longer than
 //! a tick (a row of 640 pixels 15,000, the solution of a fit 731,000), so it is refused while anything moves. RAM:
