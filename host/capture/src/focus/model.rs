@@ -4,7 +4,7 @@
 //! distance `e` from focus (`d` = pixel pitch). Whatever the texture is, the logarithm of the ratio of two images' power
 //! is therefore a line in `w^2`, and its slope, with the two places known, tells `e`:
 //! `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`. This is depth from defocus after Subbarao, used to steer. It holds for
-//! other lenses' PSFs too while the blur is small against `1 / w`; a wrong `k` only makes the next step too long or short.
+//! other lenses' PSFs too while the blur is small against `1 / w`, so higher frequencies are left out; a wrong `k` only makes the next step too long or short.
 //!
 //! Cost: one FFT of the image binned by two, and 30 operations a pixel.
 
@@ -19,6 +19,8 @@ const RINGS: usize = 48;
 const FIRST_RING: usize = 2;
 /// Rings with less than so many times the noise say nothing.
 const ABOVE_NOISE: f64 = 3.0;
+/// Beyond a frequency at which the two images differ by more than this, a PSF that is no Gaussian may have its first zero.
+const SMALL_RATIO: f64 = 1.0;
 /// The rings in which only noise is left once an image is blurred.
 const NOISE_RINGS: usize = 8;
 
@@ -116,10 +118,14 @@ fn slope(one: &Spectrum, other: &Spectrum, noise: f64) -> Option<f64> {
         if a.min(b) < (ABOVE_NOISE - 1.0) * noise || a.min(b) <= 0.0 {
             continue;
         }
+        let ratio = (a / b).ln();
+        if ratio.abs() > SMALL_RATIO && xx > 0.0 {
+            break;
+        }
         let x = frequency(ring).powi(2);
         // The logarithm is as uncertain as the noise is large beside the power.
         let weight = one.count[ring] * (a.min(b) / (a.min(b) + noise)).powi(2);
-        xy += weight * x * (a / b).ln();
+        xy += weight * x * ratio;
         xx += weight * x * x;
     }
     (xx > 0.0).then(|| xy / xx)
