@@ -224,7 +224,7 @@ impl Client {
         Ok(stream)
     }
 
-    /// The board's log from now on: pieces of its defmt stream, see [`crate::log`].
+    /// The board's log from now on: pieces of its defmt stream, to be decoded with the firmware's ELF file.
     ///
     /// # Errors
     /// [`ClientError::Gone`] where the port's owner has ended.

@@ -1,7 +1,7 @@
 //! Finding the sensor distance of the best focus.
 //!
 //! *Coarse*: at each place of the stepper the piezo takes three images, 190 um of travel apart at most. How their spectra
-//! differ tells on which side the focus lies and about how far away ([`model`]), so the stepper goes there
+//! differ tells on which side the focus lies and about how far away (`model`), so the stepper goes there
 //! directly instead of sweeping the whole range. *Fine*: a sweep by piezo around the estimate, and the tip of the parabola
 //! through the largest measures ([`farnear_depth::focus_measure::peak`]). All images are taken by exposure programs.
 //!
