@@ -20,6 +20,8 @@ use crate::{
 const STACK_PAINT: u64 = 0xcccc_cccc;
 /// Where the firmware's stack lies, see its `memory.x`: first address and length.
 pub const STACK: (u64, u64) = (0x2000_0000, 128 << 10);
+/// Where the firmware's vector table lies.
+const FLASH: u64 = 0x0800_0000;
 /// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 2.93 V).
 const LOW_SUPPLY_MV: u32 = 2800;
 
@@ -189,6 +191,19 @@ impl Hands<'_, '_> {
     /// Writes a word of the chip's volatile memory, as a stray pointer would.
     pub fn write_word(&mut self, address: u64, value: u32) {
         let _ = Memory::write(self.host, address, Width::W32, u64::from(value));
+    }
+
+    /// Overwrites the firmware's interrupt handler of this position in the vector table, as a flash that ages would; `false`
+    /// where the emulator will not have it.
+    pub fn spoil_handler(&mut self, interrupt: u64, code: &[u16]) -> bool {
+        let vector = FLASH + 4 * (16 + interrupt);
+        let Some(handler) = self.read_word(vector) else { return false };
+        let at = u64::from(handler & !1);
+        code.iter().zip(0..).all(|(half, i)| {
+            Memory::program(self.host, at + 2 * i, Width::W16, u64::from(*half))
+                .or_else(|_| Memory::write(self.host, at + 2 * i, Width::W16, u64::from(*half)))
+                .is_ok()
+        })
     }
 
     /// The largest depth that the firmware's stack has had since the reset, bytes; start-up code paints it.

@@ -1,15 +1,18 @@
-//! Resets: each has its cause and the next boot number, and nobody acts on requests of an earlier boot.
+//! Resets: each has its cause and the next boot number, nobody acts on requests of an earlier boot, and what was grave
+//! enough to reset the board is an alarm that stays until somebody has read and cleared it.
 
 mod common;
 
-use common::{Bench, request_frame};
+use common::{Bench, go, request_frame};
 use farnear_protocol::{
     EventKind, Request, RequestError,
-    message::{Alarm, ResetCause},
+    message::{Alarm, Axis, PositionState, ResetCause},
 };
+use farnear_sim::Hands;
 
-/// TIM5, which keeps the firmware's time.
+/// TIM5, which keeps the firmware's time, and its place in the vector table.
 const TIM5_CR1: u64 = 0x4000_0c00;
+const TIM5: u64 = 50;
 
 fn check_boot(bench: &mut Bench, boot: u32, cause: ResetCause) {
     let started = bench.events.iter().rev().find(|event| matches!(event.kind, EventKind::Started { .. }));
@@ -29,32 +32,102 @@ fn reboot_counts_up_and_its_repeat_is_refused() {
     bench.rig.settle().expect("runs");
     assert_eq!(bench.answers(), [(id, Err(RequestError::Boot { current: 2 }))]);
     assert_eq!(bench.report().resets, 1);
+    assert_eq!(bench.alarm(), None, "nothing went wrong");
 }
 
 #[test]
 fn the_reset_button_is_told_from_a_request() {
     let mut bench = Bench::new(1);
-    bench.home();
-    bench.rig.reach_in(|hands| hands.press_reset()).expect("runs");
+    bench.home_axis(Axis::SensorCoarse);
+    bench.hands(|hands| hands.press_reset());
     bench.settle();
     check_boot(&mut bench, 2, ResetCause::Pin);
-    assert_eq!(bench.status().coarse.state, farnear_protocol::message::PositionState::Unknown);
+    assert_eq!(bench.status().coarse.state, PositionState::Unknown);
+    assert_eq!(bench.alarm(), None, "it stood still");
+}
+
+/// Something resets the board; the alarm that names it survives further resets and is cleared only by its number.
+fn leaves_an_alarm(
+    happen: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static,
+    cause: ResetCause,
+    alarm: Alarm,
+) {
+    let mut bench = Bench::new(1);
+    bench.hands(happen);
+    // The watchdog bites within 0.19 s.
+    bench.rig.advance_us(250_000).expect("runs");
+    bench.settle();
+    check_boot(&mut bench, 2, cause);
+    let latched = bench.alarm().expect("an alarm is latched");
+    assert_eq!((latched.alarm, latched.boot), (alarm, 2));
+    let refused = RequestError::Alarm { number: latched.number, alarm };
+    assert_eq!(bench.ask(&go(Axis::SensorFine, 50_000)), Err(refused));
+
+    bench.hands(|hands| hands.press_reset());
+    bench.settle();
+    check_boot(&mut bench, 3, ResetCause::Pin);
+    assert_eq!(bench.alarm(), Some(latched), "it survives a reset");
+    bench.hands(|hands| hands.set_power(false));
+    bench.rig.advance_us(100_000).expect("runs");
+    assert!(!bench.report().powered);
+    bench.hands(|hands| hands.set_power(true));
+    bench.settle();
+    check_boot(&mut bench, 4, ResetCause::PowerOn);
+    assert_eq!(bench.alarm(), Some(latched), "and a loss of power");
+
+    let wrong = bench.ask(&Request::ClearAlarm { number: latched.number + 1 });
+    assert!(matches!(wrong, Err(RequestError::NoSuchAlarm { .. })), "{wrong:?}");
+    bench.clear(|latched| *latched == alarm);
+    bench.hands(|hands| hands.press_reset());
+    bench.settle();
+    check_boot(&mut bench, 5, ResetCause::Pin);
+    assert_eq!(bench.alarm(), None, "what was cleared stays so");
 }
 
 #[test]
 fn the_watchdog_resets_a_firmware_whose_clock_has_died() {
-    let mut bench = Bench::new(1);
     // A stray write stops the timer that wakes the control loop.
-    bench.rig.reach_in(|hands| hands.write_register(TIM5_CR1, 0)).expect("runs");
-    let before = bench.report().now_ns;
-    bench.rig.advance_us(250_000).expect("runs");
+    leaves_an_alarm(|hands| hands.write_register(TIM5_CR1, 0), ResetCause::Watchdog, Alarm::Watchdog);
+}
+
+#[test]
+fn a_brown_out_is_told() {
+    leaves_an_alarm(|hands| hands.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
+}
+
+/// Spoils the handler that runs every tick until it has reset the board, then puts it back, as the emulated flash
+/// would stay spoilt for ever.
+fn spoil(code: &'static [u16], alarm: Alarm) {
+    let mut bench = Bench::new(1);
+    let was: Vec<u16> = bench.peek(move |hands| {
+        let at = u64::from(hands.read_word(0x0800_0000 + 4 * (16 + TIM5)).expect("a vector") & !1);
+        // The handler may begin in the middle of a word.
+        let half = |i: u64| {
+            let address = at + 2 * i;
+            let word = hands.read_word(address & !3).expect("flash");
+            if address & 2 == 0 { word as u16 } else { (word >> 16) as u16 }
+        };
+        (0..code.len() as u64).map(half).collect()
+    });
+    assert!(bench.peek(move |hands| hands.spoil_handler(TIM5, code)), "the emulator lets flash be spoilt");
+    let resets = bench.report().resets;
+    while bench.report().resets == resets {
+        bench.rig.advance_us(100).expect("runs");
+    }
+    assert!(bench.peek(move |hands| hands.spoil_handler(TIM5, &was)), "and mended");
     bench.settle();
-    check_boot(&mut bench, 2, ResetCause::Watchdog);
-    assert_eq!(bench.report().resets, 1);
-    let stamps = bench.events.last().expect("started").time.0;
-    println!(
-        "the watchdog bit within {} ms, started at {stamps} us of its own time",
-        (bench.report().now_ns - before) / 1_000_000
-    );
-    bench.clear(|alarm| *alarm == Alarm::Watchdog);
+    check_boot(&mut bench, 2, ResetCause::Software);
+    bench.clear(|latched| *latched == alarm);
+}
+
+#[test]
+fn a_fault_of_the_program_is_told() {
+    // UDF: an instruction that is none.
+    spoil(&[0xde00], Alarm::Panic);
+}
+
+#[test]
+fn a_stack_overflow_is_told_and_reaches_no_variable() {
+    // PUSH {R0-R7, LR}, again and again.
+    spoil(&[0xb5ff, 0xe7fd], Alarm::StackOverflow);
 }
