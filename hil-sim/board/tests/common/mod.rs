@@ -7,6 +7,7 @@ use farnear_protocol::{
     message::{Alarm, AlarmRecord, Axis, Hello, Shot, Status, TriggerMode},
 };
 use farnear_sim::{EmulatedRig, Hands, Report, RigConfig};
+use object::{Object, ObjectSymbol};
 
 /// Long enough that no test's host is silent for so long, unless silence is what it tests.
 pub const SILENCE: Micros = Micros(60_000_000);
@@ -153,6 +154,16 @@ impl Bench {
         let (tell, told) = std::sync::mpsc::channel();
         self.hands(move |hands| tell.send(look(hands)).expect("somebody waits"));
         told.recv().expect("the rig runs")
+    }
+
+    /// Cycles of the firmware's longest control tick since its reset.
+    pub fn longest_tick(&mut self) -> u32 {
+        let elf = farnear_sim::firmware::find(None).expect("a firmware");
+        let bytes = std::fs::read(elf).expect("readable");
+        let elf = object::File::parse(&*bytes).expect("an ELF");
+        let symbol = elf.symbols().find(|symbol| symbol.name() == Ok("FARNEAR_LONGEST_TICK_CYCLES"));
+        let at = symbol.expect("the firmware counts").address();
+        self.peek(move |hands| hands.read_word(at)).expect("RAM")
     }
 
     /// The alarm that is latched.
