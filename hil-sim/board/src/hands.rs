@@ -20,8 +20,10 @@ use crate::{
 const STACK_PAINT: u64 = 0xcccc_cccc;
 /// Where the firmware's stack lies, see its `memory.x`: first address and length.
 pub const STACK: (u64, u64) = (0x2000_0000, 128 << 10);
-/// Where the firmware's vector table lies.
+/// The firmware's flash, and RAM that it does not use: its variables end well before.
 const FLASH: u64 = 0x0800_0000;
+const FLASH_BYTES: u32 = 2 << 20;
+const FREE_RAM: u64 = 0x2002_f000;
 /// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 2.93 V).
 const LOW_SUPPLY_MV: u32 = 2800;
 
@@ -193,17 +195,20 @@ impl Hands<'_, '_> {
         let _ = Memory::write(self.host, address, Width::W32, u64::from(value));
     }
 
-    /// Overwrites the firmware's interrupt handler of this position in the vector table, as a flash that ages would; `false`
-    /// where the emulator will not have it.
-    pub fn spoil_handler(&mut self, interrupt: u64, code: &[u16]) -> bool {
-        let vector = FLASH + 4 * (16 + interrupt);
-        let Some(handler) = self.read_word(vector) else { return false };
-        let at = u64::from(handler & !1);
-        code.iter().zip(0..).all(|(half, i)| {
-            Memory::program(self.host, at + 2 * i, Width::W16, u64::from(*half))
-                .or_else(|_| Memory::write(self.host, at + 2 * i, Width::W16, u64::from(*half)))
-                .is_ok()
-        })
+    /// Lets a task of the firmware go on with this code, as a stray pointer would: the code is laid into free RAM, and the
+    /// first pointer to a function in the task's variable is made to point there. `false` where there is none.
+    pub fn lead_astray(&mut self, (task, length): (u64, u64), code: &[u16]) -> bool {
+        let is_code = |word: u32| (FLASH as u32..FLASH as u32 + FLASH_BYTES).contains(&word) && word & 1 == 1;
+        let words: Vec<u64> = (task..task + length).step_by(4).collect();
+        let found = words.into_iter().find(|at| self.read_word(*at).is_some_and(is_code));
+        let Some(at) = found else { return false };
+        for (half, i) in code.iter().zip(0..) {
+            if Memory::write(self.host, FREE_RAM + 2 * i, Width::W16, u64::from(*half)).is_err() {
+                return false;
+            }
+        }
+        self.write_word(at, FREE_RAM as u32 | 1);
+        true
     }
 
     /// The largest depth that the firmware's stack has had since the reset, bytes; start-up code paints it.

@@ -42,7 +42,7 @@ enum Job {
     #[command(after_help = "Example:\n  \
         farnear-sim run --scene staircase --psf gaussian:k=0.4578 --noise 8bit --seed 1\n  \
         {\"port\": \"/dev/pts/3\", \"camera\": \"127.0.0.1:40123\"}")]
-    Run(Run),
+    Run(Box<Run>),
     /// Count the instructions of the on-board routines: runs the counting firmware and prints its table.
     #[command(after_help = "Example:\n  farnear-sim count farnear-count.elf")]
     Count {

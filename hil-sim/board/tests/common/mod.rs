@@ -156,13 +156,21 @@ impl Bench {
         told.recv().expect("the rig runs")
     }
 
-    /// Cycles of the firmware's longest control tick since its reset.
-    pub fn longest_tick(&mut self) -> u32 {
+    /// Address and length of a variable of the firmware, by a part of its name.
+    pub fn variable(&mut self, part: &str) -> (u64, u64) {
         let elf = farnear_sim::firmware::find(None).expect("a firmware");
         let bytes = std::fs::read(elf).expect("readable");
         let elf = object::File::parse(&*bytes).expect("an ELF");
-        let symbol = elf.symbols().find(|symbol| symbol.name() == Ok("FARNEAR_LONGEST_TICK_CYCLES"));
-        let at = symbol.expect("the firmware counts").address();
+        let symbol = elf.symbols().find(|symbol| {
+            symbol.address() >= 0x2000_0000 && symbol.name().is_ok_and(|name| name.contains(part))
+        });
+        let symbol = symbol.unwrap_or_else(|| panic!("the firmware has no {part}"));
+        (symbol.address(), symbol.size())
+    }
+
+    /// Cycles of the firmware's longest control tick since its reset.
+    pub fn longest_tick(&mut self) -> u32 {
+        let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
         self.peek(move |hands| hands.read_word(at)).expect("RAM")
     }
 
