@@ -9,7 +9,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::units::BoardMicros;
+use crate::units::{BoardMicros, Micros};
 
 /// Bytes of [`FrameHeader`] on the wire.
 pub const FRAME_HEADER: usize = 17;
@@ -17,7 +17,8 @@ pub const FRAME_HEADER: usize = 17;
 /// What stands before the pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FrameHeader {
-    /// Running number of the trigger since the board's reset: [`crate::message::ShotRecord::trigger_number`].
+    /// Running number of the trigger since the board's reset: [`crate::message::ShotRecord::trigger_number`]; what
+    /// [`Control::Expose`] said; or [`FREE_RUNNING`], whose images are told apart by the start of their exposures.
     pub shot_id: u32,
     /// Start of the exposure, board time.
     pub exposure: BoardMicros,
@@ -65,4 +66,22 @@ impl FrameHeader {
 pub enum Control {
     /// Let this much virtual time pass, though nothing is under way (lockstep stands still otherwise).
     AdvanceMicros(u64),
+    /// Software trigger: expose once, now.
+    Expose {
+        /// What the image will be called: [`FrameHeader::shot_id`].
+        shot_id: u32,
+        /// For so long.
+        exposure: Micros,
+    },
+    /// Expose again and again, heedless of the trigger line, until another of these comes.
+    FreeRun {
+        /// From the start of one exposure to that of the next; at least exposure and read-out. 0: stop, and heed the
+        /// trigger line again.
+        period: Micros,
+        /// How long each lasts.
+        exposure: Micros,
+    },
 }
+
+/// [`FrameHeader::shot_id`] of an image of a camera that runs freely.
+pub const FREE_RUNNING: u32 = u32::MAX;

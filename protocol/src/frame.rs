@@ -39,11 +39,15 @@ pub enum Kind {
     Error = 3,
     /// Board to host: [`crate::Event`]; id = event number.
     Event = 4,
+    /// Board to host: [`crate::Log`]; id = running number of the log's frames.
+    Log = 5,
 }
 
 impl Kind {
     fn from_byte(byte: u8) -> Option<Self> {
-        [Self::Request, Self::Response, Self::Error, Self::Event].into_iter().find(|kind| *kind as u8 == byte)
+        [Self::Request, Self::Response, Self::Error, Self::Event, Self::Log]
+            .into_iter()
+            .find(|kind| *kind as u8 == byte)
     }
 }
 

@@ -13,13 +13,15 @@
 
 pub mod camera;
 pub mod frame;
+mod log;
 pub mod message;
 pub mod units;
 
+pub use log::{LOG_BYTES_MAX, Log};
 pub use message::{Event, EventKind, Request, RequestError, Response};
 pub use units::{BoardMicros, Micros, Nanometres};
 
 /// The oldest protocol version this crate can still speak.
-pub const PROTOCOL_MIN: u8 = 1;
+pub const PROTOCOL_MIN: u8 = 2;
 /// The protocol version this crate speaks.
-pub const PROTOCOL_CURRENT: u8 = 1;
+pub const PROTOCOL_CURRENT: u8 = 2;

@@ -1,16 +1,36 @@
-//! The message table: everything host and board can say, in one place.
+//! The message table: everything host and board can say. The four tables are here; what their messages are made of
+//! lies in one file per subject.
 //!
-//! Conventions: positions are [`Nanometres`], positive = sensor away from the lens (near focus lies on the
-//! positive side); coarse 0 = home switch; sensor distance = datum + coarse + fine. Set-points are absolute, so
-//! a request that arrives twice asks for nothing new. Moments are [`BoardMicros`]; durations [`Micros`].
+//! Conventions: positions are [`Nanometres`], positive = sensor and lens away from each other (near focus lies on the
+//! positive side); 0 = home switch; sensor distance = datum + coarse + fine + lens. Set-points are absolute, so a
+//! request that arrives twice asks for nothing new. Moments are [`BoardMicros`]; durations [`Micros`].
 //!
 //! Growing the table: append variants and messages at the end; anything else is a new protocol version. The
-//! bytes of version 1 are frozen in `tests/frozen_wire.rs`.
+//! bytes of version 2 are frozen in `tests/frozen_wire.rs`.
 
-use heapless::String;
+mod alarm;
+mod axis;
+mod board;
+mod calibration;
+mod maths;
+mod memory;
+mod shot;
+
 use postcard_schema::{Schema, key::Key};
 use serde::{Deserialize, Serialize};
 
+pub use self::{
+    alarm::{Alarm, AlarmRecord},
+    axis::{Axis, AxisStatus, PositionState},
+    board::{Capabilities, Hello, Limits, LinkCounters, ResetCause, Status},
+    calibration::{Calibration, Routine},
+    maths::{
+        CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,
+        QueryDeviations, ShadowAnswer, ShadowQuery, ShadowReliability, SunAnswer, SunQuery,
+    },
+    memory::{Counters, RecordName, Setting, SettingKey},
+    shot::{ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode},
+};
 use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// What the host can ask. Each request carries an id; the board answers a repeated id with the remembered
@@ -27,30 +47,37 @@ pub enum Request {
     Home {
         /// The axis; only axes with a home switch can be homed.
         axis: Axis,
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
     },
     /// Go to an absolute position. Answer: [`Response::Accepted`]; ends with [`EventKind::MoveDone`] or
-    /// [`EventKind::Failed`].
+    /// [`EventKind::Failed`]. Other axes may move at the same time.
     Move {
         /// The axis that moves.
         axis: Axis,
         /// Where to; outside the limits of [`Hello::limits`] it is refused, never clamped.
         target: Nanometres,
+        /// How long the host may say nothing while this is under way, within [`Limits::silence_min`] and
+        /// [`Limits::silence_max`]. After half of it the board says [`EventKind::StillThere`]; any good frame answers
+        /// that. After all of it everything stops with [`Alarm::HostSilence`].
+        silence: Micros,
     },
-    /// Stop all motion and end a running program. Answer: [`Response::Accepted`], also when nothing moves; what
+    /// Stop all motion along the ramps and end a running program. Answer: [`Response::Accepted`], also when nothing moves; what
     /// was running ends with [`EventKind::Failed`] and [`Failure::Stopped`].
     Stop,
-    /// Put one shot into the exposure program. Refused while a program runs. Answer: [`Response::Accepted`].
+    /// Put one shot into the exposure program, which then must be armed again. Refused while a program runs. Answer:
+    /// [`Response::Accepted`].
     LoadShot {
         /// Place in the program, from 0; at most [`Limits::shots_max`] - 1.
         index: u8,
         /// The shot.
         shot: Shot,
     },
-    /// Run the shots 0 to `shots` - 1: move, settle, trigger, time-stamp, each in turn. Answer:
-    /// [`Response::Accepted`]; ends with [`EventKind::ProgramDone`] or [`EventKind::Failed`].
+    /// Run the armed program: move, settle, trigger, time-stamp, each shot in turn. Answer: [`Response::Accepted`];
+    /// ends with [`EventKind::ProgramDone`] or [`EventKind::Failed`]. The program stays armed and may be run again.
     RunProgram {
-        /// How many of the loaded shots to run.
-        shots: u8,
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
     },
     /// Send an event again (the host saw a gap in the event numbers). Answer: [`Response::Event`].
     ReadEvent {
@@ -60,10 +87,113 @@ pub enum Request {
     /// Stop everything, answer, then reset. The next boot has another boot number, so a retry is refused.
     /// Answer: [`Response::Accepted`].
     Reboot,
+    /// Emergency stop by the host: the last STEP pulse comes within a millisecond, and an axis that moved has lost its
+    /// position. Latches [`Alarm::Halt`]. Answer: [`Response::Accepted`].
+    Halt,
+    /// Check the shots 0 to `shots` - 1 as a program: all loaded, inside the limits, axes homed. Answer:
+    /// [`Response::Accepted`] and the program is armed.
+    ArmProgram {
+        /// How many of the loaded shots.
+        shots: u8,
+    },
+    /// Stand still after the exposure that is under way. Answer: [`Response::Accepted`]; [`EventKind::Paused`] follows.
+    PauseProgram,
+    /// Go on after a pause; the position is settled anew. Answer: [`Response::Accepted`].
+    ResumeProgram,
+    /// Measure the mechanics. Answer: [`Response::Accepted`]; ends with [`EventKind::Calibrated`] or
+    /// [`EventKind::Failed`].
+    Calibrate {
+        /// What.
+        routine: Routine,
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
+    },
+    /// Read a past alarm by its number (the last eight are kept). Answer: [`Response::Alarm`].
+    ReadAlarm {
+        /// Its number; 0 = the last.
+        number: u32,
+    },
+    /// Clear the latched alarm. Answer: [`Response::Accepted`], or [`RequestError::AlarmRemains`] while its cause does.
+    ClearAlarm {
+        /// Its number: only what was read can be cleared.
+        number: u32,
+    },
+    /// Read a setting. Answer: [`Response::Setting`].
+    ReadSetting {
+        /// Which.
+        key: SettingKey,
+    },
+    /// Change a setting, now and for later boots. Refused while anything moves. Answer: [`Response::Setting`].
+    WriteSetting {
+        /// Which.
+        key: SettingKey,
+        /// Its new value, in the unit of its name.
+        value: i32,
+    },
+    /// Read the counters of the board's life. Answer: [`Response::Counters`].
+    ReadCounters,
+    /// Where is the sun, and how does a subject's shadow lie? Answer: [`Response::Sun`].
+    Sun(SunQuery),
+    /// Begin an empty correction: coefficients come by [`Request::PutCoefficients`], or samples by
+    /// [`Request::FitSamples`]. Maths requests are refused with `Busy` while a stepper moves. Answer:
+    /// [`Response::Accepted`].
+    OpenCorrection(CorrectionInfo),
+    /// Take the stored correction as the open one. Answer: [`Response::Correction`].
+    LoadCorrection,
+    /// Keep the open correction without power. Answer: [`Response::Accepted`].
+    StoreCorrection,
+    /// Set some coefficients of the open correction. Answer: [`Response::Accepted`].
+    PutCoefficients {
+        /// Number of the first.
+        first: u8,
+        /// Their Q2.29 bits.
+        bits: CoefficientBits,
+    },
+    /// Read some coefficients of the open correction. Answer: [`Response::Coefficients`].
+    GetCoefficients {
+        /// Number of the first.
+        first: u8,
+        /// How many, at most [`COEFFICIENTS_MAX`].
+        count: u8,
+    },
+    /// Add pixels of a flat target to the fit of the open correction. Answer: [`Response::Accepted`].
+    FitSamples {
+        /// Row of the depth map.
+        row: u16,
+        /// Column of the first pixel.
+        first: u16,
+        /// From one pixel to the next.
+        step: u16,
+        /// Code of the target's true depth.
+        truth: i16,
+        /// Codes of the depths.
+        codes: Codes,
+    },
+    /// Solve the fit; its coefficients become those of the open correction. Answer: [`Response::Accepted`].
+    SolveFit,
+    /// Put pixels into the row buffer. Answer: [`Response::Accepted`].
+    PutRow {
+        /// Column of the first.
+        first: u16,
+        /// Codes of the depths.
+        codes: Codes,
+    },
+    /// Correct the row buffer as this row of the map. Answer: [`Response::Accepted`].
+    CorrectRow {
+        /// Row of the depth map.
+        row: u16,
+    },
+    /// Read pixels from the row buffer. Answer: [`Response::Row`].
+    GetRow {
+        /// Column of the first.
+        first: u16,
+        /// How many, at most [`CODES_MAX`].
+        count: u8,
+    },
 }
 
 /// The board's answer to a request it carried out or took on.
-#[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+#[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Debug)]
 pub enum Response {
     /// Answer to [`Request::Hello`].
     Hello(Hello),
@@ -73,6 +203,20 @@ pub enum Response {
     Accepted,
     /// Answer to [`Request::ReadEvent`].
     Event(Event),
+    /// Answer to [`Request::ReadAlarm`].
+    Alarm(AlarmRecord),
+    /// Answer to [`Request::ReadSetting`] and [`Request::WriteSetting`].
+    Setting(Setting),
+    /// Answer to [`Request::ReadCounters`].
+    Counters(Counters),
+    /// Answer to [`Request::Sun`].
+    Sun(SunAnswer),
+    /// Answer to [`Request::LoadCorrection`].
+    Correction(CorrectionInfo),
+    /// Answer to [`Request::GetCoefficients`].
+    Coefficients(CoefficientBits),
+    /// Answer to [`Request::GetRow`].
+    Row(Codes),
 }
 
 /// Why the board did not do what was asked. Nothing has changed when one of these comes.
@@ -136,21 +280,55 @@ pub enum RequestError {
         /// The number the next event will get.
         next: u32,
     },
-}
-
-/// What is wrong with a shot.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub enum ShotFault {
-    /// The index is not below [`Limits::shots_max`], or the program has no shots.
-    Index,
-    /// This shot of the program was never loaded.
-    Missing,
-    /// The exposure is outside [`Limits::exposure_min`] to [`Limits::exposure_max`].
-    Exposure,
-    /// The settle window or its dwell time is 0 or larger than the board can watch.
-    Settle,
-    /// The repeat count is 0.
-    Repeat,
+    /// An alarm is latched: clear it first.
+    Alarm {
+        /// Its number.
+        number: u32,
+        /// What it is.
+        alarm: Alarm,
+    },
+    /// No alarm with this number is latched, or kept.
+    NoSuchAlarm {
+        /// The latched one, or 0.
+        latched: u32,
+        /// The number of the last alarm, or 0.
+        last: u32,
+    },
+    /// The alarm's cause is still there, so it cannot be cleared.
+    AlarmRemains {
+        /// What it is.
+        alarm: Alarm,
+    },
+    /// Sensor and lens would come too close to each other.
+    TooClose {
+        /// Their smallest distance on the way.
+        distance: Nanometres,
+        /// The smallest allowed.
+        min: Nanometres,
+    },
+    /// The deadline for the host's silence is outside what the board allows.
+    Silence {
+        /// Shortest.
+        min: Micros,
+        /// Longest.
+        max: Micros,
+    },
+    /// The program is in another state than the request needs.
+    Program {
+        /// Its state.
+        state: ProgramState,
+    },
+    /// The setting's value is not allowed.
+    SettingRange(Setting),
+    /// A depth correction is not possible.
+    Correction(CorrectionFault),
+    /// The board has not this part.
+    NotFitted {
+        /// The axis.
+        axis: Axis,
+    },
+    /// The calibration routine is not possible on this axis.
+    NoSuchRoutine,
 }
 
 /// Something that happened, with the board's time. Events are numbered from 0 at each boot; the number travels
@@ -205,7 +383,7 @@ pub enum EventKind {
         /// Exposures taken.
         exposures: u16,
     },
-    /// Terminal event of any long work that did not reach its end. All motion has stopped.
+    /// Terminal event of any long work that did not reach its end. Its motion has stopped.
     Failed {
         /// The request that this ends.
         request: u32,
@@ -213,6 +391,52 @@ pub enum EventKind {
         axis: Option<Axis>,
         /// Why.
         reason: Failure,
+    },
+    /// Terminal event of [`Request::Calibrate`].
+    Calibrated {
+        /// The request that this ends.
+        request: u32,
+        /// What was found.
+        result: Calibration,
+    },
+    /// An alarm came up and is latched.
+    Alarm(AlarmRecord),
+    /// The alarm was cleared.
+    AlarmCleared {
+        /// Its number.
+        number: u32,
+    },
+    /// Half of the host's silence deadline has passed: say something.
+    StillThere {
+        /// The request with the deadline.
+        request: u32,
+    },
+    /// A shot of [`TriggerMode::Software`] is settled: trigger the camera now.
+    ShotReady {
+        /// The request that runs the program.
+        request: u32,
+        /// Place in the program.
+        index: u8,
+        /// Which of the repeats, from 0.
+        repeat: u16,
+        /// The number that the exposure will have.
+        trigger_number: u32,
+        /// The exposure that the shot asks for.
+        exposure: Micros,
+    },
+    /// The program stands between two exposures.
+    Paused {
+        /// The request that runs the program.
+        request: u32,
+        /// The shot that comes next.
+        index: u8,
+    },
+    /// A copy of a record was bad at the start, and the other one is in use.
+    RecordRepaired {
+        /// Which.
+        record: RecordName,
+        /// The version of the copy in use.
+        sequence: u32,
     },
 }
 
@@ -247,201 +471,13 @@ pub enum Failure {
     StepUnderrun,
     /// The gauge's converter answers nonsense (not connected, saturated).
     Gauge,
-}
-
-/// A movable part of the rig.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Axis {
-    /// Stage A's stepper and screw, 0 at the home switch.
-    SensorCoarse,
-    /// Stage A's piezo, 0 = relaxed, as its strain gauge measures it.
-    SensorFine,
-}
-
-/// What is known of an axis' position.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub enum PositionState {
-    /// Never homed since the reset.
-    Unknown,
-    /// Homed, and steps and encoder have agreed since.
-    Homed,
-    /// Was homed, but steps and encoder disagree: home again.
-    Lost,
-}
-
-/// One entry of an exposure program.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Shot {
-    /// The axis to move before the exposure.
-    pub axis: Axis,
-    /// Where to.
-    pub target: Nanometres,
-    /// Length of the trigger pulse, which is the camera's exposure time.
-    pub exposure: Micros,
-    /// The position counts as settled while it is within this distance of the target...
-    pub settle_window: Nanometres,
-    /// ...for this long without a break.
-    pub settle_dwell: Micros,
-    /// Exposures at this position, at least 1.
-    pub repeat: u16,
-}
-
-/// What was measured at one exposure.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub struct ShotRecord {
-    /// Place in the program.
-    pub index: u8,
-    /// Which of the repeats, from 0.
-    pub repeat: u16,
-    /// Running number of the trigger since the reset; the camera's shot id.
-    pub trigger_number: u32,
-    /// The axis that was moved.
-    pub axis: Axis,
-    /// Where it was sent.
-    pub asked: Nanometres,
-    /// Encoder position of the coarse axis at the trigger.
-    pub coarse: Nanometres,
-    /// Gauge position of the fine axis at the trigger (mean over the settle dwell).
-    pub fine: Nanometres,
-    /// From the start of the move until it was settled.
-    pub settle: Micros,
-    /// Rising edge of the trigger.
-    pub trigger: BoardMicros,
-    /// Start of the exposure as the camera reports it.
-    pub strobe_start: BoardMicros,
-    /// End of the exposure as the camera reports it.
-    pub strobe_end: BoardMicros,
-    /// Length of the trigger pulse.
-    pub exposure: Micros,
-}
-
-/// Who the board is and what it can do.
-#[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-pub struct Hello {
-    /// Oldest protocol version it speaks.
-    pub protocol_min: u8,
-    /// Newest protocol version it speaks.
-    pub protocol_current: u8,
-    /// [`SCHEMA_KEY`] of its message table.
-    pub schema_key: u64,
-    /// Name of the board, e.g. `nucleo-f429zi`.
-    pub board: String<24>,
-    /// Firmware version.
-    pub firmware: String<24>,
-    /// The chip's unique id.
-    pub unique_id: [u8; 12],
-    /// Number of this boot; every other request must carry it.
-    pub boot: u32,
-    /// Why the board was reset last.
-    pub reset_cause: ResetCause,
-    /// Whether this is an emulated board.
-    pub emulated: bool,
-    /// What it can do.
-    pub capabilities: Capabilities,
-    /// How far and how much.
-    pub limits: Limits,
-}
-
-/// What a board can do; all `true` for the rig of `docs/rig.md`.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Capabilities {
-    /// Has the stepper of stage A.
-    pub sensor_coarse: bool,
-    /// Has the piezo of stage A.
-    pub sensor_fine: bool,
-    /// Measures the camera's exposure-active signal.
-    pub strobe: bool,
-}
-
-/// How far the axes go and how much fits.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Limits {
-    /// Sensor distance from the lens' principal plane at coarse 0 and fine 0.
-    pub datum: Nanometres,
-    /// Smallest coarse position.
-    pub coarse_min: Nanometres,
-    /// Largest coarse position.
-    pub coarse_max: Nanometres,
-    /// Coarse distance per STEP pulse, in picometres.
-    pub coarse_step_pm: u32,
-    /// Smallest fine position.
-    pub fine_min: Nanometres,
-    /// Largest fine position.
-    pub fine_max: Nanometres,
-    /// Shots a program may have.
-    pub shots_max: u8,
-    /// Shortest exposure.
-    pub exposure_min: Micros,
-    /// Longest exposure.
-    pub exposure_max: Micros,
-}
-
-/// Why the board was reset.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub enum ResetCause {
-    /// Power came on.
-    PowerOn,
-    /// The reset pin or button.
-    Pin,
-    /// [`Request::Reboot`].
-    Software,
-    /// The independent watchdog: the firmware had stopped responding.
-    Watchdog,
-    /// The supply dipped.
-    BrownOut,
-    /// Left a low-power state by reset.
-    LowPower,
-    /// The flags fit none of these.
-    Unknown,
-}
-
-/// How the board is.
-#[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
-pub struct Status {
-    /// The board's time at this answer.
-    pub time: BoardMicros,
-    /// The coarse axis.
-    pub coarse: AxisStatus,
-    /// The fine axis; always homed, its gauge is absolute.
-    pub fine: AxisStatus,
-    /// Whether the home switch is closed.
-    pub home_switch: bool,
-    /// Whether the far switch is closed.
-    pub far_switch: bool,
-    /// The request that is under way.
-    pub active: Option<u32>,
-    /// The number the next event will get.
-    pub next_event: u32,
-    /// Triggers given since the reset.
-    pub triggers: u32,
-    /// STEP pulses given since the reset.
-    pub steps: u64,
-    /// What the link has seen.
-    pub link: LinkCounters,
-}
-
-/// How an axis is.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
-pub struct AxisStatus {
-    /// What is known of its position.
-    pub state: PositionState,
-    /// Where it was last sent.
-    pub asked: Nanometres,
-    /// Where the encoder or gauge says it is.
-    pub measured: Nanometres,
-    /// Whether it moves.
-    pub moving: bool,
-}
-
-/// What the board's link has seen since the reset.
-#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct LinkCounters {
-    /// Good frames.
-    pub frames: u32,
-    /// Frames dropped for a wrong CRC, length or encoding.
-    pub bad_frames: u32,
-    /// Repeated requests answered from memory.
-    pub repeated: u32,
+    /// An alarm stopped it; [`EventKind::Alarm`] names which.
+    Alarm {
+        /// The alarm's number.
+        number: u32,
+    },
+    /// Backlash or piezo could not be measured: the readings contradict each other.
+    Implausible,
 }
 
 /// A key of the whole message table: two programs with the same key agree on every byte of every message.

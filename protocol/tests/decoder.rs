@@ -1,14 +1,14 @@
 //! The decoder against garbage, cuts and flipped bits.
 
 use farnear_protocol::{
-    BoardMicros, Event, EventKind, Nanometres, Request, RequestError, Response,
+    BoardMicros, Event, EventKind, Log, Micros, Nanometres, Request, RequestError, Response,
     frame::{BODY_MAX, Decoder, Encoded, FRAME_MAX, FrameError, Header, Kind, Packet, decode, encode},
-    message::{Axis, ResetCause, Shot},
+    message::{Axis, CODES_MAX, COEFFICIENTS_MAX, Codes, ResetCause, Shot, TriggerMode},
 };
 use proptest::{collection::vec, prelude::*};
 
 fn header(kind: Kind, id: u32, boot: u32) -> Header {
-    Header { version: 1, kind, id, boot }
+    Header { version: 2, kind, id, boot }
 }
 
 fn request(id: u32, request: &Request) -> Encoded {
@@ -20,26 +20,41 @@ fn feed(decoder: &mut Decoder, bytes: &[u8]) -> Vec<Result<Packet, FrameError>> 
 }
 
 fn any_request() -> impl Strategy<Value = Request> {
-    let axis = prop_oneof![Just(Axis::SensorCoarse), Just(Axis::SensorFine)];
+    let axis = prop_oneof![Just(Axis::SensorCoarse), Just(Axis::SensorFine), Just(Axis::Lens)];
+    let mode =
+        prop_oneof![Just(TriggerMode::Hardware), Just(TriggerMode::Software), Just(TriggerMode::FreeRunning)];
+    let codes = || vec(any::<i16>(), 0..=CODES_MAX).prop_map(|codes| codes.into_iter().collect::<Codes>());
     prop_oneof![
         Just(Request::Hello),
         Just(Request::Status),
-        axis.clone().prop_map(|axis| Request::Home { axis }),
-        (axis.clone(), any::<i32>()).prop_map(|(axis, nm)| Request::Move { axis, target: Nanometres(nm) }),
-        (any::<u8>(), axis, any::<(i32, u32, i32, u32, u16)>()).prop_map(
-            |(index, axis, (target, exposure, window, dwell, repeat))| Request::LoadShot {
+        (axis.clone(), any::<u32>()).prop_map(|(axis, us)| Request::Home { axis, silence: Micros(us) }),
+        (axis.clone(), any::<i32>(), any::<u32>()).prop_map(|(axis, nm, us)| Request::Move {
+            axis,
+            target: Nanometres(nm),
+            silence: Micros(us)
+        }),
+        (any::<u8>(), axis, mode, any::<(i32, u32, i32, u32, u16)>()).prop_map(
+            |(index, axis, mode, (target, exposure, window, dwell, repeat))| Request::LoadShot {
                 index,
                 shot: Shot {
                     axis,
                     target: Nanometres(target),
-                    exposure: farnear_protocol::Micros(exposure),
+                    exposure: Micros(exposure),
                     settle_window: Nanometres(window),
-                    settle_dwell: farnear_protocol::Micros(dwell),
+                    settle_dwell: Micros(dwell),
                     repeat,
+                    mode,
                 },
             }
         ),
         any::<u32>().prop_map(|number| Request::ReadEvent { number }),
+        (any::<[u16; 3]>(), any::<i16>(), codes()).prop_map(|([row, first, step], truth, codes)| {
+            Request::FitSamples { row, first, step, truth, codes }
+        }),
+        (any::<u16>(), codes()).prop_map(|(first, codes)| Request::PutRow { first, codes }),
+        (any::<u8>(), vec(any::<i32>(), 0..=COEFFICIENTS_MAX)).prop_map(|(first, bits)| {
+            Request::PutCoefficients { first, bits: bits.into_iter().collect() }
+        }),
         Just(Request::Stop),
         Just(Request::Reboot),
     ]
@@ -160,6 +175,7 @@ proptest! {
         let _ = packet.message::<Response>();
         let _ = packet.message::<RequestError>();
         let _ = packet.message::<Event>();
+        let _ = packet.message::<Log>();
     }
 }
 

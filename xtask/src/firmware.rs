@@ -11,10 +11,25 @@ use crate::{
 
 /// Name of the firmware's package and program.
 const PROGRAM: &str = "farnear-nucleo-f429zi";
+/// The program that counts the instructions of the on-board routines, built alongside.
+const COUNTER: &str = "farnear-count";
 
 /// The firmware's own workspace.
 pub fn folder() -> PathBuf {
     ROOT.join("firmware/nucleo-f429zi")
+}
+
+fn built(program: &str) -> Result<PathBuf> {
+    let elf = folder().join("target").join(TARGET).join("release").join(program);
+    if !elf.exists() {
+        bail!("the build ended well but left no {}", elf.display());
+    }
+    Ok(elf)
+}
+
+/// The counting program's ELF, after a build.
+pub fn counter() -> Result<PathBuf> {
+    built(COUNTER)
 }
 
 /// Builds the firmware; gives the path of its ELF.
@@ -26,10 +41,7 @@ pub fn build() -> Result<PathBuf> {
 /// Builds the firmware in a way that was found before.
 pub fn build_with(way: Way) -> Result<PathBuf> {
     finish(way.cargo(&folder(), "build").args(["--release", "--locked"]))?;
-    let elf = folder().join("target").join(TARGET).join("release").join(PROGRAM);
-    if !elf.exists() {
-        bail!("the build ended well but left no {}", elf.display());
-    }
+    let elf = built(PROGRAM)?;
     for profile in ["debug", "release"] {
         let beside = target_folder().join(profile);
         let copy = beside.join(format!("{PROGRAM}.elf"));

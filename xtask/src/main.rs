@@ -3,11 +3,13 @@
 //! One file per job. Every step says what it does before it does it, and every failure says what to type next.
 
 mod bench;
+mod campaign;
 mod demo;
 mod evaluate;
 mod firmware;
 mod fuzz;
 mod install;
+mod instructions;
 mod run;
 mod sizes;
 mod test;
@@ -33,8 +35,15 @@ enum Job {
     Test,
     /// Build the firmware and lay its ELF beside the host programs.
     Firmware,
-    /// The firmware's flash and static RAM against their budgets.
-    Sizes,
+    /// The firmware's flash and static RAM against their budgets, and the instructions of its routines against
+    /// docs/instructions.md.
+    Sizes {
+        /// Write docs/instructions.md anew.
+        #[arg(long)]
+        write: bool,
+    },
+    /// The long tests on the emulated board, seed after seed: a million steps, thousands of moves, a fuzzed link.
+    Campaign(campaign::Arguments),
     /// Run the property tests with many more cases, seed after seed.
     Fuzz {
         /// For about so long; a round that has begun is finished.
@@ -54,7 +63,11 @@ fn main() -> ExitCode {
         Job::Demo => demo::run(),
         Job::Test => test::run(),
         Job::Firmware => firmware::build().map(|elf| println!("{}", elf.display())),
-        Job::Sizes => firmware::build().and_then(|elf| sizes::check(&elf)),
+        Job::Sizes { write } => firmware::build().and_then(|elf| {
+            sizes::check(&elf)?;
+            instructions::run(write)
+        }),
+        Job::Campaign(arguments) => campaign::run(&arguments),
         Job::Fuzz { seconds } => fuzz::run(seconds),
         Job::Bench(arguments) => bench::run(&arguments),
         Job::Evaluate(arguments) => evaluate::run(&arguments),

@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 
 use crate::{
-    firmware,
+    firmware, instructions,
     run::{cargo, finish, step, target_folder},
     sizes,
     thumb::Way,
@@ -27,6 +27,7 @@ pub fn run() -> Result<()> {
     let way = Way::find()?;
     let elf = firmware::build_with(way)?;
     sizes::check(&elf)?;
+    instructions::run(false)?;
 
     step("lints");
     finish(&mut cargo(["clippy", "--workspace", "--all-targets", "--locked", "--", "--deny", "warnings"]))?;

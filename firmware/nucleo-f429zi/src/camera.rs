@@ -1,7 +1,8 @@
 //! The camera's trigger and its exposure-active signal (strobe), both on TIM2, which counts board microseconds.
 //!
 //! Trigger: channel 3, PB10. Both edges are compare matches, so they come at their microsecond whatever the
-//! program does; the interrupt only prepares the next. Strobe: channel 4, PB11, captured by the hardware.
+//! program does; the interrupt only prepares the next. Strobe: channel 4, PB11, captured by the hardware, after a trigger
+//! or, where the camera exposes by itself, while somebody listens.
 
 use core::cell::RefCell;
 
@@ -17,7 +18,7 @@ use embassy_stm32::{
     timer::{Ch3, Ch4, input_capture::CapturePin, simple_pwm::PwmPin},
 };
 use farnear_protocol::{BoardMicros, Micros};
-use farnear_rig::io::ExposureEdges;
+use farnear_rig::io::{ExposureEdges, StrobeEdges};
 
 use crate::{
     clock::{self, APB1_TIMER_HZ},
@@ -42,7 +43,27 @@ struct Exposure {
     strobe_end: Option<u32>,
 }
 
-static EXPOSURE: Mutex<RefCell<Option<Exposure>>> = Mutex::new(RefCell::new(None));
+/// What the strobe input is for.
+#[derive(Clone, Copy)]
+enum Strobe {
+    /// Nothing.
+    Ignored,
+    /// The exposure that was triggered.
+    Triggered(Exposure),
+    /// Exposures that come by themselves: the start of the one under way, and the last whole one.
+    Listening { start: Option<u32>, ended: Option<(u32, u32)> },
+}
+
+impl Strobe {
+    fn triggered(&mut self) -> Option<&mut Exposure> {
+        match self {
+            Self::Triggered(exposure) => Some(exposure),
+            _ => None,
+        }
+    }
+}
+
+static EXPOSURE: Mutex<RefCell<Strobe>> = Mutex::new(RefCell::new(Strobe::Ignored));
 
 fn drive(mode: vals::Ocm) {
     pac::TIM2.ccmr_output(1).modify(|w| w.set_ocm(TRIGGER - 2, mode));
@@ -64,11 +85,11 @@ fn TIM2() {
                 w.0 = u32::MAX;
                 w.set_ccif(TRIGGER, false);
             });
-            trigger_edge(exposure.as_mut());
+            trigger_edge(exposure.triggered());
         }
         if flags.ccif(STROBE) {
             let stamp = timer.ccr(STROBE).read(); // clears the flag
-            strobe_edge(exposure.as_mut(), stamp);
+            strobe_edge(&mut exposure, stamp);
         }
     });
 }
@@ -91,14 +112,27 @@ fn trigger_edge(exposure: Option<&mut Exposure>) {
     exposure.pulse_ended = true;
 }
 
-fn strobe_edge(exposure: Option<&mut Exposure>, stamp: u32) {
-    let Some(exposure) = exposure else { return };
-    if exposure.strobe_start.is_none() {
-        exposure.strobe_start = Some(stamp);
-        capture_rising(false);
-    } else if exposure.strobe_end.is_none() {
-        exposure.strobe_end = Some(stamp);
-        capture_rising(true);
+fn strobe_edge(strobe: &mut Strobe, stamp: u32) {
+    match strobe {
+        Strobe::Triggered(exposure) if exposure.strobe_start.is_none() => {
+            exposure.strobe_start = Some(stamp);
+            capture_rising(false);
+        }
+        Strobe::Triggered(exposure) if exposure.strobe_end.is_none() => {
+            exposure.strobe_end = Some(stamp);
+            capture_rising(true);
+        }
+        Strobe::Listening { start, ended } => match start.take() {
+            None => {
+                *start = Some(stamp);
+                capture_rising(false);
+            }
+            Some(began) => {
+                *ended = Some((began, stamp));
+                capture_rising(true);
+            }
+        },
+        _ => {}
     }
 }
 
@@ -150,7 +184,7 @@ impl CameraPort {
         critical_section::with(|cs| {
             capture_rising(true);
             let rising = timer.cnt().read().wrapping_add(LEAD_US);
-            *EXPOSURE.borrow_ref_mut(cs) = Some(Exposure {
+            *EXPOSURE.borrow_ref_mut(cs) = Strobe::Triggered(Exposure {
                 length_us: length.0,
                 rising,
                 pulse_ended: false,
@@ -168,11 +202,45 @@ impl CameraPort {
         });
     }
 
-    /// The edges of the last exposure, once, when all are known.
+    /// Measures exposures that come without a trigger from now on, or no longer.
+    pub fn listen(&mut self, listen: bool) {
+        critical_section::with(|cs| {
+            let mut strobe = EXPOSURE.borrow_ref_mut(cs);
+            match (listen, &*strobe) {
+                (true, Strobe::Ignored) => {
+                    *strobe = Strobe::Listening { start: None, ended: None };
+                    // An edge that came before belongs to an exposure that had begun.
+                    pac::TIM2.sr().write(|w| {
+                        w.0 = u32::MAX;
+                        w.set_ccif(STROBE, false);
+                    });
+                    capture_rising(true);
+                }
+                (false, Strobe::Listening { .. }) => {
+                    *strobe = Strobe::Ignored;
+                    capture_rising(true);
+                }
+                _ => {}
+            }
+        });
+    }
+
+    /// The last exposure that began while somebody listened and has ended, once.
+    pub fn take_strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges> {
+        critical_section::with(|cs| match &mut *EXPOSURE.borrow_ref_mut(cs) {
+            Strobe::Listening { ended, .. } => ended.take().map(|(start, end)| StrobeEdges {
+                start: clock::extend(start, now),
+                end: clock::extend(end, now),
+            }),
+            _ => None,
+        })
+    }
+
+    /// The edges of the last triggered exposure, once, when all are known.
     pub fn take_edges(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
         critical_section::with(|cs| {
-            let mut exposure = EXPOSURE.borrow_ref_mut(cs);
-            let edges = exposure.as_ref().and_then(|exposure| {
+            let mut strobe = EXPOSURE.borrow_ref_mut(cs);
+            let edges = strobe.triggered().and_then(|exposure| {
                 exposure.pulse_ended.then_some(())?;
                 Some(ExposureEdges {
                     trigger: clock::extend(exposure.rising, now),
@@ -181,7 +249,7 @@ impl CameraPort {
                 })
             });
             if edges.is_some() {
-                *exposure = None;
+                *strobe = Strobe::Ignored;
             }
             edges
         })

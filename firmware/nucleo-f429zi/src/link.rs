@@ -56,13 +56,20 @@ pub fn open(
 }
 
 impl Link {
-    /// Hands over what has come in.
-    pub fn drain(&mut self, mut take: impl FnMut(u8)) {
+    /// Hands over what has come in; `true` where the buffer was full, so that bytes may have been lost.
+    pub fn drain(&mut self, mut take: impl FnMut(u8)) -> bool {
         let mut bytes = [0; 64];
-        while let Ok(true) = self.receiver.read_ready() {
-            let Ok(count) = self.receiver.read(&mut bytes) else { return };
+        let mut taken = 0;
+        // What comes meanwhile waits for the next tick: a sender without a pause must not hold this one up.
+        while taken < RECEIVE_BUFFER
+            && let Ok(true) = self.receiver.read_ready()
+        {
+            let Ok(count) = self.receiver.read(&mut bytes) else { break };
             bytes[..count].iter().for_each(|byte| take(*byte));
+            taken += count;
         }
+        // The ring keeps one place free to tell full from empty.
+        taken >= RECEIVE_BUFFER - 1
     }
 
     /// Whether another frame can be queued.

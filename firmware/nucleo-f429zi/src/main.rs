@@ -5,55 +5,84 @@
 //!
 //! | pin | function | signal |
 //! |---|---|---|
-//! | PE9 | TIM1_CH1 (AF1) | STEP |
-//! | PF13, PF14, PF15 | GPIO | DIR (high = away from the lens), EN (low = on), DIAG (high = fault) |
-//! | PD12, PD13 | TIM4_CH1, CH2 (AF2) | encoder A, B |
-//! | PG0, PG1 | GPIO, pull-up | home and far switch, normally closed to ground |
-//! | PC10, PC11, PC12 | SPI3 (AF6) | clock, data in, data out |
+//! | PE9, PC6 | TIM1_CH1 (AF1), TIM8_CH1 (AF3) | STEP of stage A, of stage B |
+//! | PF13, PF14, PF15 | GPIO | stage A: DIR (high = away from the lens), EN (low = on), DIAG (high = fault) |
+//! | PF0, PF1, PF2 | GPIO | stage B: DIR (high = away from the sensor), EN, DIAG |
+//! | PD12, PD13 | TIM4_CH1, CH2 (AF2) | stage A: encoder A, B |
+//! | PB4, PB5 | TIM3_CH1, CH2 (AF2) | stage B: encoder A, B |
+//! | PG0, PG1, PG2, PG3 | GPIO, pull-up | home and far switch of stage A, of stage B, normally closed to ground |
+//! | PE15, PA6 | TIM1_BKIN (AF1), TIM8_BKIN (AF3), pull-up | emergency stop, normally closed to ground, on both |
+//! | PC10, PC11, PC12 | SPI3 (AF6) | clock, data in, data out of DAC and converter |
 //! | PD0, PD1 | GPIO | select of the piezo's DAC, CNV of the gauge's converter |
+//! | PE2, PE5, PE6 | SPI4 (AF5) | clock, data in, data out of the FRAM |
+//! | PE4 | GPIO | select of the FRAM |
 //! | PB10 | TIM2_CH3 (AF1) | camera trigger |
 //! | PB11 | TIM2_CH4 (AF1) | camera strobe (exposure active) |
 //! | PD8, PD9 | USART3 (AF7) | link, on the ST-LINK's virtual COM port |
 //! | PD15 | GPIO, pull-down | strap: high only on the emulated board |
 //! | PB0 | GPIO | LED: blinks while the control loop runs |
 //!
-//! Interrupts: TIM1 update (steps) above TIM2 (camera) above USART3 above TIM5 (time); the loop runs in thread
-//! mode below them all.
+//! Interrupts: the step timers' update and break above TIM2 (camera) above USART3 above TIM5 (time); the loop runs in
+//! thread mode below them all.
 #![no_std]
 #![no_main]
 
+mod axis;
 mod camera;
 mod clock;
+mod clock_tree;
 mod control;
 mod encoder;
 mod link;
+mod memory;
 mod piezo;
 mod registers;
 mod stepper;
+mod supply;
 
 use defmt::{error, info};
-use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_stm32::{
     gpio::{Input, Pull},
     interrupt::{Interrupt, InterruptExt, Priority},
     uid,
 };
-use farnear_rig::{Identity, Rig};
-use panic_probe as _;
+use embassy_time::{Duration, block_for};
+use farnear_rig::{Identity, Rig, io::MEMORY_BYTES};
+use static_cell::StaticCell;
 
 use crate::{
+    axis::{Axis, Switches},
     camera::CameraPort,
-    control::{Hardware, Switches},
+    control::Hardware,
     encoder::Encoder,
+    memory::Memory,
     piezo::Piezo,
-    stepper::Stepper,
+    registers::retained::{self, Last},
+    stepper::{DriverPins, Stepper},
+    supply::Supply,
 };
+
+/// From power-on to the FRAM's first answer (FM25V02, t_PU).
+const MEMORY_STARTS: Duration = Duration::from_micros(250);
+
+/// The rig with what its memory holds, and whether there is a memory. Not inside `main`, whose variables would have a
+/// place of their own for ever, and moved ones several.
+#[inline(never)]
+fn start(identity: Identity, memory: &mut Memory) -> (&'static mut Rig, bool) {
+    static RIG: StaticCell<Rig> = StaticCell::new();
+    block_for(MEMORY_STARTS);
+    let mut records = [0; MEMORY_BYTES];
+    let remembers = memory.is_there() && memory.read(&mut records);
+    (RIG.init_with(|| Rig::new(identity, remembers.then_some(&records), clock::now())), remembers)
+}
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let reset_cause = registers::take_reset_cause();
+    let (boot, last) = retained::take();
     let p = clock::start();
+    clock::start_cycle_counter();
     Interrupt::USART3.set_priority(Priority::P2);
     Interrupt::TIM5.set_priority(Priority::P3);
 
@@ -61,11 +90,19 @@ async fn main(spawner: Spawner) {
         board: "nucleo-f429zi",
         firmware: env!("CARGO_PKG_VERSION"),
         unique_id: uid::uid(),
-        boot: registers::next_boot_number(),
+        boot,
         reset_cause,
         emulated: Input::new(p.PD15, Pull::Down).is_high(),
+        last_words: last.map(Last::words),
     };
-    info!("boot {}, emulated: {}", identity.boot, identity.emulated);
+    match last {
+        Some(Last::Panic { file, line }) => error!("panicked at {}:{}", file.unwrap_or("?"), line),
+        Some(Last::Fault { program_counter, status }) => {
+            error!("a fault at {:#010x}, CFSR {:#010x}", program_counter, status);
+        }
+        Some(Last::StackOverflow) => error!("the stack overflowed"),
+        None => {}
+    }
 
     let (link, sender) = match link::open(p.USART3, p.PD8, p.PD9) {
         Ok(ends) => ends,
@@ -79,13 +116,38 @@ async fn main(spawner: Spawner) {
         Ok(task) => spawner.spawn(task),
         Err(fault) => error!("no place for the sending task: {}", defmt::Debug2Format(&fault)),
     }
+    let mut memory = Memory::new(p.SPI4, p.PE2, p.PE5, p.PE6, p.PE4);
+    let (rig, remembers) = start(identity, &mut memory);
+    info!("boot {}, emulated: {}, memory: {}", rig.boot(), identity.emulated, remembers);
+
     let hardware = Hardware {
-        stepper: Stepper::new(p.TIM1, p.PE9, p.PF13, p.PF14, p.PF15),
-        encoder: Encoder::new(p.TIM4, p.PD12, p.PD13),
-        switches: Switches::new(p.PG0, p.PG1),
+        coarse: Axis {
+            stepper: Stepper::new(
+                p.TIM1,
+                DriverPins {
+                    step: p.PE9,
+                    direction: p.PF13,
+                    enable: p.PF14,
+                    diagnosis: p.PF15,
+                    stop: p.PE15,
+                },
+            ),
+            encoder: Encoder::new(p.TIM4, p.PD12, p.PD13),
+            switches: Switches::new(p.PG0, p.PG1),
+        },
+        lens: Axis {
+            stepper: Stepper::new(
+                p.TIM8,
+                DriverPins { step: p.PC6, direction: p.PF0, enable: p.PF1, diagnosis: p.PF2, stop: p.PA6 },
+            ),
+            encoder: Encoder::new(p.TIM3, p.PB4, p.PB5),
+            switches: Switches::new(p.PG2, p.PG3),
+        },
         piezo: Piezo::new(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD0, p.PD1),
         camera: CameraPort::new(p.TIM2, p.PB10, p.PB11),
+        memory: remembers.then_some(memory),
+        supply: Supply::new(),
         link,
     };
-    control::run(hardware, Rig::new(identity, clock::now()), p.IWDG, p.PB0).await
+    control::run(hardware, rig, p.IWDG, p.PB0).await
 }

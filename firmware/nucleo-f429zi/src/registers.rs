@@ -1,7 +1,12 @@
-//! The only `unsafe` code of the firmware: interrupt enables and the memory that survives a reset.
+//! The only `unsafe` code of the firmware: interrupt enables, the memory that survives a reset, the way out of a fault, the
+//! log's encoder, and the names under which a debugger finds what was measured.
 #![allow(unsafe_code)]
 
-use core::{cell::UnsafeCell, mem::MaybeUninit};
+mod faults;
+mod logger;
+pub mod retained;
+
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::{
@@ -10,38 +15,21 @@ use embassy_stm32::{
 };
 use farnear_protocol::message::ResetCause;
 
-/// Says that the retained memory holds a boot number and not what was there at power-on ("fnBT").
-const MAGIC: u32 = 0x666e_4254;
+pub use self::logger::take_log;
 
-/// What survives a reset, but not a loss of power: [magic, boot number, check].
-struct Retained(UnsafeCell<MaybeUninit<[u32; 3]>>);
+/// Cycles of the longest control tick since the reset, interrupts included; a debugger (and the emulated board's
+/// tests) find it by its name.
+// SAFETY: no other symbol has this name.
+#[unsafe(no_mangle)]
+static FARNEAR_LONGEST_TICK_CYCLES: AtomicU32 = AtomicU32::new(0);
 
-// SAFETY: `next_boot_number` is the only access, and it runs inside a critical section.
-unsafe impl Sync for Retained {}
-
-// SAFETY: `.uninit` is a section of cortex-m-rt's linker script that start-up code leaves alone; it has no
-// initial value, which `MaybeUninit` says.
-#[unsafe(link_section = ".uninit.boot")]
-static RETAINED: Retained = Retained(UnsafeCell::new(MaybeUninit::uninit()));
-
-fn check(boot: u32) -> u32 {
-    !boot.rotate_left(16)
-}
-
-/// The number of this boot: one more than the last, or 1 after a loss of power. Never 0, which means "not
-/// known" on the wire. Call once per boot.
-pub fn next_boot_number() -> u32 {
-    critical_section::with(|_| {
-        let place = RETAINED.0.get().cast::<[u32; 3]>();
-        // SAFETY: the place is valid, aligned static memory that nobody else touches (critical section). Any
-        // bits are a valid [u32; 3]; volatile, so that the compiler cannot reason from "uninitialised".
-        let [magic, last, sum] = unsafe { place.read_volatile() };
-        let known = magic == MAGIC && sum == check(last);
-        let boot = if known { last.wrapping_add(1).max(1) } else { 1 };
-        // SAFETY: as above.
-        unsafe { place.write_volatile([MAGIC, boot, check(boot)]) };
-        boot
-    })
+/// Notes how long a tick took; `true` where it is the longest so far.
+pub fn note_tick(cycles: u32) -> bool {
+    let longest = cycles > FARNEAR_LONGEST_TICK_CYCLES.load(Ordering::Relaxed);
+    if longest {
+        FARNEAR_LONGEST_TICK_CYCLES.store(cycles, Ordering::Relaxed);
+    }
+    longest
 }
 
 /// Lets an interrupt in, at a priority. Call when its handler's state is ready.

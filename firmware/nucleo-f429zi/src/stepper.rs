@@ -1,9 +1,13 @@
-//! STEP pulses from TIM1, exactly as many as ordered.
+//! STEP pulses from an advanced timer, exactly as many as ordered: TIM1 for stage A, TIM8 for stage B.
 //!
-//! TIM1 runs in one-pulse mode: it plays one [`Segment`] from its repetition counter and stops by itself at the
+//! The timer runs in one-pulse mode: it plays one [`Segment`] from its repetition counter and stops by itself at the
 //! update event, so no late interrupt can ever add a pulse. The update interrupt, the highest of the program,
 //! loads the waiting segment and starts the timer again; that takes well under a microsecond, which the motor's
 //! spacing absorbs (at least 25 us). STEP is low for the first half of a period and high for the second.
+//!
+//! The emergency stop's circuit is on the timer's break input: when it opens, the hardware takes STEP low at once,
+//! whatever the program does; the break interrupt then empties the queue. Pulses of the segment that was running are not
+//! counted, for nobody knows how many of them came; the axis is lost anyway.
 //!
 //! DIR, EN and DIAG are the driver chip's other lines (TMC2209 class: EN is active low, DIAG active high).
 
@@ -12,15 +16,18 @@ use core::cell::RefCell;
 use critical_section::Mutex;
 use embassy_stm32::{
     Peri,
-    gpio::{Input, Level, Output, OutputType, Pull, Speed},
+    gpio::{AfType, Flex, Input, Level, Output, OutputType, Pin, Pull, Speed},
     interrupt,
     interrupt::{Interrupt, Priority},
-    pac::{self, timer::vals},
-    peripherals::{PE9, PF13, PF14, PF15, TIM1},
+    pac::{
+        self,
+        timer::{TimAdv, vals},
+    },
+    peripherals::{TIM1, TIM8},
     rcc,
-    timer::{Ch1, simple_pwm::PwmPin},
+    timer::{AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, TimerPin, simple_pwm::PwmPin},
 };
-use farnear_rig::io::{Outputs, STEP_TIMER_HZ, Segment, StepperState};
+use farnear_rig::io::{MotorOutputs, STEP_TIMER_HZ, Segment, StepperState};
 use heapless::Deque;
 
 use crate::{clock::APB2_TIMER_HZ, registers};
@@ -34,57 +41,67 @@ struct Queue {
     running: Option<Segment>,
     pulses: u32,
     underrun: bool,
+    /// The break input has stopped the timer since the last look.
+    broken: bool,
 }
 
-static STEPS: Mutex<RefCell<Queue>> =
-    Mutex::new(RefCell::new(Queue { waiting: Deque::new(), running: None, pulses: 0, underrun: false }));
-
-impl Queue {
-    /// Starts the next segment. Only while the timer stands.
-    fn start_next(&mut self) {
-        self.running = self.waiting.pop_front();
-        let Some(segment) = self.running else { return };
-        let timer = pac::TIM1;
-        timer.arr().write(|w| w.set_arr(segment.period_ticks - 1));
-        timer.ccr(0).write(|w| w.set_ccr(segment.period_ticks / 2));
-        timer.rcr().write(|w| w.set_rep(segment.pulses - 1));
-        // Takes the three into the working registers; makes no flag (URS) and no edge (the count is 0 already).
-        timer.egr().write(|w| w.set_ug(true));
-        timer.cr1().modify(|w| w.set_cen(true));
-    }
+/// A step timer and what it is to play.
+pub struct StepTimer {
+    registers: TimAdv,
+    queue: Mutex<RefCell<Queue>>,
+    update: Interrupt,
+    brake: Interrupt,
 }
+
+static COARSE: StepTimer = StepTimer::new(pac::TIM1, Interrupt::TIM1_UP_TIM10, Interrupt::TIM1_BRK_TIM9);
+static LENS: StepTimer = StepTimer::new(pac::TIM8, Interrupt::TIM8_UP_TIM13, Interrupt::TIM8_BRK_TIM12);
 
 #[interrupt]
 fn TIM1_UP_TIM10() {
-    pac::TIM1.sr().modify(|w| w.set_uif(false));
-    critical_section::with(|cs| {
-        let mut steps = STEPS.borrow_ref_mut(cs);
-        let Some(ended) = steps.running else { return };
-        steps.pulses = steps.pulses.wrapping_add(u32::from(ended.pulses));
-        steps.start_next();
-        steps.underrun |= steps.running.is_none() && !ended.last;
-    });
+    COARSE.updated();
 }
 
-/// The coarse axis' motor.
-pub struct Stepper {
-    direction: Output<'static>,
-    enable: Output<'static>,
-    diagnosis: Input<'static>,
-    _step: PwmPin<'static, TIM1, Ch1>,
+#[interrupt]
+fn TIM8_UP_TIM13() {
+    LENS.updated();
 }
 
-impl Stepper {
-    /// Sets the timer and the pins up; the driver is off.
-    pub fn new(
-        _timer: Peri<'static, TIM1>,
-        step: Peri<'static, PE9>,
-        direction: Peri<'static, PF13>,
-        enable: Peri<'static, PF14>,
-        diagnosis: Peri<'static, PF15>,
-    ) -> Self {
-        rcc::enable_and_reset::<TIM1>();
-        let timer = pac::TIM1;
+#[interrupt]
+fn TIM1_BRK_TIM9() {
+    COARSE.broke();
+}
+
+#[interrupt]
+fn TIM8_BRK_TIM12() {
+    LENS.broke();
+}
+
+/// A timer that can make STEP pulses.
+pub trait StepInstance: AdvancedInstance4Channel {
+    /// Its registers and its queue.
+    fn steps() -> &'static StepTimer;
+}
+
+impl StepInstance for TIM1 {
+    fn steps() -> &'static StepTimer {
+        &COARSE
+    }
+}
+
+impl StepInstance for TIM8 {
+    fn steps() -> &'static StepTimer {
+        &LENS
+    }
+}
+
+impl StepTimer {
+    const fn new(registers: TimAdv, update: Interrupt, brake: Interrupt) -> Self {
+        let queue = Queue { waiting: Deque::new(), running: None, pulses: 0, underrun: false, broken: false };
+        Self { registers, queue: Mutex::new(RefCell::new(queue)), update, brake }
+    }
+
+    fn set_up(&self) {
+        let timer = self.registers;
         timer.psc().write_value(PRESCALER);
         timer.arr().write(|w| w.set_arr(u16::MAX));
         timer.ccr(0).write(|w| w.set_ccr(u16::MAX));
@@ -100,27 +117,138 @@ impl Stepper {
         // The working registers first, then the output: otherwise it would come up high and give one edge.
         timer.egr().write(|w| w.set_ug(true));
         timer.ccer().write(|w| w.set_cce(0, true));
-        timer.bdtr().write(|w| w.set_moe(true));
+        timer.bdtr().write(|w| {
+            // An open circuit (the pull-up makes it high) takes STEP to its idle level, low.
+            w.set_bke(0, true);
+            w.set_bkp(0, vals::Bkp::ACTIVE_HIGH);
+            w.set_ossi(vals::Ossi::IDLE_LEVEL);
+        });
+        timer.sr().write(|w| w.0 = 0);
         timer.dier().write(|w| w.set_uie(true));
-        registers::enable_interrupt(Interrupt::TIM1_UP_TIM10, Priority::P0);
+        registers::enable_interrupt(self.update, Priority::P0);
+        registers::enable_interrupt(self.brake, Priority::P0);
+    }
+
+    fn with<T>(&self, work: impl FnOnce(&mut Queue) -> T) -> T {
+        critical_section::with(|cs| work(&mut self.queue.borrow_ref_mut(cs)))
+    }
+
+    /// Starts the next segment. Only while the timer stands.
+    fn start_next(&self, queue: &mut Queue) {
+        queue.running = queue.waiting.pop_front();
+        let Some(segment) = queue.running else { return };
+        let timer = self.registers;
+        timer.arr().write(|w| w.set_arr(segment.period_ticks - 1));
+        timer.ccr(0).write(|w| w.set_ccr(segment.period_ticks / 2));
+        timer.rcr().write(|w| w.set_rep(segment.pulses - 1));
+        // Takes the three into the working registers; makes no flag (URS) and no edge (the count is 0 already).
+        timer.egr().write(|w| w.set_ug(true));
+        if !timer.bdtr().read().moe() {
+            // At the first segment, and after an emergency stop. While that lasts the hardware refuses.
+            timer.bdtr().modify(|w| w.set_moe(true));
+            if !timer.bdtr().read().moe() {
+                queue.running = None;
+                queue.waiting.clear();
+                queue.broken = true;
+                return;
+            }
+            timer.sr().write(|w| {
+                w.0 = u32::MAX;
+                w.set_bif(0, false);
+            });
+            timer.dier().modify(|w| w.set_bie(true));
+        }
+        timer.cr1().modify(|w| w.set_cen(true));
+    }
+
+    /// A segment has ended.
+    fn updated(&self) {
+        self.registers.sr().write(|w| {
+            // Flags are cleared by writing 0; ones leave the others alone.
+            w.0 = u32::MAX;
+            w.set_uif(false);
+        });
+        self.with(|queue| {
+            let Some(ended) = queue.running else { return };
+            queue.pulses = queue.pulses.wrapping_add(u32::from(ended.pulses));
+            self.start_next(queue);
+            queue.underrun |= queue.running.is_none() && !ended.last && !queue.broken;
+        });
+    }
+
+    /// The emergency stop's circuit has opened; STEP is low already.
+    fn broke(&self) {
+        self.registers.cr1().modify(|w| w.set_cen(false));
+        // Its flag stays while the circuit is open, so it is heard once, until the next start.
+        self.registers.dier().modify(|w| w.set_bie(false));
+        self.registers.sr().write(|w| {
+            w.0 = u32::MAX;
+            w.set_uif(false);
+        });
+        self.with(|queue| {
+            queue.waiting.clear();
+            queue.running = None;
+            queue.broken = true;
+        });
+    }
+}
+
+/// The pins of a motor's driver chip.
+pub struct DriverPins<STEP, DIR, EN, DIAG, STOP> {
+    /// STEP.
+    pub step: STEP,
+    /// DIR.
+    pub direction: DIR,
+    /// EN.
+    pub enable: EN,
+    /// DIAG.
+    pub diagnosis: DIAG,
+    /// Break input: the emergency stop.
+    pub stop: STOP,
+}
+
+/// One axis' motor.
+pub struct Stepper<T: StepInstance> {
+    direction: Output<'static>,
+    enable: Output<'static>,
+    diagnosis: Input<'static>,
+    stop: Flex<'static>,
+    _step: PwmPin<'static, T, Ch1>,
+}
+
+impl<T: StepInstance> Stepper<T> {
+    /// Sets the timer and the pins up; the driver is off.
+    pub fn new(
+        _timer: Peri<'static, T>,
+        pins: DriverPins<
+            Peri<'static, impl TimerPin<T, Ch1>>,
+            Peri<'static, impl Pin>,
+            Peri<'static, impl Pin>,
+            Peri<'static, impl Pin>,
+            Peri<'static, impl BreakInputPin<T, BkIn1>>,
+        >,
+    ) -> Self {
+        rcc::enable_and_reset::<T>();
+        let function = pins.stop.af_num();
+        let mut stop = Flex::new(pins.stop);
+        stop.set_as_af_unchecked(function, AfType::input(Pull::Up));
+        T::steps().set_up();
         Self {
-            direction: Output::new(direction, Level::Low, Speed::Low),
-            enable: Output::new(enable, Level::High, Speed::Low),
-            diagnosis: Input::new(diagnosis, Pull::Down),
-            _step: PwmPin::new(step, OutputType::PushPull),
+            direction: Output::new(pins.direction, Level::Low, Speed::Low),
+            enable: Output::new(pins.enable, Level::High, Speed::Low),
+            diagnosis: Input::new(pins.diagnosis, Pull::Down),
+            stop,
+            _step: PwmPin::new(pins.step, OutputType::PushPull),
         }
     }
 
     /// What the timer is doing.
     pub fn state(&self) -> StepperState {
-        critical_section::with(|cs| {
-            let steps = STEPS.borrow_ref(cs);
-            StepperState {
-                pulses: steps.pulses,
-                idle: steps.running.is_none() && steps.waiting.is_empty(),
-                underrun: steps.underrun,
-                room: (QUEUE - steps.waiting.len()) as u8,
-            }
+        T::steps().with(|queue| StepperState {
+            pulses: queue.pulses,
+            idle: queue.running.is_none() && queue.waiting.is_empty(),
+            underrun: queue.underrun,
+            room: (QUEUE - queue.waiting.len()) as u8,
         })
     }
 
@@ -129,29 +257,35 @@ impl Stepper {
         self.diagnosis.is_high()
     }
 
+    /// The emergency stop's circuit is open, or was since the last look.
+    pub fn emergency_stop(&mut self) -> bool {
+        let broke = T::steps().with(|queue| core::mem::take(&mut queue.broken));
+        broke || self.stop.is_high()
+    }
+
     /// Carries out the orders of one tick.
-    pub fn apply(&mut self, outputs: &Outputs) {
+    pub fn apply(&mut self, outputs: &MotorOutputs) {
         self.enable.set_level((!outputs.enable).into());
         self.direction.set_level(outputs.direction_away.into());
-        critical_section::with(|cs| {
-            let mut steps = STEPS.borrow_ref_mut(cs);
+        let timer = T::steps();
+        timer.with(|queue| {
             if outputs.abort_steps {
-                steps.waiting.clear();
-                steps.underrun = false;
+                queue.waiting.clear();
+                queue.underrun = false;
                 // What runs ends by itself within a millisecond, and that is no underrun.
-                if let Some(running) = &mut steps.running {
+                if let Some(running) = &mut queue.running {
                     running.last = true;
                 }
             }
             for segment in &outputs.segments {
-                if steps.waiting.push_back(*segment).is_err() {
+                if queue.waiting.push_back(*segment).is_err() {
                     // More than `room`: stop rather than lose pulses silently.
-                    steps.waiting.clear();
-                    steps.underrun = true;
+                    queue.waiting.clear();
+                    queue.underrun = true;
                 }
             }
-            if steps.running.is_none() && !steps.underrun {
-                steps.start_next();
+            if queue.running.is_none() && !queue.underrun {
+                timer.start_next(queue);
             }
         });
     }

@@ -1,19 +1,32 @@
-//! The camera: when it may be triggered, and what its strobe says.
+//! The camera: when it may be exposed, and what its strobe says.
 //!
 //! The read-out of an exposure overlaps the next move, but the camera must not be triggered before it is over:
 //! [`CameraSettings::readout`] after the end of the exposure. Known from the strobe; until that is in, from the
 //! length of the trigger pulse and the longest answer a camera may take.
+//!
+//! An exposure that the board does not trigger (by the host, or of a camera that runs freely) is listened for: the first
+//! one that begins after listening did is it.
 
 use farnear_protocol::{BoardMicros, Micros};
 
-use crate::io::ExposureEdges;
+use crate::io::{ExposureEdges, Inputs};
 use crate::settings::CameraSettings;
 
-/// An ordered exposure whose edges are not in yet.
+/// How an awaited exposure comes about.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Awaited {
+    /// By the board's pulse.
+    Triggered,
+    /// By itself, beginning at this moment or later.
+    Since(BoardMicros),
+}
+
+/// An exposure whose edges are not in yet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Pending {
     number: u32,
     deadline: BoardMicros,
+    awaited: Awaited,
 }
 
 /// The camera as the board knows it.
@@ -32,25 +45,45 @@ impl Camera {
         Self { settings, ready_at: BoardMicros(0), triggers: 0, pending: None, order: None, edges: None }
     }
 
-    /// Triggers given since the reset.
+    /// Takes other numbers.
+    pub(crate) const fn apply(&mut self, settings: CameraSettings) {
+        self.settings = settings;
+    }
+
+    /// Exposures begun since the reset; the next one's number.
     pub(crate) const fn triggers(&self) -> u32 {
         self.triggers
     }
 
-    /// Whether it may be triggered.
+    /// Whether it may be exposed.
     pub(crate) fn is_ready(&self, now: BoardMicros) -> bool {
         self.pending.is_none() && now >= self.ready_at
     }
 
     /// Orders an exposure; gives its number, from 0. The camera is ready.
     pub(crate) fn trigger(&mut self, exposure: Micros, now: BoardMicros) -> u32 {
-        let number = self.triggers;
-        self.triggers = self.triggers.wrapping_add(1);
         let end = now.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
-        self.pending = Some(Pending { number, deadline: BoardMicros(end) });
         self.order = Some(exposure);
+        self.expect(BoardMicros(end), Awaited::Triggered)
+    }
+
+    /// Listens for an exposure that begins from now on; gives its number.
+    pub(crate) fn listen(&mut self, now: BoardMicros) -> u32 {
+        let deadline = BoardMicros(now.0 + u64::from(self.settings.patience.0));
+        self.expect(deadline, Awaited::Since(now))
+    }
+
+    fn expect(&mut self, deadline: BoardMicros, awaited: Awaited) -> u32 {
+        let number = self.triggers;
+        self.triggers = self.triggers.wrapping_add(1);
+        self.pending = Some(Pending { number, deadline, awaited });
         number
+    }
+
+    /// Nobody waits any more for an exposure that the board did not trigger.
+    pub(crate) fn give_up(&mut self) {
+        self.pending = self.pending.filter(|pending| pending.awaited == Awaited::Triggered);
     }
 
     /// The exposure ordered in this tick, for the board.
@@ -58,16 +91,27 @@ impl Camera {
         self.order.take()
     }
 
+    /// Whether the board is to report exposures that come without a trigger.
+    pub(crate) fn is_listening(&self) -> bool {
+        self.pending.is_some_and(|pending| pending.awaited != Awaited::Triggered)
+    }
+
     /// Reads the board. Edges that nobody waits for are dropped.
-    pub(crate) fn sense(&mut self, edges: Option<ExposureEdges>, now: BoardMicros) {
+    pub(crate) fn sense(&mut self, inputs: &Inputs) {
         self.edges = None;
         let Some(pending) = self.pending else { return };
+        let edges = match pending.awaited {
+            Awaited::Triggered => inputs.exposure,
+            Awaited::Since(ready) => inputs.strobe.filter(|strobe| strobe.start >= ready).map(|strobe| {
+                ExposureEdges { trigger: ready, strobe_start: strobe.start, strobe_end: strobe.end }
+            }),
+        };
         if let Some(edges) = edges {
             self.edges = Some((pending.number, edges));
             self.ready_at =
                 BoardMicros(edges.strobe_end.0.saturating_add(u64::from(self.settings.readout.0)));
             self.pending = None;
-        } else if now > pending.deadline {
+        } else if inputs.now > pending.deadline {
             self.pending = None;
         }
     }

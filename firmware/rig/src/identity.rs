@@ -11,10 +11,22 @@ pub struct Identity {
     pub firmware: &'static str,
     /// The chip's unique id.
     pub unique_id: [u8; 12],
-    /// Number of this boot, not 0; differs from that of the boot before.
+    /// What retained RAM says is the number of this boot, not 0: one more than [`crate::Rig::boot`] of the boot before, or
+    /// 1 after a loss of power. The memory knows better, where it is good.
     pub boot: u32,
     /// Why the board was reset.
     pub reset_cause: ResetCause,
     /// Whether the strap says that this is an emulated board.
     pub emulated: bool,
+    /// What the firmware wrote into retained RAM before it stopped itself; given once.
+    pub last_words: Option<LastWords>,
+}
+
+/// Why the firmware stopped itself in the boot before this.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LastWords {
+    /// A panic or a hard fault.
+    Panic,
+    /// The stack grew into its guard.
+    StackOverflow,
 }

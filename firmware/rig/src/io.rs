@@ -8,11 +8,21 @@
 //! The inputs of a tick already reflect the outputs of the tick before: segments handed over count as queued,
 //! so [`StepperState::idle`] is false, and an ordered abort has emptied the queue.
 //!
+//! The emergency stop is read after the step timers: a circuit that opens between the two readings must not look
+//! like a timer that ran dry. Ticks that make up for lost time (a long calculation) may follow each other at once;
+//! the piezo's loop leaves those out.
+//!
 //! # Step pulses
 //! A [`Segment`] is some pulses of equal spacing. An advanced timer plays one from its repetition counter (8 bit:
 //! 256 pulses) while the next waits in the preload registers; one-pulse mode is on whenever no next one waits.
 //! No segment lasts more than [`SEGMENT_MAX_TICKS`] (1 ms), so that clearing the queue and letting the running
 //! segment end stops the motor within a millisecond, with an exact count.
+//!
+//! # Memory
+//! At the start the binary reads the first [`MEMORY_BYTES`] of the FRAM and hands them to [`crate::Rig::new`];
+//! later it writes what [`Outputs::memory`] orders, at most [`MEMORY_CHUNK`] bytes a tick, before the next tick.
+//! The rig relies on it: the mark that an axis moves lies in the memory before the first STEP pulse.
+//! [`crate::Rig::boot`] is then the number of this boot; the binary keeps it in its retained RAM.
 
 use farnear_protocol::{BoardMicros, Micros};
 use heapless::Vec;
@@ -32,7 +42,7 @@ pub const SEGMENT_MAX_PULSES: u16 = 256;
 /// Most segments handed over in one tick.
 pub const SEGMENTS_PER_TICK: usize = 4;
 
-/// Coarse encoder: nanometres per count (0.5 mm screw, 4000 counts per turn).
+/// Encoders of both steppers: nanometres per count (0.5 mm screw, 4000 counts per turn).
 pub const ENCODER_NM_PER_COUNT: i32 = 125;
 
 /// Largest code of the piezo's DAC (16 bit). Code 0 = 0 V.
@@ -47,6 +57,11 @@ pub const GAUGE_CODE_MAX: u32 = (1 << 18) - 1;
 /// is saturated or not connected.
 pub const GAUGE_CODE_ZERO: u32 = 10_000;
 
+/// Bytes of the memory that the rig uses, from address 0.
+pub const MEMORY_BYTES: usize = 8 * 1024;
+/// Most bytes written to the memory in a tick: 30 us of SPI.
+pub const MEMORY_CHUNK: usize = 64;
+
 /// What the step timer reports.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StepperState {
@@ -55,7 +70,7 @@ pub struct StepperState {
     pub pulses: u32,
     /// No segment runs and none waits.
     pub idle: bool,
-    /// The timer ran dry after a segment without [`Segment::last`]. Stays set until [`Outputs::abort_steps`].
+    /// The timer ran dry after a segment without [`Segment::last`]. Stays set until [`MotorOutputs::abort_steps`].
     pub underrun: bool,
     /// Segments that can be handed over in this tick.
     pub room: u8,
@@ -72,26 +87,53 @@ pub struct ExposureEdges {
     pub strobe_end: BoardMicros,
 }
 
+/// An exposure that came without a trigger of the board.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct StrobeEdges {
+    /// Rising edge of the camera's exposure-active signal.
+    pub start: BoardMicros,
+    /// Its falling edge.
+    pub end: BoardMicros,
+}
+
+/// What the board saw of a stepper axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct MotorInputs {
+    /// Encoder since the reset, [`ENCODER_NM_PER_COUNT`] each, extended beyond the counter's 16 bits; counts up when
+    /// sensor and lens move away from each other.
+    pub encoder_counts: i32,
+    /// The home switch is closed.
+    pub home_switch: bool,
+    /// The far switch is closed.
+    pub far_switch: bool,
+    /// The driver pulls its DIAG line.
+    pub driver_fault: bool,
+    /// The step timer.
+    pub stepper: StepperState,
+}
+
 /// What the board saw; read at the start of a control tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Inputs {
     /// Board time of this tick.
     pub now: BoardMicros,
-    /// Coarse encoder since the reset, [`ENCODER_NM_PER_COUNT`] each, extended beyond the counter's 16 bits;
-    /// counts up when the sensor moves away from the lens.
-    pub encoder_coarse_counts: i32,
+    /// Stage A's stepper.
+    pub coarse: MotorInputs,
+    /// Stage B's stepper.
+    pub lens: MotorInputs,
     /// Strain gauge, 18 bit, see [`GAUGE_CODE_ZERO`]; `None` where the converter did not answer.
     pub gauge_code: Option<u32>,
-    /// The home switch is closed.
-    pub home_switch: bool,
-    /// The far switch is closed.
-    pub far_switch: bool,
-    /// The stepper driver pulls its DIAG line.
-    pub driver_fault: bool,
-    /// The step timer.
-    pub stepper: StepperState,
+    /// The emergency-stop circuit is open (pressed, or a broken wire). The board has cut the STEP outputs already.
+    pub emergency_stop: bool,
+    /// The supply is below the level at which the board can still stop in order.
+    pub supply_low: bool,
+    /// Bytes from the link were lost since the tick before.
+    pub link_overflow: bool,
     /// The edges of the last ordered exposure, given once, in the first tick after all three are known.
     pub exposure: Option<ExposureEdges>,
+    /// An exposure that began while [`Outputs::listen`] was set, given once, in the first tick after its end. The
+    /// latest one where several ended since the tick before.
+    pub strobe: Option<StrobeEdges>,
 }
 
 /// STEP pulses of equal spacing. `pulses * period_ticks` is at most [`SEGMENT_MAX_TICKS`].
@@ -106,24 +148,48 @@ pub struct Segment {
     pub last: bool,
 }
 
+/// What the board is to do with a stepper now.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct MotorOutputs {
+    /// Driver enabled (current in the coils).
+    pub enable: bool,
+    /// Level of DIR: sensor and lens move away from each other. Changes only while the stepper is idle, at least one
+    /// tick before the first segment.
+    pub direction_away: bool,
+    /// Empty the segment queue and let the motor stop with the running segment; clears
+    /// [`StepperState::underrun`]. Never together with new `segments`. Also ordered, of a motor that stands, before
+    /// it sets off.
+    pub abort_steps: bool,
+    /// New segments, to be played in this order behind those that wait; never more than
+    /// [`StepperState::room`].
+    pub segments: Vec<Segment, SEGMENTS_PER_TICK>,
+}
+
+/// Bytes for the memory.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MemoryWrite {
+    /// Where; address and length stay below [`MEMORY_BYTES`].
+    pub address: u16,
+    /// What.
+    pub bytes: Vec<u8, MEMORY_CHUNK>,
+}
+
 /// What the board is to do now.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs {
     /// Code for the piezo's DAC.
     pub piezo_dac: u16,
-    /// Stepper driver enabled (current in the coils).
-    pub enable: bool,
-    /// Level of DIR: the sensor moves away from the lens. Changes only while the stepper is idle, at least one
-    /// tick before the first segment.
-    pub direction_away: bool,
-    /// Empty the segment queue and let the motor stop with the running segment; clears
-    /// [`StepperState::underrun`]. Never together with new `segments`.
-    pub abort_steps: bool,
-    /// New segments, to be played in this order behind those that wait; never more than
-    /// [`StepperState::room`].
-    pub segments: Vec<Segment, SEGMENTS_PER_TICK>,
+    /// Stage A's stepper.
+    pub coarse: MotorOutputs,
+    /// Stage B's stepper.
+    pub lens: MotorOutputs,
     /// Give a trigger pulse of this length now, and capture its edges.
     pub trigger: Option<Micros>,
+    /// Measure exposures that come without a trigger: report each that begins from now on as [`Inputs::strobe`]. Not
+    /// set together with `trigger`, nor while a triggered exposure is awaited.
+    pub listen: bool,
+    /// Write this to the memory now.
+    pub memory: Option<MemoryWrite>,
     /// Reset the microcontroller now; the answers have left.
     pub reset: bool,
 }

@@ -5,21 +5,27 @@
 //! state feedback on the difference from the undisturbed model's motion, which damps what shaping left. See
 //! [`crate::gains`] for the equations.
 //!
+//! What the calibration has found of hysteresis and creep is taken off the command ahead of time ([`model`]); the observer
+//! learns what is left of them.
+//!
 //! Until its first move the piezo stays relaxed (code 0) with the loop open. If the gauge fails, the command is
 //! held and the loop opens until the next move.
 //!
-//! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64; saturating, so no input can wrap it. Cost: about 25
+//! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64; saturating, so no input can wrap it. Cost: about 35
 //! multiplications a tick.
+
+mod model;
 
 use farnear_protocol::Nanometres;
 
+use self::model::{Lag, Scale};
 use crate::gains::{GAIN_BITS, Gains};
-use crate::io::{DAC_CODE_MAX, DAC_FULL_SCALE_NM, GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_US};
+use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_US};
 use crate::settings::FineSettings;
 use crate::shaper::Shaper;
 
 /// Fraction bits of a position.
-const BITS: u32 = 10;
+pub(crate) const BITS: u32 = 10;
 
 /// Position, scaled velocity, disturbance and its drift per tick, each nm in 2^-10.
 type State = [i32; 4];
@@ -40,6 +46,9 @@ struct Loop {
 #[derive(Clone, Debug)]
 pub(crate) struct Piezo {
     settings: FineSettings,
+    scale: Scale,
+    /// What hysteresis and creep should be, as the calibration found them.
+    lag: Lag,
     control: Option<Loop>,
     /// A move was ordered: close the loop as soon as the gauge says where it is.
     closing: bool,
@@ -49,12 +58,17 @@ pub(crate) struct Piezo {
     code: u16,
     measured: Nanometres,
     gauge_missing_ticks: u32,
+    failed: bool,
+    /// A sweep drives it without the loop, and reads the gauge.
+    driven: bool,
 }
 
 impl Piezo {
     pub(crate) const fn new(settings: FineSettings) -> Self {
         Self {
             settings,
+            scale: Scale::new(settings.gain_pm_per_code),
+            lag: Lag::new(settings.hysteresis_ppm, settings.creep_ppm_per_decade),
             control: None,
             closing: false,
             target: Nanometres(0),
@@ -62,6 +76,8 @@ impl Piezo {
             code: 0,
             measured: Nanometres(0),
             gauge_missing_ticks: 0,
+            failed: false,
+            driven: false,
         }
     }
 
@@ -80,8 +96,25 @@ impl Piezo {
         self.gauge_missing_ticks == 0
     }
 
+    /// Takes other numbers; nothing moves.
+    pub(crate) const fn apply(&mut self, settings: FineSettings) {
+        self.settings = settings;
+        self.scale = Scale::new(settings.gain_pm_per_code);
+        self.lag = self.lag.with(settings.hysteresis_ppm, settings.creep_ppm_per_decade);
+    }
+
+    /// The lowest position on the way that is under way.
+    pub(crate) fn lowest(&self) -> Nanometres {
+        if self.control.is_some() || self.closing { self.measured.min(self.target) } else { self.measured }
+    }
+
+    /// Whether the gauge failed while the loop needed it; given once.
+    pub(crate) const fn take_failure(&mut self) -> bool {
+        core::mem::replace(&mut self.failed, false)
+    }
+
     /// Whether the gauge has been silent or saturated for too long.
-    pub(crate) const fn gauge_failed(&self) -> bool {
+    const fn gauge_failed(&self) -> bool {
         self.gauge_missing_ticks as u64 * TICK_US as u64 > self.settings.gauge_deadline.0 as u64
     }
 
@@ -95,6 +128,20 @@ impl Piezo {
     pub(crate) const fn go(&mut self, target: Nanometres) {
         self.target = target;
         self.closing = self.control.is_none();
+        self.driven = false;
+    }
+
+    /// Opens the loop and plays a code.
+    pub(crate) const fn drive(&mut self, code: u16) {
+        (self.control, self.closing, self.driven) = (None, false, true);
+        self.code = code;
+        self.command = self.scale.played(code);
+        self.target = Nanometres(0);
+    }
+
+    /// The code that is played.
+    pub(crate) const fn code(&self) -> u16 {
+        self.code
     }
 
     /// Closes the loop without a jump: standing still, and what the command does not explain is disturbance.
@@ -103,7 +150,7 @@ impl Piezo {
         self.control = Some(Loop {
             shaper: Shaper::at(here),
             model: [here, 0],
-            state: [here, 0, here.saturating_sub(self.command), 0],
+            state: [here, 0, here.saturating_sub(self.command).saturating_sub(self.lag.offset()), 0],
             reference_before: here,
         });
         self.closing = false;
@@ -111,7 +158,7 @@ impl Piezo {
 
     /// Stays where the gauge says it is now.
     pub(crate) fn hold(&mut self) {
-        self.closing = false;
+        (self.closing, self.driven) = (false, false);
         if self.control.is_some() && !self.arrived() {
             self.target = Nanometres(self.measured.0.clamp(self.settings.min.0, self.settings.max.0));
         }
@@ -122,7 +169,8 @@ impl Piezo {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
             if self.gauge_failed() {
-                (self.control, self.closing) = (None, false);
+                self.failed |= self.closing || self.driven || self.control.is_some();
+                (self.control, self.closing, self.driven) = (None, false, false);
             }
             return;
         };
@@ -150,18 +198,24 @@ impl Piezo {
                 (gains.feedback[1], velocity.saturating_sub(control.model[1])),
             ]);
             let wanted = reference.saturating_sub(disturbance).saturating_sub(feedback);
-            let command_before = self.command;
-            (self.code, self.command) = playable(wanted);
+            // What the lag will be depends on the command; with the one before it is nearly known.
+            let ahead = self.lag.ahead(wanted.saturating_sub(self.lag.offset()));
+            let input_before = self.command.saturating_add(self.lag.offset());
+            (self.code, self.command) = self.scale.playable(wanted.saturating_sub(ahead));
+            self.lag.push(self.command);
+            let input = self.command.saturating_add(self.lag.offset());
 
             control.model = advance(gains, control.model, control.reference_before, reference);
             control.reference_before = reference;
             let [position, velocity] = advance(
                 gains,
                 [position, velocity],
-                command_before.saturating_add(disturbance),
-                self.command.saturating_add(disturbance),
+                input_before.saturating_add(disturbance),
+                input.saturating_add(disturbance),
             );
             control.state = [position, velocity, disturbance.saturating_add(drift), drift];
+        } else {
+            self.lag.push(self.command);
         }
         self.code
     }
@@ -188,15 +242,7 @@ const fn fixed(position: Nanometres) -> i32 {
     position.0 << BITS // a gauge code or a position within the stroke: below 2^18
 }
 
-/// The nearest DAC code to a command, and the command that it really is.
-fn playable(command: i32) -> (u16, i32) {
-    const FULL: i64 = (DAC_FULL_SCALE_NM as i64) << BITS;
-    const CODES: i64 = DAC_CODE_MAX as i64;
-    let command = i64::from(command).clamp(0, FULL);
-    let code = (command * CODES + FULL / 2) / FULL;
-    (code as u16, ((code * FULL + CODES / 2) / CODES) as i32)
-}
-
 #[cfg(test)]
-#[path = "piezo_tests.rs"]
+pub(crate) mod plant;
+#[cfg(test)]
 mod tests;

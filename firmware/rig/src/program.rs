@@ -1,30 +1,36 @@
 //! The exposure program: up to 64 shots, and the one that runs.
 //!
-//! Each shot: move, settle, trigger, wait for the strobe, report; `repeat` exposures at each position. The next
-//! move begins with the end of the exposure and so overlaps the camera's read-out; the next trigger waits for the
+//! Each shot: move, settle, expose, wait for the strobe, report; `repeat` exposures at each position. The next
+//! move begins with the end of the exposure and so overlaps the camera's read-out; the next exposure waits for the
 //! camera. At the trigger the position has been inside the settle window for the whole dwell, however long the
 //! camera took.
+//!
+//! A pause waits for the exposure that is under way; a resumed program settles anew.
 
-use farnear_protocol::message::{Axis, Failure, Shot, ShotFault, ShotRecord};
+use farnear_protocol::message::{
+    Axis, Failure, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode,
+};
 use farnear_protocol::{BoardMicros, Micros, Nanometres};
 
 use crate::camera::{Camera, NoAnswer};
 use crate::io::ExposureEdges;
+use crate::motion::positioning::Positioning;
+use crate::motion::stage::{Stage, limits};
 use crate::settings::{SETTLE_DWELL_MAX, SETTLE_WINDOW_MAX, Settings};
-use crate::stage::{Positioning, Stage};
 
 /// Shots a program may have.
 pub const SHOTS_MAX: usize = 64;
 
-/// The loaded shots.
+/// The loaded shots, and how many of them are armed.
 #[derive(Clone, Debug)]
 pub(crate) struct Shots {
     shots: [Option<Shot>; SHOTS_MAX],
+    armed: u8,
 }
 
 impl Shots {
     pub(crate) const fn new() -> Self {
-        Self { shots: [None; SHOTS_MAX] }
+        Self { shots: [None; SHOTS_MAX], armed: 0 }
     }
 
     /// Puts a shot into its place; limits of the axis are the caller's.
@@ -43,7 +49,26 @@ impl Shots {
             return Err(ShotFault::Repeat);
         }
         *place = Some(shot);
+        self.armed = 0;
         Ok(())
+    }
+
+    /// Puts a shot back that the memory kept; one that the settings no longer allow is dropped.
+    pub(crate) fn restore(&mut self, index: usize, shot: Shot, settings: &Settings) {
+        let (min, max) = limits(settings, shot.axis);
+        if (min..=max).contains(&shot.target) {
+            let _ = self.load(index as u8, shot, settings); // an index is below SHOTS_MAX
+        }
+    }
+
+    /// Arms the first `shots`, which were checked; 0 disarms.
+    pub(crate) const fn arm(&mut self, shots: u8) {
+        self.armed = shots;
+    }
+
+    /// How many are armed, 0 = none.
+    pub(crate) const fn armed(&self) -> u8 {
+        self.armed
     }
 
     /// A loaded shot.
@@ -52,13 +77,23 @@ impl Shots {
     }
 }
 
+/// Where the axes are at an exposure.
+#[derive(Clone, Copy, Debug)]
+struct Places {
+    coarse: Nanometres,
+    fine: Nanometres,
+    lens: Nanometres,
+}
+
 /// What a shot is doing.
 #[derive(Clone, Debug)]
 enum Phase {
     /// On the way, settling, or waiting for the camera.
     Positioning,
-    /// Waiting for the strobe of this trigger; the positions are those of the trigger.
-    Exposing { number: u32, coarse: Nanometres, fine: Nanometres },
+    /// Waiting for the strobe of this exposure; the positions are those of the trigger.
+    Exposing { number: u32, places: Places },
+    /// Standing between two exposures.
+    Paused,
 }
 
 /// A program under way.
@@ -73,15 +108,22 @@ pub(crate) struct Run {
     /// From the start of the move until it was first settled.
     settle: Option<Micros>,
     phase: Phase,
+    pausing: bool,
 }
 
 /// What a tick of a program brought.
-#[derive(Debug, Default)]
-pub(crate) struct Progress {
-    /// An exposure was taken.
-    pub(crate) taken: Option<ShotRecord>,
-    /// It is over: with this many exposures, or for this reason.
-    pub(crate) end: Option<Result<u16, Failure>>,
+#[derive(Debug)]
+pub(crate) enum Progress {
+    /// Nothing to tell.
+    On,
+    /// The shot is settled and the host triggers the camera: number of the exposure.
+    Ready { number: u32 },
+    /// It stands.
+    Paused,
+    /// An exposure was taken; with the number of exposures, if it was the last.
+    Taken { shot: ShotRecord, end: Option<u16> },
+    /// It cannot go on; whether that is the axis' fault.
+    Failed { axis: Option<Axis>, reason: Failure },
 }
 
 impl Run {
@@ -102,12 +144,40 @@ impl Run {
             positioning: approach(&first, stage, settings, now),
             settle: None,
             phase: Phase::Positioning,
+            pausing: false,
         }
     }
 
-    /// The axis that the present shot moves.
-    pub(crate) const fn axis(&self) -> Axis {
-        self.shot.axis
+    /// For the status answer.
+    pub(crate) const fn status(&self) -> ProgramStatus {
+        let paused = matches!(self.phase, Phase::Paused);
+        let state = if paused { ProgramState::Paused } else { ProgramState::Running };
+        ProgramStatus { state, shots: self.shots, index: self.index, exposures: self.exposures }
+    }
+
+    /// The shot under way and which of its repeats.
+    pub(crate) const fn shot(&self) -> (u8, u16, &Shot) {
+        (self.index, self.repeat, &self.shot)
+    }
+
+    /// Stands after the exposure under way.
+    pub(crate) const fn pause(&mut self) {
+        self.pausing = true;
+    }
+
+    /// Whether it stands, or is going to.
+    pub(crate) const fn is_pausing(&self) -> bool {
+        self.pausing
+    }
+
+    /// Goes on after a pause; settles anew.
+    pub(crate) fn resume(&mut self, stage: &mut Stage, settings: &Settings, now: BoardMicros) {
+        self.pausing = false;
+        if matches!(self.phase, Phase::Paused) {
+            self.phase = Phase::Positioning;
+            self.settle = None;
+            self.positioning = approach(&self.shot, stage, settings, now);
+        }
     }
 
     /// Goes on.
@@ -120,30 +190,49 @@ impl Run {
         now: BoardMicros,
     ) -> Progress {
         match self.phase {
+            Phase::Paused => Progress::On,
+            Phase::Positioning if self.pausing => {
+                // Stopped on the way it stands where it stopped; to the piezo a way is 5 ms.
+                stage.stop();
+                if !stage.steppers_still() {
+                    return Progress::On;
+                }
+                self.phase = Phase::Paused;
+                Progress::Paused
+            }
             Phase::Positioning => match self.positioning.tick(stage, now) {
-                None => Progress::default(),
-                Some(Err(failure)) => Progress { taken: None, end: Some(Err(failure)) },
+                None => Progress::On,
+                Some(Err(reason)) => Progress::Failed { axis: Some(self.shot.axis), reason },
                 Some(Ok(time)) => {
                     self.settle.get_or_insert(time);
-                    if camera.is_ready(now) {
-                        let number = camera.trigger(self.shot.exposure, now);
-                        let (coarse, fine) = (stage.coarse.measured(), self.positioning.mean_fine());
-                        self.phase = Phase::Exposing { number, coarse, fine };
-                    }
-                    Progress::default()
+                    if camera.is_ready(now) { self.expose(stage, camera, now) } else { Progress::On }
                 }
             },
-            Phase::Exposing { number, coarse, fine } => match camera.result(number) {
-                None => Progress::default(),
-                Some(Err(NoAnswer)) => Progress { taken: None, end: Some(Err(Failure::NoStrobe)) },
+            Phase::Exposing { number, places } => match camera.result(number) {
+                None => Progress::On,
+                Some(Err(NoAnswer)) => Progress::Failed { axis: None, reason: Failure::NoStrobe },
                 Some(Ok(edges)) => {
-                    let record = self.record(number, coarse, fine, &edges);
+                    let shot = self.record(number, places, &edges);
                     self.exposures = self.exposures.saturating_add(1);
                     self.phase = Phase::Positioning;
-                    Progress { taken: Some(record), end: self.next(shots, stage, settings, now).map(Ok) }
+                    Progress::Taken { shot, end: self.next(shots, stage, settings, now) }
                 }
             },
         }
+    }
+
+    fn expose(&mut self, stage: &Stage, camera: &mut Camera, now: BoardMicros) -> Progress {
+        let number = match self.shot.mode {
+            TriggerMode::Hardware => camera.trigger(self.shot.exposure, now),
+            TriggerMode::Software | TriggerMode::FreeRunning => camera.listen(now),
+        };
+        let places = Places {
+            coarse: stage.coarse.measured(),
+            fine: self.positioning.mean_fine(),
+            lens: stage.lens.measured(),
+        };
+        self.phase = Phase::Exposing { number, places };
+        if self.shot.mode == TriggerMode::Software { Progress::Ready { number } } else { Progress::On }
     }
 
     /// After an exposure: the next repeat, the next shot, or the end.
@@ -163,19 +252,22 @@ impl Run {
             return Some(self.exposures);
         };
         self.shot = *shot;
-        self.positioning = approach(shot, stage, settings, now);
+        if !self.pausing {
+            self.positioning = approach(shot, stage, settings, now);
+        }
         None
     }
 
-    fn record(&self, number: u32, coarse: Nanometres, fine: Nanometres, edges: &ExposureEdges) -> ShotRecord {
+    fn record(&self, number: u32, places: Places, edges: &ExposureEdges) -> ShotRecord {
         ShotRecord {
             index: self.index,
             repeat: self.repeat,
             trigger_number: number,
             axis: self.shot.axis,
             asked: self.shot.target,
-            coarse,
-            fine,
+            coarse: places.coarse,
+            fine: places.fine,
+            lens: places.lens,
             settle: self.settle.unwrap_or_default(),
             trigger: edges.trigger,
             strobe_start: edges.strobe_start,

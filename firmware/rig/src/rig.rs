@@ -1,96 +1,169 @@
-//! The rig as a whole: what a request starts, what runs, how it ends.
-//!
-//! One piece of long work at a time (the protocol's `active`). Work that fails or is stopped stays active until
-//! nothing moves any more, and then ends with its one terminal event.
+//! The rig as a whole: what happens in a tick, what stops everything, what is remembered.
 
+use farnear_protocol::BoardMicros;
 use farnear_protocol::frame::{self, Encoded, Kind};
-use farnear_protocol::message::{
-    Axis, Capabilities, EventKind, Failure, Hello, Limits, PositionState, Request, RequestError, Response,
-    SCHEMA_KEY, Shot, ShotFault, Status,
-};
-use farnear_protocol::{BoardMicros, Nanometres, PROTOCOL_CURRENT, PROTOCOL_MIN};
-use heapless::{String, Vec};
+use farnear_protocol::message::{Alarm, Axis, Counters, EventKind, Failure, RecordName, ResetCause};
 
+use crate::alarms::{self, Alarms};
 use crate::camera::Camera;
+use crate::correction::Correction;
 use crate::events::Events;
-use crate::home::Homing;
-use crate::identity::Identity;
-use crate::io::{Inputs, Outputs};
-use crate::program::{Run, SHOTS_MAX, Shots};
-use crate::session::{Incoming, Session};
-use crate::settings::{COARSE_STEP_PM, Settings};
-use crate::stage::{Positioning, Stage, limits, since};
-
-/// Long work.
-#[derive(Clone, Debug)]
-enum Work {
-    Home(Homing),
-    Move {
-        axis: Axis,
-        target: Nanometres,
-        positioning: Positioning,
-    },
-    Program(Run),
-    /// Ends with this once nothing moves.
-    Ending {
-        axis: Option<Axis>,
-        reason: Failure,
-    },
-}
-
-/// Long work and the request that began it.
-#[derive(Clone, Debug)]
-struct Active {
-    request: u32,
-    work: Work,
-}
+use crate::identity::{Identity, LastWords};
+use crate::io::{Inputs, MEMORY_BYTES, MemoryWrite, MotorOutputs, Outputs};
+use crate::memory::contents::{Contents, Restored};
+use crate::memory::record::{self, Found, RECORDS};
+use crate::memory::store::Store;
+use crate::motion::since;
+use crate::motion::stage::Stage;
+use crate::program::Shots;
+use crate::session::Session;
+use crate::settings::{Settings, Values};
+use crate::silence::{Silence, Verdict};
+use crate::work::{AXES, Works};
 
 /// A reboot that was asked for.
 #[derive(Clone, Copy, Debug)]
-struct Reboot {
-    request: u32,
-    asked: BoardMicros,
-    /// Since when nothing moves and nothing waits to be sent.
-    quiet_since: Option<BoardMicros>,
+pub(crate) struct Reboot {
+    pub(crate) request: u32,
+    pub(crate) asked: BoardMicros,
+    /// Since when nothing moves and nothing waits to be sent or written.
+    pub(crate) quiet_since: Option<BoardMicros>,
 }
 
 /// Everything the board does, without its hardware.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    identity: Identity,
-    settings: Settings,
-    stage: Stage,
-    camera: Camera,
-    shots: Shots,
-    active: Option<Active>,
-    events: Events,
-    session: Session,
-    reboot: Option<Reboot>,
+    pub(crate) identity: Identity,
+    pub(crate) boot: u32,
+    /// What the rig is made of, the settings by key, and all numbers with them.
+    pub(crate) parts: Settings,
+    pub(crate) values: Values,
+    pub(crate) settings: Settings,
+    pub(crate) stage: Stage,
+    pub(crate) camera: Camera,
+    pub(crate) shots: Shots,
+    pub(crate) works: Works,
+    pub(crate) alarms: Alarms,
+    pub(crate) silence: Silence,
+    pub(crate) correction: Correction,
+    pub(crate) events: Events,
+    pub(crate) session: Session,
+    pub(crate) reboot: Option<Reboot>,
+    pub(crate) store: Store,
+    /// As of the start of this boot; what was counted since is added.
+    pub(crate) counters: Counters,
+    /// Axes that may be moving, a bit each, as they are to be in the memory and as they are.
+    in_motion: u8,
+    in_motion_stored: u8,
+    pub(crate) emergency_stop: bool,
+    pub(crate) supply_low: bool,
+    untold: Option<Untold>,
+}
+
+/// What there is to say at the start.
+#[derive(Clone, Copy, Debug)]
+struct Untold {
+    found: Option<[Found; RECORDS]>,
+    in_motion: u8,
 }
 
 /// What the rig may take of a board's memory.
-const _: () = assert!(size_of::<Rig>() <= 16 * 1024);
+const _: () = assert!(size_of::<Rig>() <= 36 * 1024);
 
 impl Rig {
-    /// The rig of `docs/rig.md`, just reset, at `now`.
-    pub fn new(identity: Identity, now: BoardMicros) -> Self {
-        Self::with_settings(identity, Settings::DEFAULT, now)
+    /// The rig of `docs/rig.md`, just reset, at `now`: 25 KiB, best made in static memory. `memory` is what the
+    /// FRAM holds, `None` where none answers.
+    pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
+        Self::with_parts(identity, Settings::DEFAULT, memory, now)
     }
 
-    /// A rig with other numbers.
-    pub fn with_settings(identity: Identity, settings: Settings, now: BoardMicros) -> Self {
+    /// A rig of other parts.
+    pub fn with_parts(
+        identity: Identity,
+        parts: Settings,
+        memory: Option<&[u8; MEMORY_BYTES]>,
+        now: BoardMicros,
+    ) -> Self {
+        let Restored { mut counters, in_motion, alarms, values, shots, correction } =
+            memory.map_or_else(Restored::nothing, |memory| Restored::from(memory, &parts));
+        // Both grow; after a loss of power only the memory's does, without a memory only the other.
+        let boot = counters.boots.saturating_add(1).max(identity.boot);
+        counters.boots = boot;
+        let settings = parts.with(&values);
         let mut events = Events::new();
         events.push(now, EventKind::Started { cause: identity.reset_cause });
+        let mut store = memory.map_or_else(Store::absent, Store::new);
+        store.mark(RecordName::Counters);
+        // Nothing is done to the rig here: it is made where the caller wants it, and not on the stack first.
         Self {
             identity,
+            boot,
+            parts,
+            values,
             settings,
             stage: Stage::new(&settings),
             camera: Camera::new(settings.camera),
-            shots: Shots::new(),
-            active: None,
+            shots,
+            works: Works::new(),
+            alarms,
+            silence: Silence::new(now),
+            correction: Correction::new(correction),
             events,
-            session: Session::new(identity.boot),
+            session: Session::new(boot),
             reboot: None,
+            store,
+            counters,
+            in_motion: 0,
+            in_motion_stored: 0,
+            emergency_stop: false,
+            supply_low: false,
+            untold: Some(Untold { found: memory.map(record::find_all), in_motion }),
+        }
+    }
+
+    /// Says, before anything else is done, how the last boot ended and what the memory held.
+    fn begin(&mut self, now: BoardMicros) {
+        let Some(Untold { found, in_motion }) = self.untold.take() else { return };
+        for (record, found) in record::ALL.into_iter().zip(found.into_iter().flatten()) {
+            self.tell_of_record(record, found, now);
+        }
+        self.tell_of_last_boot(in_motion, now);
+    }
+
+    /// Says whether a record was damaged.
+    fn tell_of_record(&mut self, record: RecordName, found: Found, now: BoardMicros) {
+        match found {
+            Found::Good { sequence, repaired: true, .. } => {
+                self.counters.repaired = self.counters.repaired.saturating_add(1);
+                self.events.push(now, EventKind::RecordRepaired { record, sequence });
+            }
+            Found::Lost => {
+                self.store.mark(record);
+                self.alarm(Alarm::RecordLost { record }, now);
+            }
+            Found::Good { .. } | Found::Blank => {}
+        }
+    }
+
+    /// Latches what ended the boot before.
+    fn tell_of_last_boot(&mut self, in_motion: u8, now: BoardMicros) {
+        let cause = match (self.identity.last_words, self.identity.reset_cause) {
+            (Some(LastWords::StackOverflow), _) => Some(Alarm::StackOverflow),
+            (Some(LastWords::Panic), _) => Some(Alarm::Panic),
+            (None, ResetCause::Watchdog) => Some(Alarm::Watchdog),
+            (None, ResetCause::BrownOut) => Some(Alarm::BrownOut),
+            (None, _) => None,
+        };
+        if let Some(alarm) = cause {
+            self.alarm(alarm, now);
+        }
+        for axis in AXES {
+            if in_motion & bit(axis) != 0
+                && let Some(stepper) = self.stage.stepper_mut(axis)
+            {
+                stepper.was_interrupted();
+                self.alarm(Alarm::MotionInterrupted { axis }, now);
+            }
         }
     }
 
@@ -99,10 +172,21 @@ impl Rig {
         &self.identity
     }
 
+    /// The number of this boot.
+    pub const fn boot(&self) -> u32 {
+        self.boot
+    }
+
     /// Takes one byte from the link. At the end of a request the request is carried out or begun, and its answer
     /// waits in [`Self::transmit`].
     pub fn receive(&mut self, byte: u8, now: BoardMicros) {
-        if let Some(incoming) = self.session.receive(byte) {
+        self.begin(now);
+        let frames = self.session.counters().frames;
+        let incoming = self.session.receive(byte);
+        if self.session.counters().frames != frames {
+            self.silence.hear(now);
+        }
+        if let Some(incoming) = incoming {
             let answer = self.carry_out(&incoming, now);
             self.session.answer(incoming, &answer);
         }
@@ -120,204 +204,138 @@ impl Rig {
     /// One control tick; call it [`crate::io::TICK_HZ`] times a second and carry its outputs out at once.
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let now = inputs.now;
+        self.begin(now);
+        (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
+        // First: an open circuit has cut the pulses, which is no fault of the step timers then.
+        self.watch_inputs(inputs);
         self.stage.sense(inputs);
-        self.camera.sense(inputs.exposure, now);
+        self.camera.sense(inputs);
+        self.watch(now);
         self.advance(now);
+        self.remember_motion();
         let mut outputs = Outputs {
             piezo_dac: 0,
-            enable: false,
-            direction_away: false,
-            abort_steps: false,
-            segments: Vec::new(),
+            coarse: MotorOutputs::default(),
+            lens: MotorOutputs::default(),
             trigger: self.camera.take_order(),
+            listen: self.camera.is_listening(),
+            memory: None,
             reset: self.reset_is_due(now),
         };
         self.stage.act(inputs, &mut outputs);
+        outputs.memory = self.write();
         outputs
     }
 
-    fn carry_out(&mut self, incoming: &Incoming, now: BoardMicros) -> Result<Response, RequestError> {
-        let id = incoming.id;
-        match &incoming.request {
-            Request::Hello => Ok(Response::Hello(self.hello())),
-            Request::Status => Ok(Response::Status(self.status(now))),
-            Request::ReadEvent { number } => self.read_event(*number),
-            Request::Stop => {
-                self.end_early(None, Failure::Stopped);
-                Ok(Response::Accepted)
+    /// Looks for what must stop the rig in what the board reads.
+    fn watch_inputs(&mut self, inputs: &Inputs) {
+        let now = inputs.now;
+        if inputs.emergency_stop {
+            self.alarm(Alarm::EmergencyStop, now);
+        }
+        if inputs.supply_low {
+            self.alarm(Alarm::SupplyLow, now);
+        }
+        if inputs.link_overflow {
+            self.alarm(Alarm::QueueOverflow, now);
+        }
+    }
+
+    /// Looks for what must stop the rig in what the axes and the host do.
+    fn watch(&mut self, now: BoardMicros) {
+        for axis in AXES {
+            let fault = self.stage.stepper_mut(axis).and_then(|stepper| stepper.take_fault());
+            if let Some(alarm) = fault.and_then(|fault| alarms::of_fault(axis, fault)) {
+                self.alarm(alarm, now);
             }
-            Request::Reboot => {
-                self.end_early(None, Failure::Stopped);
-                self.reboot.get_or_insert(Reboot { request: id, asked: now, quiet_since: None });
-                Ok(Response::Accepted)
+        }
+        if self.stage.fine.take_failure() {
+            self.alarm(Alarm::Gauge, now);
+        }
+        match self.silence.check(now, self.works.shortest_silence()) {
+            Verdict::Fine => {}
+            Verdict::Remind(request) => self.events.push(now, EventKind::StillThere { request }),
+            Verdict::Expired(request) => self.alarm(Alarm::HostSilence { request }, now),
+        }
+    }
+
+    /// Stops everything, latches why and says so. Nothing where its like is latched: then nothing moves either.
+    pub(crate) fn alarm(&mut self, alarm: Alarm, now: BoardMicros) {
+        let Some(record) = self.alarms.raise(alarm, self.boot, now) else { return };
+        self.counters.alarms = self.counters.alarms.saturating_add(1);
+        self.events.push(now, EventKind::Alarm(record));
+        self.store.mark(RecordName::Alarms);
+        self.store.mark(RecordName::Counters);
+        self.stage.abort();
+        self.camera.give_up();
+        let number = record.number;
+        let own = alarms::as_failure(&alarm);
+        for axis in AXES {
+            let reason = own.filter(|(of, _)| *of == axis).map(|(_, reason)| reason);
+            self.works.end(axis, reason.unwrap_or(Failure::Alarm { number }));
+        }
+        match own {
+            Some((axis, reason)) => self.works.end_whole(Some(axis), reason),
+            None => self.works.end_whole(None, Failure::Alarm { number }),
+        }
+    }
+
+    /// Has the memory know which axes may be moving before they do.
+    fn remember_motion(&mut self) {
+        let mut in_motion = 0;
+        for axis in [Axis::SensorCoarse, Axis::Lens] {
+            if self.works.is_on(axis) || !self.stage.is_still(axis) {
+                in_motion |= bit(axis);
             }
-            Request::Home { axis } => self.home(*axis, id),
-            Request::Move { axis, target } => self.go(*axis, *target, id, now),
-            Request::LoadShot { index, shot } => self.load_shot(*index, shot),
-            Request::RunProgram { shots } => self.run_program(*shots, id, now),
+        }
+        if in_motion != self.in_motion {
+            self.in_motion = in_motion;
+            self.store.mark(RecordName::Counters);
+        }
+        for axis in [Axis::SensorCoarse, Axis::Lens] {
+            let known = !self.store.is_fitted() || self.in_motion_stored & bit(axis) != 0;
+            if let Some(stepper) = self.stage.stepper_mut(axis) {
+                stepper.permit(known);
+            }
         }
     }
 
-    fn home(&mut self, axis: Axis, request: u32) -> Result<Response, RequestError> {
-        self.must_be_free()?;
-        if axis != Axis::SensorCoarse {
-            return Err(RequestError::CannotHome { axis });
+    /// What is to be written to the memory now.
+    fn write(&mut self) -> Option<MemoryWrite> {
+        if self.store.is_idle() {
+            return None;
         }
-        self.active = Some(Active { request, work: Work::Home(Homing::new()) });
-        Ok(Response::Accepted)
-    }
-
-    fn go(
-        &mut self,
-        axis: Axis,
-        target: Nanometres,
-        request: u32,
-        now: BoardMicros,
-    ) -> Result<Response, RequestError> {
-        self.must_be_inside(axis, target)?;
-        self.must_be_homed(axis)?;
-        self.must_be_free()?;
-        let settled = Positioning::plain(&self.settings, axis);
-        let positioning = Positioning::start(&mut self.stage, &self.settings, (axis, target), settled, now);
-        self.active = Some(Active { request, work: Work::Move { axis, target, positioning } });
-        Ok(Response::Accepted)
-    }
-
-    fn load_shot(&mut self, index: u8, shot: &Shot) -> Result<Response, RequestError> {
-        if let Some(Active { request, work: Work::Program(_) }) = self.active {
-            return Err(RequestError::Busy { request });
-        }
-        self.must_be_inside(shot.axis, shot.target)?;
-        self.shots
-            .load(index, *shot, &self.settings)
-            .map_err(|reason| RequestError::Shot { index, reason })?;
-        Ok(Response::Accepted)
-    }
-
-    fn run_program(&mut self, count: u8, request: u32, now: BoardMicros) -> Result<Response, RequestError> {
-        self.must_be_free()?;
-        if usize::from(count) > SHOTS_MAX {
-            return Err(RequestError::Shot { index: count, reason: ShotFault::Index });
-        }
-        for index in 0..count {
-            let missing = RequestError::Shot { index, reason: ShotFault::Missing };
-            let axis = self.shots.get(index).ok_or(missing)?.axis;
-            self.must_be_homed(axis)?;
-        }
-        let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
-            return Err(RequestError::Shot { index: 0, reason: ShotFault::Index });
+        let contents = Contents {
+            counters: self.counters(),
+            in_motion: self.in_motion,
+            alarms: &self.alarms,
+            values: &self.values,
+            shots: &self.shots,
+            correction: self.correction.stored(),
         };
-        let run = Run::start(count, first, &mut self.stage, &self.settings, now);
-        self.active = Some(Active { request, work: Work::Program(run) });
-        Ok(Response::Accepted)
+        let (write, done) = self.store.tick(|record, index| contents.block(record, index))?;
+        if done == Some(RecordName::Counters) {
+            // A change begins the record again, so what was written is what is wanted now.
+            self.in_motion_stored = self.in_motion;
+        }
+        Some(write)
     }
 
-    fn read_event(&self, number: u32) -> Result<Response, RequestError> {
-        match self.events.get(number) {
-            Some(event) => Ok(Response::Event(event.clone())),
-            None => {
-                Err(RequestError::EventGone { oldest: self.events.oldest(), next: self.events.next_number() })
-            }
+    /// What was counted in the board's life.
+    pub(crate) fn counters(&self) -> Counters {
+        let base = &self.counters;
+        Counters {
+            triggers: base.triggers + u64::from(self.camera.triggers()),
+            coarse_steps: base.coarse_steps + self.stage.coarse.total_pulses(),
+            lens_steps: base.lens_steps + self.stage.lens.total_pulses(),
+            ..*base
         }
     }
 
-    fn must_be_free(&self) -> Result<(), RequestError> {
-        let reboot = self.reboot.map(|reboot| reboot.request);
-        match self.active.as_ref().map(|active| active.request).or(reboot) {
-            Some(request) => Err(RequestError::Busy { request }),
-            None => Ok(()),
-        }
-    }
-
-    fn must_be_homed(&self, axis: Axis) -> Result<(), RequestError> {
-        match self.stage.state(axis) {
-            PositionState::Homed => Ok(()),
-            state => Err(RequestError::NotHomed { axis, state }),
-        }
-    }
-
-    fn must_be_inside(&self, axis: Axis, asked: Nanometres) -> Result<(), RequestError> {
-        let (min, max) = limits(&self.settings, axis);
-        if (min..=max).contains(&asked) {
-            Ok(())
-        } else {
-            Err(RequestError::OutOfRange { axis, asked, min, max })
-        }
-    }
-
-    /// Takes the active work one tick further.
-    fn advance(&mut self, now: BoardMicros) {
-        // Whatever runs: a coarse axis that was pushed, stalled or met a switch ends it. Without work nobody is
-        // told but whoever asks for the status.
-        if self.stage.is_still()
-            && let Some(reason) = self.stage.coarse.take_fault()
-        {
-            self.end_early(Some(Axis::SensorCoarse), reason);
-        }
-        let Some(Active { request, work }) = &mut self.active else { return };
-        let request = *request;
-        match work {
-            Work::Home(homing) => {
-                let axis = Axis::SensorCoarse;
-                let home_switch = self.stage.home_switch;
-                match homing.tick(&mut self.stage.coarse, &self.settings.coarse, home_switch) {
-                    None => {}
-                    Some(Ok(shift)) => self.finish(now, EventKind::Homed { request, axis, shift }),
-                    Some(Err(reason)) => self.end_early(Some(axis), reason),
-                }
-            }
-            Work::Move { axis, target, positioning } => {
-                let (axis, asked) = (*axis, *target);
-                match positioning.tick(&self.stage, now) {
-                    None => {}
-                    Some(Ok(_)) => {
-                        let measured = self.stage.measured(axis);
-                        self.finish(now, EventKind::MoveDone { request, axis, asked, measured });
-                    }
-                    Some(Err(reason)) => self.end_early(Some(axis), reason),
-                }
-            }
-            Work::Program(run) => {
-                let axis = run.axis();
-                let progress = run.tick(&self.shots, &mut self.stage, &mut self.camera, &self.settings, now);
-                if let Some(shot) = progress.taken {
-                    self.events.push(now, EventKind::ShotDone { request, shot });
-                }
-                match progress.end {
-                    None => {}
-                    Some(Ok(exposures)) => self.finish(now, EventKind::ProgramDone { request, exposures }),
-                    Some(Err(Failure::NoStrobe)) => self.end_early(None, Failure::NoStrobe),
-                    Some(Err(reason)) => self.end_early(Some(axis), reason),
-                }
-            }
-            Work::Ending { axis, reason } if self.stage.is_still() => {
-                let (axis, reason) = (*axis, *reason);
-                self.finish(now, EventKind::Failed { request, axis, reason });
-            }
-            Work::Ending { .. } => {}
-        }
-    }
-
-    fn finish(&mut self, now: BoardMicros, terminal: EventKind) {
-        self.active = None;
-        self.events.push(now, terminal);
-    }
-
-    /// Stops what moves; the active work ends with `reason` once it stands. A fault on the way there tells more
-    /// than the stop, so it takes its place. Does nothing where nothing is active.
-    fn end_early(&mut self, axis: Option<Axis>, reason: Failure) {
-        let Some(active) = &mut self.active else { return };
-        if !matches!(active.work, Work::Ending { .. }) {
-            self.stage.stop();
-        } else if reason == Failure::Stopped {
-            return;
-        }
-        active.work = Work::Ending { axis, reason };
-    }
-
-    /// Everything was said and nothing moves, or that took too long.
+    /// Everything was said and written and nothing moves, or that took too long.
     fn reset_is_due(&mut self, now: BoardMicros) -> bool {
-        let quiet = self.active.is_none() && self.session.all_sent() && self.events.all_sent();
+        let said = self.session.all_sent() && self.events.all_sent();
+        let quiet = self.works.any().is_none() && said && self.store.is_idle();
         let link = &self.settings.link;
         let Some(reboot) = &mut self.reboot else { return false };
         if !quiet {
@@ -327,56 +345,13 @@ impl Rig {
         let quiet_since = *reboot.quiet_since.get_or_insert(now);
         since(quiet_since, now) >= link.reset_drain
     }
-
-    fn hello(&self) -> Hello {
-        Hello {
-            protocol_min: PROTOCOL_MIN,
-            protocol_current: PROTOCOL_CURRENT,
-            schema_key: SCHEMA_KEY,
-            board: cut(self.identity.board),
-            firmware: cut(self.identity.firmware),
-            unique_id: self.identity.unique_id,
-            boot: self.identity.boot,
-            reset_cause: self.identity.reset_cause,
-            emulated: self.identity.emulated,
-            capabilities: Capabilities { sensor_coarse: true, sensor_fine: true, strobe: true },
-            limits: Limits {
-                datum: self.settings.datum,
-                coarse_min: self.settings.coarse.min,
-                coarse_max: self.settings.coarse.max,
-                coarse_step_pm: COARSE_STEP_PM,
-                fine_min: self.settings.fine.min,
-                fine_max: self.settings.fine.max,
-                shots_max: SHOTS_MAX as u8,
-                exposure_min: self.settings.camera.exposure_min,
-                exposure_max: self.settings.camera.exposure_max,
-            },
-        }
-    }
-
-    fn status(&self, now: BoardMicros) -> Status {
-        Status {
-            time: now,
-            coarse: self.stage.status(Axis::SensorCoarse),
-            fine: self.stage.status(Axis::SensorFine),
-            home_switch: self.stage.home_switch,
-            far_switch: self.stage.far_switch,
-            active: self.active.as_ref().map(|active| active.request),
-            next_event: self.events.next_number(),
-            triggers: self.camera.triggers(),
-            steps: self.stage.coarse.total_pulses(),
-            link: self.session.counters(),
-        }
-    }
 }
 
-/// As much of a text as fits.
-fn cut<const N: usize>(text: &str) -> String<N> {
-    let mut out = String::new();
-    for character in text.chars() {
-        if out.push(character).is_err() {
-            break;
-        }
+/// An axis' bit in the memory.
+const fn bit(axis: Axis) -> u8 {
+    match axis {
+        Axis::SensorCoarse => 1,
+        Axis::Lens => 2,
+        Axis::SensorFine => 0,
     }
-    out
 }

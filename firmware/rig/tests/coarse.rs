@@ -1,24 +1,17 @@
-//! The coarse axis through the rig's public face: homing, moves, stops, and everything that can go wrong.
+//! The stepper axes through the rig's public face: homing, moves, stops, and everything that can go wrong.
 
 mod bench;
 
-use bench::Bench;
-use bench::hardware::Faults;
-use farnear_protocol::message::{Axis, EventKind, Failure, PositionState};
+use bench::motor::MotorFaults as Faults;
+use bench::{Bench, SILENCE, failure};
+use farnear_protocol::message::{Alarm, Axis, EventKind, Failure, PositionState};
 use farnear_protocol::{Nanometres, Request, RequestError};
 use proptest::prelude::*;
 
-const HOME: Request = Request::Home { axis: Axis::SensorCoarse };
+const HOME: Request = Request::Home { axis: Axis::SensorCoarse, silence: SILENCE };
 
 fn go(nm: i32) -> Request {
-    Request::Move { axis: Axis::SensorCoarse, target: Nanometres(nm) }
-}
-
-fn failure(end: &EventKind) -> Failure {
-    match end {
-        EventKind::Failed { reason, .. } => *reason,
-        other => panic!("did not fail: {other:?}"),
-    }
+    bench::go(Axis::SensorCoarse, nm)
 }
 
 #[test]
@@ -34,7 +27,11 @@ fn homing_from_anywhere_ends_at_the_switch() {
         // The switch is read once in 200 us of an approach with a pulse a millisecond.
         assert!(bench.hardware.position_um().abs() <= 0.32, "{} um", bench.hardware.position_um());
         // Braking behind the switch stays within half a millimetre.
-        assert!(bench.hardware.leftmost as f64 * 0.15625 >= start.min(-500.0), "{}", bench.hardware.leftmost);
+        assert!(
+            bench.hardware.coarse.leftmost as f64 * 0.15625 >= start.min(-500.0),
+            "{}",
+            bench.hardware.coarse.leftmost
+        );
     }
 }
 
@@ -55,9 +52,9 @@ fn nothing_moves_before_homing() {
     let unknown = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Unknown };
     assert_eq!(bench.ask(&go(1_000)).1, Err(unknown));
     bench.run_ms(50);
-    assert_eq!(bench.hardware.edges, 0);
+    assert_eq!(bench.hardware.coarse.edges, 0);
     assert_eq!(
-        bench.ask(&Request::Home { axis: Axis::SensorFine }).1,
+        bench.ask(&bench::home(Axis::SensorFine)).1,
         Err(RequestError::CannotHome { axis: Axis::SensorFine })
     );
 }
@@ -65,7 +62,7 @@ fn nothing_moves_before_homing() {
 #[test]
 fn limits_are_refused_and_never_clamped() {
     let mut bench = Bench::homed();
-    let before = bench.hardware.edges;
+    let before = bench.hardware.coarse.edges;
     for asked in [-1, 13_000_001, i32::MIN, i32::MAX] {
         let refused = RequestError::OutOfRange {
             axis: Axis::SensorCoarse,
@@ -76,22 +73,22 @@ fn limits_are_refused_and_never_clamped() {
         assert_eq!(bench.ask(&go(asked)).1, Err(refused));
     }
     bench.run_ms(20);
-    assert_eq!(bench.hardware.edges, before);
+    assert_eq!(bench.hardware.coarse.edges, before);
 }
 
 #[test]
-fn the_whole_travel_takes_2_2_seconds_at_40_khz() {
+fn the_whole_travel_takes_2_24_seconds_at_40_khz() {
     let mut bench = Bench::homed();
-    let (edges, start) = (bench.hardware.edges, bench.now);
-    bench.hardware.closest_edges_us = f64::INFINITY;
+    let (edges, start) = (bench.hardware.coarse.edges, bench.now);
+    bench.hardware.coarse.closest_edges_us = f64::INFINITY;
     let end = bench.work(&go(13_000_000));
     assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
-    assert_eq!(bench.hardware.edges - edges, 83_200);
+    assert_eq!(bench.hardware.coarse.edges - edges, 83_200);
     let ms = (bench.now - start) / 1_000;
-    assert!((2_200..2_230).contains(&ms), "{ms} ms");
+    assert!((2_230..2_260).contains(&ms), "{ms} ms");
     // 25 us, with what two segments of different period leave between their edges.
-    assert!(bench.hardware.closest_edges_us >= 24.9, "{} us", bench.hardware.closest_edges_us);
-    assert_eq!(bench.status().steps, bench.hardware.edges);
+    assert!(bench.hardware.coarse.closest_edges_us >= 24.9, "{} us", bench.hardware.coarse.closest_edges_us);
+    assert_eq!(bench.status().steps, bench.hardware.coarse.edges);
 }
 
 #[test]
@@ -105,9 +102,9 @@ fn a_stop_brakes_and_the_position_is_still_known() {
         let status = bench.status();
         assert_eq!(status.coarse.state, PositionState::Homed);
         assert!((f64::from(status.coarse.measured.0) / 1e3 - bench.hardware.position_um()).abs() < 0.4);
-        let edges = bench.hardware.edges;
+        let edges = bench.hardware.coarse.edges;
         bench.run_ms(20);
-        assert_eq!(bench.hardware.edges, edges, "still after the terminal event");
+        assert_eq!(bench.hardware.coarse.edges, edges, "still after the terminal event");
         // A move after a stop just works, and lands exactly.
         let end = bench.work(&go(100_000));
         assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
@@ -125,7 +122,7 @@ fn a_second_work_is_refused_while_the_first_runs() {
     let mut bench = Bench::homed();
     let request = bench.accepted(&go(5_000_000));
     bench.run_ms(10);
-    for second in [go(1), HOME, Request::RunProgram { shots: 1 }] {
+    for second in [go(1), HOME, Request::RunProgram { silence: SILENCE }] {
         assert_eq!(bench.ask(&second).1, Err(RequestError::Busy { request }));
     }
     assert!(matches!(bench.end_of(request), EventKind::MoveDone { .. }));
@@ -136,12 +133,12 @@ fn break_in_motion(faults: Faults) -> (Failure, f64, Bench) {
     let mut bench = Bench::homed();
     let id = bench.accepted(&go(9_000_000));
     bench.run_ms(300);
-    bench.hardware.faults = faults;
+    bench.hardware.coarse.faults = faults;
     let broken = bench.now as f64;
     let reason = failure(&bench.end_of(id));
     bench.run_ms(5);
-    let time = bench.hardware.last_edge_us - broken;
-    assert_eq!(bench.status().active, None);
+    let time = bench.hardware.coarse.last_edge_us - broken;
+    assert_eq!(bench.status().coarse.request, None);
     (reason, time, bench)
 }
 
@@ -152,11 +149,17 @@ fn a_stall_is_seen_and_loses_the_position() {
     assert!((6_000..20_000).contains(&error.0), "{error:?}");
     assert!(time < 5_000.0, "{time} us");
     assert_eq!(bench.status().coarse.state, PositionState::Lost);
+    let latched =
+        RequestError::Alarm { number: 1, alarm: Alarm::Following { axis: Axis::SensorCoarse, error } };
+    assert_eq!(bench.ask(&go(0)).1, Err(latched.clone()));
+    assert_eq!(bench.ask(&HOME).1, Err(latched));
+    bench.clear();
     let lost = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Lost };
     assert_eq!(bench.ask(&go(0)).1, Err(lost));
     // Still blocked: homing says so, too. Freed: homing makes it known again, and the encoder was right all along.
     assert!(matches!(failure(&bench.work(&HOME)), Failure::Following { .. }));
-    bench.hardware.faults = Faults::default();
+    bench.clear();
+    bench.hardware.coarse.faults = Faults::default();
     let EventKind::Homed { shift, .. } = bench.work(&HOME) else { panic!("homes") };
     assert!(shift.0.abs() <= 500, "{shift:?}");
     assert!(matches!(bench.work(&go(2_000_000)), EventKind::MoveDone { .. }));
@@ -164,20 +167,26 @@ fn a_stall_is_seen_and_loses_the_position() {
 }
 
 #[test]
-fn switches_end_a_move_within_a_millisecond_and_keep_the_position() {
+fn switches_end_a_move_within_a_millisecond() {
     let far = Faults { far_switch: Some(true), ..Faults::default() };
     let home = Faults { home_switch: Some(true), ..Faults::default() };
     for (faults, expected) in [(far, Failure::FarSwitch), (home, Failure::HomeSwitch)] {
         let (reason, time, mut bench) = break_in_motion(faults);
         assert_eq!(reason, expected);
         assert!(time <= 1_400.0, "a tick to see it and a segment to end: {time} us");
-        let status = bench.status();
-        assert_eq!(status.coarse.state, PositionState::Homed);
-        assert!((f64::from(status.coarse.measured.0) / 1e3 - bench.hardware.position_um()).abs() < 0.4);
-        if expected == Failure::FarSwitch {
-            assert_eq!(failure(&bench.work(&go(10_000_000))), expected, "not one step further");
-            assert!(matches!(bench.work(&go(1_000_000)), EventKind::MoveDone { .. }), "but back");
-        }
+        assert_eq!(
+            bench.status().coarse.state,
+            PositionState::Lost,
+            "stopped from full speed it may have slipped"
+        );
+        assert!(
+            (f64::from(bench.status().coarse.measured.0) / 1e3 - bench.hardware.position_um()).abs() < 0.4
+        );
+        let far = expected == Failure::FarSwitch;
+        assert_eq!(bench.alarm(), Some(Alarm::UnexpectedSwitch { axis: Axis::SensorCoarse, far }));
+        bench.clear();
+        bench.hardware.coarse.faults = Faults::default();
+        assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
     }
 }
 
@@ -186,10 +195,13 @@ fn a_driver_fault_takes_the_current_away_and_homing_tries_again() {
     let (reason, time, mut bench) = break_in_motion(Faults { driver: true, ..Faults::default() });
     assert_eq!(reason, Failure::DriverFault);
     assert!(time <= 1_400.0, "{time} us");
-    assert!(!bench.tick().enable);
+    assert!(!bench.tick().coarse.enable);
     assert_eq!(bench.status().coarse.state, PositionState::Lost);
-    assert_eq!(failure(&bench.work(&HOME)), Failure::DriverFault);
-    bench.hardware.faults = Faults::default();
+    let remains = RequestError::AlarmRemains { alarm: Alarm::DriverFault { axis: Axis::SensorCoarse } };
+    assert_eq!(bench.ask(&Request::ClearAlarm { number: 1 }).1, Err(remains), "while the line says so");
+    bench.hardware.coarse.faults = Faults::default();
+    bench.run_ms(1);
+    bench.clear();
     assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
 }
 
@@ -202,16 +214,17 @@ fn a_step_timer_that_fails_is_named() {
         let mut bench = Bench::homed();
         let id = bench.accepted(&go(9_000_000));
         bench.run_ms(300);
-        bench.hardware.faults = faults;
+        bench.hardware.coarse.faults = faults;
         assert_eq!(failure(&bench.end_of(id)), Failure::StepUnderrun, "{faults:?}");
         assert_eq!(bench.status().coarse.state, PositionState::Lost);
         let outputs = bench.tick();
         assert_eq!(
-            outputs.enable, !faults.timer_dead,
+            outputs.coarse.enable, !faults.timer_dead,
             "a timer that never stops gets no current to move with"
         );
-        bench.hardware.faults = Faults::default();
-        bench.run_ms(5);
+        bench.hardware.coarse.faults = Faults::default();
+        bench.run_ms(15);
+        bench.clear();
         assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
     }
 }
@@ -219,9 +232,9 @@ fn a_step_timer_that_fails_is_named() {
 #[test]
 fn switches_that_do_not_work_end_the_homing() {
     let mut bench = Bench::new(300.0);
-    bench.hardware.faults.home_switch = Some(true);
+    bench.hardware.coarse.faults.home_switch = Some(true);
     assert_eq!(failure(&bench.work(&HOME)), Failure::HomeSwitchStuck);
-    bench.hardware.faults.home_switch = Some(false);
+    bench.hardware.coarse.faults.home_switch = Some(false);
     assert_eq!(failure(&bench.work(&HOME)), Failure::HomeSwitchNotFound);
     assert_eq!(bench.status().coarse.state, PositionState::Unknown);
 }
@@ -230,9 +243,27 @@ fn switches_that_do_not_work_end_the_homing() {
 fn a_push_at_rest_loses_the_position() {
     let mut bench = Bench::homed();
     bench.run_ms(10);
-    bench.hardware.microsteps += 64; // 10 um: one slip of the motor
+    bench.hardware.coarse.turn(64); // 10 um: one slip of the motor
     bench.run_ms(1);
     assert_eq!(bench.status().coarse.state, PositionState::Lost);
+    assert!(matches!(bench.alarm(), Some(Alarm::Following { axis: Axis::SensorCoarse, .. })));
+    bench.clear();
+    assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
+}
+
+#[test]
+fn a_motor_that_rolls_on_after_an_abort_is_no_further_alarm() {
+    let mut bench = Bench::homed();
+    bench.accepted(&go(9_000_000));
+    bench.run_ms(300);
+    bench.accepted(&Request::Halt);
+    bench.run_ms(3);
+    bench.hardware.coarse.turn(512); // two turns of the field
+    bench.run_ms(5);
+    assert_eq!(bench.alarm(), Some(Alarm::Halt));
+    bench.clear();
+    assert_eq!(bench.alarm(), None);
+    assert!((f64::from(bench.status().coarse.measured.0) / 1e3 - bench.hardware.position_um()).abs() < 0.4);
     assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
 }
 

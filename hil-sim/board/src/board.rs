@@ -1,5 +1,5 @@
-//! The board as the emulator sees it: one STM32F427, an 8 MHz clock, two chips on SPI3, the link on USART3, and
-//! the levels that the outside puts on its pins.
+//! The board as the emulator sees it: one STM32F427, an 8 MHz clock, two chips on SPI3, the FRAM on SPI4, the link on
+//! USART3, and the levels that the outside puts on its pins.
 //!
 //! The firmware is built for the STM32F429ZI, which is the F427 plus a display controller (one reference manual,
 //! RM0090); the emulator has the F427.
@@ -22,9 +22,10 @@ use rigless::{
     snapshot::Store,
     soc::{
         Bus,
-        st::tim::Channel,
+        st::tim::{BreakInput, BreakSource, Channel},
         stm32f427::{
             Stm32f427,
+            generated::rcc,
             peripherals::{gpio::Pin, spi::Select},
         },
     },
@@ -33,34 +34,51 @@ use rigless::{
 
 use crate::{
     chips::{Dac, GaugeConverter, SharedPlant},
-    plant::Noise,
+    memory::MemoryChip,
+    plant::{Noise, StageName},
     serial::Line,
 };
 
 /// SYSCLK; also the instructions per second, so that the cycle counter counts what it should.
 const SYSCLK_HZ: u64 = 168_000_000;
 const HSE_HZ: u64 = 8_000_000;
-const SUPPLY_MV: u32 = 3300;
+/// The supply as it should be, millivolts.
+pub const SUPPLY_MV: u32 = 3300;
 /// Where the chip keeps its unique id (RM0090, section 39.1).
 const UNIQUE_ID_AT: u64 = 0x1FFF_7A10;
 
-/// SPI3, USART3, TIM2, TIM4 and TIM5 in the part's tables.
+/// RCC_CSR after each kind of reset that the emulator's part does not know (RM0090, section 6.3.21): power-on sets
+/// PORRSTF, PINRSTF and BORRSTF; a brown-out the last two.
+const CSR_POWER_ON: u64 = 0x0e00_0000;
+const CSR_BROWN_OUT: u64 = 0x0600_0000;
+
+/// SPI3, SPI4 and USART3 in the part's tables.
 const SPI3: usize = 2;
+const SPI4: usize = 3;
 const USART3: usize = 2;
 /// TIM2 in the part's table of general timers.
 pub const TIM2: usize = 0;
+/// TIM3 likewise.
+pub const TIM3: usize = 1;
 /// TIM4 likewise.
 pub const TIM4: usize = 2;
 /// TIM1 in the table of advanced timers.
 pub const TIM1: usize = 0;
+/// TIM8 likewise.
+pub const TIM8: usize = 1;
 
-/// A chip on SPI3, in the order in which the board attaches them.
+/// The volatile memory of the chip: where it begins and how long it is. SRAM1 to 3, and the core's own.
+pub const RAM: [(u64, u64); 2] = [(0x2000_0000, 192 << 10), (0x1000_0000, 64 << 10)];
+
+/// A chip on SPI3 or SPI4.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SpiChip {
     /// The piezo's DAC.
     Dac,
     /// The gauge's converter.
     Gauge,
+    /// The FRAM.
+    Memory,
 }
 
 /// A pin of the chip: port A is 0.
@@ -84,22 +102,58 @@ impl PinName {
     }
 }
 
-/// STEP.
-pub const STEP: PinName = PinName::new(b'E', 9);
-/// DIR, high = away from the lens.
-pub const DIR: PinName = PinName::new(b'F', 13);
-/// EN, low = on.
-pub const ENABLE: PinName = PinName::new(b'F', 14);
-/// DIAG, high = fault.
-pub const DIAG: PinName = PinName::new(b'F', 15);
-/// Encoder, channel A.
-pub const ENCODER_A: PinName = PinName::new(b'D', 12);
-/// Encoder, channel B.
-pub const ENCODER_B: PinName = PinName::new(b'D', 13);
-/// Home switch, high = closed (actuated).
-pub const HOME: PinName = PinName::new(b'G', 0);
-/// Far switch, high = closed (actuated).
-pub const FAR: PinName = PinName::new(b'G', 1);
+/// The wires of one motorised stage.
+#[derive(Clone, Copy, Debug)]
+pub struct StagePins {
+    /// STEP, and the advanced timer and alternate function that drive it.
+    pub step: (PinName, usize, u8),
+    /// DIR, high = sensor and lens away from each other.
+    pub direction: PinName,
+    /// EN, low = on.
+    pub enable: PinName,
+    /// DIAG, high = fault.
+    pub diagnosis: PinName,
+    /// Encoder A and B, and the general timer that counts them (alternate function 2).
+    pub encoder: ([PinName; 2], usize),
+    /// Home switch, high = open = actuated.
+    pub home: PinName,
+    /// Far switch likewise.
+    pub far: PinName,
+    /// Break input, which the emergency stop's circuit reaches; the STEP timer's, with its alternate function.
+    pub stop: (PinName, u8),
+}
+
+/// Stage A's wires (DS9405, table 12, for the alternate functions).
+const SENSOR_PINS: StagePins = StagePins {
+    step: (PinName::new(b'E', 9), TIM1, 1),
+    direction: PinName::new(b'F', 13),
+    enable: PinName::new(b'F', 14),
+    diagnosis: PinName::new(b'F', 15),
+    encoder: ([PinName::new(b'D', 12), PinName::new(b'D', 13)], TIM4),
+    home: PinName::new(b'G', 0),
+    far: PinName::new(b'G', 1),
+    stop: (PinName::new(b'E', 15), 1),
+};
+/// Stage B's wires.
+const LENS_PINS: StagePins = StagePins {
+    step: (PinName::new(b'C', 6), TIM8, 3),
+    direction: PinName::new(b'F', 0),
+    enable: PinName::new(b'F', 1),
+    diagnosis: PinName::new(b'F', 2),
+    encoder: ([PinName::new(b'B', 4), PinName::new(b'B', 5)], TIM3),
+    home: PinName::new(b'G', 2),
+    far: PinName::new(b'G', 3),
+    stop: (PinName::new(b'A', 6), 3),
+};
+
+/// The wires of a stage.
+pub const fn pins(stage: StageName) -> &'static StagePins {
+    match stage {
+        StageName::Sensor => &SENSOR_PINS,
+        StageName::Lens => &LENS_PINS,
+    }
+}
+
 /// Camera trigger.
 pub const TRIGGER: PinName = PinName::new(b'B', 10);
 /// Camera strobe.
@@ -112,6 +166,10 @@ pub struct Chip {
     part: Stm32f427,
     pins: BTreeMap<PinName, Level>,
     inputs: BTreeMap<(usize, Channel), Level>,
+    /// What each break input was last given, in the order of the advanced timers; a reset forgets it.
+    breaks: [Option<Level>; 2],
+    /// The flags of the reset that comes, where they are not what the emulator's part makes of it.
+    reset_flags: Option<u64>,
 }
 
 impl Chip {
@@ -154,10 +212,52 @@ impl Chip {
         port.level(name.pin(), registers)
     }
 
-    /// Cuts the data lines of a chip on SPI3, or mends them.
+    /// Brings the level on the emergency stop's pins to the break inputs of the timers, as far as the firmware has
+    /// switched the pins to them.
+    pub fn join_breaks(&mut self, at: VirtualNanos) {
+        for stage in [StageName::Sensor, StageName::Lens] {
+            let StagePins { stop: (pin, function), step: (_, timer, _), .. } = *pins(stage);
+            let level = self.level(pin);
+            if self.function(pin) == Some(function) && self.breaks[timer].replace(level) != Some(level) {
+                self.part.drive_advanced_timer(at, timer, |tim, registers, context| {
+                    tim.drive_break_source(BreakInput::First, BreakSource::Pin, level, registers, context);
+                    context.schedule(at);
+                });
+            }
+        }
+    }
+
+    /// Cuts the part's supply or gives it back.
+    pub fn power(&mut self, at: VirtualNanos, on: bool) {
+        if on && let Some(memory) = self.memory() {
+            memory.power_up(at);
+        }
+        self.part.drive_port(at, 0, |_, _, context| {
+            context.request_power(on);
+            // What a model asks for is looked at only at an event.
+            context.schedule(at);
+        });
+    }
+
+    /// The next reset is to look like a brown-out.
+    pub fn expect_brown_out(&mut self) {
+        self.reset_flags = Some(CSR_BROWN_OUT);
+    }
+
+    /// The FRAM.
+    pub fn memory(&mut self) -> Option<&mut MemoryChip> {
+        self.part.spi[SPI4].chip_mut::<MemoryChip>(0)
+    }
+
+    /// Cuts the data lines of a chip, or mends them.
     pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
-        // It says whether such a chip is there; both are, since `RigBoard::new`.
-        let _ = self.part.spi[SPI3].silence(chip as usize, cut);
+        let (interface, nth) = match chip {
+            SpiChip::Dac => (SPI3, 0),
+            SpiChip::Gauge => (SPI3, 1),
+            SpiChip::Memory => (SPI4, 0),
+        };
+        // It says whether such a chip is there; all are, since `RigBoard::new`.
+        let _ = self.part.spi[interface].silence(nth, cut);
     }
 
     /// The alternate function that a pin is set to.
@@ -183,7 +283,17 @@ impl Mcu for Chip {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        // The emulator's part knows no power-on reset; all that differs is in its flags.
+        let (cause, flags) = match cause {
+            ResetCause::PowerOn => (ResetCause::Pin, Some(CSR_POWER_ON)),
+            other => (other, self.reset_flags.take()),
+        };
         self.part.reset(at, cause);
+        if let Some(flags) = flags {
+            let (_, registers) = self.part.clocks();
+            registers.set(rcc::Register::Csr, flags);
+        }
+        self.breaks = [None; 2];
         // The part comes back with floating pins; the outside still holds them.
         for (name, level) in self.pins.clone() {
             self.put_pin(at, name, level);
@@ -221,11 +331,25 @@ impl RigBoard {
             part.spi[SPI3].attach_selected(Dac::new(plant.clone()), select(dac));
             part.spi[SPI3].attach_selected(GaugeConverter::new(plant.clone()), select(gauge));
         }
+        if let Some(pin) = Pin::new(4) {
+            let select = Select { port: "GPIOE", pin, active: Level::Low };
+            part.spi[SPI4].attach_selected(MemoryChip::new(), select);
+        }
         part.usart[USART3].attach(line);
-        let mut chip = Chip { part, pins: BTreeMap::new(), inputs: BTreeMap::new() };
+        let mut chip = Chip {
+            part,
+            pins: BTreeMap::new(),
+            inputs: BTreeMap::new(),
+            breaks: [None; 2],
+            reset_flags: None,
+        };
         let start = VirtualNanos(0);
         chip.drive_pin(start, STRAP, Level::High);
-        chip.drive_pin(start, DIAG, Level::Low);
+        for stage in [StageName::Sensor, StageName::Lens] {
+            chip.drive_pin(start, pins(stage).diagnosis, Level::Low);
+            // The emergency stop's circuit is closed to ground.
+            chip.drive_pin(start, pins(stage).stop.0, Level::Low);
+        }
         chip.drive_pin(start, STROBE, Level::Low);
         let mut noise = Noise::new(seed, "unique id");
         let (low, high) = (noise.bits().to_le_bytes(), noise.bits().to_le_bytes());

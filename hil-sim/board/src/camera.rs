@@ -1,9 +1,12 @@
 //! The camera's timing: from the trigger's edges to strobe, exposure and frame.
 //!
 //! A global-shutter camera in trigger-width mode: it collects light while the trigger is high, from 20 us after
-//! its edge (with 2 us of jitter), and says so on the strobe; then it reads out for 10 ms and hears no trigger.
+//! its edge (with 2 us of jitter), and says so on the strobe; then it reads out for 10 ms and hears no trigger. A
+//! command of its host makes it expose once as if triggered 1 ms later, or freely, one exposure a period.
 
 use std::collections::BTreeMap;
+
+use farnear_protocol::camera::FREE_RUNNING;
 
 use crate::plant::Noise;
 
@@ -13,14 +16,23 @@ const LATENCY_NS: f64 = 20_000.0;
 const JITTER_NS: f64 = 2_000.0;
 /// Read-out of a frame.
 const READOUT_NS: u64 = 10_000_000;
+/// From a command of the host to the exposure: USB and the camera's own program.
+const COMMAND_NS: u64 = 1_000_000;
 
 /// What happens to the sensor at a moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Edge {
-    /// It begins to collect light.
-    Begin,
+    /// It begins to collect light for the image of this name.
+    Begin(u32),
     /// It stops.
     End,
+}
+
+/// A camera that runs freely.
+#[derive(Clone, Copy, Debug)]
+struct FreeRun {
+    period_ns: u64,
+    exposure_ns: u64,
 }
 
 /// The camera.
@@ -31,6 +43,7 @@ pub struct Camera {
     latency_ns: u64,
     armed: bool,
     busy_until_ns: u64,
+    free_run: Option<FreeRun>,
     triggers: u32,
     missed: u32,
 }
@@ -44,23 +57,39 @@ impl Camera {
             latency_ns: 0,
             armed: false,
             busy_until_ns: 0,
+            free_run: None,
             triggers: 0,
             missed: 0,
         }
+    }
+
+    fn is_busy(&self, now_ns: u64) -> bool {
+        self.armed || !self.coming.is_empty() || now_ns < self.busy_until_ns
+    }
+
+    fn latency(&mut self) -> u64 {
+        let latency_ns = LATENCY_NS + JITTER_NS * self.jitter.normal();
+        libm::round(latency_ns.max(0.0)) as u64
+    }
+
+    fn schedule(&mut self, begin_ns: u64, exposure_ns: u64, id: u32) {
+        let end_ns = begin_ns + exposure_ns.max(1);
+        self.coming.insert(begin_ns, Edge::Begin(id));
+        self.coming.insert(end_ns, Edge::End);
+        self.busy_until_ns = end_ns + READOUT_NS;
     }
 
     /// An edge of the trigger line.
     pub fn trigger(&mut self, now_ns: u64, rising: bool) {
         if rising {
             self.triggers += 1;
-            if self.armed || !self.coming.is_empty() || now_ns < self.busy_until_ns {
+            if self.is_busy(now_ns) {
                 self.missed += 1;
                 return;
             }
             self.armed = true;
-            let latency_ns = LATENCY_NS + JITTER_NS * self.jitter.normal();
-            self.latency_ns = libm::round(latency_ns.max(0.0)) as u64;
-            self.coming.insert(now_ns + self.latency_ns, Edge::Begin);
+            self.latency_ns = self.latency();
+            self.coming.insert(now_ns + self.latency_ns, Edge::Begin(self.triggers - 1));
         } else if self.armed {
             self.armed = false;
             // A pulse of no length would end where it began.
@@ -68,6 +97,29 @@ impl Camera {
             let end = (now_ns + self.latency_ns).max(begin + 1);
             self.coming.insert(end, Edge::End);
             self.busy_until_ns = end + READOUT_NS;
+        }
+    }
+
+    /// The host's software trigger, for an image of this name; waits for the end of a read-out.
+    pub fn expose(&mut self, now_ns: u64, exposure_ns: u64, id: u32) {
+        if self.armed || !self.coming.is_empty() {
+            self.missed += 1;
+            return;
+        }
+        let begin_ns = now_ns.max(self.busy_until_ns) + COMMAND_NS + self.latency();
+        self.schedule(begin_ns, exposure_ns, id);
+    }
+
+    /// The host lets the camera run freely, or (period 0) stops that.
+    pub fn run_freely(&mut self, now_ns: u64, period_ns: u64, exposure_ns: u64) {
+        self.free_run = None;
+        if period_ns > 0 {
+            let shortest_ns = exposure_ns.max(1) + READOUT_NS;
+            self.free_run = Some(FreeRun { period_ns: period_ns.max(shortest_ns), exposure_ns });
+            if !self.armed && self.coming.is_empty() {
+                let begin_ns = now_ns.max(self.busy_until_ns) + COMMAND_NS;
+                self.schedule(begin_ns, exposure_ns, FREE_RUNNING);
+            }
         }
     }
 
@@ -79,7 +131,14 @@ impl Camera {
     /// The next edge that is due.
     pub fn due(&mut self, now_ns: u64) -> Option<(u64, Edge)> {
         let at_ns = self.next_ns().filter(|at_ns| *at_ns <= now_ns)?;
-        self.coming.remove(&at_ns).map(|edge| (at_ns, edge))
+        let edge = self.coming.remove(&at_ns)?;
+        if let (Edge::End, Some(run)) = (edge, self.free_run)
+            && !self.armed
+        {
+            let begin_ns = at_ns + run.period_ns - run.exposure_ns;
+            self.schedule(begin_ns, run.exposure_ns, FREE_RUNNING);
+        }
+        Some((at_ns, edge))
     }
 
     /// Rising edges of the trigger since the board's reset.
@@ -107,7 +166,7 @@ mod tests {
         let mut camera = Camera::new(1);
         camera.trigger(1_000_000, true);
         let (begin, edge) = camera.due(2_000_000).expect("begins");
-        assert_eq!(edge, Edge::Begin);
+        assert_eq!(edge, Edge::Begin(0));
         // 20 us with six standard deviations of jitter.
         assert!((1_008_000..1_032_000).contains(&begin), "{begin}");
         camera.trigger(6_000_000, false);
@@ -118,5 +177,28 @@ mod tests {
         camera.trigger(16_001_000, false);
         camera.trigger(17_000_000, true);
         assert!(camera.next_ns().is_some());
+    }
+
+    #[test]
+    fn it_exposes_on_command_and_freely() {
+        let mut camera = Camera::new(1);
+        camera.expose(1_000_000, 5_000_000, 7);
+        let (begin, edge) = camera.due(3_000_000).expect("begins");
+        assert_eq!((edge, begin > 2_000_000), (Edge::Begin(7), true));
+        assert_eq!(camera.due(10_000_000), Some((begin + 5_000_000, Edge::End)));
+        assert_eq!(camera.next_ns(), None);
+
+        camera.run_freely(20_000_000, 40_000_000, 5_000_000);
+        let mut edges = Vec::new();
+        while let Some(edge) = camera.due(130_000_000) {
+            edges.push(edge);
+        }
+        let begins: Vec<u64> =
+            edges.iter().filter(|e| e.1 == Edge::Begin(FREE_RUNNING)).map(|e| e.0).collect();
+        assert_eq!(begins, [21_000_000, 61_000_000, 101_000_000]);
+        camera.run_freely(130_000_000, 0, 0);
+        assert_eq!(camera.due(141_000_000).map(|e| e.1), Some(Edge::Begin(FREE_RUNNING)), "one was begun");
+        assert_eq!(camera.due(200_000_000).map(|e| e.1), Some(Edge::End));
+        assert_eq!(camera.next_ns(), None);
     }
 }

@@ -6,19 +6,20 @@ use std::{
 };
 
 use rigless::{
-    device::Level,
     emulator::{self, AccessKind, Host, Settled, Stop},
     session::Session,
     time::VirtualNanos,
 };
 
 use crate::{
-    board::{DIAG, RigBoard, SpiChip},
+    board::RigBoard,
     chips::{SharedPlant, with_plant},
     error::SimError,
     faults::{Faults, NoisyLine},
+    hands::{Hands, Happening, forget},
     lockstep::Lockstep,
-    plant::Plant,
+    memory::MemoryChip,
+    plant::StageName,
     rig::{Outlets, RigConfig},
     serial::Line,
     trace::Trace,
@@ -27,8 +28,13 @@ use crate::{
 
 /// Virtual time between two looks at line, commands and the right to go on.
 const QUANTUM_NS: u64 = 100_000;
+/// SPI4's registers: the memory hangs there, and its supply may be set to fail in the middle of a write.
+const SPI4: std::ops::Range<u64> = 0x4001_3400..0x4001_3800;
 /// The same when time follows the wall clock.
 const REALTIME_QUANTUM_NS: u64 = 1_000_000;
+
+/// So long by the wall clock time stands for a host that the board waits for; then it is taken for gone.
+const HOST_PATIENCE: Duration = Duration::from_secs(1);
 
 /// How virtual time passes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -60,8 +66,25 @@ pub enum Command {
     },
     /// Do something with the rig between two instructions.
     ReachIn(Box<dyn FnOnce(&mut Hands<'_, '_>) + Send>),
+    /// Something that the camera's host asks of the camera; the host of the rig has spoken.
+    Camera(Box<dyn FnOnce(&mut Hands<'_, '_>) + Send>),
     /// End.
     End,
+}
+
+/// How a stage is.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct StageReport {
+    /// Where it really is, micrometres from its true home edge.
+    pub position_um: f64,
+    /// Where its driver's sequencer stands, microsteps from the true home edge: exactly what STEP and DIR said.
+    pub microsteps: i64,
+    /// That, less where the rotor is.
+    pub lost_microsteps: f64,
+    /// Rising edges on its STEP pin since power-on.
+    pub step_edges: u64,
+    /// When the last of them was.
+    pub last_step_ns: u64,
 }
 
 /// How the rig is.
@@ -73,12 +96,12 @@ pub struct Report {
     pub started: bool,
     /// Resets of the chip since power-on.
     pub resets: usize,
-    /// Rising edges on the STEP pin since power-on.
-    pub step_edges: u64,
-    /// When the last of them was.
-    pub last_step_ns: u64,
-    /// Where the coarse stage really is, micrometres from the true home edge.
-    pub coarse_um: f64,
+    /// Whether the chip has power.
+    pub powered: bool,
+    /// The sensor's stage.
+    pub coarse: StageReport,
+    /// The lens' stage.
+    pub lens: StageReport,
     /// Where the piezo really is, micrometres.
     pub piezo_um: f64,
     /// Triggers since the board's reset.
@@ -89,40 +112,15 @@ pub struct Report {
     pub flipped_bits: u64,
 }
 
-/// The inside of the rig, for tests that break it.
-pub struct Hands<'a, 'h> {
-    session: &'a mut Session<RigBoard>,
-    host: &'a mut (dyn Host + 'h),
-    stop: Stop,
-    plant: &'a SharedPlant,
-}
-
-impl Hands<'_, '_> {
-    /// Works on the plant.
-    pub fn plant<T>(&mut self, work: impl FnOnce(&mut Plant) -> T) -> T {
-        with_plant(self.plant, work)
+impl Report {
+    /// Rising edges on both STEP pins since power-on.
+    pub fn step_edges(&self) -> u64 {
+        self.coarse.step_edges + self.lens.step_edges
     }
 
-    /// Presses the reset button.
-    pub fn press_reset(&mut self) {
-        self.session.reset_by_pin(self.stop.at, self.stop.instruction_count, self.host);
-    }
-
-    /// The stepper driver reports a fault on DIAG, or takes it back.
-    pub fn set_driver_fault(&mut self, fault: bool) {
-        self.session.board_mut().chip.drive_pin(self.stop.at, DIAG, Level::from(fault));
-    }
-
-    /// Cuts the data lines of a chip, or mends them.
-    pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
-        self.session.board_mut().chip.disconnect(chip, cut);
-    }
-
-    /// Writes a register of the chip behind the firmware's back, as a stray pointer would.
-    pub fn write_register(&mut self, address: u64, value: u64) {
-        use rigless::{mcu::Operate, soc::Width};
-        // An address without a register is what a stray pointer may have, too.
-        let _ = Operate::write(&mut self.session.board_mut().chip, self.stop.at, address, Width::W32, value);
+    /// When the last of them was.
+    pub fn last_step_ns(&self) -> u64 {
+        self.coarse.last_step_ns.max(self.lens.last_step_ns)
     }
 }
 
@@ -138,12 +136,14 @@ pub struct Driver {
     to_board: NoisyLine,
     to_host: NoisyLine,
     faults: Faults,
+    happens: Vec<Happening>,
     trace: Option<Trace>,
     told_ns: u64,
     held: Vec<u8>,
     told: Vec<Sender<Report>>,
     settling: Vec<Sender<Report>>,
     resets: usize,
+    powered: bool,
     wall: Option<(Instant, u64)>,
     failed: Option<SimError>,
 }
@@ -171,12 +171,14 @@ impl Driver {
             to_board: NoisyLine::new(rate, config.seed, "line to the board"),
             to_host: NoisyLine::new(rate, config.seed, "line to the host"),
             faults: config.faults.clone(),
+            happens: config.faults.happens.clone(),
             trace,
             told_ns: 0,
             held: Vec::new(),
             told: Vec::new(),
             settling: Vec::new(),
             resets: 0,
+            powered: true,
             wall: None,
             failed: None,
         };
@@ -200,19 +202,31 @@ impl Driver {
     }
 
     fn report(&self, now_ns: u64) -> Report {
-        let (coarse_um, piezo_um) =
-            with_plant(&self.plant, |plant| (plant.screw().position_um(), plant.piezo().position_um()));
         Report {
             now_ns,
             started: self.lockstep.has_started(),
             resets: self.resets,
-            step_edges: self.wiring.step_edges(),
-            last_step_ns: self.wiring.last_step_ns(),
-            coarse_um,
-            piezo_um,
+            powered: self.powered,
+            coarse: self.stage_report(StageName::Sensor),
+            lens: self.stage_report(StageName::Lens),
+            piezo_um: with_plant(&self.plant, |plant| plant.piezo().position_um()),
             triggers: self.wiring.camera().triggers(),
             missed_triggers: self.wiring.camera().missed(),
             flipped_bits: self.to_board.flipped() + self.to_host.flipped(),
+        }
+    }
+
+    fn stage_report(&self, name: StageName) -> StageReport {
+        let (position_um, microsteps, lost_microsteps) = with_plant(&self.plant, |plant| {
+            let stage = plant.stage(name);
+            (stage.position_um(), stage.microsteps(), stage.lost_microsteps())
+        });
+        StageReport {
+            position_um,
+            microsteps,
+            lost_microsteps,
+            step_edges: self.wiring.step_edges(name),
+            last_step_ns: self.wiring.last_step_ns(name),
         }
     }
 
@@ -259,20 +273,55 @@ impl Driver {
                 self.told.push(done);
             }
             Command::Settle { done } => self.settling.push(done),
-            Command::ReachIn(work) => {
-                work(&mut Hands { session, host, stop, plant: &self.plant });
-                self.note_resets(session, stop.at);
-                self.wiring.put_switches(&mut session.board_mut().chip, stop.at);
+            Command::ReachIn(work) => self.reach_in(work, session, stop, host),
+            Command::Camera(work) => {
+                self.lockstep.host_spoke();
+                self.reach_in(work, session, stop, host);
             }
             Command::End => return false,
         }
         true
     }
 
+    fn reach_in(
+        &mut self,
+        work: impl FnOnce(&mut Hands<'_, '_>),
+        session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) {
+        work(&mut Hands { session, host, stop, plant: &self.plant, wiring: &mut self.wiring });
+        self.note_resets(session, stop.at);
+        self.wiring.put(&mut session.board_mut().chip, stop.at);
+        session.pause_at(self.wiring.next_ns().map(VirtualNanos));
+    }
+
+    /// Lets happen what is due.
+    fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
+        let now_ns = stop.at.0;
+        let is_due = |after_ms: u64| now_ns >= after_ms.saturating_mul(1_000_000);
+        let (mut due, later): (Vec<_>, Vec<_>) =
+            self.happens.drain(..).partition(|happening| is_due(happening.after_ms));
+        self.happens = later;
+        due.sort_by_key(|happening| happening.after_ms);
+        for happening in due {
+            self.reach_in(|hands| hands.happen(&happening), session, stop, host);
+        }
+    }
+
     /// Puts on the line what came for the board.
     fn send_held(&mut self, now_ns: u64) {
         let mut bytes = std::mem::take(&mut self.held);
         if self.outlets.bytes.is_some() {
+            if self.pace == Pace::Lockstep {
+                let mut fresh = Vec::new();
+                for frame in bytes.split_inclusive(|byte| *byte == 0) {
+                    if !self.lockstep.repeats(frame) {
+                        fresh.extend(frame);
+                    }
+                }
+                bytes = fresh;
+            }
             self.lockstep.sent(&bytes, now_ns);
             self.to_board.carry(&mut bytes);
             self.line.send(&bytes);
@@ -282,6 +331,11 @@ impl Driver {
     /// Whether the chip was reset since the last look.
     fn note_resets(&mut self, session: &Session<RigBoard>, at: VirtualNanos) {
         let resets = session.resets().len();
+        if self.powered == session.unpowered() {
+            self.powered = !session.unpowered();
+            self.wiring.board_reset(at);
+            self.lockstep.reset(at.0);
+        }
         if resets != self.resets {
             self.resets = resets;
             self.wiring.board_reset(at);
@@ -310,9 +364,25 @@ impl Driver {
         now_ns < self.told_ns
             || match self.pace {
                 Pace::Told => busy && !self.settling.is_empty(),
-                Pace::Lockstep => busy,
+                Pace::Lockstep => busy && !self.lockstep.waits_for_host(),
                 Pace::Realtime => true,
             }
+    }
+
+    /// Waits for a command while time stands; `None` where the host has let the board wait for too long.
+    fn wait(&mut self) -> Option<Command> {
+        // Nobody left who could command: end.
+        if !self.lockstep.waits_for_host() {
+            return Some(self.commands.recv().unwrap_or(Command::End));
+        }
+        match self.commands.recv_timeout(HOST_PATIENCE) {
+            Ok(command) => Some(command),
+            Err(RecvTimeoutError::Timeout) => {
+                self.lockstep.host_spoke();
+                None
+            }
+            Err(RecvTimeoutError::Disconnected) => Some(Command::End),
+        }
     }
 
     /// Waits until the wall clock has caught up with virtual time; a command ends the wait.
@@ -336,8 +406,16 @@ impl Driver {
 }
 
 impl emulator::Driver<RigBoard> for Driver {
-    fn on_settled(&mut self, session: &mut Session<RigBoard>, _host: &mut dyn Host, settled: Settled) {
+    fn on_settled(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, settled: Settled) {
         let at = match settled {
+            Settled::Access { access, .. } if SPI4.contains(&access.address) => {
+                let chip = &mut session.board_mut().chip;
+                if chip.memory().is_some_and(MemoryChip::take_failure) {
+                    chip.power(access.virtual_time, false);
+                    forget(host);
+                }
+                return;
+            }
             Settled::Access { access, .. }
                 if access.kind == AccessKind::Write && Wiring::watches(access.address) =>
             {
@@ -362,7 +440,11 @@ impl emulator::Driver<RigBoard> for Driver {
             self.failed = Some(SimError::Emulator(error.to_string()));
             return None;
         }
+        self.note_resets(session, stop.at);
         self.exchange(now_ns);
+        self.wiring.put(&mut session.board_mut().chip, stop.at);
+        session.board_mut().chip.join_breaks(stop.at);
+        self.happen(session, stop, host);
         loop {
             while let Ok(command) = self.commands.try_recv() {
                 if !self.carry_out(command, session, stop, host) {
@@ -370,8 +452,10 @@ impl emulator::Driver<RigBoard> for Driver {
                 }
             }
             let command = if !self.may_pass(now_ns) {
-                // Nobody left who could command: end.
-                self.commands.recv().ok().or(Some(Command::End))
+                match self.wait() {
+                    Some(command) => Some(command),
+                    None => continue,
+                }
             } else if self.pace == Pace::Realtime && now_ns >= self.told_ns {
                 self.keep_pace(now_ns)
             } else {

@@ -1,16 +1,25 @@
-//! Faults on the line and of the port, from a TOML file.
+//! Faults of line, port and rig, from a TOML file.
 //!
 //! ```toml
 //! bit_error_rate = 1e-4      # of each bit, in both directions
 //! garbage = [1, 255, 0, 66]  # the host hears this before anything else
-//! unplug_after_ms = 500      # board time after the start; the port goes away
+//! unplug_after_ms = 500      # virtual time after power-on; the port goes away
+//!
+//! [[happens]]                # in any number
+//! after_ms = 1500            # virtual time after power-on
+//! what = "motor-stalls"      # see below
+//! stage = "lens"             # or "sensor", which is the default; where a stage is concerned
 //! ```
+//!
+//! `what` is one of emergency-stop, emergency-stop-released, reset-button, power-loss, power-return, brown-out,
+//! supply-low, supply-normal, driver-fault, driver-fine, motor-stalls, motor-free, home-switch-dead, piezo-dead,
+//! firmware-hangs, and memory-bit-flips (with `address` and `bit`). See [`crate::hands::What`].
 
 use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::{error::SimError, plant::Noise};
+use crate::{error::SimError, hands::Happening, plant::Noise};
 
 /// What goes wrong.
 #[derive(Clone, PartialEq, Debug, Default, Deserialize)]
@@ -22,6 +31,8 @@ pub struct Faults {
     pub garbage: Vec<u8>,
     /// The port goes away after this much virtual time since the board's start, in milliseconds.
     pub unplug_after_ms: Option<u64>,
+    /// What happens to the rig, in any order.
+    pub happens: Vec<Happening>,
 }
 
 impl Faults {
@@ -92,6 +103,7 @@ impl NoisyLine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{hands::What, plant::StageName};
 
     #[test]
     fn flips_its_share_of_bits() {
@@ -115,6 +127,11 @@ mod tests {
         std::fs::write(&path, "bit_error_rate = 2.0").expect("can write");
         let error = Faults::read(&path).expect_err("2 is no probability");
         assert!(error.to_string().contains("bit_error_rate = 2"), "{error}");
+        std::fs::write(&path, "[[happens]]\nafter_ms = 7\nwhat = \"motor-stalls\"\nstage = \"lens\"")
+            .expect("can write");
+        let happens = Faults::read(&path).expect("a good file").happens;
+        assert_eq!((happens[0].after_ms, happens[0].what), (7, What::MotorStalls));
+        assert_eq!(happens[0].stage, StageName::Lens);
         std::fs::write(&path, "bit_eror_rate = 0.1").expect("can write");
         assert!(Faults::read(&path).expect_err("misspelt").to_string().contains("bit_eror_rate"));
     }

@@ -1,9 +1,13 @@
 //! When virtual time may pass.
 //!
 //! In lockstep it runs only while the board owes something: an answer to a request, the terminal event of a move,
-//! a homing or a program, or its first event after a reset. Otherwise it stands still, however long the host
-//! takes, so a run repeats to the byte. All of it is decided from the frames that cross the line; a request that
+//! a homing, a calibration or a program, or its first event after a reset. Otherwise it stands still, however long the
+//! host takes, so a run repeats to the byte. It also stands while the board waits for its host: after "still there?", and
+//! after "trigger your camera". All of it is decided from the frames that cross the line; a request that
 //! is lost on the way is given up after a while of virtual time, and the host asks again.
+//!
+//! A host on a slow machine may lose its patience and repeat a request while time stands; such a repeat is dropped, for the
+//! answer is on its way.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -27,7 +31,7 @@ pub struct Lockstep {
     to_board: Decoder,
     from_board: Decoder,
     /// Requests without an answer: what was asked, and until when it is waited for.
-    asked: BTreeMap<u32, (Work, u64)>,
+    asked: BTreeMap<u32, Asked>,
     /// Accepted long work: until when its end is waited for.
     running: BTreeMap<u32, u64>,
     /// Requests whose work has ended; a repeated answer to one of them starts nothing.
@@ -35,6 +39,18 @@ pub struct Lockstep {
     /// The board is starting: until when its first event is waited for.
     starting: Option<u64>,
     boots: BTreeSet<u32>,
+    /// The program that stands between two exposures until its host lets it go on.
+    paused: Option<u32>,
+    /// The board has said something that its host must answer.
+    waits_for_host: bool,
+}
+
+/// A request without an answer.
+#[derive(Debug)]
+struct Asked {
+    work: Work,
+    until_ns: u64,
+    body: Vec<u8>,
 }
 
 /// What an accepted request leaves under way.
@@ -44,6 +60,8 @@ enum Work {
     Done,
     /// Something that ends with a terminal event.
     Long,
+    /// A paused program goes on.
+    Resume,
     /// A reset.
     Reset,
 }
@@ -56,19 +74,44 @@ impl Lockstep {
 
     /// Bytes leave for the board.
     pub fn sent(&mut self, bytes: &[u8], now_ns: u64) {
+        self.host_spoke();
         for byte in bytes {
             let Some(Ok(packet)) = self.to_board.push(*byte) else { continue };
             if packet.header.kind == Kind::Request {
                 let work = match packet.message::<Request>() {
-                    Some(Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. }) => {
-                        Work::Long
-                    }
+                    Some(
+                        Request::Home { .. }
+                        | Request::Move { .. }
+                        | Request::RunProgram { .. }
+                        | Request::Calibrate { .. },
+                    ) => Work::Long,
+                    Some(Request::ResumeProgram) => Work::Resume,
                     Some(Request::Reboot) => Work::Reset,
                     _ => Work::Done,
                 };
-                self.asked.insert(packet.header.id, (work, now_ns + ANSWER_NS));
+                let asked = Asked { work, until_ns: now_ns + ANSWER_NS, body: packet.body.to_vec() };
+                self.asked.insert(packet.header.id, asked);
             }
         }
+    }
+
+    /// Whether this frame repeats a request whose answer is still awaited.
+    pub fn repeats(&self, frame: &[u8]) -> bool {
+        let mut decoder = Decoder::new();
+        let packets: Vec<Packet> = frame.iter().filter_map(|byte| decoder.push(*byte)?.ok()).collect();
+        let [packet] = packets.as_slice() else { return false };
+        let asked = self.asked.get(&packet.header.id);
+        packet.header.kind == Kind::Request && asked.is_some_and(|asked| asked.body == packet.body.as_slice())
+    }
+
+    /// The host has said something, or will not: time may pass again.
+    pub fn host_spoke(&mut self) {
+        self.waits_for_host = false;
+    }
+
+    /// Whether time stands because the board waits for its host, though it owes something itself.
+    pub fn waits_for_host(&self) -> bool {
+        self.waits_for_host
     }
 
     /// Bytes have come from the board.
@@ -84,13 +127,14 @@ impl Lockstep {
         let id = packet.header.id;
         match packet.header.kind {
             Kind::Response => {
-                let work = self.asked.remove(&id).map(|(work, _)| work);
+                let work = self.asked.remove(&id).map(|asked| asked.work);
                 match packet.message::<Response>() {
                     // A session begins, and with it the request ids.
                     Some(Response::Hello(_)) => self.ended.clear(),
                     Some(Response::Accepted) if work == Some(Work::Long) && !self.ended.contains(&id) => {
                         self.running.insert(id, now_ns + WORK_NS);
                     }
+                    Some(Response::Accepted) if work == Some(Work::Resume) => self.paused = None,
                     Some(Response::Accepted) if work == Some(Work::Reset) => self.reset(now_ns),
                     _ => {}
                 }
@@ -103,7 +147,7 @@ impl Lockstep {
                     self.event(&event, packet.header.boot);
                 }
             }
-            Kind::Request => {}
+            Kind::Request | Kind::Log => {}
         }
     }
 
@@ -117,13 +161,26 @@ impl Lockstep {
                 }
                 return;
             }
-            EventKind::ShotDone { .. } => return,
+            EventKind::StillThere { .. } | EventKind::ShotReady { .. } => {
+                self.waits_for_host = true;
+                return;
+            }
+            EventKind::Paused { request, .. } => {
+                self.paused = Some(request);
+                return;
+            }
+            EventKind::ShotDone { .. }
+            | EventKind::Alarm(_)
+            | EventKind::AlarmCleared { .. }
+            | EventKind::RecordRepaired { .. } => return,
             EventKind::Homed { request, .. }
             | EventKind::MoveDone { request, .. }
             | EventKind::ProgramDone { request, .. }
+            | EventKind::Calibrated { request, .. }
             | EventKind::Failed { request, .. } => request,
         };
         self.running.remove(&ended);
+        self.paused = self.paused.filter(|paused| *paused != ended);
         if self.ended.len() == ENDED {
             self.ended.pop_front();
         }
@@ -134,15 +191,19 @@ impl Lockstep {
     pub fn reset(&mut self, now_ns: u64) {
         self.running.clear();
         self.asked.clear();
-        self.starting = Some(now_ns + BOOT_NS);
+        self.paused = None;
+        self.waits_for_host = false;
+        // One that is reset again and again before it has started is waited for only once.
+        self.starting.get_or_insert(now_ns + BOOT_NS);
     }
 
     /// Whether the board owes something at this moment.
     pub fn is_busy(&mut self, now_ns: u64) -> bool {
-        self.asked.retain(|_, (_, until)| *until > now_ns);
+        self.asked.retain(|_, asked| asked.until_ns > now_ns);
         self.running.retain(|_, until| *until > now_ns);
         self.starting = self.starting.filter(|until| *until > now_ns);
-        !self.asked.is_empty() || !self.running.is_empty() || self.starting.is_some()
+        let runs = self.running.keys().any(|request| Some(*request) != self.paused);
+        !self.asked.is_empty() || runs || self.starting.is_some()
     }
 
     /// Whether the board has ever said that it started.
@@ -154,7 +215,7 @@ impl Lockstep {
 #[cfg(test)]
 mod tests {
     use farnear_protocol::{
-        BoardMicros, Nanometres,
+        BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT,
         frame::{Header, encode},
         message::{Axis, ResetCause},
     };
@@ -162,7 +223,7 @@ mod tests {
     use super::*;
 
     fn frame<T: serde::Serialize>(kind: Kind, id: u32, message: &T) -> Vec<u8> {
-        encode(Header { version: 1, kind, id, boot: 1 }, message).expect("fits").to_vec()
+        encode(Header { version: PROTOCOL_CURRENT, kind, id, boot: 1 }, message).expect("fits").to_vec()
     }
 
     fn event(kind: EventKind) -> Vec<u8> {
@@ -181,11 +242,15 @@ mod tests {
     fn a_move_keeps_time_running_until_its_end_and_its_repeat_does_not() {
         let mut lockstep = started();
         let asked = Nanometres(5);
-        let request = frame(Kind::Request, 7, &Request::Move { axis: Axis::SensorFine, target: asked });
+        let silence = Micros(1_000_000);
+        let body = Request::Move { axis: Axis::SensorFine, target: asked, silence };
+        let request = frame(Kind::Request, 7, &body);
         let accepted = frame(Kind::Response, 7, &Response::Accepted);
         lockstep.sent(&request, 10);
         assert!(lockstep.is_busy(11));
+        assert!(lockstep.repeats(&request) && !lockstep.repeats(&accepted));
         lockstep.received(&accepted, 12);
+        assert!(!lockstep.repeats(&request), "it was answered");
         assert!(lockstep.is_busy(13) && lockstep.is_busy(ANSWER_NS * 2));
         let done = EventKind::MoveDone { request: 7, axis: Axis::SensorFine, asked, measured: asked };
         lockstep.received(&event(done), 14);
@@ -193,6 +258,31 @@ mod tests {
         lockstep.sent(&request, 20);
         lockstep.received(&accepted, 21);
         assert!(!lockstep.is_busy(22));
+    }
+
+    #[test]
+    fn time_stands_while_the_board_waits_for_its_host() {
+        let mut lockstep = started();
+        lockstep.received(&event(EventKind::StillThere { request: 7 }), 5);
+        assert!(lockstep.waits_for_host());
+        lockstep.sent(&frame(Kind::Request, 8, &Request::Status), 5);
+        assert!(!lockstep.waits_for_host());
+    }
+
+    #[test]
+    fn a_paused_program_owes_nothing_until_it_goes_on() {
+        let mut lockstep = started();
+        let run = Request::RunProgram { silence: Micros(1_000_000) };
+        let accepted = |id| frame(Kind::Response, id, &Response::Accepted);
+        lockstep.sent(&frame(Kind::Request, 3, &run), 0);
+        lockstep.received(&accepted(3), 1);
+        lockstep.received(&event(EventKind::Paused { request: 3, index: 1 }), 2);
+        assert!(!lockstep.is_busy(3));
+        lockstep.sent(&frame(Kind::Request, 4, &Request::ResumeProgram), 4);
+        lockstep.received(&accepted(4), 5);
+        assert!(lockstep.is_busy(6));
+        lockstep.received(&event(EventKind::ProgramDone { request: 3, exposures: 2 }), 7);
+        assert!(!lockstep.is_busy(8));
     }
 
     #[test]

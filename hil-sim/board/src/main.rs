@@ -4,7 +4,7 @@ use std::{
     fs::File,
     io::Write,
     os::{fd::AsFd, unix::fs::FileTypeExt},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
@@ -42,7 +42,13 @@ enum Job {
     #[command(after_help = "Example:\n  \
         farnear-sim run --scene staircase --psf gaussian:k=0.4578 --noise 8bit --seed 1\n  \
         {\"port\": \"/dev/pts/3\", \"camera\": \"127.0.0.1:40123\"}")]
-    Run(Run),
+    Run(Box<Run>),
+    /// Count the instructions of the on-board routines: runs the counting firmware and prints its table.
+    #[command(after_help = "Example:\n  farnear-sim count farnear-count.elf")]
+    Count {
+        /// The counting firmware, which `cargo xtask firmware` builds.
+        elf: PathBuf,
+    },
 }
 
 #[derive(Args)]
@@ -78,14 +84,26 @@ struct Run {
 }
 
 fn main() -> ExitCode {
-    let Job::Run(run) = Program::parse().job;
-    match serve(&run) {
+    let done = match Program::parse().job {
+        Job::Run(run) => serve(&run),
+        Job::Count { elf } => count(&elf),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("farnear-sim: {error:#}");
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints a line per routine: instructions, units, unit, name; separated by tabs.
+fn count(elf: &Path) -> Result<()> {
+    let mut stdout = std::io::stdout();
+    for count in farnear_sim::count::count(elf)? {
+        writeln!(stdout, "{}\t{}\t{}\t{}", count.instructions, count.units, count.unit, count.routine)?;
+    }
+    Ok(())
 }
 
 fn serve(run: &Run) -> Result<()> {

@@ -39,11 +39,20 @@ impl ServedRig {
         let (frames_out, frames) = mpsc::channel();
         eye.watch(shots, frames_out)?;
         let control = commands.clone();
-        let camera = endpoint::open(frames, move |Control::AdvanceMicros(micros)| {
-            // Nobody waits for the end: what comes from the host meanwhile is held until the time has passed.
-            let (done, _) = mpsc::channel();
-            let nanos = micros.saturating_mul(1000);
-            let _ = control.send(Command::Advance { nanos, done }); // the rig may have ended
+        let camera = endpoint::open(frames, move |asked| {
+            let command = match asked {
+                // Nobody waits for the end: what comes from the host meanwhile is held until the time has passed.
+                Control::AdvanceMicros(micros) => {
+                    Command::Advance { nanos: micros.saturating_mul(1000), done: mpsc::channel().0 }
+                }
+                Control::Expose { shot_id, exposure } => Command::Camera(Box::new(move |hands| {
+                    hands.expose(u64::from(exposure.0), shot_id);
+                })),
+                Control::FreeRun { period, exposure } => Command::Camera(Box::new(move |hands| {
+                    hands.run_camera_freely(u64::from(period.0), u64::from(exposure.0));
+                })),
+            };
+            let _ = control.send(command); // the rig may have ended
         })?;
         let to_board = commands.clone();
         let port = port::open(bytes, move |frame| to_board.send(Command::Bytes(frame)).is_ok())?;

@@ -1,4 +1,4 @@
-//! What the plant really did, as CSV: `time_us,event,coarse_um,piezo_um,dac,step_edges,triggers`.
+//! What the plant really did, as CSV: `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
 //!
 //! A `tick` row each millisecond of virtual time in which something moved, and a row `shot` per exposure with its
 //! mean positions.
@@ -9,7 +9,11 @@ use std::{
     path::Path,
 };
 
-use crate::{error::SimError, plant::Plant, wiring::Wiring};
+use crate::{
+    error::SimError,
+    plant::{Plant, StageName},
+    wiring::Wiring,
+};
 
 /// Virtual time between two looks.
 const PERIOD_NS: u64 = 1_000_000;
@@ -31,7 +35,7 @@ impl Trace {
         let wrong =
             |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };
         let mut file = BufWriter::new(File::create(path).map_err(wrong)?);
-        writeln!(file, "time_us,event,coarse_um,piezo_um,dac,step_edges,triggers").map_err(wrong)?;
+        writeln!(file, "time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers").map_err(wrong)?;
         Ok(Self { file, next_ns: 0, last: String::new(), failed: None })
     }
 
@@ -42,11 +46,12 @@ impl Trace {
         }
         self.next_ns = now_ns + PERIOD_NS;
         let row = format!(
-            "{:.3},{:.4},{},{},{}",
-            plant.screw().position_um(),
+            "{:.3},{:.3},{:.4},{},{},{}",
+            plant.stage(StageName::Sensor).position_um(),
+            plant.stage(StageName::Lens).position_um(),
             plant.piezo().position_um(),
             plant.piezo().dac(),
-            wiring.step_edges(),
+            step_edges(wiring),
             wiring.camera().triggers()
         );
         if row != self.last {
@@ -58,12 +63,13 @@ impl Trace {
     /// An exposure has ended.
     pub fn shot(&mut self, shot: &crate::wiring::Shot, plant: &Plant, wiring: &Wiring) {
         self.write(&format!(
-            "{},shot,{:.3},{:.4},{},{},{}",
+            "{},shot,{:.3},{:.3},{:.4},{},{},{}",
             shot.begin_ns / 1000,
             shot.truth.coarse_um,
+            shot.truth.lens_um,
             shot.truth.piezo_um,
             plant.piezo().dac(),
-            wiring.step_edges(),
+            step_edges(wiring),
             wiring.camera().triggers()
         ));
     }
@@ -82,4 +88,9 @@ impl Trace {
         let result = self.failed.take().map_or_else(|| self.file.flush(), Err);
         result.map_err(|source| SimError::Io { what: "cannot write the trace".into(), source })
     }
+}
+
+/// Edges on both STEP pins.
+fn step_edges(wiring: &Wiring) -> u64 {
+    wiring.step_edges(StageName::Sensor) + wiring.step_edges(StageName::Lens)
 }

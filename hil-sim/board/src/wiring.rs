@@ -8,28 +8,27 @@ use rigless::{
 };
 
 use crate::{
-    board::{
-        self, Chip, DIR, ENABLE, ENCODER_A, ENCODER_B, FAR, HOME, STEP, STROBE, TIM1, TIM2, TIM4, TRIGGER,
-    },
+    board::{Chip, PinName, STROBE, TIM2, TRIGGER, pins},
     camera::{Camera, Edge},
     chips::{SharedPlant, with_plant},
-    plant::ExposureTruth,
+    plant::{ExposureTruth, StageName},
 };
 
-/// Alternate functions of TIM1 and TIM2, and of TIM4, on their pins (DS9405, table 12). A pin that the firmware
+/// Alternate functions of TIM2, and of TIM3 and TIM4, on their pins (DS9405, table 12). A pin that the firmware
 /// has not switched to its timer is not connected to it.
-const TIM1_TIM2_FUNCTION: u8 = 1;
-const TIM4_FUNCTION: u8 = 2;
+const TIM2_FUNCTION: u8 = 1;
+const ENCODER_FUNCTION: u8 = 2;
 /// TIM2's counter, which the firmware keeps at the lower 32 bits of its microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
-/// Addresses of the registers whose writes can move one of the watched pins: TIM2, TIM1, port F.
+/// Addresses of the registers whose writes can move one of the watched pins: TIM2, TIM1 and TIM8, port F.
 const WATCHED: [(u64, u64); 3] =
-    [(0x4000_0000, 0x4000_0400), (0x4001_0000, 0x4001_0400), (0x4002_1400, 0x4002_1800)];
+    [(0x4000_0000, 0x4000_0400), (0x4001_0000, 0x4001_0800), (0x4002_1400, 0x4002_1800)];
 
 /// One exposure, as it really was.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
-    /// Running number of the trigger since the board's reset, from 0.
+    /// The image's name: the running number of the trigger since the board's reset, from 0, or what the camera's host
+    /// said.
     pub id: u32,
     /// Start of the exposure in the board's microseconds.
     pub board_us: u64,
@@ -41,16 +40,25 @@ pub struct Shot {
     pub truth: ExposureTruth,
 }
 
+/// The wires of a stage, with the levels they had when last looked at.
+#[derive(Debug)]
+struct StageWires {
+    name: StageName,
+    step: bool,
+    counts: i64,
+    step_edges: u64,
+    last_step_ns: u64,
+    /// When each edge of STEP came, while somebody wants to know.
+    record: Option<Vec<u64>>,
+}
+
 /// The wires, with the levels they had when last looked at.
 #[derive(Debug)]
 pub struct Wiring {
     plant: SharedPlant,
     camera: Camera,
-    step: bool,
+    stages: [StageWires; 2],
     trigger: bool,
-    counts: i64,
-    step_edges: u64,
-    last_step_ns: u64,
     begun: Option<(u32, u64, u64)>,
     shots: Vec<Shot>,
 }
@@ -59,23 +67,74 @@ fn channel(number: u8) -> Channel {
     Channel::new(number).unwrap_or_else(|| unreachable!("timers have channels 1 to 4"))
 }
 
+impl StageWires {
+    fn new(plant: &SharedPlant, name: StageName) -> Self {
+        let counts = with_plant(plant, |plant| plant.stage(name).encoder_counts());
+        Self { name, step: false, counts, step_edges: 0, last_step_ns: 0, record: None }
+    }
+
+    /// Looks at STEP.
+    fn look(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos) {
+        let (pin, timer, function) = pins(self.name).step;
+        let step = is_high(chip, pin, function, |chip| {
+            let (timer, registers) = chip.part().advanced_timer(timer);
+            timer.output(channel(1), registers)
+        });
+        if step == std::mem::replace(&mut self.step, step) || !step {
+            return;
+        }
+        self.step_edges += 1;
+        self.last_step_ns = at.0;
+        if let Some(record) = &mut self.record {
+            record.push(at.0);
+        }
+        if chip.level(pins(self.name).enable) == Level::High {
+            return;
+        }
+        let away = chip.level(pins(self.name).direction) == Level::High;
+        with_plant(plant, |plant| plant.step_edge(at.0, self.name, away));
+        self.put(plant, chip, at);
+    }
+
+    /// Brings encoder and switches to where the stage is.
+    fn put(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos) {
+        let (counts, home, far) = with_plant(plant, |plant| {
+            let stage = plant.stage(self.name);
+            (stage.encoder_counts(), stage.home_closed(), stage.far_closed())
+        });
+        let ([a, b], _) = pins(self.name).encoder;
+        if self.counts != counts {
+            let connected = [a, b].iter().all(|pin| chip.function(*pin) == Some(ENCODER_FUNCTION));
+            while self.counts != counts {
+                self.counts += (counts - self.counts).signum();
+                if connected {
+                    self.put_encoder(chip, at);
+                }
+            }
+        }
+        // Normally closed to ground: an actuated switch opens, and the pull-up makes the pin high.
+        chip.drive_pin(at, pins(self.name).home, Level::from(home));
+        chip.drive_pin(at, pins(self.name).far, Level::from(far));
+    }
+
+    /// Quadrature: A leads B when the count rises.
+    fn put_encoder(&self, chip: &mut Chip, at: VirtualNanos) {
+        let (_, timer) = pins(self.name).encoder;
+        let phase = self.counts.rem_euclid(4);
+        chip.drive_timer(at, timer, channel(1), Level::from(phase == 1 || phase == 2));
+        chip.drive_timer(at, timer, channel(2), Level::from(phase >= 2));
+    }
+}
+
 impl Wiring {
     /// Connects the board to the plant at power-on.
     pub fn new(plant: SharedPlant, camera: Camera, chip: &mut Chip) -> Self {
-        let counts = with_plant(&plant, |plant| plant.screw().encoder_counts());
-        let mut wiring = Self {
-            plant,
-            camera,
-            step: false,
-            trigger: false,
-            counts,
-            step_edges: 0,
-            last_step_ns: 0,
-            begun: None,
-            shots: Vec::new(),
-        };
-        wiring.put_encoder(chip, VirtualNanos(0), counts);
-        wiring.put_switches(chip, VirtualNanos(0));
+        let stages = [StageName::Sensor, StageName::Lens].map(|name| StageWires::new(&plant, name));
+        let mut wiring = Self { plant, camera, stages, trigger: false, begun: None, shots: Vec::new() };
+        for stage in &mut wiring.stages {
+            stage.put_encoder(chip, VirtualNanos(0));
+            stage.put(&wiring.plant, chip, VirtualNanos(0));
+        }
         wiring
     }
 
@@ -89,17 +148,10 @@ impl Wiring {
         while let Some((at_ns, edge)) = self.camera.due(at.0) {
             self.expose(chip, at, at_ns, edge);
         }
-        let step = output(chip, STEP, |chip| {
-            let (timer, registers) = chip.part().advanced_timer(TIM1);
-            timer.output(channel(1), registers)
-        });
-        if step != self.step {
-            self.step = step;
-            if step {
-                self.step(chip, at);
-            }
+        for stage in &mut self.stages {
+            stage.look(&self.plant, chip, at);
         }
-        let trigger = output(chip, TRIGGER, |chip| {
+        let trigger = is_high(chip, TRIGGER, TIM2_FUNCTION, |chip| {
             let (timer, registers) = chip.part().timer(TIM2);
             timer.output(channel(3), registers)
         });
@@ -109,53 +161,21 @@ impl Wiring {
         }
     }
 
-    fn step(&mut self, chip: &mut Chip, at: VirtualNanos) {
-        self.step_edges += 1;
-        self.last_step_ns = at.0;
-        if chip.level(ENABLE) == Level::High {
-            return;
+    /// Brings encoders and switches to where the stages are: a rotor also turns between two steps.
+    pub fn put(&mut self, chip: &mut Chip, at: VirtualNanos) {
+        for stage in &mut self.stages {
+            stage.put(&self.plant, chip, at);
         }
-        let away = chip.level(DIR) == Level::High;
-        let counts = with_plant(&self.plant, |plant| {
-            plant.step_edge(at.0, away);
-            plant.screw().encoder_counts()
-        });
-        let connected = [ENCODER_A, ENCODER_B].iter().all(|pin| chip.function(*pin) == Some(TIM4_FUNCTION));
-        while self.counts != counts {
-            self.counts += (counts - self.counts).signum();
-            if connected {
-                self.put_encoder(chip, at, self.counts);
-            }
-        }
-        self.put_switches(chip, at);
-    }
-
-    /// Quadrature: A leads B when the count rises.
-    fn put_encoder(&mut self, chip: &mut Chip, at: VirtualNanos, counts: i64) {
-        let phase = counts.rem_euclid(4);
-        chip.drive_timer(at, TIM4, channel(1), Level::from(phase == 1 || phase == 2));
-        chip.drive_timer(at, TIM4, channel(2), Level::from(phase >= 2));
-    }
-
-    /// Puts the switches' levels on their pins.
-    pub fn put_switches(&mut self, chip: &mut Chip, at: VirtualNanos) {
-        let (home, far) = with_plant(&self.plant, |plant| {
-            let screw = plant.screw();
-            (screw.home_closed(), screw.far_closed())
-        });
-        // Normally closed to ground: an actuated switch opens, and the pull-up makes the pin high.
-        chip.drive_pin(at, HOME, Level::from(home));
-        chip.drive_pin(at, FAR, Level::from(far));
     }
 
     fn expose(&mut self, chip: &mut Chip, at: VirtualNanos, at_ns: u64, edge: Edge) {
         match edge {
-            Edge::Begin => {
+            Edge::Begin(id) => {
                 with_plant(&self.plant, |plant| plant.begin_exposure(at_ns));
                 let low = Operate::peek(chip, at, TIM2_CNT, Width::W32).unwrap_or(0);
                 // The counter has the lower 32 bits of about the virtual time; a run has few of their periods.
                 let high = (at_ns / 1000) & !0xffff_ffff;
-                self.begun = Some((self.camera.triggers().wrapping_sub(1), high | low, at_ns));
+                self.begun = Some((id, high | low, at_ns));
             }
             Edge::End => {
                 let truth = with_plant(&self.plant, |plant| plant.end_exposure(at_ns));
@@ -164,9 +184,9 @@ impl Wiring {
                 }
             }
         }
-        let level = Level::from(edge == Edge::Begin);
+        let level = Level::from(edge != Edge::End);
         chip.drive_pin(at, STROBE, level);
-        if chip.function(STROBE) == Some(TIM1_TIM2_FUNCTION) {
+        if chip.function(STROBE) == Some(TIM2_FUNCTION) {
             chip.drive_timer(at, TIM2, channel(4), level);
         }
     }
@@ -181,14 +201,36 @@ impl Wiring {
         std::mem::take(&mut self.shots)
     }
 
-    /// Rising edges on the STEP pin since power-on, whether or not the driver was on.
-    pub fn step_edges(&self) -> u64 {
-        self.step_edges
+    fn stage(&self, name: StageName) -> &StageWires {
+        match name {
+            StageName::Sensor => &self.stages[0],
+            StageName::Lens => &self.stages[1],
+        }
+    }
+
+    /// Rising edges on a STEP pin since power-on, whether or not the driver was on.
+    pub fn step_edges(&self, name: StageName) -> u64 {
+        self.stage(name).step_edges
     }
 
     /// When the last of them was.
-    pub fn last_step_ns(&self) -> u64 {
-        self.last_step_ns
+    pub fn last_step_ns(&self, name: StageName) -> u64 {
+        self.stage(name).last_step_ns
+    }
+
+    /// Begins to note when each STEP edge comes.
+    pub fn record_steps(&mut self) {
+        self.stages.iter_mut().for_each(|stage| stage.record = Some(Vec::new()));
+    }
+
+    /// The edges noted so far, stage A's and stage B's, in virtual nanoseconds; goes on with empty notes.
+    pub fn take_steps(&mut self) -> [Vec<u64>; 2] {
+        self.stages.each_mut().map(|stage| stage.record.as_mut().map(std::mem::take).unwrap_or_default())
+    }
+
+    /// The camera, for its host's commands.
+    pub fn camera_mut(&mut self) -> &mut Camera {
+        &mut self.camera
     }
 
     /// The camera.
@@ -198,7 +240,7 @@ impl Wiring {
 
     /// The board was reset.
     pub fn board_reset(&mut self, at: VirtualNanos) {
-        self.step = false;
+        self.stages.iter_mut().for_each(|stage| stage.step = false);
         if std::mem::take(&mut self.trigger) {
             self.camera.trigger(at.0, false);
         }
@@ -207,6 +249,11 @@ impl Wiring {
 }
 
 /// The level of a timer's pin: high only where the pin is switched to the timer.
-fn output(chip: &mut Chip, name: board::PinName, read: impl FnOnce(&mut Chip) -> Option<Level>) -> bool {
-    read(chip) == Some(Level::High) && chip.function(name) == Some(TIM1_TIM2_FUNCTION)
+fn is_high(
+    chip: &mut Chip,
+    name: PinName,
+    function: u8,
+    read: impl FnOnce(&mut Chip) -> Option<Level>,
+) -> bool {
+    read(chip) == Some(Level::High) && chip.function(name) == Some(function)
 }

@@ -2,11 +2,8 @@
 
 mod common;
 
-use common::Bench;
-use farnear_protocol::{
-    EventKind, Micros, Nanometres, Request, Response,
-    message::{Axis, Shot},
-};
+use common::{Bench, SILENCE, fine_shot};
+use farnear_protocol::{EventKind, Request, Response};
 use farnear_sim::{RigConfig, faults::Faults};
 
 const REQUESTS: u32 = 10_000;
@@ -17,21 +14,14 @@ const RUN_EVERY: u32 = 50;
 fn ten_thousand_requests_over_a_bad_line() {
     let faults = Faults { bit_error_rate: 1e-4, ..Faults::default() };
     let mut bench = Bench::with(&RigConfig { seed: 5, faults, ..RigConfig::default() });
-    let shot = |target| Shot {
-        axis: Axis::SensorFine,
-        target: Nanometres(target),
-        exposure: Micros(200),
-        settle_window: Nanometres(1_000),
-        settle_dwell: Micros(200),
-        repeat: 1,
-    };
+    let shot = |target| fine_shot(target, 200, 1_000, 200);
     let (mut asked, mut unanswered, mut runs) = (1, 0, 0u32);
     let mut index = 0;
     while asked < REQUESTS {
         asked += 1;
         if asked % RUN_EVERY == 0 {
             // The position does not matter, so that it is settled at once; the trigger is what counts.
-            match bench.try_ask(&Request::RunProgram { shots: 1 }) {
+            match bench.try_ask(&Request::RunProgram { silence: SILENCE }) {
                 Some(Ok(Response::Accepted)) => {}
                 other => panic!("a run was not accepted but {other:?}"),
             }

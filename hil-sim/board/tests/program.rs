@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::Bench;
+use common::{Bench, fine_shot};
 use farnear_protocol::{
-    EventKind, Micros, Nanometres, Request, Response,
-    message::{Axis, Shot, ShotRecord},
+    EventKind, Micros, Nanometres,
+    message::{Shot, ShotRecord},
 };
 
 /// Far and near setting of the 50 mm lens are this far apart (933 and 886.81 mm).
@@ -17,23 +17,13 @@ const FAR: Nanometres = Nanometres(10_000);
 
 /// Loads a far and near pair.
 fn load_pair(bench: &mut Bench) {
-    for (index, target) in [(0, FAR), (1, Nanometres(FAR.0 + TRAVEL_NM))] {
-        let shot = Shot {
-            axis: Axis::SensorFine,
-            target,
-            exposure: EXPOSURE,
-            settle_window: WINDOW,
-            settle_dwell: Micros(2_000),
-            repeat: 1,
-        };
-        assert_eq!(bench.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
-    }
+    bench.arm(&[FAR, Nanometres(FAR.0 + TRAVEL_NM)].map(|at| fine_shot(at.0, EXPOSURE.0, WINDOW.0, 2_000)));
 }
 
 /// Runs the pair; gives its records.
 fn run_pair(bench: &mut Bench) -> Vec<ShotRecord> {
     let before = bench.events.len();
-    let end = bench.carry_out(&Request::RunProgram { shots: 2 });
+    let end = bench.run();
     assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
     let records = bench.events[before..].iter().filter_map(|event| match &event.kind {
         EventKind::ShotDone { shot, .. } => Some(*shot),
@@ -83,16 +73,8 @@ fn a_pair_is_fast_and_stands_still() {
 fn exposures_are_as_long_as_asked_from_the_shortest_on() {
     let mut bench = Bench::new(2);
     for exposure in [20, 21, 37, 100, 999, 10_000, 200_000] {
-        let shot = Shot {
-            axis: Axis::SensorFine,
-            target: Nanometres(50_000),
-            exposure: Micros(exposure),
-            settle_window: Nanometres(200),
-            settle_dwell: Micros(400),
-            repeat: 3,
-        };
-        assert_eq!(bench.ask(&Request::LoadShot { index: 0, shot }), Ok(Response::Accepted));
-        let end = bench.carry_out(&Request::RunProgram { shots: 1 });
+        bench.arm(&[Shot { repeat: 3, ..fine_shot(50_000, exposure, 200, 400) }]);
+        let end = bench.run();
         assert!(matches!(end, EventKind::ProgramDone { exposures: 3, .. }), "{end:?}");
         let shots = bench.rig.take_shots();
         assert_eq!(shots.len(), 3);

@@ -3,6 +3,7 @@
 mod common;
 
 use std::{
+    collections::VecDeque,
     io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
     path::Path,
@@ -10,12 +11,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{Answer, answer_in, request_frame};
+use common::{Answer, SILENCE, answer_in, fine_shot, go, request_frame};
 use farnear_protocol::{
-    Event, EventKind, Micros, Nanometres, Request, Response,
+    Event, EventKind, Request, Response,
     camera::{Control, FRAME_HEADER, FrameHeader},
     frame::{Decoder, Kind},
-    message::{Axis, Shot},
+    message::Axis,
 };
 use serialport::SerialPort;
 
@@ -68,6 +69,8 @@ impl Program {
 struct Client {
     port: Box<dyn SerialPort>,
     decoder: Decoder,
+    /// Bytes that came behind what was waited for.
+    rest: VecDeque<u8>,
     boot: u32,
     next: u32,
 }
@@ -78,7 +81,7 @@ impl Client {
             .timeout(Duration::from_millis(100))
             .open()
             .expect("the pty opens");
-        let mut client = Self { port, decoder: Decoder::new(), boot: 0, next: 0 };
+        let mut client = Self { port, decoder: Decoder::new(), rest: VecDeque::new(), boot: 0, next: 0 };
         match client.ask(&Request::Hello) {
             Ok(Response::Hello(hello)) => client.boot = hello.boot,
             other => panic!("no hello but {other:?}"),
@@ -91,13 +94,15 @@ impl Client {
         let deadline = Instant::now() + PATIENCE;
         let mut bytes = [0; 256];
         while Instant::now() < deadline {
-            let count = match self.port.read(&mut bytes) {
+            let read = if self.rest.is_empty() { self.port.read(&mut bytes) } else { Ok(0) };
+            let count = match read {
                 Ok(count) => count,
                 Err(error) if error.kind() == std::io::ErrorKind::TimedOut => 0,
                 Err(error) => panic!("the port failed: {error}"),
             };
-            for byte in &bytes[..count] {
-                if let Some(Ok(packet)) = self.decoder.push(*byte)
+            self.rest.extend(&bytes[..count]);
+            while let Some(byte) = self.rest.pop_front() {
+                if let Some(Ok(packet)) = self.decoder.push(byte)
                     && let Some(found) = wanted(&packet)
                 {
                     return found;
@@ -146,23 +151,20 @@ fn receive_frame(camera: &mut TcpStream) -> (FrameHeader, Vec<u8>) {
 /// Homes, goes to the far focus, exposes far and near; gives both frames.
 fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
     let mut client = Client::open(&program.port);
-    let homed = client.carry_out(&Request::Home { axis: Axis::SensorCoarse });
-    assert!(matches!(homed, EventKind::Homed { .. }), "{homed:?}");
-    let target = Nanometres(5_821_300);
-    let moved = client.carry_out(&Request::Move { axis: Axis::SensorCoarse, target });
-    assert!(matches!(moved, EventKind::MoveDone { .. }), "{moved:?}");
+    for axis in [Axis::SensorCoarse, Axis::Lens] {
+        let homed = client.carry_out(&Request::Home { axis, silence: SILENCE });
+        assert!(matches!(homed, EventKind::Homed { .. }), "{homed:?}");
+    }
+    for (axis, target) in [(Axis::SensorCoarse, 5_821_300), (Axis::Lens, 1_000)] {
+        let moved = client.carry_out(&go(axis, target));
+        assert!(matches!(moved, EventKind::MoveDone { .. }), "{moved:?}");
+    }
     for (index, target) in [(0, 10_000), (1, 166_270)] {
-        let shot = Shot {
-            axis: Axis::SensorFine,
-            target: Nanometres(target),
-            exposure: Micros(5_000),
-            settle_window: Nanometres(50),
-            settle_dwell: Micros(2_000),
-            repeat: 1,
-        };
+        let shot = fine_shot(target, 5_000, 50, 2_000);
         assert_eq!(client.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
     }
-    let done = client.carry_out(&Request::RunProgram { shots: 2 });
+    assert_eq!(client.ask(&Request::ArmProgram { shots: 2 }), Ok(Response::Accepted));
+    let done = client.carry_out(&Request::RunProgram { silence: SILENCE });
     assert!(matches!(done, EventKind::ProgramDone { exposures: 2, .. }), "{done:?}");
     // The frames have waited for us.
     let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
@@ -222,7 +224,10 @@ fn garbage_comes_first_and_the_port_goes_away_in_mid_move() {
     std::fs::write(&faults, "garbage = [1, 255, 0, 66, 7]\nunplug_after_ms = 1000\n").expect("can write");
     let program = Program::start(&["--faults", faults.to_str().expect("text")]);
     let mut client = Client::open(&program.port);
-    assert_eq!(client.ask(&Request::Home { axis: Axis::SensorCoarse }), Ok(Response::Accepted));
+    assert_eq!(
+        client.ask(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE }),
+        Ok(Response::Accepted)
+    );
     let deadline = Instant::now() + PATIENCE;
     let mut bytes = [0; 64];
     let gone = loop {

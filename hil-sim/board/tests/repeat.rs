@@ -2,11 +2,8 @@
 
 mod common;
 
-use common::Bench;
-use farnear_protocol::{
-    Micros, Nanometres, Request, Response,
-    message::{Axis, Shot},
-};
+use common::{Bench, fine_shot};
+use farnear_protocol::{Nanometres, message::Axis};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene};
 use farnear_sim::{eye::Eye, rig::RigConfig};
 
@@ -29,18 +26,8 @@ fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
     let mut bench = Bench::with(&config);
     bench.home();
     bench.move_to(Axis::SensorCoarse, Nanometres(5_821_300));
-    for (index, target) in [(0, 10_000), (1, 166_270)] {
-        let shot = Shot {
-            axis: Axis::SensorFine,
-            target: Nanometres(target),
-            exposure: Micros(2_000),
-            settle_window: Nanometres(50),
-            settle_dwell: Micros(2_000),
-            repeat: 1,
-        };
-        assert_eq!(bench.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
-    }
-    bench.carry_out(&Request::RunProgram { shots: 2 });
+    bench.arm(&[10_000, 166_270].map(|target| fine_shot(target, 2_000, 50, 2_000)));
+    bench.run();
     let lens = Lens::from_optics(&OpticsFile::parse(OPTICS).expect("optics")).expect("a lens");
     let scene: Scene = "plane:900".parse().expect("a scene");
     let psf: Psf = "gaussian:k=0.4578".parse().expect("a PSF");

@@ -1,16 +1,21 @@
-//! Resets: each has its cause and the next boot number, and nobody acts on requests of an earlier boot.
+//! Resets: each has its cause and the next boot number, nobody acts on requests of an earlier boot, and what was grave
+//! enough to reset the board is an alarm that stays until somebody has read and cleared it.
 
 mod common;
 
-use common::{Bench, request_frame};
-use farnear_protocol::{EventKind, Request, RequestError, Response, message::ResetCause};
+use common::{Bench, go, request_frame};
+use farnear_protocol::{
+    EventKind, Request, RequestError,
+    message::{Alarm, Axis, PositionState, ResetCause},
+};
+use farnear_sim::Hands;
 
 /// TIM5, which keeps the firmware's time.
 const TIM5_CR1: u64 = 0x4000_0c00;
 
 fn check_boot(bench: &mut Bench, boot: u32, cause: ResetCause) {
-    let started = bench.events.last().expect("the board says that it started");
-    assert_eq!(started.kind, EventKind::Started { cause });
+    let started = bench.events.iter().rev().find(|event| matches!(event.kind, EventKind::Started { .. }));
+    assert_eq!(started.expect("the board says that it started").kind, EventKind::Started { cause });
     let hello = bench.say_hello();
     assert_eq!((hello.boot, hello.reset_cause), (boot, cause));
 }
@@ -26,32 +31,91 @@ fn reboot_counts_up_and_its_repeat_is_refused() {
     bench.rig.settle().expect("runs");
     assert_eq!(bench.answers(), [(id, Err(RequestError::Boot { current: 2 }))]);
     assert_eq!(bench.report().resets, 1);
+    assert_eq!(bench.alarm(), None, "nothing went wrong");
 }
 
 #[test]
 fn the_reset_button_is_told_from_a_request() {
     let mut bench = Bench::new(1);
-    bench.home();
-    bench.rig.reach_in(|hands| hands.press_reset()).expect("runs");
+    bench.home_axis(Axis::SensorCoarse);
+    // The motor has come to rest, and the memory knows.
+    bench.rig.advance_us(200_000).expect("runs");
+    bench.hands(|hands| hands.press_reset());
     bench.settle();
     check_boot(&mut bench, 2, ResetCause::Pin);
-    assert_eq!(bench.status().coarse.state, farnear_protocol::message::PositionState::Unknown);
+    assert_eq!(bench.status().coarse.state, PositionState::Unknown);
+    assert_eq!(bench.alarm(), None, "it stood still");
+}
+
+/// Something resets the board; the alarm that names it survives further resets and is cleared only by its number.
+fn leaves_an_alarm(
+    happen: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static,
+    cause: ResetCause,
+    alarm: Alarm,
+) {
+    let mut bench = Bench::new(1);
+    bench.hands(happen);
+    // The watchdog bites within 0.19 s.
+    bench.rig.advance_us(250_000).expect("runs");
+    bench.settle();
+    check_boot(&mut bench, 2, cause);
+    let latched = bench.alarm().expect("an alarm is latched");
+    assert_eq!((latched.alarm, latched.boot), (alarm, 2));
+    let refused = RequestError::Alarm { number: latched.number, alarm };
+    assert_eq!(bench.ask(&go(Axis::SensorFine, 50_000)), Err(refused));
+
+    bench.hands(|hands| hands.press_reset());
+    bench.settle();
+    check_boot(&mut bench, 3, ResetCause::Pin);
+    assert_eq!(bench.alarm(), Some(latched), "it survives a reset");
+    bench.hands(|hands| hands.set_power(false));
+    bench.rig.advance_us(100_000).expect("runs");
+    assert!(!bench.report().powered);
+    bench.hands(|hands| hands.set_power(true));
+    bench.settle();
+    check_boot(&mut bench, 4, ResetCause::PowerOn);
+    assert_eq!(bench.alarm(), Some(latched), "and a loss of power");
+
+    let wrong = bench.ask(&Request::ClearAlarm { number: latched.number + 1 });
+    assert!(matches!(wrong, Err(RequestError::NoSuchAlarm { .. })), "{wrong:?}");
+    bench.clear(|latched| *latched == alarm);
+    bench.hands(|hands| hands.press_reset());
+    bench.settle();
+    check_boot(&mut bench, 5, ResetCause::Pin);
+    assert_eq!(bench.alarm(), None, "what was cleared stays so");
 }
 
 #[test]
 fn the_watchdog_resets_a_firmware_whose_clock_has_died() {
-    let mut bench = Bench::new(1);
     // A stray write stops the timer that wakes the control loop.
-    bench.rig.reach_in(|hands| hands.write_register(TIM5_CR1, 0)).expect("runs");
-    let before = bench.report().now_ns;
-    bench.rig.advance_us(250_000).expect("runs");
-    bench.settle();
-    check_boot(&mut bench, 2, ResetCause::Watchdog);
-    assert_eq!(bench.report().resets, 1);
-    let stamps = bench.events.last().expect("started").time.0;
-    println!(
-        "the watchdog bit within {} ms, started at {stamps} us of its own time",
-        (bench.report().now_ns - before) / 1_000_000
+    leaves_an_alarm(|hands| hands.write_register(TIM5_CR1, 0), ResetCause::Watchdog, Alarm::Watchdog);
+}
+
+#[test]
+fn a_brown_out_is_told() {
+    leaves_an_alarm(|hands| hands.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
+}
+
+/// Lets the program's next step be this code, as a stray pointer in the right place would.
+fn astray(code: &'static [u16], alarm: Alarm) {
+    let mut bench = Bench::new(1);
+    let resets = bench.report().resets;
+    let task = bench.variable("__embassy_main");
+    assert!(
+        bench.peek(move |hands| hands.lead_astray(task, code)),
+        "the task's function is found and replaced"
     );
-    assert_eq!(bench.ask(&Request::Stop), Ok(Response::Accepted));
+    for _ in 0..100 {
+        bench.rig.advance_us(100).expect("runs");
+    }
+    bench.settle();
+    assert_eq!(bench.report().resets, resets + 1);
+    check_boot(&mut bench, 2, ResetCause::Software);
+    bench.clear(|latched| *latched == alarm);
+}
+
+#[test]
+fn a_fault_of_the_program_is_told() {
+    // UDF: an instruction that is none.
+    astray(&[0xde00], Alarm::Panic);
 }

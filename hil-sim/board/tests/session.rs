@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::Bench;
+use common::{Bench, SILENCE, go};
 use farnear_protocol::{
     EventKind, Nanometres, Request, RequestError,
-    message::{Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
+    message::{Alarm, Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
 };
-use farnear_sim::board::SpiChip;
+use farnear_sim::{board::SpiChip, plant::StageName};
 
 #[test]
 fn hello_tells_who_the_board_is() {
@@ -22,7 +22,7 @@ fn hello_tells_who_the_board_is() {
 #[test]
 fn homing_finds_the_edge_and_moves_reach_their_target() {
     let mut bench = Bench::new(1);
-    let refused = bench.ask(&Request::Move { axis: Axis::SensorCoarse, target: Nanometres(0) });
+    let refused = bench.ask(&go(Axis::SensorCoarse, 0));
     assert!(
         matches!(refused, Err(RequestError::NotHomed { state: PositionState::Unknown, .. })),
         "{refused:?}"
@@ -32,7 +32,7 @@ fn homing_finds_the_edge_and_moves_reach_their_target() {
         let end = bench.move_to(Axis::SensorCoarse, Nanometres(target));
         let EventKind::MoveDone { measured, .. } = end else { panic!("{end:?}") };
         assert!((measured.0 - target).abs() <= 200, "{measured:?}: within a microstep and an encoder count");
-        let off_um = bench.report().coarse_um - 1e-3 * f64::from(target);
+        let off_um = bench.report().coarse.position_um - 1e-3 * f64::from(target);
         // The screw's data sheet (2 um), the home switch (3 SD = 0.9 um) and the resolution of switch and steps.
         assert!(off_um.abs() < 3.2, "truly {off_um} um beside {target} nm");
     }
@@ -42,7 +42,10 @@ fn homing_finds_the_edge_and_moves_reach_their_target() {
 fn a_stall_is_seen_and_loses_the_position() {
     let mut bench = Bench::new(3);
     bench.home();
-    bench.rig.reach_in(|hands| hands.plant(|plant| plant.screw_mut().set_stalled(true))).expect("runs");
+    bench
+        .rig
+        .reach_in(|hands| hands.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true)))
+        .expect("runs");
     let end = bench.move_to(Axis::SensorCoarse, Nanometres(2_000_000));
     assert!(
         matches!(end, EventKind::Failed { reason: Failure::Following { .. }, .. }),
@@ -56,9 +59,9 @@ fn a_home_switch_that_never_closes_ends_the_search() {
     let mut bench = Bench::new(4);
     bench
         .rig
-        .reach_in(|hands| hands.plant(|plant| plant.screw_mut().set_stuck_home(Some(false))))
+        .reach_in(|hands| hands.plant(|plant| plant.stage_mut(StageName::Sensor).set_stuck_home(Some(false))))
         .expect("runs");
-    let end = bench.carry_out(&Request::Home { axis: Axis::SensorCoarse });
+    let end = bench.carry_out(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE });
     // The carriage runs against its end stop, which the encoder notices first.
     assert!(
         matches!(
@@ -72,7 +75,7 @@ fn a_home_switch_that_never_closes_ends_the_search() {
 #[test]
 fn a_cut_gauge_and_a_dead_drive_end_a_fine_move() {
     let mut bench = Bench::new(6);
-    let go = |target| Request::Move { axis: Axis::SensorFine, target: Nanometres(target) };
+    let go = |target| go(Axis::SensorFine, target);
     // The gauge's code passes through every pattern of bits on the way, none of which may look like a cut wire.
     for target in [20_000, 121_071, 121_072, 121_073, 180_000] {
         let end = bench.carry_out(&go(target));
@@ -82,6 +85,7 @@ fn a_cut_gauge_and_a_dead_drive_end_a_fine_move() {
     let end = bench.carry_out(&go(50_000));
     assert!(matches!(end, EventKind::Failed { reason: Failure::Gauge, .. }), "{end:?}");
     bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Gauge, false)).expect("runs");
+    bench.clear(|alarm| *alarm == Alarm::Gauge);
     let end = bench.carry_out(&go(50_000));
     assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
     bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Dac, true)).expect("runs");

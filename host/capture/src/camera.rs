@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use farnear_protocol::message::ShotRecord;
+use farnear_protocol::message::{ShotRecord, TriggerMode};
+use farnear_protocol::units::Micros;
 use ndarray::Array2;
 
 pub mod folder;
@@ -26,8 +27,12 @@ pub trait Camera {
     /// What it is, for a capture's record: the same for each camera of the kind, without address or path.
     fn kind(&self) -> &'static str;
 
-    /// Makes ready for triggers: images from before do not count.
-    fn arm(&mut self) -> Result<(), CameraError>;
+    /// Makes ready for exposures that come about like this: images from before do not count. A camera that runs freely
+    /// takes pictures of this exposure until it is armed again.
+    fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError>;
+
+    /// Triggers the camera by its own means, once, now.
+    fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError>;
 
     /// The image of this exposure, waiting at most `wait` for it. Called for each exposure, in order; after
     /// [`CameraError::Late`] it may be called for the same exposure again.
@@ -60,6 +65,14 @@ pub enum CameraError {
         address: String,
         /// What is wrong.
         reason: String,
+    },
+    /// The camera knows no such trigger.
+    #[error("a camera of the kind `{camera}` cannot be triggered by {mode}; use hardware triggers")]
+    Trigger {
+        /// The camera's kind.
+        camera: &'static str,
+        /// How it was to be triggered.
+        mode: &'static str,
     },
     /// Nothing came in time.
     #[error("the camera gave no image of exposure {trigger_number} within {waited:?} ({camera})")]

@@ -1,156 +1,212 @@
-//! A session with a board: requests that are answered or fail, and events without a gap.
+//! A handle of a board: requests that are answered or fail, and streams of what the board says by itself.
 //!
 //! A request is sent with an id and the board's boot number and sent again, byte for byte, until its answer
-//! comes; the board acts once per id. Events carry running numbers; a gap is filled with
-//! [`Request::ReadEvent`]. Garbage between frames is skipped. See `docs/protocol.md`.
+//! comes; the board acts once per id. Handles can be cloned and used from any thread; one thread owns the port and sends
+//! one request after the other. A handle belongs to one session: after a reset or an unplugging every
+//! request gives [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`] says that this is understood,
+//! for the rig may have lost its position. See `docs/protocol.md`.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use farnear_protocol::frame::{Kind, Packet};
-use farnear_protocol::message::{EventKind, Hello, Status};
-use farnear_protocol::{Event, Request, RequestError, Response};
+use farnear_protocol::message::{Hello, Status};
+use farnear_protocol::{Request, Response};
 
 use crate::error::ClientError;
-use crate::handshake::shake_hands;
-use crate::link::Link;
+use crate::owner::{Command, Connect, Listener, Owner, Session, nonsense};
+use crate::stream::{LogPart, News, Stream};
 use crate::timing::Timing;
 use crate::transport::{SerialTransport, Transport};
 
-/// Longest single wait for an event, so that an interruption by the user is seen soon.
-const SLICE: Duration = Duration::from_millis(100);
-/// An event further ahead of the due one cannot come from a sane board, whose memory is smaller.
-const AHEAD_MAX: u32 = 4096;
+/// From one attempt to reach a board that restarts to the next.
+const NEXT_ATTEMPT: Duration = Duration::from_millis(50);
 
-/// A session with a board.
+/// A handle of a board.
+#[derive(Clone)]
 pub struct Client {
-    link: Link,
-    version: u8,
-    hello: Hello,
-    timing: Timing,
-    events: Events,
+    port: Arc<Port>,
+    session: Session,
     interrupt: Option<Arc<AtomicBool>>,
 }
 
-/// The events of one boot, in order.
-#[derive(Default)]
-struct Events {
-    boot: u32,
-    /// Number of the event that is to be given out next.
-    due: u32,
-    /// What has arrived and was not given out.
-    arrived: BTreeMap<u32, Event>,
+/// The way to the thread that owns the port; the thread ends with the last handle.
+struct Port {
+    name: String,
+    timing: Arc<Mutex<Timing>>,
+    inbox: Option<Sender<Command>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        drop(self.inbox.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // it never panics; what it still had to send is sent now
+        }
+    }
 }
 
 impl Client {
-    /// Opens a serial port and says hello.
+    /// Opens a serial port and says hello. Once the board was there, the port is opened again whenever it comes back.
     pub fn open(port: &str) -> Result<Self, ClientError> {
-        Self::connect(Box::new(SerialTransport::open(port)?), port)
+        Self::start(serial(port), port, false)
     }
 
     /// As [`Client::open`], where the board is known to be emulated: hello is asked as patiently as all else, so
     /// that a slow computer does not ask it twice, which would make the run another one.
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
-        Self::start(Box::new(SerialTransport::open(port)?), port, true)
+        Self::start(serial(port), port, true)
     }
 
-    /// Says hello over any transport. `port` is its name in messages.
+    /// Says hello over any transport, which is not opened again. `port` is its name in messages.
     pub fn connect(transport: Box<dyn Transport>, port: &str) -> Result<Self, ClientError> {
-        Self::start(transport, port, false)
+        let mut only = Some(transport);
+        let name = port.to_owned();
+        let connect = move || {
+            only.take().ok_or_else(|| crate::PortError::Absent { port: name.clone(), present: Vec::new() })
+        };
+        Self::start(Box::new(connect), port, false)
     }
 
-    fn start(transport: Box<dyn Transport>, port: &str, emulated: bool) -> Result<Self, ClientError> {
-        let mut link = Link::new(transport, port);
-        let (hello, version) = shake_hands(&mut link, emulated)?;
-        let timing = if hello.emulated { Timing::EMULATED } else { Timing::REAL };
-        let events = Events { boot: hello.boot, ..Events::default() };
-        let mut client = Self { link, version, hello, timing, events, interrupt: None };
-        client.join_events()?;
-        Ok(client)
+    /// Says hello over what `connect` opens, the first time and whenever the line broke.
+    pub fn connect_by(connect: Connect, port: &str) -> Result<Self, ClientError> {
+        Self::start(connect, port, false)
     }
 
-    /// Says hello anew, after a reset of the board for instance. Events that were not read are forgotten.
+    fn start(connect: Connect, port: &str, emulated: bool) -> Result<Self, ClientError> {
+        let (inbox, commands) = channel();
+        let timing = Arc::new(Mutex::new(Timing::REAL));
+        let choose = |hello: &Hello| {
+            if hello.emulated {
+                *timing.lock().unwrap_or_else(PoisonError::into_inner) = Timing::EMULATED;
+            }
+            Arc::clone(&timing)
+        };
+        let owner = Owner::start(connect, port, emulated, choose, commands)?;
+        let session = owner.session();
+        let thread = std::thread::spawn(move || owner.run());
+        let port = Port { name: port.into(), timing, inbox: Some(inbox), thread: Some(thread) };
+        Ok(Self { port: Arc::new(port), session, interrupt: None })
+    }
+
+    /// Goes on with a board after it was reset or unplugged: says hello if that has not happened yet. What was moving is
+    /// at rest and not homed, whatever it was before.
+    ///
+    /// # Errors
+    /// [`ClientError`] where the board is not there (yet): it may be tried again.
     pub fn reopen(&mut self) -> Result<(), ClientError> {
-        (self.hello, self.version) = shake_hands(&mut self.link, self.hello.emulated)?;
-        self.events = Events { boot: self.hello.boot, ..Events::default() };
-        self.join_events()
+        let (answer, joined) = sync_channel(1);
+        self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
+        self.session = joined.recv().map_err(|_| self.ended("saying hello"))??;
+        Ok(())
     }
 
-    /// Events count from now on.
-    fn join_events(&mut self) -> Result<(), ClientError> {
-        let due = self.status()?.next_event;
-        self.events.due = due;
-        self.events.arrived.retain(|number, _| *number >= due);
-        Ok(())
+    /// As [`Client::reopen`], tried again for at most `allowed`.
+    ///
+    /// # Errors
+    /// The last error, when time is up.
+    pub fn reopen_within(&mut self, allowed: Duration) -> Result<(), ClientError> {
+        let until = Instant::now() + allowed;
+        loop {
+            match self.reopen() {
+                Ok(()) => return Ok(()),
+                Err(error) if Instant::now() >= until || self.interrupted() => return Err(error),
+                Err(_) => std::thread::sleep(NEXT_ATTEMPT),
+            }
+        }
     }
 
     /// Who the board is.
     pub fn hello(&self) -> &Hello {
-        &self.hello
+        &self.session.hello
     }
 
     /// The protocol version of this session.
     pub fn protocol(&self) -> u8 {
-        self.version
+        self.session.version
+    }
+
+    /// What is to be said about the firmware's version, where it is another than this program's. Both speak the same
+    /// protocol all the same.
+    pub fn firmware_note(&self) -> Option<String> {
+        let (theirs, ours) = (self.hello().firmware.as_str(), env!("CARGO_PKG_VERSION"));
+        (theirs != ours).then(|| {
+            format!(
+                "the board's firmware is version {theirs}, this program {ours}; they speak the same protocol, but consider \
+                 flashing the firmware that belongs to it (`cargo xtask firmware`)"
+            )
+        })
     }
 
     /// Name of the port.
     pub fn port(&self) -> &str {
-        self.link.port()
+        &self.port.name
     }
 
     /// The waiting times in use.
     pub fn timing(&self) -> Timing {
-        self.timing
+        *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Uses other waiting times, for a test or an unusual line.
-    pub fn set_timing(&mut self, timing: Timing) {
-        self.timing = timing;
+    /// Uses other waiting times, for a test or an unusual line; for all handles.
+    pub fn set_timing(&self, timing: Timing) {
+        *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner) = timing;
     }
 
     /// Once this flag becomes true, waiting for work ends: the board is told to stop and
-    /// [`ClientError::Interrupted`] is returned.
+    /// [`ClientError::Interrupted`] is returned. Handles cloned from now on share it.
     pub fn interrupt_by(&mut self, flag: Arc<AtomicBool>) {
         self.interrupt = Some(flag);
     }
 
-    pub(crate) fn interrupted(&self) -> bool {
+    /// Whether the user interrupted.
+    pub fn interrupted(&self) -> bool {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
-    }
-
-    /// The flag of [`Client::interrupt_by`].
-    pub(crate) fn interrupt_flag(&self) -> Option<Arc<AtomicBool>> {
-        self.interrupt.clone()
     }
 
     /// Sends a request until its answer comes. `during` says what for, e.g. "homing". Gives the request's id,
     /// which events will name.
-    pub fn request(&mut self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
-        let waits = vec![self.timing.reply; self.timing.retries as usize + 1];
-        let address = (self.version, self.hello.boot);
-        let events = &mut self.events;
-        let (id, packet) =
-            self.link.ask(address, request, &waits, during, &mut |packet| events.take(packet, during))?;
-        let unreadable = || ClientError::Nonsense {
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn request(&self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
+        self.ask(request, during, None)
+    }
+
+    pub(crate) fn ask(
+        &self,
+        request: &Request,
+        during: &str,
+        listener: Option<Listener>,
+    ) -> Result<(u32, Response), ClientError> {
+        let (answer, answered) = sync_channel(1);
+        let command = Command::Ask {
+            session: self.session.number,
+            request: Box::new(request.clone()),
             during: during.into(),
-            answer: format!("{:?} {:02x?}", packet.header.kind, packet.body.as_slice()),
+            listener,
+            answer,
         };
-        if packet.header.kind == Kind::Response {
-            return Ok((id, packet.message().ok_or_else(unreadable)?));
+        self.command(command, during)?;
+        answered.recv().map_err(|_| self.ended(during))?
+    }
+
+    /// Asks for something that is done at once.
+    pub(crate) fn expect_accepted(&self, request: &Request, during: &str) -> Result<(), ClientError> {
+        match self.request(request, during)? {
+            (_, Response::Accepted) => Ok(()),
+            (_, other) => Err(nonsense(during, &other)),
         }
-        Err(match packet.message().ok_or_else(unreadable)? {
-            RequestError::Boot { current } => {
-                ClientError::Reset { during: during.into(), was: self.hello.boot, now: current, cause: None }
-            }
-            error => ClientError::Refused { during: during.into(), error },
-        })
     }
 
     /// How the board is.
-    pub fn status(&mut self) -> Result<Status, ClientError> {
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn status(&self) -> Result<Status, ClientError> {
         let during = "reading the status";
         match self.request(&Request::Status, during)? {
             (_, Response::Status(status)) => Ok(status),
@@ -158,90 +214,38 @@ impl Client {
         }
     }
 
-    /// The next event, waiting at most `wait` for it; `None` where none came, or the user interrupted.
-    pub fn next_event(&mut self, wait: Duration, during: &str) -> Result<Option<(u32, Event)>, ClientError> {
-        let until = Instant::now() + wait;
-        loop {
-            if let Some(event) = self.events.pop() {
-                return Ok(Some(event));
-            }
-            if !self.events.arrived.is_empty() {
-                self.fetch_due_event(during)?;
-                continue;
-            }
-            let now = Instant::now();
-            if now >= until || self.interrupted() {
-                return Ok(None);
-            }
-            if let Some(packet) = self.link.receive(until.min(now + SLICE), during)?
-                && packet.header.kind == Kind::Event
-            {
-                self.events.take(&packet, during)?;
-            }
-        }
+    /// The board's events from now on, those after a reset or an unplugging too.
+    ///
+    /// # Errors
+    /// [`ClientError::Gone`] where the port's owner has ended.
+    pub fn events(&self) -> Result<Stream<News>, ClientError> {
+        let (sender, stream) = Stream::new();
+        self.command(Command::Events(sender), "listening")?;
+        Ok(stream)
     }
 
-    /// Whether an event lies ready.
-    pub(crate) fn has_event_waiting(&self) -> bool {
-        !self.events.arrived.is_empty()
+    /// The board's log from now on: pieces of its defmt stream, to be decoded with the firmware's ELF file.
+    ///
+    /// # Errors
+    /// [`ClientError::Gone`] where the port's owner has ended.
+    pub fn logs(&self) -> Result<Stream<LogPart>, ClientError> {
+        let (sender, stream) = Stream::new();
+        self.command(Command::Logs(sender), "listening")?;
+        Ok(stream)
     }
 
-    /// Number of the event that is due next.
-    pub(crate) fn due_event(&self) -> u32 {
-        self.events.due
+    fn command(&self, command: Command, during: &str) -> Result<(), ClientError> {
+        let inbox = self.port.inbox.as_ref().ok_or_else(|| self.ended(during))?;
+        inbox.send(command).map_err(|_| self.ended(during))
     }
 
-    /// Asks the board for the due event, which did not arrive by itself.
-    pub(crate) fn fetch_due_event(&mut self, during: &str) -> Result<(), ClientError> {
-        let number = self.events.due;
-        match self.request(&Request::ReadEvent { number }, during) {
-            Ok((_, Response::Event(event))) => {
-                self.events.arrived.insert(number, event);
-                Ok(())
-            }
-            Ok((_, other)) => Err(nonsense(during, &other)),
-            Err(ClientError::Refused { error: RequestError::EventGone { oldest, .. }, .. }) => {
-                Err(ClientError::EventsLost {
-                    during: during.into(),
-                    from: number,
-                    to: oldest.saturating_sub(1).max(number),
-                })
-            }
-            Err(error) => Err(error),
-        }
+    pub(crate) fn ended(&self, during: &str) -> ClientError {
+        let source = Arc::new(std::io::Error::other("the port's owner has ended"));
+        ClientError::Gone { port: self.port().into(), during: during.into(), source }
     }
 }
 
-impl Events {
-    /// Keeps an event, unless it is old. An event of another boot means that the board was reset.
-    fn take(&mut self, packet: &Packet, during: &str) -> Result<(), ClientError> {
-        let event = packet.message::<Event>();
-        if packet.header.boot != self.boot {
-            let cause = match event {
-                Some(Event { kind: EventKind::Started { cause }, .. }) => Some(cause),
-                _ => None,
-            };
-            let (was, now) = (self.boot, packet.header.boot);
-            return Err(ClientError::Reset { during: during.into(), was, now, cause });
-        }
-        let event = event.ok_or_else(|| ClientError::Nonsense {
-            during: during.into(),
-            answer: format!("event {:02x?}", packet.body.as_slice()),
-        })?;
-        if packet.header.id.wrapping_sub(self.due) < AHEAD_MAX {
-            self.arrived.insert(packet.header.id, event);
-        }
-        Ok(())
-    }
-
-    fn pop(&mut self) -> Option<(u32, Event)> {
-        let event = self.arrived.remove(&self.due)?;
-        self.due += 1;
-        Some((self.due - 1, event))
-    }
-}
-
-/// An answer that is none to what was asked.
-pub(crate) fn nonsense(during: &str, response: &Response) -> ClientError {
-    ClientError::Nonsense { during: during.into(), answer: format!("{response:?}") }
+fn serial(port: &str) -> Connect {
+    let port = port.to_owned();
+    Box::new(move || Ok(Box::new(SerialTransport::open(&port)?) as Box<dyn Transport>))
 }

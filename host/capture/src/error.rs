@@ -1,13 +1,15 @@
 //! What can go wrong between this program and the rig, each with what was seen and what to do.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use farnear_protocol::message::{Axis, Failure, RequestError, ResetCause};
+use farnear_protocol::RequestError;
+use farnear_protocol::message::{AlarmRecord, Axis, Failure, ResetCause};
 
 use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
 
 /// The port could not be opened.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum PortError {
     /// There is no such port.
     #[error("there is no port {port}; {}", present_ports(present))]
@@ -57,20 +59,23 @@ fn present_ports(present: &[String]) -> String {
 }
 
 /// A conversation with a board failed.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum ClientError {
     /// The port could not be opened.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The port broke off: unplugged, or the program behind it ended.
-    #[error("port {port} went away while {during}; plug the board in again and check its cable ({source})")]
+    #[error(
+        "port {port} went away while {during}; plug the board in again and check its cable ({source}); what was moving is \
+         stopped by the board's own deadline for this program's silence"
+    )]
     Gone {
         /// The port.
         port: String,
         /// What was being done.
         during: String,
         /// What the system says.
-        source: std::io::Error,
+        source: Arc<std::io::Error>,
     },
     /// No answer came in time, however often it was asked.
     #[error(
@@ -141,7 +146,8 @@ pub enum ClientError {
     },
     /// The board started anew in mid-session.
     #[error(
-        "the board was reset while {during} (boot {was} became {now}{}); positions are unknown until it is homed again",
+        "the board was reset while {during} (boot {was} became {now}{}); what was under way is interrupted, and positions \
+         are unknown until it is homed again",
         cause.map(|cause| format!(", cause: {}", cause_name(cause))).unwrap_or_default()
     )]
     Reset {
@@ -155,7 +161,7 @@ pub enum ClientError {
         cause: Option<ResetCause>,
     },
     /// Long work ended early.
-    #[error("{during} failed{}: {}", axis.map(|axis| format!(" on the {}", axis_name(axis))).unwrap_or_default(), failure_text(*reason))]
+    #[error("{during} failed{}: {}", axis.map(|axis| format!(" on the {}", axis_name(axis))).unwrap_or_default(), failure_text(*reason, alarm.as_ref()))]
     Failed {
         /// What was being done.
         during: String,
@@ -163,6 +169,8 @@ pub enum ClientError {
         axis: Option<Axis>,
         /// The board's reason.
         reason: Failure,
+        /// The alarm that it names.
+        alarm: Option<AlarmRecord>,
     },
     /// The work took longer than it possibly should; the board was told to stop.
     #[error("{during} did not end within {allowed:?}; the rig was told to stop")]
@@ -188,6 +196,17 @@ pub enum ClientError {
         /// What was being done.
         during: String,
     },
+    /// More shots than the board's program can hold.
+    #[error("a program of {shots} shots, the board can hold {max}; use repeats, or run it in parts")]
+    TooManyShots {
+        /// How many.
+        shots: usize,
+        /// What the board can hold.
+        max: u8,
+    },
+    /// No program was armed.
+    #[error("no exposure program is armed")]
+    NotArmed,
     /// The user interrupted; the board was told to stop.
     #[error("interrupted while {during}; the rig was stopped")]
     Interrupted {

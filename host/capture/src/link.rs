@@ -3,6 +3,7 @@
 //! Knows no session: which boot and version a request carries, and what an event means, is the caller's.
 
 use std::io::{self, ErrorKind};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use farnear_protocol::Request;
@@ -45,19 +46,26 @@ impl Link {
         }
     }
 
+    /// Goes on over another transport, after the first broke. Request ids go on counting.
+    pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
+        self.transport = transport;
+        self.decoder = Decoder::new();
+        self.unread = 0..0;
+    }
+
     pub(crate) fn port(&self) -> &str {
         &self.port
     }
 
     /// Sends a request at most `waits.len()` times, the same bytes each time, and gives its id and the frame
-    /// that answers it. Events that come meanwhile go to `on_event`.
+    /// that answers it. Events and log frames that come meanwhile go to `on_other`.
     pub(crate) fn ask(
         &mut self,
         (version, boot): (u8, u32),
         request: &Request,
         waits: &[Duration],
         during: &str,
-        on_event: &mut dyn FnMut(&Packet) -> Result<(), ClientError>,
+        on_other: &mut dyn FnMut(&Packet) -> Result<(), ClientError>,
     ) -> Result<(u32, Packet), ClientError> {
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1).max(1);
@@ -78,7 +86,7 @@ impl Link {
             while let Some(packet) = self.receive(until, during)? {
                 match packet.header.kind {
                     Kind::Response | Kind::Error if packet.header.id == id => return Ok((id, packet)),
-                    Kind::Event => on_event(&packet)?,
+                    Kind::Event | Kind::Log => on_other(&packet)?,
                     // The late answer to an earlier attempt.
                     Kind::Response | Kind::Error | Kind::Request => {}
                 }
@@ -143,6 +151,6 @@ impl Link {
     }
 
     fn gone(&self, source: io::Error, during: &str) -> ClientError {
-        ClientError::Gone { port: self.port.clone(), during: during.into(), source }
+        ClientError::Gone { port: self.port.clone(), during: during.into(), source: Arc::new(source) }
     }
 }

@@ -1,20 +1,19 @@
 //! Taking a pair: home where needed, bring the coarse stage near, expose far and near by piezo.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use farnear_protocol::message::{Axis, PositionState, Shot, ShotRecord};
+use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
 use farnear_protocol::units::{Micros, Nanometres};
 
-use crate::camera::{Camera, CameraError, Image};
+use crate::camera::{Camera, Image};
 use crate::client::Client;
-use crate::describe::{state_name, um};
-use crate::error::ClientError;
-use crate::plan::{PlanError, SensorPair, approach_for, coarse_for, fine_for};
+use crate::describe::um;
+use crate::expose::{expose, sensor_mm};
+use crate::plan::{SensorPair, coarse_for, fine_for};
+use crate::ready::{base_nm, base_when_homed_nm, ensure_homed};
 use crate::work::Moved;
 
-/// Longest single wait for an image, so that an interruption by the user is seen soon.
-const SLICE: Duration = Duration::from_millis(200);
+pub use crate::expose::CaptureError;
 
 /// How the exposures are taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -75,57 +74,24 @@ impl Pair {
     }
 }
 
-/// A pair could not be taken.
-#[derive(Debug, thiserror::Error)]
-pub enum CaptureError {
-    /// The board, or the way to it.
-    #[error(transparent)]
-    Board(#[from] ClientError),
-    /// The rig does not reach that far.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// The camera.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// The two images do not belong together.
-    #[error(
-        "the far image has {far_width}x{far_height} pixels of {far_bits} bits, the near one {near_width}x{near_height} of {near_bits}"
-    )]
-    Unlike {
-        /// Width of the far image.
-        far_width: usize,
-        /// Height of the far image.
-        far_height: usize,
-        /// Bits of the far image.
-        far_bits: u8,
-        /// Width of the near image.
-        near_width: usize,
-        /// Height of the near image.
-        near_height: usize,
-        /// Bits of the near image.
-        near_bits: u8,
-    },
-    /// The board ended the program with another number of exposures than two.
-    #[error("the board told of {told} exposures where two were asked for")]
-    Count {
-        /// How many.
-        told: usize,
-    },
-}
-
 /// Takes a pair. `say` is told in words what is being done.
 pub fn capture_pair(
-    client: &mut Client,
+    client: &Client,
     camera: &mut dyn Camera,
     sensor: &SensorPair,
     exposures: &Exposures,
     say: &mut dyn FnMut(&str),
 ) -> Result<Pair, CaptureError> {
     let limits = client.hello().limits;
-    let target = coarse_for(sensor, &limits)?;
-    let coarse = bring_coarse_to(client, target, say)?;
-    let fine_far = fine_for(sensor.far_mm, coarse.measured, &limits)?;
-    let fine_near = fine_for(sensor.near_mm, coarse.measured, &limits)?;
+    // Before anything moves: what the stage cannot reach is said at once.
+    coarse_for(sensor, base_when_homed_nm(client, &client.status()?), &limits)?;
+    ensure_homed(client, say)?;
+    let base = base_nm(client, &client.status()?);
+    let target = coarse_for(sensor, base, &limits)?;
+    say(&format!("moving the coarse stage to {:.3} um", um(target)));
+    let coarse = client.move_to(Axis::SensorCoarse, target)?;
+    let fine_far = fine_for(sensor.far_mm, base, coarse.measured, &limits)?;
+    let fine_near = fine_for(sensor.near_mm, base, coarse.measured, &limits)?;
     let shot = |target| Shot {
         axis: Axis::SensorFine,
         target,
@@ -133,23 +99,23 @@ pub fn capture_pair(
         settle_window: exposures.settle_window,
         settle_dwell: exposures.settle_dwell,
         repeat: 1,
+        mode: TriggerMode::Hardware,
     };
     say(&format!("exposing far (piezo at {:.3} um) and near ({:.3} um)", um(fine_far), um(fine_near)));
-    camera.arm()?;
     let mut asked = [sensor.far_mm, sensor.near_mm].into_iter();
     let mut taken = Vec::new();
-    let interrupt = client.interrupt_flag();
-    client.run_program(&[shot(fine_far), shot(fine_near)], |record| -> Result<(), CaptureError> {
-        let image = wait_for_image(camera, record, exposures.image_wait, interrupt.as_deref())?;
+    let shots = [shot(fine_far), shot(fine_near)];
+    expose(client, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
         if let Some(sensor_asked_mm) = asked.next() {
-            let measured = i64::from(limits.datum.0) + i64::from(record.coarse.0) + i64::from(record.fine.0);
-            let sensor_measured_mm = measured as f64 / 1e6;
-            taken.push(Taken { image, sensor_asked_mm, sensor_measured_mm, record: *record });
+            let sensor_measured_mm = sensor_mm(&record, &limits);
+            taken.push(Taken { image, sensor_asked_mm, sensor_measured_mm, record });
         }
         Ok(())
     })?;
     let told = taken.len();
-    let Ok([far, near]) = <[Taken; 2]>::try_from(taken) else { return Err(CaptureError::Count { told }) };
+    let Ok([far, near]) = <[Taken; 2]>::try_from(taken) else {
+        return Err(CaptureError::Count { told, asked: 2 });
+    };
     if far.image.pixels.dim() != near.image.pixels.dim() || far.image.bits != near.image.bits {
         let ((far_height, far_width), (near_height, near_width)) =
             (far.image.pixels.dim(), near.image.pixels.dim());
@@ -164,47 +130,4 @@ pub fn capture_pair(
         });
     }
     Ok(Pair { far, near, coarse })
-}
-
-fn wait_for_image(
-    camera: &mut dyn Camera,
-    record: &ShotRecord,
-    allowed: Duration,
-    interrupt: Option<&AtomicBool>,
-) -> Result<Image, CaptureError> {
-    let until = Instant::now() + allowed;
-    loop {
-        let left = until.saturating_duration_since(Instant::now());
-        match camera.image(record, left.min(SLICE)) {
-            Err(CameraError::Late { camera, trigger_number, .. }) => {
-                if interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-                    let during = "waiting for the camera's image".into();
-                    return Err(ClientError::Interrupted { during }.into());
-                }
-                if Instant::now() >= until {
-                    return Err(CameraError::Late { camera, trigger_number, waited: allowed }.into());
-                }
-            }
-            result => return Ok(result?),
-        }
-    }
-}
-
-/// Homes the coarse stage unless it is homed, and moves it, from the home side, to `target`.
-fn bring_coarse_to(
-    client: &mut Client,
-    target: Nanometres,
-    say: &mut dyn FnMut(&str),
-) -> Result<Moved, ClientError> {
-    let state = client.status()?.coarse.state;
-    if state != PositionState::Homed {
-        say(&format!("homing the stage (its position is {})", state_name(state)));
-        client.home(Axis::SensorCoarse)?;
-    }
-    let limits = client.hello().limits;
-    if let Some(before) = approach_for(target, &client.status()?, &limits) {
-        client.move_to(Axis::SensorCoarse, before)?;
-    }
-    say(&format!("moving the coarse stage to {:.3} um", um(target)));
-    client.move_to(Axis::SensorCoarse, target)
 }

@@ -1,15 +1,12 @@
 //! Where the axes go for a pair of images.
 //!
-//! `sensor distance = datum + coarse + fine`. The coarse stage is put where both sensor distances lie inside the
+//! `sensor distance = datum + coarse + fine + lens`. The lens stage stays where it is; datum and lens together are the
+//! *base*, the sensor distance with both axes of stage A at 0. The coarse stage is put where both sensor distances lie inside the
 //! piezo's range, in its middle; the piezo then makes up for what the coarse stage is off, and toggles between
 //! the two in milliseconds. Lengths in nanometres unless a name says otherwise.
 
-use farnear_protocol::message::{Limits, Status};
+use farnear_protocol::message::Limits;
 use farnear_protocol::units::Nanometres;
-
-/// The coarse stage is always approached from the home side, from at least this far: its screw has about 4 um
-/// of backlash, which the encoder on the motor does not see.
-const APPROACH: i32 = 20_000;
 
 /// Sensor distances of a pair from the lens' principal plane, in millimetres.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -73,10 +70,9 @@ fn um(nm: impl Into<i64>) -> f64 {
 
 /// Where the coarse stage goes for a pair: the whole number of its steps that puts the pair nearest to the middle
 /// of the piezo's range.
-pub fn coarse_for(pair: &SensorPair, limits: &Limits) -> Result<Nanometres, PlanError> {
+pub fn coarse_for(pair: &SensorPair, base_nm: i64, limits: &Limits) -> Result<Nanometres, PlanError> {
     let (fine_min, fine_max) = (i64::from(limits.fine_min.0), i64::from(limits.fine_max.0));
     let (coarse_min, coarse_max) = (i64::from(limits.coarse_min.0), i64::from(limits.coarse_max.0));
-    let datum = i64::from(limits.datum.0);
     // Half a step to either side is what rounding to whole steps may cost.
     let step_nm = f64::from(limits.coarse_step_pm.max(1)) / 1e3;
     let travel = nm(pair.near_mm - pair.far_mm);
@@ -84,20 +80,25 @@ pub fn coarse_for(pair: &SensorPair, limits: &Limits) -> Result<Nanometres, Plan
         return Err(PlanError::Travel { travel_um: um(travel), piezo_um: um(fine_max - fine_min) });
     }
     for sensor_mm in [pair.far_mm, pair.near_mm] {
-        let (min, max) = (datum + coarse_min + fine_min, datum + coarse_max + fine_max);
+        let (min, max) = (base_nm + coarse_min + fine_min, base_nm + coarse_max + fine_max);
         if !(min..=max).contains(&nm(sensor_mm)) {
             return Err(PlanError::Reach { sensor_mm, min_mm: min as f64 / 1e6, max_mm: max as f64 / 1e6 });
         }
     }
     let middle = (nm(pair.far_mm) + nm(pair.near_mm)) / 2;
-    let wanted = (middle - datum - (fine_min + fine_max) / 2).clamp(coarse_min, coarse_max);
+    let wanted = (middle - base_nm - (fine_min + fine_max) / 2).clamp(coarse_min, coarse_max);
     let whole_steps = (wanted as f64 / step_nm).round() * step_nm;
     Ok(Nanometres((whole_steps.round() as i64).clamp(coarse_min, coarse_max) as i32))
 }
 
 /// Where the piezo goes for one sensor distance, with the coarse stage where its encoder says it is.
-pub fn fine_for(sensor_mm: f64, coarse: Nanometres, limits: &Limits) -> Result<Nanometres, PlanError> {
-    let fine = nm(sensor_mm) - i64::from(limits.datum.0) - i64::from(coarse.0);
+pub fn fine_for(
+    sensor_mm: f64,
+    base_nm: i64,
+    coarse: Nanometres,
+    limits: &Limits,
+) -> Result<Nanometres, PlanError> {
+    let fine = nm(sensor_mm) - base_nm - i64::from(coarse.0);
     if !(i64::from(limits.fine_min.0)..=i64::from(limits.fine_max.0)).contains(&fine) {
         return Err(PlanError::CoarseOff {
             coarse_um: um(coarse.0),
@@ -109,18 +110,13 @@ pub fn fine_for(sensor_mm: f64, coarse: Nanometres, limits: &Limits) -> Result<N
     Ok(Nanometres(fine as i32))
 }
 
-/// Where the coarse stage goes first, so that it comes to `target` from the home side; `None` where it does
-/// anyway.
-pub fn approach_for(target: Nanometres, status: &Status, limits: &Limits) -> Option<Nanometres> {
-    let before = target.0.saturating_sub(APPROACH).max(limits.coarse_min.0);
-    (status.coarse.measured.0 > before).then_some(Nanometres(before))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use farnear_protocol::units::Micros;
     use proptest::prelude::*;
+
+    const BASE: i64 = 47_000_000;
 
     fn limits() -> Limits {
         Limits {
@@ -130,30 +126,45 @@ mod tests {
             coarse_step_pm: 156_250,
             fine_min: Nanometres(5_000),
             fine_max: Nanometres(195_000),
-            shots_max: 16,
+            shots_max: 64,
             exposure_min: Micros(20),
             exposure_max: Micros(1_000_000),
+            lens_min: Nanometres(0),
+            lens_max: Nanometres(12_000_000),
+            lens_step_pm: 156_250,
+            distance_min: Nanometres(46_000_000),
+            silence_min: Micros(100_000),
+            silence_max: Micros(60_000_000),
+            row_pixels_max: 1024,
         }
     }
 
     #[test]
     fn the_pair_of_the_50_mm_lens_lies_in_the_middle_of_the_piezo() {
         let pair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
-        let coarse = coarse_for(&pair, &limits()).unwrap();
-        let far = fine_for(pair.far_mm, coarse, &limits()).unwrap();
-        let near = fine_for(pair.near_mm, coarse, &limits()).unwrap();
+        let coarse = coarse_for(&pair, BASE, &limits()).unwrap();
+        let far = fine_for(pair.far_mm, BASE, coarse, &limits()).unwrap();
+        let near = fine_for(pair.near_mm, BASE, coarse, &limits()).unwrap();
         assert_eq!(near.0 - far.0, 156_200);
         // Middle of the two and middle of the piezo's range agree to a step.
         assert!(((far.0 + near.0) / 2 - 100_000).abs() <= 157, "{far:?} {near:?}");
     }
 
     #[test]
+    fn a_lens_stage_that_stands_further_out_brings_the_sensor_in() {
+        let pair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
+        let coarse = coarse_for(&pair, BASE, &limits()).unwrap();
+        let with_lens = coarse_for(&pair, BASE + 1_000_000, &limits()).unwrap();
+        assert_eq!(coarse.0 - with_lens.0, 1_000_000);
+    }
+
+    #[test]
     fn what_cannot_be_reached_is_said() {
         let wide = SensorPair { far_mm: 52.0, near_mm: 52.2 };
-        assert!(matches!(coarse_for(&wide, &limits()), Err(PlanError::Travel { .. })));
+        assert!(matches!(coarse_for(&wide, BASE, &limits()), Err(PlanError::Travel { .. })));
         let long = SensorPair { far_mm: 75.0, near_mm: 75.1 };
-        assert!(matches!(coarse_for(&long, &limits()), Err(PlanError::Reach { .. })));
-        let off = fine_for(52.0, Nanometres(6_000_000), &limits()).unwrap_err();
+        assert!(matches!(coarse_for(&long, BASE, &limits()), Err(PlanError::Reach { .. })));
+        let off = fine_for(52.0, BASE, Nanometres(6_000_000), &limits()).unwrap_err();
         assert!(off.to_string().contains("-1000.000 um"), "{off}");
     }
 
@@ -162,10 +173,10 @@ mod tests {
         #[test]
         fn every_pair_in_reach_is_reached(far in 47.1..59.9f64, travel in 0.001..0.185f64, off in -2_000..2_000i32) {
             let pair = SensorPair { far_mm: far, near_mm: far + travel };
-            let coarse = coarse_for(&pair, &limits()).unwrap();
+            let coarse = coarse_for(&pair, BASE, &limits()).unwrap();
             let stands = Nanometres(coarse.0 + off);
             for sensor_mm in [pair.far_mm, pair.near_mm] {
-                let fine = fine_for(sensor_mm, stands, &limits()).unwrap();
+                let fine = fine_for(sensor_mm, BASE, stands, &limits()).unwrap();
                 let reached = 47_000_000 + stands.0 + fine.0;
                 prop_assert!((f64::from(reached) / 1e6 - sensor_mm).abs() < 1e-6);
             }

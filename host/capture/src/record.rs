@@ -1,23 +1,26 @@
-//! A capture folder: `far.png`, `near.png` and `capture.toml`, which says how they came about.
+//! A capture folder: `far.png`, `near.png`, or the images of a sequence, and `capture.toml`, which says how they came about.
 //!
 //! The folder appears whole or not at all. From an emulated rig it holds no clock time, port or random number:
 //! the same scene and seed give the same bytes.
 
 use std::path::Path;
 
-use farnear_protocol::message::{Hello, SCHEMA_KEY};
+use farnear_protocol::message::{Axis, Hello, SCHEMA_KEY, ShotRecord};
 use serde::{Deserialize, Serialize};
 
 use crate::aside::{Aside, AsideError};
+use crate::camera::Image;
 use crate::client::Client;
-use crate::describe::{cause_name, um};
+use crate::describe::{cause_name, trigger_name, um};
+use crate::expose::sensor_mm;
 use crate::image_file::{ImageError, encode_png};
 use crate::pair::{Pair, Taken};
+use crate::sequence::SequenceShot;
 
 /// Name of the record in a capture folder.
 pub const CAPTURE_FILE: &str = "capture.toml";
 /// Version of the record's layout.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// The content of `capture.toml`.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
@@ -31,7 +34,7 @@ pub struct CaptureRecord {
     pub time: Option<String>,
     /// Datum and coarse stage.
     pub stage: StageRecord,
-    /// The two exposures, far first.
+    /// The exposures; of a pair far first.
     pub exposure: Vec<ExposureRecord>,
     /// The camera.
     pub camera: CameraRecord,
@@ -41,20 +44,26 @@ pub struct CaptureRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationRecord>,
     /// The optics file, as it was given.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub optics: toml::Table,
 }
 
 /// Where the stage stood.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct StageRecord {
-    /// Sensor distance at coarse 0 and fine 0.
+    /// Sensor distance with all axes at 0.
     pub datum_mm: f64,
-    /// Where the coarse stage was sent.
-    pub coarse_asked_um: f64,
+    /// Where the lens stage's encoder said it was.
+    #[serde(default)]
+    pub lens_measured_um: f64,
+    /// Where the coarse stage was sent for a pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coarse_asked_um: Option<f64>,
     /// Where its encoder said it came to.
     pub coarse_measured_um: f64,
-    /// Board time for both settled moves and both images, without the exposures.
-    pub moving_us: u64,
+    /// Board time for both settled moves and both images of a pair, without the exposures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving_us: Option<u64>,
 }
 
 /// One exposure. Times are the board's, since its reset.
@@ -62,16 +71,30 @@ pub struct StageRecord {
 pub struct ExposureRecord {
     /// The image file.
     pub image: String,
-    /// Sensor distance the optics ask for.
-    pub sensor_asked_mm: f64,
-    /// Sensor distance by encoder and gauge.
+    /// Sensor distance the optics ask for, in a pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor_asked_mm: Option<f64>,
+    /// Sensor distance by encoders and gauge.
     pub sensor_measured_mm: f64,
-    /// Where the piezo was sent.
-    pub fine_asked_um: f64,
+    /// The axis that was moved, in a sequence: `coarse`, `fine` or `lens`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<String>,
+    /// Where it was sent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asked_um: Option<f64>,
+    /// Where the piezo was sent, in a pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fine_asked_um: Option<f64>,
     /// Where its gauge said it was.
     pub fine_measured_um: f64,
     /// Where the coarse stage's encoder said it was.
     pub coarse_measured_um: f64,
+    /// Where the lens stage's encoder said it was, in a sequence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens_measured_um: Option<f64>,
+    /// How the exposure came about, in a sequence: `hardware`, `software` or `free-running`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub triggered_by: Option<String>,
     /// From the start of the move until it was settled.
     pub settle_us: u32,
     /// Length of the exposure.
@@ -144,7 +167,7 @@ pub struct Circumstances {
     pub camera: &'static str,
     /// What was simulated.
     pub simulation: Option<SimulationRecord>,
-    /// The optics file.
+    /// The optics file; empty where none was given.
     pub optics: toml::Table,
 }
 
@@ -172,20 +195,64 @@ pub enum RecordError {
 
 /// The record of a pair.
 pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> CaptureRecord {
+    let stage = StageRecord {
+        datum_mm: um(client.hello().limits.datum) / 1000.0,
+        lens_measured_um: um(pair.far.record.lens),
+        coarse_asked_um: Some(um(pair.coarse.asked)),
+        coarse_measured_um: um(pair.coarse.measured),
+        moving_us: Some(pair.moving_us()),
+    };
+    let exposure = vec![pair_exposure("far.png", &pair.far), pair_exposure("near.png", &pair.near)];
+    record(client, circumstances, stage, exposure, &pair.far.image)
+}
+
+/// The record of a sequence, `None` where it has no images.
+pub fn record_of_sequence(
+    shots: &[SequenceShot],
+    client: &Client,
+    circumstances: Circumstances,
+) -> Option<CaptureRecord> {
+    let (first, limits) = (shots.first()?, &client.hello().limits);
+    let stage = StageRecord {
+        datum_mm: um(limits.datum) / 1000.0,
+        lens_measured_um: um(first.record.lens),
+        coarse_asked_um: None,
+        coarse_measured_um: um(first.record.coarse),
+        moving_us: None,
+    };
+    let exposure = shots.iter().map(|shot| {
+        let axis = match shot.record.axis {
+            Axis::SensorCoarse => "coarse",
+            Axis::SensorFine => "fine",
+            Axis::Lens => "lens",
+        };
+        ExposureRecord {
+            axis: Some(axis.into()),
+            asked_um: Some(um(shot.record.asked)),
+            lens_measured_um: Some(um(shot.record.lens)),
+            triggered_by: Some(trigger_name(shot.mode).into()),
+            ..exposure_record(&shot.name, &shot.record, sensor_mm(&shot.record, limits))
+        }
+    });
+    Some(record(client, circumstances, stage, exposure.collect(), &first.image))
+}
+
+fn record(
+    client: &Client,
+    circumstances: Circumstances,
+    stage: StageRecord,
+    exposure: Vec<ExposureRecord>,
+    image: &Image,
+) -> CaptureRecord {
     let hello: &Hello = client.hello();
-    let (height, width) = pair.far.image.pixels.dim();
+    let (height, width) = image.pixels.dim();
     CaptureRecord {
         format: FORMAT,
         made_by: circumstances.made_by,
         time: circumstances.time,
-        stage: StageRecord {
-            datum_mm: um(hello.limits.datum) / 1000.0,
-            coarse_asked_um: um(pair.coarse.asked),
-            coarse_measured_um: um(pair.coarse.measured),
-            moving_us: pair.moving_us(),
-        },
-        exposure: vec![exposure_record("far.png", &pair.far), exposure_record("near.png", &pair.near)],
-        camera: CameraRecord { kind: circumstances.camera.into(), width, height, bits: pair.far.image.bits },
+        stage,
+        exposure,
+        camera: CameraRecord { kind: circumstances.camera.into(), width, height, bits: image.bits },
         board: BoardRecord {
             name: hello.board.as_str().into(),
             firmware: hello.firmware.as_str().into(),
@@ -201,15 +268,26 @@ pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> 
     }
 }
 
-fn exposure_record(name: &str, taken: &Taken) -> ExposureRecord {
-    let record = &taken.record;
+fn pair_exposure(name: &str, taken: &Taken) -> ExposureRecord {
+    ExposureRecord {
+        sensor_asked_mm: Some(taken.sensor_asked_mm),
+        fine_asked_um: Some(um(taken.record.asked)),
+        ..exposure_record(name, &taken.record, taken.sensor_measured_mm)
+    }
+}
+
+fn exposure_record(name: &str, record: &ShotRecord, sensor_measured_mm: f64) -> ExposureRecord {
     ExposureRecord {
         image: name.into(),
-        sensor_asked_mm: taken.sensor_asked_mm,
-        sensor_measured_mm: taken.sensor_measured_mm,
-        fine_asked_um: um(record.asked),
+        sensor_asked_mm: None,
+        sensor_measured_mm,
+        axis: None,
+        asked_um: None,
+        fine_asked_um: None,
         fine_measured_um: um(record.fine),
         coarse_measured_um: um(record.coarse),
+        lens_measured_um: None,
+        triggered_by: None,
         settle_us: record.settle.0,
         exposure_us: record.exposure.0,
         trigger_number: record.trigger_number,
@@ -226,7 +304,24 @@ pub fn begin_folder(folder: &Path) -> Result<Aside, RecordError> {
 
 /// Writes pair and record into the folder and puts it in place.
 pub fn finish_folder(aside: Aside, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
-    for (name, image) in [("far.png", &pair.far.image), ("near.png", &pair.near.image)] {
+    finish_with(aside, [("far.png", &pair.far.image), ("near.png", &pair.near.image)], record)
+}
+
+/// Writes a sequence's images and record into the folder and puts it in place.
+pub fn finish_sequence(
+    aside: Aside,
+    shots: &[SequenceShot],
+    record: &CaptureRecord,
+) -> Result<(), RecordError> {
+    finish_with(aside, shots.iter().map(|shot| (shot.name.as_str(), &shot.image)), record)
+}
+
+fn finish_with<'a>(
+    aside: Aside,
+    images: impl IntoIterator<Item = (&'a str, &'a Image)>,
+    record: &CaptureRecord,
+) -> Result<(), RecordError> {
+    for (name, image) in images {
         let png = encode_png(image.pixels.view(), image.bits)
             .map_err(|reason| ImageError::Write { path: aside.path(name), reason })?;
         aside.write(name, &png)?;

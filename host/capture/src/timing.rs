@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use farnear_protocol::message::{Limits, Shot};
+use farnear_protocol::message::{Axis, Limits, Routine, Shot, Status, TriggerMode};
 
 /// The slowest coarse speed a healthy rig has; a third of its usual 6.25 mm/s.
 const SLOWEST_COARSE_NM_PER_S: u64 = 2_000_000;
@@ -14,6 +14,9 @@ const SLOWEST_COARSE_NM_PER_S: u64 = 2_000_000;
 const SETTLE: Duration = Duration::from_secs(2);
 /// Homing approaches the switch a second time, slowly, over less than a millimetre.
 const SLOW_APPROACH: Duration = Duration::from_secs(10);
+
+/// How long the board waits for an exposure that it does not trigger, and more.
+const FOREIGN_TRIGGER: Duration = Duration::from_secs(10);
 
 /// Waiting times of a session.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -28,6 +31,9 @@ pub struct Timing {
     pub work_factor: u32,
     /// What is added to every wait for work.
     pub work_slack: Duration,
+    /// How long the board goes on with work of which the host has died, in the board's time. It asks after half of it,
+    /// and the host answers as long as somebody holds the work.
+    pub silence: Duration,
 }
 
 impl Timing {
@@ -38,6 +44,7 @@ impl Timing {
         poll: Duration::from_millis(500),
         work_factor: 1,
         work_slack: Duration::from_secs(1),
+        silence: Duration::from_secs(2),
     };
 
     /// For the emulated board, also on a crowded machine.
@@ -47,6 +54,8 @@ impl Timing {
         poll: Duration::from_secs(10),
         work_factor: 10,
         work_slack: Duration::from_secs(20),
+        // Longer: its time may run faster than this computer's, which may be slow to answer.
+        silence: Duration::from_secs(10),
     };
 
     /// The host's wait for work that takes the board `work`.
@@ -55,28 +64,61 @@ impl Timing {
     }
 }
 
-/// Longest time a healthy board takes to home the coarse axis.
-pub fn homing_time(limits: &Limits) -> Duration {
-    travel_time(u64::from(limits.coarse_max.0.abs_diff(limits.coarse_min.0))) + SLOW_APPROACH
+/// Longest time a healthy board takes to home an axis.
+pub fn homing_time(axis: Axis, limits: &Limits) -> Duration {
+    travel_time(travel(axis, limits)) + SLOW_APPROACH
 }
 
-/// Longest time a healthy board takes for a move over this many nanometres on the coarse axis; the piezo is
+/// Longest time a healthy board takes for a move over this many nanometres on a stepper's axis; the piezo is
 /// faster.
 pub fn move_time(distance_nm: u64) -> Duration {
-    travel_time(distance_nm) + SETTLE
+    // Twice for a backlash that is taken out: beyond the target and back.
+    travel_time(distance_nm) + 2 * SETTLE
 }
 
-/// Longest time a healthy board takes for an exposure program whose coarse moves add up to this distance.
-pub fn program_time(shots: &[Shot], coarse_distance_nm: u64) -> Duration {
-    let exposures: Duration = shots
+/// Longest time a healthy board takes for an exposure program.
+pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
+    let (mut coarse, mut lens) = (status.coarse.measured, status.lens.measured);
+    shots
         .iter()
         .map(|shot| {
+            let way = match shot.axis {
+                Axis::SensorCoarse => std::mem::replace(&mut coarse, shot.target).0.abs_diff(shot.target.0),
+                Axis::Lens => std::mem::replace(&mut lens, shot.target).0.abs_diff(shot.target.0),
+                Axis::SensorFine => 0,
+            };
             let exposure = Duration::from_micros(u64::from(shot.exposure.0));
+            let trigger = match shot.mode {
+                TriggerMode::Hardware => Duration::ZERO,
+                // The camera is given this long to begin by itself, or the host to trigger it.
+                TriggerMode::Software | TriggerMode::FreeRunning => FOREIGN_TRIGGER,
+            };
             // The camera reads a picture out before it can take the next one.
-            SETTLE + (exposure + Duration::from_millis(100)) * u32::from(shot.repeat)
+            let once = exposure + Duration::from_millis(100) + trigger;
+            move_time(u64::from(way)) + once * u32::from(shot.repeat)
         })
-        .sum();
-    exposures + travel_time(coarse_distance_nm)
+        .sum()
+}
+
+/// Longest time a healthy board takes for a calibration routine, homing included.
+pub fn calibration_time(routine: Routine, limits: &Limits) -> Duration {
+    match routine {
+        Routine::Travel { axis } => {
+            homing_time(axis, limits) + travel_time(4 * travel(axis, limits)) + SLOW_APPROACH
+        }
+        Routine::Backlash { axis } => homing_time(axis, limits) + 6 * SLOW_APPROACH,
+        // A sweep up and down, and creep over a decade of time.
+        Routine::Piezo => Duration::from_secs(60),
+    }
+}
+
+fn travel(axis: Axis, limits: &Limits) -> u64 {
+    let (min, max) = match axis {
+        Axis::SensorCoarse => (limits.coarse_min, limits.coarse_max),
+        Axis::SensorFine => (limits.fine_min, limits.fine_max),
+        Axis::Lens => (limits.lens_min, limits.lens_max),
+    };
+    u64::from(max.0.abs_diff(min.0))
 }
 
 fn travel_time(distance_nm: u64) -> Duration {
@@ -89,8 +131,8 @@ mod tests {
 
     #[test]
     fn the_wait_grows_with_the_way() {
-        assert_eq!(move_time(0), SETTLE);
-        assert_eq!(move_time(13_000_000), SETTLE + Duration::from_millis(6_500));
+        assert_eq!(move_time(0), 2 * SETTLE);
+        assert_eq!(move_time(13_000_000), 2 * SETTLE + Duration::from_millis(6_500));
         assert!(Timing::EMULATED.allowance(SETTLE) > Timing::REAL.allowance(SETTLE));
     }
 }

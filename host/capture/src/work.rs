@@ -1,21 +1,28 @@
-//! Long work: homing, moves and exposure programs, from the request to the event that ends it.
+//! Long work: homing, moves, exposure programs and calibrations, from the request to the event that ends it.
 //!
-//! Every wait has a deadline computed from the work ([`crate::timing`]); at the deadline, and when the user
-//! interrupts, the board is told to stop before the error is returned.
+//! A [`Work`] is held by whoever wants it done: as long as it lives, the board's question whether anybody is still there
+//! is answered; dropped before its end it stops the rig, and a program that dies leaves the board to its own deadline
+//! ([`crate::Timing::silence`]). Every wait has a deadline computed from the work ([`crate::timing`]); at the deadline,
+//! and when the user interrupts, the board is told to stop before the error is returned.
 
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use farnear_protocol::message::{Axis, EventKind, Shot, ShotRecord};
-use farnear_protocol::units::Nanometres;
-use farnear_protocol::{Event, Request, Response};
+use farnear_protocol::message::{
+    AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotRecord,
+};
+use farnear_protocol::units::{Micros, Nanometres};
+use farnear_protocol::{Request, Response};
 
-use crate::client::{Client, nonsense};
-use crate::describe::{axis_name, um};
+use crate::client::Client;
+use crate::describe::{axis_name, routine_name, um};
 use crate::error::ClientError;
-use crate::timing::{homing_time, move_time, program_time};
+use crate::owner::{Listener, Note, nonsense};
+use crate::timing::{calibration_time, homing_time, move_time, program_time};
 
-/// Longest wait for a reset board to answer again.
-const RESTART: Duration = Duration::from_secs(5);
+/// Longest single wait for an event, so that an interruption by the user is seen soon.
+const SLICE: Duration = Duration::from_millis(50);
 
 /// How a move ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -26,186 +33,336 @@ pub struct Moved {
     pub measured: Nanometres,
 }
 
-impl Client {
-    /// Homes an axis. Gives how far the encoder's old zero was from the new one.
-    pub fn home(&mut self, axis: Axis) -> Result<Nanometres, ClientError> {
-        let during = format!("homing the {}", axis_name(axis));
-        let work = homing_time(&self.hello().limits);
-        match self.carry_out(&Request::Home { axis }, work, &during, &mut |_| Ok(()))? {
-            EventKind::Homed { shift, .. } => Ok(shift),
-            other => Err(wrong_end(&during, &other)),
+/// Work that the board has taken on.
+pub struct Work {
+    client: Client,
+    id: u32,
+    during: String,
+    notes: Receiver<Note>,
+    /// What the owner of the port holds weakly.
+    _held: Arc<()>,
+    allowed: Duration,
+    /// What is left of it.
+    left: Duration,
+    /// A program that stands still takes no time.
+    paused: bool,
+    alarm: Option<AlarmRecord>,
+    over: bool,
+}
+
+/// What work says.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Step {
+    /// Something on the way, such as an exposure that was taken.
+    Event(EventKind),
+    /// Its end.
+    Done(EventKind),
+}
+
+impl Work {
+    /// Number of the request, by which events name it.
+    pub fn id(&self) -> u32 {
+        self.id
+    }
+
+    /// The next event, waiting at most `wait`; `None` where none came. Time between two calls does not count as
+    /// the board's.
+    ///
+    /// # Errors
+    /// [`ClientError`]; the work is over then.
+    pub fn step_within(&mut self, wait: Duration) -> Result<Option<Step>, ClientError> {
+        let until = Instant::now() + wait;
+        loop {
+            if self.client.interrupted() {
+                return Err(self.stop_with(ClientError::Interrupted { during: self.during.clone() }));
+            }
+            let begin = Instant::now();
+            let slice = SLICE.min(until.saturating_duration_since(begin)).min(self.left);
+            let note = self.notes.recv_timeout(slice);
+            if !self.paused {
+                self.left = self.left.saturating_sub(begin.elapsed());
+            }
+            match note {
+                Ok(note) => return self.take(note).map(Some),
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.over = true;
+                    return Err(self.client.ended(&self.during));
+                }
+                Err(RecvTimeoutError::Timeout) if self.left.is_zero() => {
+                    let (during, allowed) = (self.during.clone(), self.allowed);
+                    return Err(self.stop_with(ClientError::Overdue { during, allowed }));
+                }
+                Err(RecvTimeoutError::Timeout) if Instant::now() >= until => return Ok(None),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
         }
     }
 
-    /// Moves an axis to an absolute position.
-    pub fn move_to(&mut self, axis: Axis, target: Nanometres) -> Result<Moved, ClientError> {
-        let during = format!("moving the {} to {:.3} um", axis_name(axis), um(target));
-        let status = self.status()?;
-        let distance = match axis {
-            Axis::SensorCoarse => status.coarse.measured.0.abs_diff(target.0),
-            Axis::SensorFine => 0,
-        };
-        let work = move_time(u64::from(distance));
-        match self.carry_out(&Request::Move { axis, target }, work, &during, &mut |_| Ok(()))? {
+    /// The next event, however long it takes; the work's own deadline holds.
+    ///
+    /// # Errors
+    /// [`ClientError`]; the work is over then.
+    pub fn step(&mut self) -> Result<Step, ClientError> {
+        loop {
+            if let Some(step) = self.step_within(Duration::from_secs(3600))? {
+                return Ok(step);
+            }
+        }
+    }
+
+    /// Waits for the end.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn wait(mut self) -> Result<EventKind, ClientError> {
+        loop {
+            if let Step::Done(kind) = self.step()? {
+                return Ok(kind);
+            }
+        }
+    }
+
+    /// Waits for the end of a move.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn moved(self) -> Result<Moved, ClientError> {
+        let during = self.during.clone();
+        match self.wait()? {
             EventKind::MoveDone { asked, measured, .. } => Ok(Moved { asked, measured }),
             other => Err(wrong_end(&during, &other)),
         }
     }
 
-    /// Stops all motion and ends a running program.
-    pub fn stop(&mut self) -> Result<(), ClientError> {
-        self.expect_accepted(&Request::Stop, "stopping").map(|_| ())
+    /// Waits for the end of a homing. Gives how far the encoder's old zero was from the new one.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn homed(self) -> Result<Nanometres, ClientError> {
+        let during = self.during.clone();
+        match self.wait()? {
+            EventKind::Homed { shift, .. } => Ok(shift),
+            other => Err(wrong_end(&during, &other)),
+        }
     }
 
-    /// Loads and runs an exposure program. `on_shot` is called for each exposure as soon as the board tells of
-    /// it; an error from it stops the board and is returned.
+    fn take(&mut self, note: Note) -> Result<Step, ClientError> {
+        let during = || self.during.clone();
+        let kind = match note {
+            Note::Event(kind) => kind,
+            Note::Broken(broken) => {
+                self.over = true;
+                return Err(broken.error(self.client.port(), &self.during));
+            }
+            Note::EventsLost { from, to } => {
+                let error = ClientError::EventsLost { during: during(), from, to };
+                return Err(self.stop_with(error));
+            }
+            Note::NoEnd => {
+                self.over = true;
+                return Err(ClientError::NoEnd { during: during() });
+            }
+        };
+        match kind {
+            EventKind::Failed { axis, reason, .. } => {
+                self.over = true;
+                Err(ClientError::Failed { during: during(), axis, reason, alarm: self.alarm_of(reason) })
+            }
+            EventKind::Homed { .. }
+            | EventKind::MoveDone { .. }
+            | EventKind::ProgramDone { .. }
+            | EventKind::Calibrated { .. } => {
+                self.over = true;
+                Ok(Step::Done(kind))
+            }
+            kind => {
+                self.paused = matches!(kind, EventKind::Paused { .. });
+                if let EventKind::Alarm(record) = kind {
+                    self.alarm = Some(record);
+                }
+                Ok(Step::Event(kind))
+            }
+        }
+    }
+
+    /// What the alarm is that a failure names: from the event that came before, else from the board's list.
+    fn alarm_of(&self, reason: Failure) -> Option<AlarmRecord> {
+        let Failure::Alarm { number } = reason else { return self.alarm };
+        self.alarm.filter(|record| record.number == number).or_else(|| self.client.alarm(number).ok())
+    }
+
+    fn stop_with(&mut self, error: ClientError) -> ClientError {
+        self.over = true;
+        match self.client.stop() {
+            Ok(()) => error,
+            Err(failed) => failed,
+        }
+    }
+}
+
+impl Drop for Work {
+    fn drop(&mut self) {
+        if !self.over {
+            // Whoever gave the work up is on the way out with an error of their own; the board has its deadline.
+            let _ = self.client.stop();
+        }
+    }
+}
+
+impl Client {
+    fn start_work(&self, request: &Request, work: Duration, during: String) -> Result<Work, ClientError> {
+        if self.interrupted() {
+            return Err(ClientError::Interrupted { during });
+        }
+        let ((notes, receiver), held) = (channel(), Arc::new(()));
+        let listener = Listener { notes, held: Arc::downgrade(&held) };
+        let (id, response) = self.ask(request, &during, Some(listener))?;
+        if response != Response::Accepted {
+            return Err(nonsense(&during, &response));
+        }
+        let allowed = self.timing().allowance(work);
+        Ok(Work {
+            client: self.clone(),
+            id,
+            during,
+            notes: receiver,
+            _held: held,
+            allowed,
+            left: allowed,
+            paused: false,
+            alarm: None,
+            over: false,
+        })
+    }
+
+    fn silence(&self) -> Micros {
+        let limits = &self.hello().limits;
+        let asked = Micros(u32::try_from(self.timing().silence.as_micros()).unwrap_or(u32::MAX));
+        asked.max(limits.silence_min).min(limits.silence_max)
+    }
+
+    /// Begins to home an axis; another one may be homed or moved at the same time.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
+        let during = format!("homing the {}", axis_name(axis));
+        let work = homing_time(axis, &self.hello().limits);
+        self.start_work(&Request::Home { axis, silence: self.silence() }, work, during)
+    }
+
+    /// Homes an axis. Gives how far the encoder's old zero was from the new one.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn home(&self, axis: Axis) -> Result<Nanometres, ClientError> {
+        self.start_home(axis)?.homed()
+    }
+
+    /// Begins to move an axis to an absolute position; another one may move at the same time.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
+        let during = format!("moving the {} to {:.3} um", axis_name(axis), um(target));
+        let status = self.status()?;
+        let distance = match axis {
+            Axis::SensorCoarse => status.coarse.measured.0.abs_diff(target.0),
+            Axis::SensorFine => 0,
+            Axis::Lens => status.lens.measured.0.abs_diff(target.0),
+        };
+        let work = move_time(u64::from(distance));
+        self.start_work(&Request::Move { axis, target, silence: self.silence() }, work, during)
+    }
+
+    /// Moves an axis to an absolute position.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn move_to(&self, axis: Axis, target: Nanometres) -> Result<Moved, ClientError> {
+        self.start_move(axis, target)?.moved()
+    }
+
+    /// Lets the board measure its own mechanics.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn calibrate(&self, routine: Routine) -> Result<Calibration, ClientError> {
+        let during = format!("measuring the {}", routine_name(routine));
+        let work = calibration_time(routine, &self.hello().limits);
+        let request = Request::Calibrate { routine, silence: self.silence() };
+        match self.start_work(&request, work, during.clone())?.wait()? {
+            EventKind::Calibrated { result, .. } => Ok(result),
+            other => Err(wrong_end(&during, &other)),
+        }
+    }
+
+    /// Loads shots into the board's program and arms it: the board checks all of them. It stays armed for any number of
+    /// runs.
+    ///
+    /// # Errors
+    /// [`ClientError`]; [`ClientError::TooManyShots`] before anything is loaded.
+    pub fn arm(&self, shots: &[Shot]) -> Result<(), ClientError> {
+        let max = self.hello().limits.shots_max;
+        let Some(count) = u8::try_from(shots.len()).ok().filter(|count| *count <= max) else {
+            return Err(ClientError::TooManyShots { shots: shots.len(), max });
+        };
+        for (index, shot) in (0..count).zip(shots) {
+            let request = Request::LoadShot { index, shot: *shot };
+            self.expect_accepted(&request, &format!("loading shot {index}"))?;
+        }
+        self.expect_accepted(&Request::ArmProgram { shots: count }, "arming the exposure program")
+    }
+
+    /// Runs the armed program, whose shots tell how long it may take.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn start_program(&self, shots: &[Shot]) -> Result<Work, ClientError> {
+        let status = self.status()?;
+        if status.program.state == ProgramState::Idle {
+            return Err(ClientError::NotArmed);
+        }
+        let work = program_time(shots, &status);
+        let during = "running the exposure program".to_string();
+        self.start_work(&Request::RunProgram { silence: self.silence() }, work, during)
+    }
+
+    /// Arms and runs an exposure program. `on_event` is told of each exposure
+    /// ([`EventKind::ShotDone`]) and of each that the host has to trigger ([`EventKind::ShotReady`]) as soon as the
+    /// board tells of it; an error from it stops the board and is returned. Gives the number of exposures.
+    ///
+    /// # Errors
+    /// [`ClientError`], and what `on_event` returns.
     pub fn run_program<E: From<ClientError>>(
-        &mut self,
+        &self,
+        shots: &[Shot],
+        mut on_event: impl FnMut(&EventKind) -> Result<(), E>,
+    ) -> Result<u16, E> {
+        self.arm(shots)?;
+        let mut work = self.start_program(shots)?;
+        loop {
+            match work.step()? {
+                Step::Event(kind) => on_event(&kind)?,
+                Step::Done(EventKind::ProgramDone { exposures, .. }) => return Ok(exposures),
+                Step::Done(other) => return Err(wrong_end("running the exposure program", &other).into()),
+            }
+        }
+    }
+
+    /// As [`Client::run_program`], told of the exposures only.
+    ///
+    /// # Errors
+    /// [`ClientError`], and what `on_shot` returns.
+    pub fn run_shots<E: From<ClientError>>(
+        &self,
         shots: &[Shot],
         mut on_shot: impl FnMut(&ShotRecord) -> Result<(), E>,
     ) -> Result<u16, E> {
-        let during = "running the exposure program";
-        for (index, shot) in shots.iter().enumerate() {
-            let request = Request::LoadShot { index: index as u8, shot: *shot };
-            self.expect_accepted(&request, &format!("loading shot {index}"))?;
-        }
-        let mut at = self.status()?.coarse.measured;
-        let mut way = 0;
-        for shot in shots.iter().filter(|shot| shot.axis == Axis::SensorCoarse) {
-            way += u64::from(at.0.abs_diff(shot.target.0));
-            at = shot.target;
-        }
-        let mut refused = None;
-        let request = Request::RunProgram { shots: shots.len() as u8 };
-        let end = self.carry_out(&request, program_time(shots, way), during, &mut |event| {
-            if let EventKind::ShotDone { shot, .. } = event {
-                on_shot(shot).map_err(|error| refused = Some(error))?;
-            }
-            Ok(())
-        });
-        match (refused, end) {
-            (Some(error), _) => Err(error),
-            (None, Ok(EventKind::ProgramDone { exposures, .. })) => Ok(exposures),
-            (None, Ok(other)) => Err(wrong_end(during, &other).into()),
-            (None, Err(error)) => Err(error.into()),
-        }
-    }
-
-    /// Resets the board and says hello to it again.
-    pub fn reboot(&mut self) -> Result<(), ClientError> {
-        let during = "rebooting";
-        let before = self.hello().boot;
-        match self.expect_accepted(&Request::Reboot, during) {
-            // The answer was lost and a retry met the next boot: it has rebooted.
-            Ok(_) | Err(ClientError::Reset { .. }) => {}
-            Err(error) => return Err(error),
-        }
-        let until = Instant::now() + self.timing().allowance(RESTART);
-        loop {
-            let opened = self.reopen();
-            if opened.is_ok() && self.hello().boot != before {
-                return Ok(());
-            }
-            if Instant::now() >= until {
-                opened?;
-                return Err(ClientError::Overdue { during: during.into(), allowed: RESTART });
-            }
-        }
-    }
-
-    fn expect_accepted(&mut self, request: &Request, during: &str) -> Result<u32, ClientError> {
-        match self.request(request, during)? {
-            (id, Response::Accepted) => Ok(id),
-            (_, other) => Err(nonsense(during, &other)),
-        }
-    }
-
-    /// Sends a request that starts work and waits for the event that ends it; `on_event` sees the events in
-    /// between and may break off, whereupon the board is stopped.
-    fn carry_out(
-        &mut self,
-        request: &Request,
-        work: Duration,
-        during: &str,
-        on_event: &mut dyn FnMut(&EventKind) -> Result<(), ()>,
-    ) -> Result<EventKind, ClientError> {
-        if self.interrupted() {
-            return Err(ClientError::Interrupted { during: during.into() });
-        }
-        let id = self.expect_accepted(request, during)?;
-        let allowed = self.timing().allowance(work);
-        let mut until = Instant::now() + allowed;
-        let mut poll = Instant::now() + self.timing().poll;
-        loop {
-            if self.interrupted() {
-                self.stop()?;
-                return Err(ClientError::Interrupted { during: during.into() });
-            }
-            let now = Instant::now();
-            if now >= until {
-                self.stop()?;
-                return Err(ClientError::Overdue { during: during.into(), allowed });
-            }
-            let wait = poll.min(until).saturating_duration_since(now);
-            if let Some((_, event)) = self.next_event(wait, during)? {
-                poll = Instant::now() + self.timing().poll;
-                match end_of(id, event) {
-                    Ending::Done(kind) => return Ok(kind),
-                    Ending::Failed(axis, reason) => {
-                        return Err(ClientError::Failed { during: during.into(), axis, reason });
-                    }
-                    Ending::NotYet(kind) => {
-                        let begin = Instant::now();
-                        if on_event(&kind).is_err() {
-                            self.stop()?;
-                            return Err(ClientError::Interrupted { during: during.into() });
-                        }
-                        // Time that the caller took, for fetching an image say, is not the board's.
-                        until += begin.elapsed();
-                        poll += begin.elapsed();
-                    }
-                }
-            } else if Instant::now() >= poll {
-                poll = Instant::now() + self.timing().poll;
-                self.look_for_lost_events(id, during)?;
-            }
-        }
-    }
-
-    /// After a silence: an event that got lost is fetched. Where the board is not working on the request any
-    /// more and no event is left, its end is unknown.
-    fn look_for_lost_events(&mut self, id: u32, during: &str) -> Result<(), ClientError> {
-        let status = self.status()?;
-        if self.has_event_waiting() {
-            return Ok(());
-        }
-        if status.next_event > self.due_event() {
-            return self.fetch_due_event(during);
-        }
-        if status.active == Some(id) {
-            return Ok(());
-        }
-        Err(ClientError::NoEnd { during: during.into() })
-    }
-}
-
-enum Ending {
-    Done(EventKind),
-    Failed(Option<Axis>, farnear_protocol::message::Failure),
-    NotYet(EventKind),
-}
-
-fn end_of(id: u32, event: Event) -> Ending {
-    match event.kind {
-        EventKind::Failed { request, axis, reason } if request == id => Ending::Failed(axis, reason),
-        EventKind::Homed { request, .. }
-        | EventKind::MoveDone { request, .. }
-        | EventKind::ProgramDone { request, .. }
-            if request == id =>
-        {
-            Ending::Done(event.kind)
-        }
-        kind => Ending::NotYet(kind),
+        self.run_program(shots, |kind| match kind {
+            EventKind::ShotDone { shot, .. } => on_shot(shot),
+            _ => Ok(()),
+        })
     }
 }
 

@@ -17,7 +17,7 @@ use farnear_capture::plan::SensorPair;
 use farnear_capture::record::{Circumstances, begin_folder, finish_folder, read_record, record_of};
 use farnear_capture::{Client, ClientError};
 use farnear_protocol::camera::FrameHeader;
-use farnear_protocol::message::ShotRecord;
+use farnear_protocol::message::{ShotRecord, TriggerMode};
 use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
 use ndarray::Array2;
 use peer::{Faults, Peer};
@@ -31,7 +31,10 @@ impl Camera for Numbered {
     fn kind(&self) -> &'static str {
         "numbered"
     }
-    fn arm(&mut self) -> Result<(), CameraError> {
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         Ok(())
     }
     fn image(&mut self, shot: &ShotRecord, _: Duration) -> Result<Image, CameraError> {
@@ -69,13 +72,12 @@ fn names(folder: &Path) -> Vec<String> {
 
 #[test]
 fn a_pair_is_homed_moved_exposed_and_written() {
-    let (mut client, peer) = client();
+    let (client, peer) = client();
     let mut said = Vec::new();
-    let pair = capture_pair(&mut client, &mut Numbered, &SENSOR, &exposures(), &mut |text| {
-        said.push(text.to_string())
-    })
-    .unwrap();
-    assert!(said[0].contains("homing the stage (its position is unknown)"), "{said:?}");
+    let pair =
+        capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
+            .unwrap();
+    assert!(said[0].contains("homing the sensor's coarse axis (its position is unknown)"), "{said:?}");
     assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 1));
     // The piezo makes up for the 375 nm that the scripted coarse stage is off; its own 2 nm remain.
     for taken in [&pair.far, &pair.near] {
@@ -91,22 +93,22 @@ fn a_pair_is_homed_moved_exposed_and_written() {
     assert_eq!(read_record(&folder).unwrap().unwrap(), record);
     assert_eq!(names(root.path()), ["pair"]);
 
-    // The second time it is homed already, and is approached from the home side again.
+    // The second time it is homed already, and needs no homing.
     let acts = peer.board().acts;
     let mut said = Vec::new();
-    capture_pair(&mut client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
+    capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
         .unwrap();
     assert!(!said.iter().any(|text| text.contains("homing")), "{said:?}");
-    assert_eq!(peer.board().acts - acts, 3);
+    assert_eq!(peer.board().acts - acts, 2);
 }
 
 #[test]
 fn a_port_that_goes_away_leaves_no_folder() {
-    let (mut client, peer) = client();
+    let (client, peer) = client();
     peer.board().faults.gone_at_program = true;
     let root = tempfile::tempdir().unwrap();
     let aside = begin_folder(&root.path().join("pair")).unwrap();
-    let error = capture_pair(&mut client, &mut Numbered, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
+    let error = capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
     drop(aside);
     assert!(matches!(error, CaptureError::Board(ClientError::Gone { .. })), "{error:?}");
     assert_eq!(names(root.path()), Vec::<String>::new());
@@ -114,19 +116,19 @@ fn a_port_that_goes_away_leaves_no_folder() {
 
 #[test]
 fn a_camera_that_gives_nothing_stops_the_rig() {
-    let (mut client, peer) = client();
+    let (client, peer) = client();
     let folder = tempfile::tempdir().unwrap();
     let mut camera = FolderCamera::watch(folder.path()).unwrap();
-    let error = capture_pair(&mut client, &mut camera, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
+    let error = capture_pair(&client, &mut camera, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
     assert!(matches!(error, CaptureError::Camera(CameraError::Late { .. })), "{error:?}");
     assert_eq!(peer.board().stops, 1);
 }
 
 #[test]
 fn optics_out_of_reach_move_nothing() {
-    let (mut client, peer) = client();
+    let (client, peer) = client();
     let far_away = SensorPair { far_mm: 90.0, near_mm: 90.1 };
-    let error = capture_pair(&mut client, &mut Numbered, &far_away, &exposures(), &mut |_| {}).unwrap_err();
+    let error = capture_pair(&client, &mut Numbered, &far_away, &exposures(), &mut |_| {}).unwrap_err();
     assert!(matches!(error, CaptureError::Plan(_)), "{error:?}");
     assert_eq!(peer.board().acts, 0);
 }
@@ -140,6 +142,7 @@ fn shot(trigger_number: u32) -> ShotRecord {
         asked: Nanometres(0),
         coarse: Nanometres(0),
         fine: Nanometres(0),
+        lens: Nanometres(0),
         settle: Micros(0),
         trigger: BoardMicros(0),
         strobe_start: BoardMicros(0),

@@ -36,6 +36,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::optics::WorkingRange;
 
+pub use board::BoardCorrection;
 pub use cdc::CdcSettings;
 pub use error::CorrectionError;
 pub use pattern::Pattern;
@@ -272,6 +273,22 @@ impl Correction {
             Map::ClsfFull(full) => full.apply_as_board(depth_mm, self.scale),
             Map::Cdc(_) | Map::TwoStep(_) => Err(CorrectionError::NotOnBoard(self.method())),
         }
+    }
+
+    /// This correction in the board's number formats.
+    ///
+    /// # Errors
+    /// [`CorrectionError::NotOnBoard`], [`CorrectionError::Board`] as for [`Self::apply_as_board`].
+    pub fn for_board(&self) -> Result<BoardCorrection, CorrectionError> {
+        let coefficients = match &self.map {
+            Map::Clsf(regions) | Map::ClsfBlend(regions) => {
+                regions.quantised()?.as_flattened().as_flattened().iter().map(|c| c.to_bits()).collect()
+            }
+            Map::ClsfFull(full) => full.quantised()?.iter().map(|c| c.to_bits()).collect(),
+            Map::Cdc(_) | Map::TwoStep(_) => return Err(CorrectionError::NotOnBoard(self.method())),
+        };
+        let frame = board::frame((self.height, self.width))?;
+        Ok(BoardCorrection { method: self.method(), frame, scale: self.scale, coefficients })
     }
 
     fn check_size(&self, (height, width): (usize, usize)) -> Result<(), CorrectionError> {

@@ -1,7 +1,8 @@
 //! # farnear
 //!
-//! The command line. One file per command in [`commands`]; [`files`] and [`masks`] read and write what users have, [`picture`]
-//! makes `view.png`, [`plot`] draws operators, [`report`] prints figures as text or JSON, [`simulator`] starts the emulated rig, [`video`] reads
+//! The command line. One file per command in [`commands`]; [`files`] and [`masks`] read and write what users have,
+//! [`picture`] makes `view.png`, [`plot`] draws operators, [`prompt`] asks the user, [`report`] prints figures as text
+//! or JSON, [`simulator`] starts the emulated rig, [`video`] reads
 //! frames.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
@@ -11,6 +12,7 @@ mod files;
 mod masks;
 mod picture;
 mod plot;
+mod prompt;
 mod report;
 mod simulator;
 mod video;

@@ -48,6 +48,9 @@ pub struct Scenery {
     /// Write what the emulated mechanics really did to this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
+    /// Let the emulated rig's time follow the clock on the wall, to watch it; runs do not repeat then.
+    #[arg(long)]
+    paced: bool,
 }
 
 /// Takes the text if it parses as a `T`; the simulator parses it again.
@@ -66,9 +69,15 @@ impl Scenery {
             ("--firmware", self.firmware.is_some()),
             ("--faults", self.faults.is_some()),
             ("--trace", self.trace.is_some()),
+            ("--paced", self.paced),
         ]
         .into_iter()
         .find_map(|(flag, given)| given.then_some(flag))
+    }
+
+    /// The same before another scene.
+    pub fn with_scene(&self, scene: String) -> Self {
+        Self { scene: Some(scene), ..self.clone() }
     }
 
     /// Everything that was left open, decided; as it stands in a capture's record.
@@ -115,6 +124,9 @@ impl Simulator {
             if let Some(file) = file {
                 command.arg(flag).arg(file);
             }
+        }
+        if scenery.paced {
+            command.arg("--paced");
         }
         // In a group of its own: Ctrl-C reaches this program, which stops what moves and ends the simulator then.
         #[cfg(unix)]

@@ -6,7 +6,7 @@
 //! blended along y by one more product. Beyond the outer centres the outer regions hold alone.
 
 use super::{
-    Coefficient, Error, Frame, REGION_TERMS, REGIONS, RegionCoefficients,
+    Coefficient, Error, Frame, REGION_TERMS, REGIONS, RegionCoefficients, TableState,
     format::{CONSTANT_BITS, CUBIC_BITS, HALF_UNIT, LINEAR_BITS, SQUARE_BITS, mix, narrow},
     frame::Band,
     regions::{x_terms, y_terms},
@@ -44,6 +44,26 @@ impl<'t> Blend<'t> {
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
         let (rows, columns) = (frame.rows().bands(), frame.columns().bands());
         Ok(Self { coefficients, frame, rows, columns, table, table_band: None })
+    }
+
+    /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
+    ///
+    /// # Errors
+    /// [`Error::TableTooSmall`].
+    pub fn resume(
+        coefficients: RegionCoefficients,
+        frame: Frame,
+        table: &'t mut [i32],
+        state: TableState,
+    ) -> Result<Self, Error> {
+        let mut correction = Self::new(coefficients, frame, table)?;
+        correction.table_band = state.0;
+        Ok(correction)
+    }
+
+    /// What the table holds now.
+    pub fn table_state(&self) -> TableState {
+        TableState(self.table_band)
     }
 
     /// Corrects row `row` in place; rows may come in any order, but in order the table is built only four times.

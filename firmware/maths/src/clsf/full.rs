@@ -5,7 +5,7 @@
 //! Horner's rule beside the one in `U`: seven products a pixel.
 
 use super::{
-    Coefficient, Error, Frame,
+    Coefficient, Error, Frame, TableState,
     format::{CONSTANT_BITS, CUBIC_BITS, HALF_UNIT, LINEAR_BITS, SQUARE_BITS, multiply, narrow, step},
     row::{Factors, polynomial},
 };
@@ -47,6 +47,29 @@ impl<'t> Full<'t> {
             *entry = [x, narrow(linear, LINEAR_BITS), narrow(constant, CONSTANT_BITS) + HALF_UNIT];
         }
         Ok(Self { coefficients, frame, table })
+    }
+
+    /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
+    ///
+    /// # Errors
+    /// [`Error::TableTooSmall`].
+    pub fn resume(
+        coefficients: FullCoefficients,
+        frame: Frame,
+        table: &'t mut [i32],
+        state: TableState,
+    ) -> Result<Self, Error> {
+        if state == TableState::EMPTY {
+            return Self::new(coefficients, frame, table);
+        }
+        let (given, needed) = (table.len(), Self::table_words(frame.width()));
+        let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
+        Ok(Self { coefficients, frame, table })
+    }
+
+    /// What the table holds now.
+    pub fn table_state(&self) -> TableState {
+        TableState(Some((0, 0)))
     }
 
     /// Corrects row `row` in place; rows may come in any order.

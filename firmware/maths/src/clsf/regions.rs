@@ -1,7 +1,7 @@
 //! Ten terms in each of 3x3 regions (Li 2014, eq. 6.11 and section 6.4).
 
 use super::{
-    Coefficient, Error, Frame,
+    Coefficient, Error, Frame, TableState,
     format::{CONSTANT_BITS, CUBIC_BITS, HALF_UNIT, LINEAR_BITS, SQUARE_BITS, multiply, narrow, step},
     row::{Factors, uniform},
 };
@@ -40,6 +40,26 @@ impl<'t> Regions<'t> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
         Ok(Self { coefficients, frame, table, table_row: None })
+    }
+
+    /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
+    ///
+    /// # Errors
+    /// [`Error::TableTooSmall`].
+    pub fn resume(
+        coefficients: RegionCoefficients,
+        frame: Frame,
+        table: &'t mut [i32],
+        state: TableState,
+    ) -> Result<Self, Error> {
+        let mut correction = Self::new(coefficients, frame, table)?;
+        correction.table_row = state.0.map(|(row, _)| row);
+        Ok(correction)
+    }
+
+    /// What the table holds now.
+    pub fn table_state(&self) -> TableState {
+        TableState(self.table_row.map(|row| (row, row)))
     }
 
     /// Corrects row `row` in place; rows may come in any order, but in order the table is built only three times.

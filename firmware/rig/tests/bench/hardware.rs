@@ -1,64 +1,32 @@
-//! A model of the rig's hardware: step timer, screw, encoder, switches, piezo, gauge, camera. And its faults.
-
-use std::collections::VecDeque;
+//! A model of the rig's hardware: two stepper axes, piezo, gauge, camera, the safety inputs. And its faults.
 
 use farnear_protocol::{BoardMicros, Micros};
-use farnear_rig::io::{
-    DAC_FULL_SCALE_NM, ExposureEdges, GAUGE_CODE_ZERO, Inputs, Outputs, STEP_TIMER_HZ, Segment, StepperState,
-    TICK_US,
-};
+use farnear_rig::io::{DAC_FULL_SCALE_NM, ExposureEdges, GAUGE_CODE_ZERO, Inputs, Outputs, StrobeEdges};
 
-/// Length of the board's segment queue.
-const QUEUE: usize = 4;
-/// The far switch closes here.
-pub const FAR_SWITCH_UM: f64 = 13_150.0;
-/// Way between closing and opening of the home switch.
-const HOME_HYSTERESIS_UM: f64 = 20.0;
+use super::motor::Motor;
 
-/// What can be wrong.
+/// What can be wrong beside the motors.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
-    /// Pulses do not move the motor.
-    pub stalled: bool,
-    /// The step timer does not run.
-    pub timer_dead: bool,
-    /// The step timer gives one pulse more per segment.
-    pub extra_pulse: bool,
-    /// The board loses what waits behind the running segment.
-    pub queue_lost: bool,
-    /// The switch says this whatever the position.
-    pub home_switch: Option<bool>,
-    /// The switch says this whatever the position.
-    pub far_switch: Option<bool>,
-    /// The driver's DIAG line.
-    pub driver: bool,
     /// The gauge answers this whatever the position.
     pub gauge: Option<Option<u32>>,
     /// The piezo does not move.
     pub piezo_dead: bool,
     /// The camera does not answer.
     pub no_strobe: bool,
+    /// The emergency-stop circuit is open.
+    pub emergency_stop: bool,
+    /// The supply is low.
+    pub supply_low: bool,
+    /// The link overflows.
+    pub link_overflow: bool,
 }
 
 /// The hardware.
 pub struct Hardware {
     pub faults: Faults,
-    queue: VecDeque<Segment>,
-    /// The running segment, timer ticks into it, pulses given of it.
-    running: Option<(Segment, u32, u16)>,
-    counted: u32,
-    underrun: bool,
-    /// All STEP edges, and the times of the last ones in timer ticks.
-    pub edges: u64,
-    pub last_edge_us: f64,
-    pub closest_edges_us: f64,
-    /// Microsteps from the home switch.
-    pub microsteps: i64,
-    pub leftmost: i64,
-    pub rightmost: i64,
-    home_closed: bool,
-    away: bool,
-    enabled: bool,
+    pub coarse: Motor,
+    pub lens: Motor,
     pub piezo_nm: f64,
     piezo_velocity: f64,
     pub dac: u16,
@@ -66,28 +34,21 @@ pub struct Hardware {
     exposure: Option<(BoardMicros, Micros)>,
     /// Rising edges of the trigger: when, and how long.
     pub triggers: Vec<(u64, Micros)>,
-    /// How long the camera was exposing when the piezo moved: nm between start and end of the exposure.
+    /// Where the piezo was at each trigger.
     pub piezo_at_trigger: Vec<f64>,
+    /// A camera that runs freely: period and exposure, us.
+    pub free_running: Option<(u64, u64)>,
+    /// An exposure that the host makes: start and end.
+    pub exposed_by_host: Option<(u64, u64)>,
+    listened_since: Option<u64>,
 }
 
 impl Hardware {
     pub fn new(position_um: f64) -> Self {
-        let microsteps = (position_um / 0.15625).round() as i64;
         Self {
             faults: Faults::default(),
-            queue: VecDeque::new(),
-            running: None,
-            counted: 0xFFFF_FF00, // wraps soon
-            underrun: false,
-            edges: 0,
-            last_edge_us: f64::NEG_INFINITY,
-            closest_edges_us: f64::INFINITY,
-            microsteps,
-            leftmost: microsteps,
-            rightmost: microsteps,
-            home_closed: microsteps <= 0,
-            away: false,
-            enabled: false,
+            coarse: Motor::new(position_um),
+            lens: Motor::new(position_um + 500.0),
             piezo_nm: 0.0,
             piezo_velocity: 0.0,
             dac: 0,
@@ -95,18 +56,26 @@ impl Hardware {
             exposure: None,
             triggers: Vec::new(),
             piezo_at_trigger: Vec::new(),
+            free_running: None,
+            exposed_by_host: None,
+            listened_since: None,
         }
     }
 
-    /// Where the screw is.
+    /// Where stage A is.
     pub fn position_um(&self) -> f64 {
-        self.microsteps as f64 * 0.15625
+        self.coarse.position_um()
+    }
+
+    /// The power goes: mechanics stay, everything else forgets.
+    pub fn power_off(&mut self) {
+        self.coarse.power_off();
+        self.lens.power_off();
+        (self.dac, self.exposure, self.listened_since) = (0, None, None);
     }
 
     /// What the board reads now.
     pub fn inputs(&mut self, now: BoardMicros) -> Inputs {
-        let um = self.position_um();
-        self.home_closed = um <= if self.home_closed { HOME_HYSTERESIS_UM } else { 0.0 };
         let gauge = (self.piezo_nm + self.noise() + f64::from(GAUGE_CODE_ZERO)).round();
         let mut exposure = None;
         if let Some((trigger, length)) = self.exposure {
@@ -117,107 +86,54 @@ impl Hardware {
                 exposure = Some(ExposureEdges { trigger, strobe_start, strobe_end });
             }
         }
+        let strobe = self.strobe(now.0);
         Inputs {
             now,
-            // The encoder's own zero is anywhere.
-            encoder_coarse_counts: (self.microsteps * 5).div_euclid(4) as i32 + 12_345,
+            coarse: self.coarse.inputs(),
+            lens: self.lens.inputs(),
             gauge_code: self.faults.gauge.unwrap_or(Some(gauge as u32)),
-            home_switch: self.faults.home_switch.unwrap_or(self.home_closed),
-            far_switch: self.faults.far_switch.unwrap_or(um >= FAR_SWITCH_UM),
-            driver_fault: self.faults.driver,
-            stepper: StepperState {
-                pulses: self.counted,
-                idle: self.running.is_none() && self.queue.is_empty(),
-                underrun: self.underrun,
-                room: (QUEUE - self.queue.len()) as u8,
-            },
+            emergency_stop: self.faults.emergency_stop,
+            supply_low: self.faults.supply_low,
+            link_overflow: self.faults.link_overflow,
             exposure: exposure.filter(|_| !self.faults.no_strobe),
+            strobe: strobe.filter(|_| !self.faults.no_strobe),
         }
+    }
+
+    /// An exposure without a trigger that ended in the last tick and began while somebody listened.
+    fn strobe(&mut self, now: u64) -> Option<StrobeEdges> {
+        let since = self.listened_since?;
+        let last_of = |(period, length): (u64, u64)| {
+            let start = now.saturating_sub(length + 1) / period * period;
+            (start, start + length)
+        };
+        let (start, end) = self.exposed_by_host.or(self.free_running.map(last_of))?;
+        (start >= since && end < now && now - end <= 200)
+            .then_some(StrobeEdges { start: BoardMicros(start), end: BoardMicros(end) })
     }
 
     /// Carries the outputs out and lets a control tick pass.
     pub fn run(&mut self, outputs: &Outputs, now: u64) {
-        let idle = self.running.is_none() && self.queue.is_empty();
-        assert!(idle || outputs.direction_away == self.away, "DIR changes in motion");
-        assert!(outputs.direction_away == self.away || outputs.segments.is_empty(), "DIR and STEP at once");
-        self.away = outputs.direction_away;
-        self.enabled = outputs.enable;
+        self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
+        self.lens.run(&outputs.lens, now, self.faults.emergency_stop);
         self.dac = outputs.piezo_dac;
-        if outputs.abort_steps {
-            assert!(outputs.segments.is_empty(), "abort together with segments");
-            self.queue.clear();
-            self.underrun = false;
-            if let Some((segment, ..)) = &mut self.running {
-                segment.last = true;
-            }
-        }
-        for segment in &outputs.segments {
-            assert!(self.enabled, "steps for a driver without current");
-            assert!(self.queue.len() < QUEUE, "more segments than there is room for");
-            self.queue.push_back(*segment);
-        }
-        if self.faults.queue_lost {
-            self.queue.clear();
-        }
         if let Some(length) = outputs.trigger {
             assert!(self.exposure.is_none(), "triggered while exposing");
+            assert!(!outputs.listen, "triggered while listening");
             self.exposure = Some((BoardMicros(now + 10), length));
             self.triggers.push((now + 10, length));
             self.piezo_at_trigger.push(self.piezo_nm);
         }
-        if !self.faults.timer_dead {
-            self.play(STEP_TIMER_HZ / 1_000_000 * TICK_US, now as f64);
+        if outputs.listen {
+            self.listened_since.get_or_insert(now);
+        } else {
+            self.listened_since = None;
         }
         self.swing();
     }
 
-    /// Plays segments for some timer ticks.
-    fn play(&mut self, ticks: u32, now_us: f64) {
-        let mut left = ticks;
-        while left > 0 {
-            if self.running.is_none() {
-                self.running = self.queue.pop_front().map(|segment| (segment, 0, 0));
-            }
-            let Some((segment, at, given)) = self.running else { return };
-            let period = u32::from(segment.period_ticks);
-            // The edge comes in the middle of its period.
-            let edge = u32::from(given) * period + period / 2;
-            let end = u32::from(segment.pulses) * period;
-            let next = if given < segment.pulses { edge } else { end };
-            if at + left < next {
-                self.running = Some((segment, at + left, given));
-                return;
-            }
-            left -= next - at;
-            if given < segment.pulses {
-                let us = now_us + f64::from(ticks - left) / f64::from(STEP_TIMER_HZ / 1_000_000);
-                self.edge(us);
-                self.running = Some((segment, next, given + 1));
-            } else {
-                self.counted = self.counted.wrapping_add(u32::from(segment.pulses));
-                if self.faults.extra_pulse {
-                    self.edge(now_us);
-                    self.counted = self.counted.wrapping_add(1);
-                }
-                self.underrun |= !segment.last && self.queue.is_empty();
-                self.running = None;
-            }
-        }
-    }
-
-    fn edge(&mut self, us: f64) {
-        self.edges += 1;
-        self.closest_edges_us = self.closest_edges_us.min(us - self.last_edge_us);
-        self.last_edge_us = us;
-        if !self.faults.stalled && self.enabled {
-            self.microsteps += if self.away { 1 } else { -1 };
-            self.leftmost = self.leftmost.min(self.microsteps);
-            self.rightmost = self.rightmost.max(self.microsteps);
-        }
-    }
-
     /// The piezo: 200 Hz, damping 0.03, by steps of 10 us.
-    fn swing(&mut self) {
+    pub fn swing(&mut self) {
         if self.faults.piezo_dead {
             return;
         }

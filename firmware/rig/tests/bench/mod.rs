@@ -1,20 +1,42 @@
 //! A rig on the bench: the behaviour under test, a small model of its hardware, and a host's end of the link.
 //!
-//! The hardware model is as simple as the tests allow (a resonant piezo without hysteresis, a stiff screw); the
+//! The hardware model is as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the
 //! emulated board's plant is the thorough one.
 #![allow(dead_code)] // each test file uses its part
 
 pub mod hardware;
+pub mod motor;
 
 use farnear_protocol::frame::{self, Decoder, Header, Kind, Packet};
-use farnear_protocol::message::{Event, EventKind, Hello, ResetCause, Status};
-use farnear_protocol::{BoardMicros, PROTOCOL_CURRENT, Request, RequestError, Response};
-use farnear_rig::io::{Outputs, TICK_US};
+use farnear_protocol::message::{Alarm, Axis, Event, EventKind, Failure, Hello, ResetCause, Status};
+use farnear_protocol::{BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response};
+use farnear_rig::io::{MEMORY_BYTES, Outputs, TICK_US};
 use farnear_rig::{Identity, Rig};
 use hardware::Hardware;
 
 /// Boot number of the bench.
 pub const BOOT: u32 = 7;
+
+/// Silence that the bench's requests allow: longer than any of its work.
+pub const SILENCE: Micros = Micros(60_000_000);
+
+/// A move.
+pub fn go(axis: Axis, nm: i32) -> Request {
+    Request::Move { axis, target: Nanometres(nm), silence: SILENCE }
+}
+
+/// A homing.
+pub fn home(axis: Axis) -> Request {
+    Request::Home { axis, silence: SILENCE }
+}
+
+/// What a piece of work failed with.
+pub fn failure(end: &EventKind) -> Failure {
+    match end {
+        EventKind::Failed { reason, .. } => *reason,
+        other => panic!("did not fail: {other:?}"),
+    }
+}
 
 /// What a request was answered.
 pub type Answer = Result<Response, RequestError>;
@@ -23,6 +45,12 @@ pub type Answer = Result<Response, RequestError>;
 pub struct Bench {
     pub rig: Rig,
     pub hardware: Hardware,
+    /// The FRAM.
+    pub memory: Box<[u8; MEMORY_BYTES]>,
+    boot: u32,
+    /// The next write to the FRAM ends after this many bytes; whether one has.
+    pub tear: Option<usize>,
+    pub torn: bool,
     pub now: u64,
     pub next_id: u32,
     decoder: Decoder,
@@ -37,19 +65,21 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// A stage that stands at `position_um` from its home switch.
+    /// A rig whose stage A stands at `position_um` from its home switch, with a blank memory.
     pub fn new(position_um: f64) -> Self {
-        let identity = Identity {
-            board: "bench",
-            firmware: "0.1.0",
-            unique_id: [3; 12],
-            boot: BOOT,
-            reset_cause: ResetCause::Pin,
-            emulated: true,
-        };
+        Self::with_memory(position_um, Box::new([0; MEMORY_BYTES]))
+    }
+
+    /// A rig whose memory holds something.
+    pub fn with_memory(position_um: f64, memory: Box<[u8; MEMORY_BYTES]>) -> Self {
+        let rig = Rig::new(identity(BOOT, ResetCause::Pin), Some(&memory), BoardMicros(0));
         Self {
-            rig: Rig::new(identity, BoardMicros(0)),
+            boot: rig.boot(),
+            rig,
             hardware: Hardware::new(position_um),
+            memory,
+            tear: None,
+            torn: false,
             now: 0,
             next_id: 100,
             decoder: Decoder::new(),
@@ -60,13 +90,40 @@ impl Bench {
         }
     }
 
-    /// Homed and ready.
+    /// The power goes and comes: `boot` is what retained RAM proposes, 1 where it lost that.
+    pub fn restart(&mut self, boot: u32, cause: ResetCause) {
+        self.hardware.power_off();
+        self.rig = Rig::new(identity(boot, cause), Some(&self.memory), BoardMicros(0));
+        (self.boot, self.now, self.reset_at) = (self.rig.boot(), 0, None);
+        self.events.clear();
+        self.answers.clear();
+    }
+
+    /// Stage A homed and ready.
     pub fn homed() -> Self {
         let mut bench = Self::new(800.0);
-        let id = bench.accepted(&Request::Home { axis: farnear_protocol::message::Axis::SensorCoarse });
-        let end = bench.end_of(id);
+        let end = bench.work(&home(Axis::SensorCoarse));
         assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
         bench
+    }
+
+    /// Both stages homed and ready.
+    pub fn both_homed() -> Self {
+        let mut bench = Self::homed();
+        let end = bench.work(&home(Axis::Lens));
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
+        bench
+    }
+
+    /// The alarm that is latched.
+    pub fn alarm(&mut self) -> Option<Alarm> {
+        self.status().alarm.map(|record| record.alarm)
+    }
+
+    /// Clears the latched alarm.
+    pub fn clear(&mut self) {
+        let number = self.status().alarm.expect("an alarm is latched").number;
+        self.accepted(&Request::ClearAlarm { number });
     }
 
     /// One control tick.
@@ -74,6 +131,12 @@ impl Bench {
         let inputs = self.hardware.inputs(BoardMicros(self.now));
         let outputs = self.rig.tick(&inputs);
         self.hardware.run(&outputs, self.now);
+        if let Some(write) = &outputs.memory {
+            let at = usize::from(write.address);
+            let written = self.tear.take().map_or(write.bytes.len(), |bytes| bytes.min(write.bytes.len()));
+            self.torn |= written < write.bytes.len();
+            self.memory[at..at + written].copy_from_slice(&write.bytes[..written]);
+        }
         if outputs.reset {
             self.reset_at.get_or_insert(self.now);
         }
@@ -82,6 +145,19 @@ impl Bench {
             self.collect();
         }
         outputs
+    }
+
+    /// A calculation takes some ticks; then they are made up for, 5 us apart.
+    pub fn catch_up(&mut self, ticks: u64) {
+        for _ in 0..ticks {
+            self.hardware.swing();
+        }
+        for tick in 0..ticks {
+            let now = self.now + (ticks - 1) * u64::from(TICK_US) + 5 * tick;
+            let inputs = self.hardware.inputs(BoardMicros(now));
+            self.hardware.dac = self.rig.tick(&inputs).piezo_dac;
+        }
+        self.now += ticks * u64::from(TICK_US);
     }
 
     /// Many control ticks.
@@ -108,12 +184,12 @@ impl Bench {
 
     fn take(&mut self, packet: &Packet) {
         let id = packet.header.id;
-        assert_eq!((packet.header.version, packet.header.boot), (PROTOCOL_CURRENT, BOOT));
+        assert_eq!((packet.header.version, packet.header.boot), (PROTOCOL_CURRENT, self.boot));
         match packet.header.kind {
             Kind::Response => self.answers.push((id, Ok(packet.message().expect("a response")))),
             Kind::Error => self.answers.push((id, Err(packet.message().expect("an error")))),
             Kind::Event => self.events.push((id, packet.message().expect("an event"))),
-            Kind::Request => panic!("the rig asks nothing"),
+            Kind::Request | Kind::Log => panic!("the rig neither asks nor logs"),
         }
     }
 
@@ -135,7 +211,7 @@ impl Bench {
     pub fn ask(&mut self, request: &Request) -> (u32, Answer) {
         let id = self.next_id;
         self.next_id += 1;
-        (id, self.ask_as(id, BOOT, request))
+        (id, self.ask_as(id, self.boot, request))
     }
 
     /// Asks under an id.
@@ -189,14 +265,27 @@ impl Bench {
     }
 }
 
+fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
+    Identity {
+        board: "bench",
+        firmware: "0.1.0",
+        unique_id: [3; 12],
+        boot,
+        reset_cause,
+        emulated: true,
+        last_words: None,
+    }
+}
+
 /// Whether an event is the terminal event of a request.
 pub fn ends(kind: &EventKind, id: u32) -> bool {
     match kind {
         EventKind::Homed { request, .. }
         | EventKind::MoveDone { request, .. }
         | EventKind::ProgramDone { request, .. }
+        | EventKind::Calibrated { request, .. }
         | EventKind::Failed { request, .. } => *request == id,
-        EventKind::Started { .. } | EventKind::ShotDone { .. } => false,
+        _ => false,
     }
 }
 

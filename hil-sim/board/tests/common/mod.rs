@@ -2,11 +2,15 @@
 #![allow(dead_code)] // each test program uses its part
 
 use farnear_protocol::{
-    Event, EventKind, Nanometres, Request, RequestError, Response,
+    Event, EventKind, Log, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
     frame::{Header, Kind, Packet, encode},
-    message::{Axis, Hello, Status},
+    message::{Alarm, AlarmRecord, Axis, Hello, Shot, Status, TriggerMode},
 };
-use farnear_sim::{EmulatedRig, Report, RigConfig};
+use farnear_sim::{EmulatedRig, Hands, Report, RigConfig};
+use object::{Object, ObjectSymbol};
+
+/// Long enough that no test's host is silent for so long, unless silence is what it tests.
+pub const SILENCE: Micros = Micros(60_000_000);
 
 /// A rig and a host that keeps count of its requests.
 pub struct Bench {
@@ -14,13 +18,17 @@ pub struct Bench {
     pub boot: u32,
     next: u32,
     pub events: Vec<Event>,
+    /// Bytes of the board's log.
+    pub log: Vec<u8>,
 }
 
 pub type Answer = Result<Response, RequestError>;
 
 /// The frame of a request.
 pub fn request_frame(id: u32, boot: u32, request: &Request) -> Vec<u8> {
-    encode(Header { version: 1, kind: Kind::Request, id, boot }, request).expect("requests fit").to_vec()
+    encode(Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot }, request)
+        .expect("requests fit")
+        .to_vec()
 }
 
 /// The answer that a frame carries, if it is one.
@@ -41,7 +49,7 @@ impl Bench {
 
     pub fn with(config: &RigConfig) -> Self {
         let rig = EmulatedRig::new(config).unwrap_or_else(|error| panic!("{error}"));
-        let mut bench = Self { rig, boot: 0, next: 0, events: Vec::new() };
+        let mut bench = Self { rig, boot: 0, next: 0, events: Vec::new(), log: Vec::new() };
         bench.say_hello();
         bench
     }
@@ -72,6 +80,9 @@ impl Bench {
         for packet in self.rig.take_frames() {
             match answer_in(&packet) {
                 Some(answer) => answers.push(answer),
+                None if packet.header.kind == Kind::Log => {
+                    self.log.extend(packet.message::<Log>().expect("a log frame of this version").bytes);
+                }
                 None => self.events.push(packet.message().expect("an event of this version")),
             }
         }
@@ -114,14 +125,81 @@ impl Bench {
         self.events.last().expect("a terminal event").kind.clone()
     }
 
-    /// Homes the coarse axis.
-    pub fn home(&mut self) {
-        let end = self.carry_out(&Request::Home { axis: Axis::SensorCoarse });
+    /// Homes a stepper axis.
+    pub fn home_axis(&mut self, axis: Axis) {
+        let end = self.carry_out(&Request::Home { axis, silence: SILENCE });
         assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
     }
 
+    /// Homes both stepper axes.
+    pub fn home(&mut self) {
+        self.home_axis(Axis::SensorCoarse);
+        self.home_axis(Axis::Lens);
+    }
+
     pub fn move_to(&mut self, axis: Axis, target: Nanometres) -> EventKind {
-        self.carry_out(&Request::Move { axis, target })
+        self.carry_out(&go(axis, target.0))
+    }
+
+    /// Does something to the rig.
+    pub fn hands(&mut self, work: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static) {
+        self.rig.reach_in(work).expect("the rig runs");
+    }
+
+    /// Looks at something in the rig.
+    pub fn peek<T: Send + 'static>(
+        &mut self,
+        look: impl FnOnce(&mut Hands<'_, '_>) -> T + Send + 'static,
+    ) -> T {
+        let (tell, told) = std::sync::mpsc::channel();
+        self.hands(move |hands| tell.send(look(hands)).expect("somebody waits"));
+        told.recv().expect("the rig runs")
+    }
+
+    /// Address and length of a variable of the firmware, by a part of its name.
+    pub fn variable(&mut self, part: &str) -> (u64, u64) {
+        let elf = farnear_sim::firmware::find(None).expect("a firmware");
+        let bytes = std::fs::read(elf).expect("readable");
+        let elf = object::File::parse(&*bytes).expect("an ELF");
+        let symbol = elf.symbols().find(|symbol| {
+            symbol.address() >= 0x2000_0000 && symbol.name().is_ok_and(|name| name.contains(part))
+        });
+        let symbol = symbol.unwrap_or_else(|| panic!("the firmware has no {part}"));
+        (symbol.address(), symbol.size())
+    }
+
+    /// Cycles of the firmware's longest control tick since its reset.
+    pub fn longest_tick(&mut self) -> u32 {
+        let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
+        self.peek(move |hands| hands.read_word(at)).expect("RAM")
+    }
+
+    /// The alarm that is latched.
+    pub fn alarm(&mut self) -> Option<AlarmRecord> {
+        self.status().alarm
+    }
+
+    /// Clears the latched alarm, which must be this one.
+    pub fn clear(&mut self, expected: impl FnOnce(&Alarm) -> bool) {
+        let latched = self.alarm().expect("an alarm is latched");
+        assert!(expected(&latched.alarm), "{latched:?}");
+        let cleared = self.ask(&Request::ClearAlarm { number: latched.number });
+        assert_eq!(cleared, Ok(Response::Accepted), "{latched:?}");
+        assert_eq!(self.alarm(), None);
+    }
+
+    /// Loads and arms a program.
+    pub fn arm(&mut self, shots: &[Shot]) {
+        for (index, shot) in (0..).zip(shots) {
+            assert_eq!(self.ask(&Request::LoadShot { index, shot: *shot }), Ok(Response::Accepted));
+        }
+        let shots = u8::try_from(shots.len()).expect("a program's length");
+        assert_eq!(self.ask(&Request::ArmProgram { shots }), Ok(Response::Accepted));
+    }
+
+    /// Runs the armed program; gives its last event.
+    pub fn run(&mut self) -> EventKind {
+        self.carry_out(&Request::RunProgram { silence: SILENCE })
     }
 
     pub fn status(&mut self) -> Status {
@@ -134,4 +212,27 @@ impl Bench {
     pub fn report(&mut self) -> Report {
         self.rig.report().expect("the rig runs")
     }
+}
+
+/// The request to move.
+pub fn go(axis: Axis, target_nm: i32) -> Request {
+    Request::Move { axis, target: Nanometres(target_nm), silence: SILENCE }
+}
+
+/// A shot on the piezo with a trigger pulse.
+pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32) -> Shot {
+    Shot {
+        axis: Axis::SensorFine,
+        target: Nanometres(target_nm),
+        exposure: Micros(exposure_us),
+        settle_window: Nanometres(window_nm),
+        settle_dwell: Micros(dwell_us),
+        repeat: 1,
+        mode: TriggerMode::Hardware,
+    }
+}
+
+/// How much of something a test does: what the environment says (`cargo xtask campaign` says more), or else this.
+pub fn amount<T: std::str::FromStr>(variable: &str, else_this: T) -> T {
+    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(else_this)
 }

@@ -6,9 +6,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use farnear_protocol::message::ShotRecord;
+use farnear_protocol::message::{ShotRecord, TriggerMode};
+use farnear_protocol::units::Micros;
 
 use super::{Camera, CameraError, Image};
+use crate::describe::trigger_name;
 use crate::image_file::{GreyImage, Samples, decode_grey};
 
 const POLL: Duration = Duration::from_millis(20);
@@ -29,8 +31,14 @@ impl FolderCamera {
     /// Watches a folder, which must exist.
     pub fn watch(folder: &Path) -> Result<Self, CameraError> {
         let mut camera = Self { folder: folder.into(), used: BTreeSet::new(), candidate: None };
-        camera.arm()?;
+        camera.forget_what_is_there()?;
         Ok(camera)
+    }
+
+    fn forget_what_is_there(&mut self) -> Result<(), CameraError> {
+        let fresh = self.fresh()?;
+        self.used.extend(fresh.into_iter().map(|(_, path)| path));
+        Ok(())
     }
 
     /// Image files that were not used yet, oldest first; those written within the same tick of the file
@@ -60,10 +68,16 @@ impl Camera for FolderCamera {
         "folder"
     }
 
-    fn arm(&mut self) -> Result<(), CameraError> {
-        let fresh = self.fresh()?;
-        self.used.extend(fresh.into_iter().map(|(_, path)| path));
-        Ok(())
+    fn arm(&mut self, mode: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        // Of a camera that runs freely nobody could tell which file belongs to which exposure.
+        if mode == TriggerMode::FreeRunning {
+            return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
+        }
+        self.forget_what_is_there()
+    }
+
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(TriggerMode::Software) })
     }
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {

@@ -1,13 +1,15 @@
 //! The simulator's camera: images over a loopback TCP stream ([`farnear_protocol::camera`]).
 
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use farnear_protocol::camera::{Control, FRAME_HEADER, FrameHeader};
-use farnear_protocol::message::ShotRecord;
+use farnear_protocol::camera::{Control, FRAME_HEADER, FREE_RUNNING, FrameHeader};
+use farnear_protocol::message::{ShotRecord, TriggerMode};
+use farnear_protocol::units::Micros;
 use ndarray::Array2;
 
 use super::{Camera, CameraError, Image};
@@ -15,19 +17,86 @@ use super::{Camera, CameraError, Image};
 const CONNECT: Duration = Duration::from_secs(5);
 /// Images that wait to be fetched; a full queue holds the sender back, and memory stays bounded.
 const QUEUE: usize = 8;
+/// What a camera that runs freely needs beside its exposures: its read-out, and some time to spare.
+const BETWEEN_EXPOSURES_US: u32 = 15_000;
+/// An image belongs to the exposure whose strobe began when the camera says that it began, within this.
+const SAME_MOMENT_US: u64 = 50;
 
 /// A connection to the camera endpoint of `farnear-sim`.
 pub struct SimCamera {
     address: String,
     stream: TcpStream,
-    frames: Receiver<Result<Frame, CameraError>>,
+    queue: Arc<Queue>,
     // Reads all the time, so that the simulator is not held up while the host waits for the board's events.
     reader: Option<JoinHandle<()>>,
+    runs_freely: bool,
 }
 
 struct Frame {
     header: FrameHeader,
     pixels: Vec<u16>,
+}
+
+/// Images between the reader and who wants them.
+#[derive(Default)]
+struct Queue {
+    frames: Mutex<Waiting>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct Waiting {
+    frames: VecDeque<Result<Frame, CameraError>>,
+    /// Nothing more is read, or nobody fetches any more.
+    closed: bool,
+}
+
+impl Queue {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.frames.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds an image, waiting for room. Images of a camera that runs freely make room themselves, the oldest first:
+    /// most of them nobody wants. Gives whether anybody fetches.
+    fn push(&self, frame: Result<Frame, CameraError>) -> bool {
+        let mut waiting = self.lock();
+        while waiting.frames.len() >= QUEUE && !waiting.closed {
+            let idle =
+                |frame: &Result<Frame, _>| matches!(frame, Ok(frame) if frame.header.shot_id == FREE_RUNNING);
+            if waiting.frames.front().is_some_and(idle) {
+                waiting.frames.pop_front();
+            } else {
+                waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+            }
+        }
+        waiting.frames.push_back(frame);
+        self.changed.notify_all();
+        !waiting.closed
+    }
+
+    /// The next image; `None` when time is up, an error when nothing more can come.
+    fn pop(&self, until: Instant) -> Result<Option<Result<Frame, CameraError>>, ()> {
+        let mut waiting = self.lock();
+        loop {
+            if let Some(frame) = waiting.frames.pop_front() {
+                self.changed.notify_all();
+                return Ok(Some(frame));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if waiting.closed {
+                return Err(());
+            }
+            if left.is_zero() {
+                return Ok(None);
+            }
+            waiting = self.changed.wait_timeout(waiting, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn close(&self) {
+        self.lock().closed = true;
+        self.changed.notify_all();
+    }
 }
 
 impl SimCamera {
@@ -39,26 +108,29 @@ impl SimCamera {
         let stream =
             TcpStream::connect_timeout(&resolved, CONNECT).map_err(|error| failed(error.to_string()))?;
         let mut input = stream.try_clone().map_err(|error| failed(error.to_string()))?;
-        let (sender, frames) = sync_channel(QUEUE);
-        let name = address.to_string();
+        let queue = Arc::new(Queue::default());
+        let (filled, name) = (Arc::clone(&queue), address.to_string());
         let reader = std::thread::spawn(move || {
             loop {
                 let frame = read_frame(&mut input, &name);
                 let last = frame.is_err();
-                if sender.send(frame).is_err() || last {
-                    return;
+                if !filled.push(frame) || last {
+                    return filled.close();
                 }
             }
         });
-        Ok(Self { address: address.into(), stream, frames, reader: Some(reader) })
+        Ok(Self { address: address.into(), stream, queue, reader: Some(reader), runs_freely: false })
     }
 
     /// Lets virtual time pass in the simulator though nothing is under way there.
     pub fn advance(&mut self, micros: u64) -> Result<(), CameraError> {
+        self.control(&Control::AdvanceMicros(micros))
+    }
+
+    fn control(&mut self, control: &Control) -> Result<(), CameraError> {
         let gone = |reason: String| CameraError::Gone { address: self.address.clone(), reason };
-        let mut buffer = [0; 16];
-        let body = postcard::to_slice(&Control::AdvanceMicros(micros), &mut buffer)
-            .map_err(|error| gone(error.to_string()))?;
+        let mut buffer = [0; 32];
+        let body = postcard::to_slice(control, &mut buffer).map_err(|error| gone(error.to_string()))?;
         let length = (body.len() as u32).to_le_bytes();
         self.stream.write_all(&[&length, &*body].concat()).map_err(|error| gone(error.to_string()))
     }
@@ -69,32 +141,49 @@ impl Camera for SimCamera {
         "sim"
     }
 
-    fn arm(&mut self) -> Result<(), CameraError> {
-        // An older image is told by its trigger number when it comes up.
+    fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
+        // An older image is told by its trigger number, or by its time, when it comes up.
+        let free = mode == TriggerMode::FreeRunning;
+        if free {
+            let period = Micros(exposure.0.saturating_add(BETWEEN_EXPOSURES_US));
+            self.control(&Control::FreeRun { period, exposure })?;
+        } else if self.runs_freely {
+            self.control(&Control::FreeRun { period: Micros(0), exposure })?;
+        }
+        self.runs_freely = free;
         Ok(())
+    }
+
+    fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError> {
+        self.control(&Control::Expose { shot_id: trigger_number, exposure })
     }
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         let until = Instant::now() + wait;
         let wanted = shot.trigger_number;
         loop {
-            let left = until.saturating_duration_since(Instant::now());
-            let frame = match self.frames.recv_timeout(left) {
-                Ok(frame) => frame?,
-                Err(RecvTimeoutError::Timeout) => {
+            let frame = match self.queue.pop(until) {
+                Ok(Some(frame)) => frame?,
+                Ok(None) => {
                     return Err(CameraError::Late {
                         camera: format!("simulator at {}", self.address),
                         trigger_number: wanted,
                         waited: wait,
                     });
                 }
-                Err(RecvTimeoutError::Disconnected) => {
+                Err(()) => {
                     let reason = "the stream has ended".into();
                     return Err(CameraError::Gone { address: self.address.clone(), reason });
                 }
             };
-            let FrameHeader { shot_id, width, height, bits, .. } = frame.header;
-            match shot_id.wrapping_sub(wanted) as i32 {
+            let FrameHeader { shot_id, exposure, width, height, bits } = frame.header;
+            let later = if shot_id == FREE_RUNNING {
+                let apart = exposure.0.abs_diff(shot.strobe_start.0) > SAME_MOMENT_US;
+                i32::from(apart) * if exposure < shot.strobe_start { -1 } else { 1 }
+            } else {
+                shot_id.wrapping_sub(wanted) as i32
+            };
+            match later {
                 ..0 => {}
                 0 => {
                     let size = (usize::from(height), usize::from(width));
@@ -113,7 +202,7 @@ impl Drop for SimCamera {
     fn drop(&mut self) {
         let _ = self.stream.shutdown(Shutdown::Both);
         // A reader that waits with a full queue sees that nobody fetches any more.
-        self.frames = sync_channel(0).1;
+        self.queue.close();
         if let Some(reader) = self.reader.take() {
             let _ = reader.join();
         }

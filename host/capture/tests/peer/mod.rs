@@ -15,12 +15,15 @@ use std::time::Duration;
 use farnear_capture::Transport;
 use farnear_protocol::frame::{Decoder, Header, Kind, Packet, encode};
 use farnear_protocol::message::{
-    Axis, AxisStatus, Capabilities, EventKind, Failure, Hello, Limits, LinkCounters, PositionState,
-    ResetCause, SCHEMA_KEY, Shot, ShotRecord, Status,
+    Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
+    LinkCounters, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot, Status,
 };
 use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
-use farnear_protocol::{Event, Request, RequestError, Response};
+use farnear_protocol::{Event, Log, Request, RequestError, Response};
 use serde::Serialize;
+
+mod keep;
+mod work;
 
 /// What is wrong with the line or the board.
 #[derive(Default, Clone)]
@@ -43,12 +46,16 @@ pub struct Faults {
     pub gone_at_program: bool,
     /// Work is taken on and never ends.
     pub never_ends: bool,
+    /// Work that was taken on asks so often whether the host is still there, and ends at the last answer.
+    pub asks_first: u32,
     /// The board forgets events at once.
     pub forgetful: bool,
     /// The board works, ends, and says nothing.
     pub end_unsaid: bool,
     /// Work ends with this.
     pub fails_with: Option<Failure>,
+    /// Work ends with this alarm.
+    pub alarm_at_work: Option<Alarm>,
     /// The board refuses every version but this.
     pub other_version: Option<u8>,
 }
@@ -59,18 +66,33 @@ pub struct Board {
     pub time: u64,
     pub coarse: Nanometres,
     pub fine: Nanometres,
+    pub lens: Nanometres,
     pub homed: bool,
+    pub lens_homed: bool,
     /// Homings, moves and programs that were carried out.
     pub acts: u32,
     pub stops: u32,
+    pub halts: u32,
+    /// Deadlines of the host's silence that came with work.
+    pub silences: Vec<Micros>,
     pub program: Vec<Option<Shot>>,
+    pub armed: u8,
     pub events: Vec<Event>,
     pub triggers: u32,
-    active: Option<u32>,
+    pub alarms: Vec<AlarmRecord>,
+    pub latched: bool,
+    pub settings: BTreeMap<&'static str, i32>,
+    pub counters: Counters,
+    /// Status requests that answered [`EventKind::StillThere`].
+    pub still_there: u32,
+    /// The line is broken: nothing arrives and nothing can be opened.
+    pub gone: bool,
+    active: Option<(u32, Request)>,
+    asking: u32,
+    logs: u32,
     remembered: BTreeMap<u32, (Kind, Vec<u8>)>,
     decoder: Decoder,
     out: VecDeque<u8>,
-    gone: bool,
 }
 
 /// The host's end of the line.
@@ -89,10 +111,17 @@ impl Peer {
             shots_max: 16,
             exposure_min: Micros(10),
             exposure_max: Micros(1_000_000),
+            lens_min: Nanometres(0),
+            lens_max: Nanometres(12_000_000),
+            lens_step_pm: 156_250,
+            distance_min: Nanometres(46_000_000),
+            silence_min: Micros(100_000),
+            silence_max: Micros(60_000_000),
+            row_pixels_max: 1024,
         };
         let hello = Hello {
-            protocol_min: 1,
-            protocol_current: 1,
+            protocol_min: 2,
+            protocol_current: 2,
             schema_key: SCHEMA_KEY,
             board: "scripted".try_into().unwrap(),
             firmware: "0.0.1".try_into().unwrap(),
@@ -100,7 +129,14 @@ impl Peer {
             boot: 7,
             reset_cause: ResetCause::PowerOn,
             emulated: false,
-            capabilities: Capabilities { sensor_coarse: true, sensor_fine: true, strobe: true },
+            capabilities: Capabilities {
+                sensor_coarse: true,
+                sensor_fine: true,
+                strobe: true,
+                lens: true,
+                memory: true,
+                emergency_stop: true,
+            },
             limits,
         };
         let started = Event { time: BoardMicros(0), kind: EventKind::Started { cause: ResetCause::PowerOn } };
@@ -110,18 +146,42 @@ impl Peer {
             time: 1000,
             coarse: Nanometres(123),
             fine: Nanometres(0),
+            lens: Nanometres(77),
             homed: false,
+            lens_homed: false,
             acts: 0,
             stops: 0,
+            halts: 0,
+            silences: Vec::new(),
             program: vec![None; 16],
+            armed: 0,
             events: vec![started],
             triggers: 0,
+            alarms: Vec::new(),
+            latched: false,
+            settings: BTreeMap::new(),
+            counters: Counters { boots: 7, ..Counters::default() },
+            still_there: 0,
+            gone: false,
             active: None,
+            asking: 0,
+            logs: 0,
             remembered: BTreeMap::new(),
             decoder: Decoder::new(),
             out: VecDeque::new(),
-            gone: false,
         })))
+    }
+
+    /// What opens the line to this board again and again.
+    pub fn connect(&self) -> farnear_capture::Connect {
+        let peer = self.clone();
+        Box::new(move || {
+            if peer.board().gone {
+                let (port, present) = ("scripted".into(), Vec::new());
+                return Err(farnear_capture::PortError::Absent { port, present });
+            }
+            Ok(Box::new(peer.clone()) as Box<dyn Transport>)
+        })
     }
 
     pub fn board(&self) -> MutexGuard<'_, Board> {
@@ -168,7 +228,7 @@ impl Transport for Peer {
 
 impl Board {
     fn put<T: Serialize>(&mut self, kind: Kind, id: u32, message: &T) {
-        let header = Header { version: 1, kind, id, boot: self.hello.boot };
+        let header = Header { version: 2, kind, id, boot: self.hello.boot };
         let frame = encode(header, message).unwrap();
         let garbage = self.faults.garbage.clone();
         self.out.extend(garbage);
@@ -243,6 +303,7 @@ impl Board {
             Request::Status => {
                 let status = self.status();
                 self.answer(id, Ok(Response::Status(status)));
+                self.hear_from_host();
             }
             Request::ReadEvent { number } => {
                 let next = self.events.len() as u32;
@@ -255,98 +316,24 @@ impl Board {
             Request::Stop => {
                 self.stops += 1;
                 self.answer(id, Ok(Response::Accepted));
-                if let Some(request) = self.active.take() {
+                if let Some((request, _)) = self.active.take() {
                     self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
                 }
-            }
-            Request::LoadShot { index, shot } => {
-                self.program[usize::from(index)] = Some(shot);
-                self.answer(id, Ok(Response::Accepted));
             }
             Request::Reboot => {
                 self.answer(id, Ok(Response::Accepted));
                 self.reset(ResetCause::Software);
             }
-            Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. } => {
-                self.work(id, request)
-            }
+            Request::Home { .. }
+            | Request::Move { .. }
+            | Request::RunProgram { .. }
+            | Request::Calibrate { .. } => self.work(id, request),
+            Request::LoadShot { .. }
+            | Request::ArmProgram { .. }
+            | Request::PauseProgram
+            | Request::ResumeProgram => self.prepare(id, request),
+            other => self.keep(id, other),
         }
-    }
-
-    fn work(&mut self, id: u32, request: Request) {
-        if let Request::Move { axis: axis @ Axis::SensorCoarse, target } = request {
-            let Limits { coarse_min: min, coarse_max: max, .. } = self.hello.limits;
-            if !self.homed {
-                return self.answer(id, Err(RequestError::NotHomed { axis, state: PositionState::Unknown }));
-            }
-            if target < min || target > max {
-                return self.answer(id, Err(RequestError::OutOfRange { axis, asked: target, min, max }));
-            }
-        }
-        if self.faults.reset_at_move {
-            return self.reset(ResetCause::Watchdog);
-        }
-        if self.faults.gone_at_program && matches!(request, Request::RunProgram { .. }) {
-            self.answer(id, Ok(Response::Accepted));
-            self.gone = true;
-            return;
-        }
-        self.acts += 1;
-        self.answer(id, Ok(Response::Accepted));
-        if self.faults.never_ends {
-            self.active = Some(id);
-            return;
-        }
-        if self.faults.end_unsaid {
-            return;
-        }
-        if let Some(reason) = self.faults.fails_with {
-            return self.event(EventKind::Failed { request: id, axis: Some(Axis::SensorCoarse), reason });
-        }
-        match request {
-            Request::Home { axis } => {
-                self.homed = true;
-                self.coarse = Nanometres(0);
-                self.event(EventKind::Homed { request: id, axis, shift: Nanometres(0) });
-            }
-            Request::Move { axis, target } => {
-                self.place(axis, target);
-                let measured = self.measured(axis);
-                self.event(EventKind::MoveDone { request: id, axis, asked: target, measured });
-            }
-            _ => self.run(id),
-        }
-    }
-
-    fn run(&mut self, id: u32) {
-        let shots: Vec<Shot> = self.program.iter().map_while(|shot| *shot).collect();
-        let mut exposures = 0;
-        for (index, shot) in shots.iter().enumerate() {
-            self.place(shot.axis, shot.target);
-            for repeat in 0..shot.repeat {
-                self.time += 20_000;
-                self.triggers += 1;
-                exposures += 1;
-                let trigger = BoardMicros(self.time);
-                let strobe_start = BoardMicros(self.time + 20);
-                let record = ShotRecord {
-                    index: index as u8,
-                    repeat,
-                    trigger_number: self.triggers - 1,
-                    axis: shot.axis,
-                    asked: shot.target,
-                    coarse: self.coarse,
-                    fine: self.fine,
-                    settle: Micros(9_000),
-                    trigger,
-                    strobe_start,
-                    strobe_end: BoardMicros(strobe_start.0 + u64::from(shot.exposure.0)),
-                    exposure: shot.exposure,
-                };
-                self.event(EventKind::ShotDone { request: id, shot: record });
-            }
-        }
-        self.event(EventKind::ProgramDone { request: id, exposures });
     }
 
     /// The coarse axis lands where a screw lands: near the place asked for.
@@ -354,6 +341,7 @@ impl Board {
         match axis {
             Axis::SensorCoarse => self.coarse = Nanometres(target.0 + 375),
             Axis::SensorFine => self.fine = Nanometres(target.0 - 2),
+            Axis::Lens => self.lens = Nanometres(target.0 + 125),
         }
     }
 
@@ -361,6 +349,7 @@ impl Board {
         match axis {
             Axis::SensorCoarse => self.coarse,
             Axis::SensorFine => self.fine,
+            Axis::Lens => self.lens,
         }
     }
 
@@ -368,6 +357,8 @@ impl Board {
         self.hello.boot += 1;
         self.hello.reset_cause = cause;
         self.homed = false;
+        self.lens_homed = false;
+        self.armed = 0;
         self.active = None;
         self.remembered.clear();
         self.events.clear();
@@ -379,16 +370,42 @@ impl Board {
         }
     }
 
+    /// Says something into the log.
+    pub fn log(&mut self, bytes: &[u8]) {
+        let log = Log { bytes: bytes.try_into().unwrap() };
+        let number = self.logs;
+        self.logs += 1;
+        self.put(Kind::Log, number, &log);
+    }
+
+    /// A piece of the log that gets lost on the line.
+    pub fn lose_log(&mut self) {
+        self.logs += 1;
+    }
+
     fn status(&self) -> Status {
-        let axis = |state, position| AxisStatus { state, asked: position, measured: position, moving: false };
-        let coarse = if self.homed { PositionState::Homed } else { PositionState::Unknown };
+        let axis = |homed: bool, position| AxisStatus {
+            state: if homed { PositionState::Homed } else { PositionState::Unknown },
+            asked: position,
+            measured: position,
+            moving: false,
+            request: None,
+        };
+        let active = self.active.as_ref().map(|(id, _)| *id);
+        let state = if self.armed > 0 { ProgramState::Armed } else { ProgramState::Idle };
         Status {
             time: BoardMicros(self.time),
-            coarse: axis(coarse, self.coarse),
-            fine: axis(PositionState::Homed, self.fine),
+            coarse: AxisStatus { request: active, ..axis(self.homed, self.coarse) },
+            fine: axis(true, self.fine),
+            lens: axis(self.lens_homed, self.lens),
             home_switch: false,
             far_switch: false,
-            active: self.active,
+            lens_home_switch: false,
+            lens_far_switch: false,
+            emergency_stop: false,
+            supply_low: false,
+            alarm: self.alarms.last().copied().filter(|_| self.latched),
+            program: ProgramStatus { state, shots: self.armed, index: 0, exposures: 0 },
             next_event: self.events.len() as u32,
             triggers: self.triggers,
             steps: 0,
@@ -398,5 +415,5 @@ impl Board {
 }
 
 fn postcard_frame<T: Serialize>(boot: u32, kind: Kind, id: u32, message: &T) -> Vec<u8> {
-    encode(Header { version: 1, kind, id, boot }, message).unwrap().to_vec()
+    encode(Header { version: 2, kind, id, boot }, message).unwrap().to_vec()
 }

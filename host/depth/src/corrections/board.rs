@@ -3,7 +3,21 @@
 use farnear_maths::clsf::{DepthScale, Error, Frame};
 use ndarray::{Array2, ArrayView2};
 
-use super::CorrectionError;
+use super::{CorrectionError, Method};
+
+/// A correction in the board's number formats: what is sent to a board so that it corrects like
+/// [`Correction::apply_as_board`](super::Correction::apply_as_board).
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoardCorrection {
+    /// `Clsf`, `ClsfBlend` or `ClsfFull`.
+    pub method: Method,
+    /// Size of the depth maps.
+    pub frame: Frame,
+    /// The codes of depths.
+    pub scale: DepthScale,
+    /// Q2.29 bits: 3x3 regions of ten terms each, row by row, or twenty terms.
+    pub coefficients: Vec<i32>,
+}
 
 /// The board's frame for a map of (height, width).
 pub(super) fn frame((height, width): (usize, usize)) -> Result<Frame, CorrectionError> {

@@ -7,6 +7,7 @@ use std::{
 };
 
 use assert_cmd::Command as Assert;
+use farnear_capture::image_file::read_grey;
 use serde_json::Value;
 
 use crate::common::{Folder, SIM, beside, fails, farnear, has_emulated_rig, rig_optics, succeeds};
@@ -81,8 +82,8 @@ fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
         return;
     }
     let folder = Folder::new();
-    // Homing takes some 2 s of the board's time, both exposures lie at 2.76 s and 2.78 s.
-    for milliseconds in [300, 2_770] {
+    // Homing takes some 4 s of the board's time, both exposures lie at 5.365 s and 5.385 s.
+    for milliseconds in [300, 5_375] {
         let faults = format!("unplug_after_ms = {milliseconds}");
         fails(&mut capture(&folder, Some(&faults), "out"), 1, &["went away while", "check its cable"]);
         assert_eq!(folder.listing(), ["faults.toml"]);
@@ -159,7 +160,15 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
     let output = capture(&folder, Some("bit_error_rate = 1e-4"), "noisy").output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     match output.status.code() {
-        Some(0) => assert!(images("clean") == images("noisy"), "a capture over a bad line differs"),
+        Some(0) => {
+            // What is asked again costs time, so that the piezo stands some nanometres elsewhere in its window.
+            for file in ["far.png", "near.png"] {
+                let picture =
+                    |name: &str| read_grey(&folder.path(&format!("{name}/{file}"))).expect("an image").pixels;
+                let difference = (picture("clean") - picture("noisy")).mapv(f32::abs);
+                assert!(difference.mean() < Some(2.0), "{file}: {:?}", difference.mean());
+            }
+        }
         Some(1) => {
             assert!(said.contains("farnear: "), "{said}");
             assert_eq!(folder.listing(), before);

@@ -17,7 +17,7 @@ fn info_says_who_is_there_and_that_it_is_emulated() {
     }
     let mut command = on_the_rig(&["info", "--json"]);
     let info = figures(&mut command);
-    assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &1.into(), &1.into()));
+    assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &2.into(), &1.into()));
     assert_eq!(info["board"], "nucleo-f429zi");
     assert_eq!(info["coarse"]["state"], "unknown");
     let (_, said) = succeeds(&mut on_the_rig(&["info"]));
@@ -30,12 +30,19 @@ fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
         return;
     }
     let homed = figures(&mut on_the_rig(&["home", "--json"]));
-    assert!(homed["shift_um"].is_number(), "{homed}");
+    assert!(homed["shift_um"].is_number() && homed["lens_shift_um"].is_number(), "{homed}");
     let coarse = ["move", "--axis", "coarse", "--to-um", "123.5"];
     fails(&mut on_the_rig(&coarse), 1, &["refused", "123.500 um", "home it first"]);
     let moved = figures(on_the_rig(&coarse).args(["--home", "--json"]));
     // A step is 0.15625 um; the encoder counts 0.125 um.
     assert!((number(&moved, "measured_um") - 123.5).abs() < 0.3, "{moved}");
+    let both = [
+        "move", "--home", "--axis", "lens", "--to-um", "400", "--axis", "coarse", "--to-um", "250", "--json",
+    ];
+    let moved = figures(&mut on_the_rig(&both));
+    for (at, asked) in [(0, 400.0), (1, 250.0)] {
+        assert!((number(&moved["moved"][at], "measured_um") - asked).abs() < 0.3, "{moved}");
+    }
     let fine = figures(&mut on_the_rig(&["move", "--axis", "fine", "--to-um", "50", "--json"]));
     assert!((number(&fine, "measured_um") - 50.0).abs() <= 0.05, "{fine}");
     let beyond = ["move", "--axis", "fine", "--to-um", "500"];

@@ -8,6 +8,7 @@ mod bad_optics;
 mod bad_ports;
 mod bad_rigs;
 mod emulated_rig;
+mod emulated_work;
 mod maps;
 mod markers;
 mod scene_files;

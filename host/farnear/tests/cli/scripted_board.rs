@@ -70,11 +70,83 @@ fn a_board_behind_a_port_is_driven_by_one_program_after_the_other() {
     succeeds(&mut rig(&["home"]));
     let moved = figures(&mut rig(&["move", "--axis", "coarse", "--to-um", "5000", "--json"]));
     assert_eq!(number(&moved, "measured_um"), 5000.375);
+    let both = ["move", "--axis", "coarse", "--to-um", "1000", "--axis", "lens", "--to-um", "2000", "--json"];
+    let moved = figures(&mut rig(&both));
+    assert_eq!(number(&moved["moved"][0], "measured_um"), 1000.375);
+    assert_eq!(
+        (&moved["moved"][1]["axis"], number(&moved["moved"][1], "measured_um")),
+        (&"lens".into(), 2000.125)
+    );
     succeeds(&mut rig(&["stop"]));
     let far_off = ["move", "--axis", "coarse", "--to-um", "-5"];
     fails(&mut rig(&far_off), 1, &["-5.000 um is outside the limits", "0.000 to 13000.000 um"]);
     let board = peer.board();
-    assert_eq!((board.acts, board.stops), (2, 1));
+    assert_eq!((board.acts, board.stops), (5, 1));
+}
+
+#[test]
+fn an_alarm_is_told_listed_and_cleared_by_its_number() {
+    let (port, peer) = plug_in(Faults::default());
+    let rig = |arguments: &[&str]| {
+        let mut command = farnear(&["rig"]);
+        command.args(arguments).args(["--port", &port]);
+        command
+    };
+    succeeds(&mut rig(&["halt"]));
+    fails(
+        &mut rig(&["home"]),
+        1,
+        &["alarm 1 is latched: the host halted the rig", "farnear rig alarms --clear 1"],
+    );
+    let listed = figures(&mut rig(&["alarms", "--json"]));
+    assert_eq!((number(&listed, "latched"), number(&listed["alarms"][0], "number")), (1.0, 1.0));
+    fails(&mut rig(&["alarms", "--clear", "2"]), 1, &["the latched alarm is number 1"]);
+    let cleared = figures(&mut rig(&["alarms", "--clear", "1", "--json"]));
+    assert_eq!(number(&cleared, "latched"), 0.0);
+    succeeds(&mut rig(&["home"]));
+    assert_eq!(peer.board().halts, 1);
+}
+
+#[test]
+fn settings_and_counters_are_read_and_changed() {
+    let (port, _peer) = plug_in(Faults::default());
+    let settings = |arguments: &[&str]| {
+        let mut command = farnear(&["rig", "settings"]);
+        command.args(arguments).args(["--port", &port, "--json"]);
+        command
+    };
+    let list = figures(&mut settings(&["list"]));
+    assert_eq!(list["settings"].as_array().map(Vec::len), Some(23), "{list}");
+    let set = figures(&mut settings(&["set", "coarse_backlash_nm", "4000"]));
+    assert_eq!((number(&set, "value"), number(&set, "default")), (4000.0, 1000.0));
+    assert_eq!(number(&figures(&mut settings(&["get", "coarse_backlash_nm"])), "value"), 4000.0);
+    fails(&mut settings(&["set", "datum_nm", "-1"]), 1, &["datum_nm must lie between 0 and 20000000"]);
+    let counters = figures(&mut farnear(&["rig", "counters", "--port", &port, "--json"]));
+    assert_eq!(number(&counters, "boots"), 7.0);
+    let reset = figures(&mut farnear(&["rig", "reset", "--port", &port, "--json"]));
+    assert_eq!((number(&reset, "boot_before"), number(&reset, "boot")), (7.0, 8.0));
+}
+
+#[test]
+fn a_checklist_without_hands_stops_at_what_fails() {
+    let (port, peer) = plug_in(Faults::default());
+    peer.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().expect("a short version");
+    let images = Folder::new();
+    let camera = format!("folder:{}", images.text(""));
+    let check =
+        ["rig", "check", "--port", &port, "--no-hands", "--resting-only", "--json", "--camera", &camera];
+    // The scripted board has no memory worth the name: its counter of boots stands still.
+    let output = farnear(&check).output().expect("it starts");
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("figures");
+    assert_eq!(
+        (output.status.code(), number(&found, "passed"), number(&found, "failed")),
+        (Some(1), 3.0, 1.0)
+    );
+    assert_eq!(
+        (&found["steps"][3]["step"], &found["steps"][3]["verdict"]),
+        (&"memory".into(), &"failed".into())
+    );
+    assert_eq!(peer.board().acts, 0);
 }
 
 #[test]
@@ -109,5 +181,5 @@ fn another_message_table_under_the_same_version_is_told_with_both_keys() {
 fn garbage_between_frames_costs_nothing() {
     let (port, peer) = plug_in(Faults { garbage: vec![7, 0, 255, 255, 0], ..Faults::default() });
     succeeds(&mut farnear(&["rig", "home", "--port", &port]));
-    assert_eq!(peer.board().acts, 1);
+    assert_eq!(peer.board().acts, 2);
 }

@@ -20,7 +20,27 @@ const COMMANDS: &[&[&str]] = &[
     &["rig", "home"],
     &["rig", "move"],
     &["rig", "stop"],
+    &["rig", "halt"],
+    &["rig", "focus"],
     &["rig", "capture"],
+    &["rig", "sequence"],
+    &["rig", "calibrate"],
+    &["rig", "calibrate", "travel"],
+    &["rig", "calibrate", "backlash"],
+    &["rig", "calibrate", "piezo"],
+    &["rig", "calibrate", "targets"],
+    &["rig", "calibrate", "fit"],
+    &["rig", "sun"],
+    &["rig", "correct"],
+    &["rig", "alarms"],
+    &["rig", "settings"],
+    &["rig", "settings", "list"],
+    &["rig", "settings", "get"],
+    &["rig", "settings", "set"],
+    &["rig", "counters"],
+    &["rig", "reset"],
+    &["rig", "log"],
+    &["rig", "check"],
     &["sun"],
     &["shadow"],
     &["shadow", "remove"],
@@ -45,7 +65,16 @@ fn every_command_has_help_with_an_example() {
         let (help, _) = succeeds(farnear(command).arg("--help"));
         assert!(help.contains("Example: farnear ") && help.contains(&command.join(" ")), "{help}");
     }
-    for folder in [&[] as &[&str], &["activity"], &["calibrate"], &["rig"], &["shadow"], &["silhouettes"]] {
+    for folder in [
+        &[] as &[&str],
+        &["activity"],
+        &["calibrate"],
+        &["rig"],
+        &["rig", "calibrate"],
+        &["rig", "settings"],
+        &["shadow"],
+        &["silhouettes"],
+    ] {
         let (help, _) = succeeds(farnear(folder).arg("--help"));
         let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1);
         for line in listed.take_while(|line| !line.is_empty()) {
@@ -83,7 +112,6 @@ fn bad_usage_ends_with_2() {
         (vec!["rig", "info", "--port", "sim", "--scene", "cube"], vec!["cube", "staircase"]),
         (vec!["rig", "info", "--port", "sim", "--noise", "9bit"], vec!["9bit", "12bit"]),
         (vec!["rig", "info", "--port", "/dev/x", "--seed", "2"], vec!["--seed goes with --port sim only"]),
-        (vec!["rig", "move", "--port", "sim", "--axis", "lens", "--to-um", "1"], vec!["lens", "coarse"]),
         (vec!["sun", "--lat", "95", "--lon", "0", "--time", "2014-06-23T11:30:00Z"], vec!["95", "-90 to 90"]),
         (vec!["sun", "--lat", "9", "--lon", "-181", "--time", "2014-06-23T11:30:00Z"], vec!["-181", "360"]),
         (vec!["sun", "--lat", "52", "--lon", "0", "--time", "noon"], vec!["noon", "RFC 3339"]),
@@ -96,6 +124,35 @@ fn bad_usage_ends_with_2() {
             vec!["72"],
         ),
         (vec!["silhouettes", "synthetic", "--out", "x", "--activities", "sing"], vec!["sing", "walk, drop"]),
+        (vec!["rig", "move", "--port", "sim", "--axis", "z", "--to-um", "1"], vec!["'z'", "coarse", "lens"]),
+        (
+            vec!["rig", "move", "--port", "x", "--axis", "lens", "--axis", "fine", "--to-um", "1"],
+            vec!["--axis is given 2 times and --to-um 1 times"],
+        ),
+        (
+            vec![
+                "rig", "move", "--port", "x", "--axis", "fine", "--to-um", "1", "--axis", "fine", "--to-um",
+                "2",
+            ],
+            vec!["--axis fine is given twice"],
+        ),
+        (vec!["rig", "settings", "get", "speed", "--port", "x"], vec!["no setting \"speed\"", "datum_nm"]),
+        (vec!["rig", "calibrate", "backlash", "--port", "x", "--axis", "fine"], vec!["fine", "piezo"]),
+        (vec!["rig", "sequence", "--port", "sim", "--out", "x"], vec!["--program FILE", "--steps"]),
+        (vec!["rig", "sequence", "--port", "sim", "--out", "x", "--steps", "3"], vec!["--axis"]),
+        (vec!["rig", "focus", "--port", "sim", "--optics", optics, "--region", "1,2"], vec!["--region"]),
+        (
+            vec!["rig", "sun", "--port", "x", "--lat", "91", "--lon", "0", "--time", "2012-07-17T12:00:00Z"],
+            vec!["--lat 91", "90"],
+        ),
+        (
+            vec!["rig", "sun", "--port", "x", "--lat", "1", "--lon", "0", "--time", "noon"],
+            vec!["noon", "RFC 3339"],
+        ),
+        (
+            vec!["rig", "correct", "a.npy", "--port", "x", "--correction", "c", "--out", "a.png"],
+            vec!["a.png", ".npy"],
+        ),
         (vec!["completions", "cmd"], vec!["cmd", "bash"]),
     ] {
         fails(&mut farnear(&arguments), 2, &phrases);

@@ -92,7 +92,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
     report::print(&figures, arguments.json)
 }
 
-fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
+/// The maps that a list names, with their true depths in mm.
+pub fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
     let text = fs::read_to_string(list).with_context(|| format!("cannot read {}", list.display()))?;
     let List { pattern } = toml::from_str(&text).with_context(|| {
         format!("{} is no list of [[pattern]] with depth = FILE and true_mm = MM", list.display())

@@ -1,23 +1,21 @@
 //! `farnear rig capture`: a far- and a near-focused image into a capture folder.
 
-use std::{path::PathBuf, time::Duration};
+use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
 use farnear_capture::{
-    camera::{Camera, FolderCamera, SimCamera},
     pair::{Exposures, capture_pair},
     plan::SensorPair,
-    record::{Circumstances, begin_folder, finish_folder, record_of},
+    record::{begin_folder, finish_folder, record_of},
 };
-use farnear_protocol::Micros;
 use serde::Serialize;
 
-use super::Target;
-use crate::{
-    files,
-    report::{self, Usage},
+use super::{
+    Target,
+    camera::{self, CameraArguments},
 };
+use crate::{files, report};
 
 /// Capture a far- and a near-focused image: homes where needed, brings the stage near, exposes both by piezo.
 ///
@@ -29,18 +27,11 @@ use crate::{
 pub struct Arguments {
     #[command(flatten)]
     target: Target,
-    /// Camera: sim (with --port sim), HOST:PORT of a farnear-sim, or folder:DIR where images appear.
-    #[arg(long, value_name = "CAMERA", default_value = "sim")]
-    camera: String,
+    #[command(flatten)]
+    camera: CameraArguments,
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// Exposure time in microseconds.
-    #[arg(long, value_name = "US", default_value_t = 5_000)]
-    exposure_us: u32,
-    /// Longest wait for an image in seconds.
-    #[arg(long, value_name = "S", default_value_t = 30)]
-    image_wait_s: u64,
     /// The new capture folder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -67,28 +58,18 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let table: toml::Table = files::optics::text(&arguments.optics)?.parse()?;
     // Before anything moves: a folder that cannot be written is known now.
     let folder = begin_folder(&arguments.out)?;
-    let camera = early_camera(&arguments.camera, &arguments.target.port)?;
-    let mut rig = arguments.target.connect(Some((&arguments.optics, optics.psf())))?;
-    let mut camera = match (camera, &rig.simulator) {
-        (Some(camera), _) => camera,
-        (None, Some(simulator)) => Box::new(SimCamera::connect(simulator.camera())?),
-        (None, None) => bail!(SIM_CAMERA_ALONE),
-    };
+    let camera = arguments.camera.open_early(&arguments.target)?;
+    let rig = arguments.target.connect(Some((&arguments.optics, optics.psf())))?;
+    let mut camera = camera::of_rig(camera, &rig)?;
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
     let exposures = Exposures {
-        exposure: Micros(arguments.exposure_us),
-        image_wait: Duration::from_secs(arguments.image_wait_s),
+        exposure: arguments.camera.exposure(),
+        image_wait: arguments.camera.image_wait(),
         ..Exposures::default()
     };
     let pair =
-        capture_pair(&mut rig.client, camera.as_mut(), &sensor, &exposures, &mut |what| eprintln!("{what}"))?;
-    let circumstances = Circumstances {
-        made_by: concat!("farnear ", env!("CARGO_PKG_VERSION")).into(),
-        time: (!rig.client.hello().emulated).then(files::now_rfc3339).flatten(),
-        camera: camera.kind(),
-        simulation: rig.simulator.as_ref().map(|_| arguments.target.scenery.decided(optics.psf())),
-        optics: table,
-    };
+        capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, &mut |what| eprintln!("{what}"))?;
+    let circumstances = camera::circumstances(&rig, &arguments.target, camera.as_ref(), optics.psf(), table);
     let record = record_of(&pair, &rig.client, circumstances);
     finish_folder(folder, &pair, &record)?;
     eprintln!("wrote {}", arguments.out.display());
@@ -104,22 +85,4 @@ pub fn run(arguments: Arguments) -> Result<()> {
         height,
     };
     report::print(&figures, arguments.json)
-}
-
-const SIM_CAMERA_ALONE: &str =
-    "--camera sim belongs to --port sim; with another port give HOST:PORT or folder:DIR as the camera";
-
-/// The camera, unless it is the one that comes with the emulated rig. Opened before the rig, so that a camera that
-/// is not there is known before anything moves.
-fn early_camera(name: &str, port: &str) -> Result<Option<Box<dyn Camera>>> {
-    if name == "sim" {
-        return if port == "sim" { Ok(None) } else { bail!(Usage(SIM_CAMERA_ALONE.into())) };
-    }
-    if let Some(folder) = name.strip_prefix("folder:") {
-        return Ok(Some(Box::new(FolderCamera::watch(folder.as_ref())?)));
-    }
-    if !name.contains(':') {
-        bail!(Usage(format!("unknown camera {name:?}: expected sim, HOST:PORT or folder:DIR")));
-    }
-    Ok(Some(Box::new(SimCamera::connect(name)?)))
 }

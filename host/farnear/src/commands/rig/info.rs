@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use farnear_capture::describe::{cause_name, state_name, um};
+use farnear_capture::describe::{alarm_text, cause_name, program_name, state_name, um};
 use farnear_protocol::message::AxisStatus;
 use serde::Serialize;
 
@@ -35,10 +35,27 @@ struct Figures {
     fine_min_um: f64,
     fine_max_um: f64,
     shots_max: u8,
+    lens_min_um: f64,
+    lens_max_um: f64,
+    distance_min_mm: f64,
+    has_lens_stage: bool,
+    has_memory: bool,
+    has_emergency_stop: bool,
+    emergency_stop: bool,
+    supply_low: bool,
+    alarm: u32,
+    alarm_text: String,
+    program: &'static str,
+    program_shots: u8,
     home_switch: bool,
     far_switch: bool,
+    lens_home_switch: bool,
+    lens_far_switch: bool,
+    link_frames: u32,
+    link_bad_frames: u32,
     coarse: Axis,
     fine: Axis,
+    lens: Axis,
 }
 
 #[derive(Serialize)]
@@ -62,7 +79,7 @@ impl From<AxisStatus> for Axis {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let mut rig = arguments.target.connect(None)?;
+    let rig = arguments.target.connect(None)?;
     let status = rig.client.status()?;
     let hello = rig.client.hello();
     let limits = hello.limits;
@@ -80,10 +97,27 @@ pub fn run(arguments: Arguments) -> Result<()> {
         fine_min_um: um(limits.fine_min),
         fine_max_um: um(limits.fine_max),
         shots_max: limits.shots_max,
+        lens_min_um: um(limits.lens_min),
+        lens_max_um: um(limits.lens_max),
+        distance_min_mm: um(limits.distance_min) / 1e3,
+        has_lens_stage: hello.capabilities.lens,
+        has_memory: hello.capabilities.memory,
+        has_emergency_stop: hello.capabilities.emergency_stop,
+        emergency_stop: status.emergency_stop,
+        supply_low: status.supply_low,
+        alarm: status.alarm.map_or(0, |record| record.number),
+        alarm_text: status.alarm.map_or_else(String::new, |record| alarm_text(record.alarm)),
+        program: program_name(status.program.state),
+        program_shots: status.program.shots,
         home_switch: status.home_switch,
         far_switch: status.far_switch,
+        lens_home_switch: status.lens_home_switch,
+        lens_far_switch: status.lens_far_switch,
+        link_frames: status.link.frames,
+        link_bad_frames: status.link.bad_frames,
         coarse: status.coarse.into(),
         fine: status.fine.into(),
+        lens: status.lens.into(),
     };
     report::print(&figures, arguments.json)
 }

@@ -1,38 +1,46 @@
-//! `farnear rig home | move | stop`.
+//! `farnear rig home | move | stop | halt`.
 
 use anyhow::{Result, bail};
-use clap::{Args, ValueEnum};
-use farnear_capture::describe::um;
-use farnear_protocol::{Nanometres, message::Axis};
+use clap::Args;
+use farnear_capture::{
+    describe::um,
+    ready::{ensure_homed, steppers},
+};
+use farnear_protocol::message::Axis;
 use serde::Serialize;
 
-use super::Target;
-use crate::report;
+use super::{AxisName, Target, nanometres};
+use crate::report::{self, Usage};
 
-/// Find the home switch of the coarse stage and make it position 0.
+/// Find the home switches and make them position 0: of all stages at once, or of those that are named.
 #[derive(Args)]
-#[command(after_help = "Example: farnear rig home --port /dev/ttyACM0")]
+#[command(after_help = "Example: farnear rig home --port /dev/ttyACM0 --axis lens")]
 pub struct HomeArguments {
     #[command(flatten)]
     target: Target,
+    /// The axis to home; may be given again. Without it all that have a home switch.
+    #[arg(long, value_name = "AXIS")]
+    axis: Vec<AxisName>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }
 
-/// Move to an absolute position; outside the limits it is refused.
+/// Move to absolute positions, several axes at once; outside the limits it is refused.
 #[derive(Args)]
-#[command(after_help = "Example: farnear rig move --port /dev/ttyACM0 --axis coarse --to-um 5800")]
+#[command(
+    after_help = "Example: farnear rig move --port /dev/ttyACM0 --axis coarse --to-um 5800 --axis lens --to-um 1000"
+)]
 pub struct MoveArguments {
     #[command(flatten)]
     target: Target,
-    /// The axis.
-    #[arg(long)]
-    axis: AxisName,
-    /// The position in micrometres, positive away from the lens; coarse 0 = home switch, fine 0 = relaxed piezo.
-    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
-    to_um: f64,
-    /// Home first where that is needed.
+    /// The axis; may be given again, each with its --to-um.
+    #[arg(long, value_name = "AXIS", required = true)]
+    axis: Vec<AxisName>,
+    /// The position in micrometres, positive = sensor and lens away from each other; 0 = home switch, or relaxed piezo.
+    #[arg(long, value_name = "UM", allow_negative_numbers = true, required = true)]
+    to_um: Vec<f64>,
+    /// Home first what is not homed.
     #[arg(long)]
     home: bool,
     /// Print one JSON object.
@@ -40,7 +48,7 @@ pub struct MoveArguments {
     json: bool,
 }
 
-/// Stop all motion and end a running program.
+/// Stop all motion along the ramps and end a running program; positions stay known.
 #[derive(Args)]
 #[command(after_help = "Example: farnear rig stop --port /dev/ttyACM0")]
 pub struct StopArguments {
@@ -48,57 +56,102 @@ pub struct StopArguments {
     target: Target,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum AxisName {
-    /// Stage A's stepper and screw.
-    Coarse,
-    /// Stage A's piezo.
-    Fine,
+/// Emergency stop: the last step comes within a millisecond; what moved has lost its position, and the alarm has to be
+/// cleared (farnear rig alarms).
+#[derive(Args)]
+#[command(after_help = "Example: farnear rig halt --port /dev/ttyACM0")]
+pub struct HaltArguments {
+    #[command(flatten)]
+    target: Target,
 }
 
-#[derive(Serialize)]
+/// How far each encoder's old zero was from the new one.
+#[derive(Serialize, Default)]
 struct Homed {
-    shift_um: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shift_um: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lens_shift_um: Option<f64>,
 }
 
 #[derive(Serialize)]
 struct Moved {
+    axis: &'static str,
     asked_um: f64,
     measured_um: f64,
 }
 
+#[derive(Serialize)]
+struct AllMoved {
+    moved: Vec<Moved>,
+}
+
 /// Runs `home`.
 pub fn home(arguments: HomeArguments) -> Result<()> {
-    let mut rig = arguments.target.connect(None)?;
-    let shift = rig.client.home(Axis::SensorCoarse)?;
-    report::print(&Homed { shift_um: um(shift) }, arguments.json)
+    let rig = arguments.target.connect(None)?;
+    let mut axes: Vec<Axis> = arguments.axis.iter().map(|name| name.axis()).collect();
+    if axes.is_empty() {
+        axes = steppers(&rig.client.hello().capabilities);
+    }
+    let started: Vec<_> =
+        axes.iter().map(|axis| Ok((*axis, rig.client.start_home(*axis)?))).collect::<Result<_>>()?;
+    let mut homed = Homed::default();
+    for (axis, work) in started {
+        let shift = Some(um(work.homed()?));
+        match axis {
+            Axis::Lens => homed.lens_shift_um = shift,
+            Axis::SensorCoarse | Axis::SensorFine => homed.shift_um = shift,
+        }
+    }
+    report::print(&homed, arguments.json)
 }
 
 /// Runs `move`.
 pub fn go(arguments: MoveArguments) -> Result<()> {
-    let target = nanometres(arguments.to_um)?;
-    let axis = match arguments.axis {
-        AxisName::Coarse => Axis::SensorCoarse,
-        AxisName::Fine => Axis::SensorFine,
-    };
-    let mut rig = arguments.target.connect(None)?;
-    if arguments.home {
-        rig.client.home(Axis::SensorCoarse)?;
+    let MoveArguments { axis: axes, to_um, .. } = &arguments;
+    if axes.len() != to_um.len() {
+        let (axes, positions) = (axes.len(), to_um.len());
+        bail!(Usage(format!("--axis is given {axes} times and --to-um {positions} times: they go together")));
     }
-    let moved = rig.client.move_to(axis, target)?;
-    report::print(&Moved { asked_um: um(moved.asked), measured_um: um(moved.measured) }, arguments.json)
+    if let Some(twice) =
+        axes.iter().enumerate().find_map(|(at, axis)| axes[..at].contains(axis).then_some(axis))
+    {
+        bail!(Usage(format!("--axis {} is given twice", AxisName::of(twice.axis()))));
+    }
+    let targets: Vec<_> = axes
+        .iter()
+        .zip(to_um)
+        .map(|(axis, to)| Ok((axis.axis(), nanometres(*to)?)))
+        .collect::<Result<_>>()?;
+    let rig = arguments.target.connect(None)?;
+    if arguments.home {
+        ensure_homed(&rig.client, &mut |what| eprintln!("{what}"))?;
+    }
+    let started: Vec<_> = targets
+        .into_iter()
+        .map(|(axis, target)| Ok((axis, rig.client.start_move(axis, target)?)))
+        .collect::<Result<_>>()?;
+    let mut moved = Vec::new();
+    for (axis, work) in started {
+        let end = work.moved()?;
+        moved.push(Moved {
+            axis: AxisName::of(axis),
+            asked_um: um(end.asked),
+            measured_um: um(end.measured),
+        });
+    }
+    match &moved[..] {
+        [one] => report::print(one, arguments.json),
+        _ => report::print(&AllMoved { moved }, arguments.json),
+    }
 }
 
 /// Runs `stop`.
 pub fn stop(arguments: StopArguments) -> Result<()> {
-    let mut rig = arguments.target.connect(None)?;
-    Ok(rig.client.stop()?)
+    Ok(arguments.target.connect(None)?.client.stop()?)
 }
 
-fn nanometres(position_um: f64) -> Result<Nanometres> {
-    let nm = (position_um * 1e3).round();
-    if !nm.is_finite() || nm.abs() > f64::from(i32::MAX) {
-        bail!("{position_um} um is no position: expected a number between -2147483 and 2147483 um");
-    }
-    Ok(Nanometres(nm as i32))
+/// Runs `halt`.
+pub fn halt(arguments: HaltArguments) -> Result<()> {
+    Ok(arguments.target.connect(None)?.client.halt()?)
 }

@@ -1,31 +1,36 @@
-//! The coarse axis: feeds the step timer, counts, and watches encoder, switches and driver.
+//! A stepper axis: feeds the step timer, counts, and watches encoder, switches and driver.
 //!
 //! The position is what the timer counted, in pulses; the encoder is compared with it all the time. A reported
 //! count may lag by up to the running segment (a 1 ms segment at full speed is 40 pulses), so the encoder must lie
-//! between the counted pulses and the end of the running segment, give or take [`CoarseSettings::following`].
+//! between the counted pulses and the end of the running segment, give or take [`StepperSettings::following`].
 //!
-//! Two ways to stop: [`Axis::stop`] brakes along the ramp; a fault aborts, which takes at most 1 ms. Either way
-//! the pulses are counted, so the position is known after it. A motion is over when the timer is idle.
+//! Two ways to stop: [`Stepper::stop`] brakes along the ramp and keeps the position; [`Stepper::abort`] takes at most
+//! 1 ms and loses it. A motion is over when the timer is idle.
+//!
+//! The screw has play, so moves end from below: where the flanks do not touch on that side already, the motor first goes
+//! farther back than the play is wide. The position is that of the motor with its flanks on that side.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
 use heapless::Deque;
 
-use crate::io::{Inputs, Outputs, Segment, StepperState, TICK_US};
-use crate::ramp::{Ramp, RampLimits};
-use crate::settings::CoarseSettings;
-use crate::steps;
+use crate::io::{MotorInputs, MotorOutputs, Segment, StepperState, TICK_US};
+use crate::motion::ramp::{Ramp, RampLimits};
+use crate::motion::steps;
+use crate::settings::StepperSettings;
 
 /// Segments that may be under way at once: those that wait in the board and the one that runs.
-const OUTSTANDING: usize = 8;
+const OUTSTANDING: usize = 6;
 
-/// What the home switch means during a motion.
+/// What a motion is for: how fast it may change its speed, and which switch may close on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum HomeSwitch {
-    /// Closed away from position 0 is a fault.
-    Watched,
-    /// Homing looks at it.
-    Sought,
+pub(crate) enum Purpose {
+    /// A move: no switch may close but the home switch near position 0.
+    Move,
+    /// Looks for the home switch.
+    SeekHome,
+    /// Looks for the far switch.
+    SeekFar,
 }
 
 /// Where a motion is.
@@ -47,15 +52,23 @@ enum Motion {
     },
 }
 
-/// The coarse axis.
+/// A stepper axis.
 #[derive(Clone, Debug)]
-pub(crate) struct Axis {
-    settings: CoarseSettings,
+pub(crate) struct Stepper {
+    settings: StepperSettings,
     state: PositionState,
     motion: Motion,
     away: bool,
-    home_switch: HomeSwitch,
+    purpose: Purpose,
     enabled: bool,
+    /// How long the driver has been on.
+    enabled_ticks: u32,
+    /// The first pulse may be given: the memory knows that the axis moves.
+    permitted: bool,
+    /// Where the motion goes on to, when the axis has gone back far enough to come from below.
+    then: Option<i32>,
+    /// Pulses upwards until the screw's flanks surely touch on that side.
+    slack: u32,
     /// Position in counted pulses; from the reset's position until homed.
     position: i32,
     /// Encoder reading at position 0.
@@ -67,18 +80,26 @@ pub(crate) struct Axis {
     outstanding: Deque<u16, OUTSTANDING>,
     counted_of_oldest: u32,
     target: Nanometres,
+    speed: u32,
     fault: Option<Failure>,
+    home_closed: bool,
+    far_closed: bool,
+    driver_fault: bool,
 }
 
-impl Axis {
-    pub(crate) const fn new(settings: CoarseSettings) -> Self {
+impl Stepper {
+    pub(crate) const fn new(settings: StepperSettings) -> Self {
         Self {
             settings,
             state: PositionState::Unknown,
             motion: Motion::Still,
             away: true,
-            home_switch: HomeSwitch::Watched,
+            purpose: Purpose::Move,
             enabled: false,
+            enabled_ticks: 0,
+            permitted: true,
+            then: None,
+            slack: u32::MAX,
             position: 0,
             encoder_zero: 0,
             encoder: 0,
@@ -87,8 +108,27 @@ impl Axis {
             outstanding: Deque::new(),
             counted_of_oldest: 0,
             target: Nanometres(0),
+            speed: 0,
             fault: None,
+            home_closed: false,
+            far_closed: false,
+            driver_fault: false,
         }
+    }
+
+    /// Whether the home switch was closed at the last tick.
+    pub(crate) const fn home_closed(&self) -> bool {
+        self.home_closed
+    }
+
+    /// Whether the driver reported a fault at the last tick.
+    pub(crate) const fn driver_fault(&self) -> bool {
+        self.driver_fault
+    }
+
+    /// Whether the far switch was closed at the last tick.
+    pub(crate) const fn far_closed(&self) -> bool {
+        self.far_closed
     }
 
     /// What is known of the position.
@@ -126,42 +166,110 @@ impl Axis {
         self.fault.take()
     }
 
+    /// Takes other numbers; the axis stands still.
+    pub(crate) const fn apply(&mut self, settings: StepperSettings) {
+        self.settings = settings;
+    }
+
+    /// Whether the first pulse of a motion may be given.
+    pub(crate) const fn permit(&mut self, permitted: bool) {
+        self.permitted = permitted;
+    }
+
+    /// How far below its target a move may have to go to come from below.
+    pub(crate) const fn approach(&self) -> Nanometres {
+        let StepperSettings { backlash, approach_margin, .. } = self.settings;
+        if backlash.0 == 0 { Nanometres(0) } else { Nanometres(backlash.0 + approach_margin.0) }
+    }
+
     /// Goes to a position at the speed of moves. The caller has checked limits and state.
     pub(crate) fn go(&mut self, target: Nanometres) {
         self.target = target;
-        self.go_steps(steps::to_steps(target), self.settings.speed, HomeSwitch::Watched);
+        self.go_from_below(steps::to_steps(target), self.settings.speed, Purpose::Move);
+    }
+
+    /// Goes to a pulse so that the screw's flanks touch as always.
+    pub(crate) fn go_from_below(&mut self, target: i32, speed: u32, purpose: Purpose) {
+        let approach = steps::to_steps(self.approach());
+        let way = i64::from(target) - i64::from(self.position);
+        let touching = i64::from(self.slack.min(approach.unsigned_abs())) <= way;
+        if touching || approach == 0 {
+            self.go_steps(target, speed, purpose);
+        } else {
+            self.go_steps(target.saturating_sub(approach), speed, purpose);
+            self.then = Some(target);
+        }
     }
 
     /// Goes to a pulse at a speed. Nothing happens while it moves.
-    pub(crate) fn go_steps(&mut self, target: i32, speed: u32, home_switch: HomeSwitch) {
+    pub(crate) fn go_steps(&mut self, target: i32, speed: u32, purpose: Purpose) {
         if !self.is_still() {
             return;
         }
-        self.fault = None;
         self.counted_of_oldest = 0;
-        self.home_switch = home_switch;
+        self.purpose = purpose;
+        self.speed = speed;
+        self.then = None;
+        self.set_off(target);
+    }
+
+    fn set_off(&mut self, target: i32) {
         let way = target.wrapping_sub(self.position);
         if way == 0 {
+            self.motion = Motion::Still;
             return;
         }
         self.away = way > 0;
-        let limits = RampLimits {
-            start_speed: self.settings.start_speed,
-            speed,
-            acceleration: self.settings.acceleration,
+        let settings = &self.settings;
+        let (acceleration, jerk) = match self.purpose {
+            Purpose::Move => (settings.acceleration, settings.jerk),
+            Purpose::SeekHome | Purpose::SeekFar => (settings.home_acceleration, settings.home_jerk),
         };
+        let limits = RampLimits { start_speed: settings.start_speed, speed: self.speed, acceleration, jerk };
         // One tick at least, so that DIR is stable before STEP.
-        let ticks = if self.enabled { 1 } else { self.settings.enable_delay.0 / TICK_US + 1 };
+        let ticks = (settings.enable_delay.0 / TICK_US + 1).saturating_sub(self.enabled_ticks).max(1);
         self.enabled = true;
         self.motion = Motion::Preparing { ramp: Ramp::new(way.unsigned_abs(), limits), ticks };
     }
 
     /// Brakes along the ramp.
     pub(crate) fn stop(&mut self) {
+        self.then = None;
         match &mut self.motion {
             Motion::Preparing { .. } => self.motion = Motion::Still,
             Motion::Stepping { ramp, .. } => ramp.stop(),
             Motion::Still | Motion::Aborting { .. } => {}
+        }
+    }
+
+    /// Stops within a millisecond. An axis that moved has lost its position: a motor that is stopped from full speed may
+    /// slip.
+    pub(crate) fn abort(&mut self) {
+        self.then = None;
+        match self.motion {
+            Motion::Still | Motion::Aborting { .. } => {}
+            Motion::Preparing { .. } => self.motion = Motion::Still,
+            Motion::Stepping { .. } => {
+                self.lose();
+                self.motion = Motion::Aborting { ticks: 0 };
+            }
+        }
+    }
+
+    /// It was in motion when the power went.
+    pub(crate) const fn was_interrupted(&mut self) {
+        self.state = PositionState::Lost;
+    }
+
+    /// The lowest position on the way that is under way; where the position is not known, the lowest there is.
+    pub(crate) fn lowest(&self) -> Nanometres {
+        match (self.state, &self.motion) {
+            (PositionState::Homed, Motion::Still) => self.measured(),
+            (PositionState::Homed, _) if self.purpose == Purpose::Move => {
+                let back = self.target.0.saturating_sub(self.approach().0);
+                Nanometres(self.measured().0.min(back))
+            }
+            _ => self.settings.min.min(Nanometres(0)),
         }
     }
 
@@ -170,9 +278,11 @@ impl Axis {
         self.position = steps::to_steps(self.measured());
     }
 
-    /// Makes `zero` (in pulses of the present count) position 0 and the position known; gives how far the
-    /// encoder's zero moved. The axis stands still.
-    pub(crate) const fn set_home(&mut self, zero: i32) -> Nanometres {
+    /// Makes the edge of the home switch, which was met going down at `edge` (in pulses of the present count), position 0
+    /// and the position known; gives how far the encoder's zero moved. The axis stands still. Coming from below the
+    /// motor is the backlash farther up when the stage is there.
+    pub(crate) const fn set_home(&mut self, edge: i32) -> Nanometres {
+        let zero = edge.wrapping_add(steps::to_steps(self.settings.backlash));
         self.position = self.position.wrapping_sub(zero);
         let expected = steps::to_encoder(steps::to_nanometres(self.position));
         let new_zero = self.encoder.wrapping_sub(expected);
@@ -184,8 +294,10 @@ impl Axis {
     }
 
     /// Reads the board; finds faults.
-    pub(crate) fn sense(&mut self, inputs: &Inputs) {
-        self.encoder = inputs.encoder_coarse_counts;
+    pub(crate) fn sense(&mut self, inputs: &MotorInputs) {
+        self.encoder = inputs.encoder_counts;
+        (self.home_closed, self.far_closed) = (inputs.home_switch, inputs.far_switch);
+        self.driver_fault = inputs.driver_fault;
         let progressed = self.count(&inputs.stepper);
         if let Motion::Aborting { ticks } = &mut self.motion {
             *ticks += 1;
@@ -201,23 +313,28 @@ impl Axis {
             return;
         }
         if let Some(fault) = self.find_fault(inputs, progressed) {
-            self.abort(fault);
+            self.fail(fault);
         } else if self.has_ended(&inputs.stepper) {
             self.motion = Motion::Still;
             self.counted_of_oldest = 0;
+            if let Some(target) = self.then.take() {
+                self.set_off(target);
+            }
         }
     }
 
     /// Orders the board; feeds the timer.
-    pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut Outputs) {
+    pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut MotorOutputs) {
         outputs.enable = self.enabled;
+        self.enabled_ticks = if self.enabled { self.enabled_ticks.saturating_add(1) } else { 0 };
         outputs.direction_away = self.away;
         match &mut self.motion {
             Motion::Still => {}
             Motion::Aborting { .. } => outputs.abort_steps = true,
             Motion::Preparing { ramp, ticks } => {
+                outputs.abort_steps = true; // forgets an underrun from before
                 *ticks = ticks.saturating_sub(1);
-                if *ticks == 0 {
+                if *ticks == 0 && self.permitted {
                     self.motion = Motion::Stepping { ramp: ramp.clone(), quiet_ticks: 0 };
                 }
             }
@@ -240,6 +357,12 @@ impl Axis {
         self.total_pulses += u64::from(new);
         let way = new as i32; // between two ticks there are a few pulses
         self.position = self.position.wrapping_add(if self.away { way } else { -way });
+        if new > 0 {
+            let most = steps::to_steps(self.approach()).unsigned_abs();
+            let slack = self.slack.min(most);
+            self.slack =
+                if self.away { slack.saturating_sub(new) } else { slack.saturating_add(new).min(most) };
+        }
         self.counted_of_oldest = self.counted_of_oldest.saturating_add(new);
         while let Some(oldest) = self.outstanding.front().copied()
             && self.counted_of_oldest >= u32::from(oldest)
@@ -257,8 +380,13 @@ impl Axis {
             && stepper.idle
     }
 
-    fn find_fault(&mut self, inputs: &Inputs, progressed: bool) -> Option<Failure> {
-        if let Some(error) = self.following_error() {
+    fn find_fault(&mut self, inputs: &MotorInputs, progressed: bool) -> Option<Failure> {
+        let resting = matches!(self.motion, Motion::Still | Motion::Preparing { .. });
+        if resting && self.state != PositionState::Homed {
+            // Nothing is known that could be lost: a motor that was stopped from full speed rolls on, and one that gets
+            // its current back is pulled to the next phase.
+            self.follow_encoder();
+        } else if let Some(error) = self.following_error() {
             return Some(Failure::Following { error });
         }
         if inputs.driver_fault && self.enabled && !matches!(self.motion, Motion::Preparing { .. }) {
@@ -279,12 +407,11 @@ impl Axis {
             Motion::Still | Motion::Aborting { .. } => return None,
             Motion::Preparing { .. } => {}
         }
-        if self.away && inputs.far_switch {
+        if self.away && inputs.far_switch && self.purpose != Purpose::SeekFar {
             return Some(Failure::FarSwitch);
         }
         let outside = self.position > steps::to_steps(self.settings.home_zone);
-        (inputs.home_switch && outside && self.home_switch == HomeSwitch::Watched)
-            .then_some(Failure::HomeSwitch)
+        (inputs.home_switch && outside && self.purpose != Purpose::SeekHome).then_some(Failure::HomeSwitch)
     }
 
     /// How far the encoder is from where the pulses may have brought the motor, where that is too far. Without
@@ -303,19 +430,16 @@ impl Axis {
         (error.saturating_abs() > self.settings.following.0).then_some(Nanometres(error))
     }
 
-    /// Throws the motion away. Where steps and encoder may disagree from now on, the position is lost.
-    fn abort(&mut self, fault: Failure) {
-        let loses = matches!(fault, Failure::Following { .. } | Failure::DriverFault | Failure::StepUnderrun);
-        if loses {
+    /// Throws the motion away.
+    fn fail(&mut self, fault: Failure) {
+        // Where steps and encoder may disagree, the position is lost at rest too.
+        if matches!(fault, Failure::Following { .. } | Failure::DriverFault | Failure::StepUnderrun) {
             self.lose();
         }
+        self.abort();
         // A driver in distress gets no current; a motor that was blocked stays where it is and is believed.
         self.enabled = !matches!(fault, Failure::DriverFault) && self.enabled;
         self.fault = Some(fault);
-        self.motion = match self.motion {
-            Motion::Still | Motion::Preparing { .. } => Motion::Still,
-            Motion::Stepping { .. } | Motion::Aborting { .. } => Motion::Aborting { ticks: 0 },
-        };
         if self.is_still() {
             self.settle_accounts();
         }
@@ -333,6 +457,7 @@ impl Axis {
         self.motion = Motion::Still;
         self.outstanding.clear();
         self.counted_of_oldest = 0;
+        self.slack = u32::MAX;
         if self.state != PositionState::Homed {
             self.follow_encoder();
         }
@@ -340,7 +465,7 @@ impl Axis {
 }
 
 /// Hands a segment over and remembers it. There is room in both: the caller has looked.
-fn feed(outstanding: &mut Deque<u16, OUTSTANDING>, outputs: &mut Outputs, segment: Segment) {
+fn feed(outstanding: &mut Deque<u16, OUTSTANDING>, outputs: &mut MotorOutputs, segment: Segment) {
     if outputs.segments.push(segment).is_ok() {
         let _ = outstanding.push_back(segment.pulses);
     }

@@ -2,8 +2,8 @@
 //!
 //! 1. Search: towards the switch at some speed, braking when it closes. Left out where it is closed already.
 //! 2. Leave: away until it opens, then a little further.
-//! 3. Approach: a pulse a millisecond until it closes again; that pulse becomes position 0.
-//! 4. Return: back to position 0 over the few pulses of braking.
+//! 3. Approach: a pulse a millisecond until it closes again; that edge, with the screw's backlash, becomes position 0.
+//! 4. Return: to position 0 from below, like every move.
 //!
 //! The exact approach always comes from the same side at the same speed, so that the switch's hysteresis and its
 //! delay cancel; what is left is its own repeatability.
@@ -11,9 +11,9 @@
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
 
-use crate::axis::{Axis, HomeSwitch};
-use crate::settings::CoarseSettings;
-use crate::steps;
+use crate::motion::axis::{Purpose, Stepper};
+use crate::motion::steps;
+use crate::settings::StepperSettings;
 
 /// Where homing is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -45,10 +45,10 @@ impl Homing {
     /// Goes on while the axis has no fault; gives the shift of position 0 at the end.
     pub(crate) fn tick(
         &mut self,
-        axis: &mut Axis,
-        settings: &CoarseSettings,
-        home_switch: bool,
+        axis: &mut Stepper,
+        settings: &StepperSettings,
     ) -> Option<Result<Nanometres, Failure>> {
+        let home_switch = axis.home_closed();
         let awaited = match self.phase {
             Phase::Search | Phase::Approach => home_switch,
             Phase::Leave => !home_switch,
@@ -84,7 +84,7 @@ impl Homing {
         None
     }
 
-    fn enter(&mut self, phase: Phase, axis: &mut Axis, settings: &CoarseSettings) {
+    fn enter(&mut self, phase: Phase, axis: &mut Stepper, settings: &StepperSettings) {
         (self.phase, self.edge) = (phase, None);
         let (way, speed) = match phase {
             Phase::Begin => (0, settings.home_approach_speed),
@@ -92,8 +92,11 @@ impl Homing {
             Phase::Leave => (steps::to_steps(settings.home_leave), settings.home_leave_speed),
             Phase::Clear => (steps::to_steps(settings.home_clearance), settings.home_leave_speed),
             Phase::Approach => (-steps::to_steps(settings.home_approach), settings.home_approach_speed),
-            Phase::Return { .. } => (axis.position().wrapping_neg(), settings.home_approach_speed),
+            Phase::Return { .. } => {
+                axis.go_from_below(0, settings.home_leave_speed, Purpose::SeekHome);
+                return;
+            }
         };
-        axis.go_steps(axis.position().wrapping_add(way), speed, HomeSwitch::Sought);
+        axis.go_steps(axis.position().wrapping_add(way), speed, Purpose::SeekHome);
     }
 }

@@ -6,16 +6,16 @@
 use farnear_protocol::Nanometres;
 
 use crate::io::ENCODER_NM_PER_COUNT;
-use crate::settings::COARSE_STEP_PM;
+use crate::settings::STEP_PM;
 
 /// The pulses nearest to a position.
 pub(crate) const fn to_steps(position: Nanometres) -> i32 {
-    divide_rounded(position.0 as i64 * 1_000, COARSE_STEP_PM as i64) as i32 // smaller than the nanometres
+    divide_rounded(position.0 as i64 * 1_000, STEP_PM as i64) as i32 // smaller than the nanometres
 }
 
 /// The position of a pulse, to the nanometre; saturates beyond 2 m.
 pub(crate) const fn to_nanometres(steps: i32) -> Nanometres {
-    saturate(divide_rounded(steps as i64 * COARSE_STEP_PM as i64, 1_000))
+    saturate(divide_rounded(steps as i64 * STEP_PM as i64, 1_000))
 }
 
 /// The position of an encoder count; saturates beyond 2 m.

@@ -1,0 +1,55 @@
+//! One motorised stage: motor, encoder, end switches.
+
+use embassy_stm32::{
+    Peri,
+    gpio::{Input, Pin, Pull},
+    timer::GeneralInstance4Channel,
+};
+use farnear_rig::io::{MotorInputs, MotorOutputs};
+
+use crate::{
+    encoder::Encoder,
+    stepper::{StepInstance, Stepper},
+};
+
+/// The end switches: normally closed to ground with a pull-up, so that a broken wire reads "actuated switch" and
+/// stops the axis.
+pub struct Switches {
+    home: Input<'static>,
+    far: Input<'static>,
+}
+
+impl Switches {
+    /// Sets the pins up.
+    pub fn new(home: Peri<'static, impl Pin>, far: Peri<'static, impl Pin>) -> Self {
+        Self { home: Input::new(home, Pull::Up), far: Input::new(far, Pull::Up) }
+    }
+}
+
+/// The hardware of a stage.
+pub struct Axis<S: StepInstance, E: GeneralInstance4Channel> {
+    /// Motor.
+    pub stepper: Stepper<S>,
+    /// Encoder on its shaft.
+    pub encoder: Encoder<E>,
+    /// Both ends.
+    pub switches: Switches,
+}
+
+impl<S: StepInstance, E: GeneralInstance4Channel> Axis<S, E> {
+    /// What there is to see.
+    pub fn read(&mut self) -> MotorInputs {
+        MotorInputs {
+            encoder_counts: self.encoder.counts(),
+            home_switch: self.switches.home.is_high(),
+            far_switch: self.switches.far.is_high(),
+            driver_fault: self.stepper.fault(),
+            stepper: self.stepper.state(),
+        }
+    }
+
+    /// Carries out the orders of one tick.
+    pub fn apply(&mut self, outputs: &MotorOutputs) {
+        self.stepper.apply(outputs);
+    }
+}

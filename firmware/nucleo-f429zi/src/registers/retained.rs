@@ -1,0 +1,130 @@
+//! Memory that survives a reset, but not a loss of power: the boot number, and the last words of a program that had to
+//! stop itself.
+
+use core::{cell::UnsafeCell, mem::MaybeUninit, slice, str};
+
+use farnear_rig::identity::LastWords;
+
+/// Says that the memory holds what this program put there and not what was there at power-on ("fnRT").
+const MAGIC: u32 = 0x666e_5254;
+/// Words of [`Retained`].
+const WORDS: usize = 8;
+/// Where constants lie, and the most of a file's name that is believed.
+const FLASH: core::ops::Range<usize> = 0x0800_0000..0x0820_0000;
+const NAME_MAX: usize = 200;
+
+/// [magic, boot number, reason, three words about it, 0, check]; see [`Last`].
+struct Retained(UnsafeCell<MaybeUninit<[u32; WORDS]>>);
+
+// SAFETY: all access is through `read` and `write`, inside critical sections or with interrupts off for good.
+unsafe impl Sync for Retained {}
+
+// SAFETY: `.uninit` is a section of cortex-m-rt's linker script that start-up code leaves alone; it has no
+// initial value, which `MaybeUninit` says.
+#[unsafe(link_section = ".uninit.retained")]
+static RETAINED: Retained = Retained(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// Why the program stopped itself.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Last {
+    /// A panic at this place.
+    Panic {
+        /// The source file, where it is known.
+        file: Option<&'static str>,
+        /// The line.
+        line: u32,
+    },
+    /// The processor refused an instruction, or an access.
+    Fault {
+        /// Where the program was.
+        program_counter: u32,
+        /// The configurable fault status register (ARMv7-M, B3.2.15).
+        status: u32,
+    },
+    /// The stack was full.
+    StackOverflow,
+}
+
+impl Last {
+    /// What the rig is told.
+    pub fn words(self) -> LastWords {
+        match self {
+            Self::Panic { .. } | Self::Fault { .. } => LastWords::Panic,
+            Self::StackOverflow => LastWords::StackOverflow,
+        }
+    }
+
+    fn to_words(self) -> [u32; 4] {
+        match self {
+            Self::Panic { file, line } => {
+                let file = file.unwrap_or("");
+                [1, file.as_ptr() as u32, file.len() as u32, line]
+            }
+            Self::Fault { program_counter, status } => [2, program_counter, status, 0],
+            Self::StackOverflow => [3, 0, 0, 0],
+        }
+    }
+
+    fn from_words(words: [u32; 4]) -> Option<Self> {
+        match words {
+            [1, pointer, length, line] => Some(Self::Panic { file: name(pointer, length), line }),
+            [2, program_counter, status, _] => Some(Self::Fault { program_counter, status }),
+            [3, ..] => Some(Self::StackOverflow),
+            _ => None,
+        }
+    }
+}
+
+/// A constant text that an earlier run of this program pointed at.
+fn name(pointer: u32, length: u32) -> Option<&'static str> {
+    let (from, length) = (pointer as usize, length as usize);
+    let within = FLASH.contains(&from) && length <= NAME_MAX && FLASH.contains(&(from + length));
+    // SAFETY: the bytes lie in the flash, which is always there and is not written while the program runs.
+    let bytes = within.then(|| unsafe { slice::from_raw_parts(pointer as *const u8, length) })?;
+    // Another program may have been flashed since.
+    str::from_utf8(bytes).ok()
+}
+
+fn check(words: &[u32; WORDS]) -> u32 {
+    words[..WORDS - 1].iter().fold(!0, |sum: u32, word| sum.rotate_left(5) ^ word)
+}
+
+fn read() -> Option<[u32; WORDS]> {
+    // SAFETY: the place is valid, aligned static memory; see `Retained`. Any bits are a valid [u32; WORDS];
+    // volatile, so that the compiler cannot reason from "uninitialised".
+    let words = unsafe { RETAINED.0.get().cast::<[u32; WORDS]>().read_volatile() };
+    (words[0] == MAGIC && words[WORDS - 1] == check(&words)).then_some(words)
+}
+
+fn write(boot: u32, last: [u32; 4]) {
+    let [a, b, c, d] = last;
+    let mut words = [MAGIC, boot, a, b, c, d, 0, 0];
+    words[WORDS - 1] = check(&words);
+    // SAFETY: as in `read`.
+    unsafe { RETAINED.0.get().cast::<[u32; WORDS]>().write_volatile(words) };
+}
+
+/// What the boot before left: the number for this one (one more than the last, or 1 after a loss of power; never 0,
+/// which means "not known" on the wire), and its last words. The words are given once.
+pub fn take() -> (u32, Option<Last>) {
+    critical_section::with(|_| {
+        let Some([_, boot, a, b, c, d, ..]) = read() else {
+            write(1, [0; 4]);
+            return (1, None);
+        };
+        let next = boot.wrapping_add(1).max(1);
+        write(next, [0; 4]);
+        (next, Last::from_words([a, b, c, d]))
+    })
+}
+
+/// The number of this boot is another one, as the board's memory knows it.
+pub fn set_boot(boot: u32) {
+    critical_section::with(|_| write(boot, [0; 4]));
+}
+
+/// Leaves last words for the next boot. Call with interrupts off, just before a reset.
+pub fn leave(last: Last) {
+    let boot = read().map_or(0, |words| words[1]);
+    write(boot, last.to_words());
+}

@@ -1,0 +1,230 @@
+//! Alarms: latched, numbered over the board's life, kept without power, cleared one by one by their numbers.
+//!
+//! Alarms that come while one is latched are latched behind it: the host sees the oldest first, which is the cause more
+//! often than not. Nothing that is latched already is latched again, so a cause that stays gives one alarm. The last
+//! eight are kept, and those not cleared are always among them: with eight latched, nothing more is.
+
+use farnear_protocol::BoardMicros;
+use farnear_protocol::message::{Alarm, AlarmRecord, Axis, Failure, RequestError};
+
+/// Alarms kept.
+pub(crate) const KEPT: usize = 8;
+
+/// All alarms.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Alarms {
+    /// The number of the last.
+    count: u32,
+    /// How many of the last are latched.
+    latched: u8,
+    /// Alarm `n` is in place `n % KEPT`.
+    kept: [Option<AlarmRecord>; KEPT],
+}
+
+impl Alarms {
+    pub(crate) const fn new() -> Self {
+        Self { count: 0, latched: 0, kept: [None; KEPT] }
+    }
+
+    /// Alarms as they were kept; what does not fit together is dropped.
+    pub(crate) fn restored(count: u32, latched: u8, records: impl Iterator<Item = AlarmRecord>) -> Self {
+        let mut alarms = Self { count, latched: 0, kept: [None; KEPT] };
+        for record in records {
+            let recent = record.number <= count && count - record.number < KEPT as u32;
+            if recent && record.number > 0 {
+                alarms.kept[record.number as usize % KEPT] = Some(record);
+            }
+        }
+        let known = (0..u32::from(latched).min(KEPT as u32))
+            .take_while(|ago| alarms.read(count.wrapping_sub(*ago)).is_ok_and(|record| record.number > 0))
+            .count();
+        alarms.latched = known as u8; // at most KEPT
+        alarms
+    }
+
+    /// The number of the last alarm, 0 = none ever.
+    pub(crate) const fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// How many are latched.
+    pub(crate) const fn latched_count(&self) -> u8 {
+        self.latched
+    }
+
+    /// What is kept, in no order.
+    pub(crate) const fn kept(&self) -> &[Option<AlarmRecord>; KEPT] {
+        &self.kept
+    }
+
+    /// The oldest latched alarm.
+    pub(crate) fn latched(&self) -> Option<&AlarmRecord> {
+        let oldest = self.count.checked_sub(u32::from(self.latched.checked_sub(1)?))?;
+        self.kept[oldest as usize % KEPT].as_ref()
+    }
+
+    /// Latches an alarm. `None` where its like is latched already.
+    pub(crate) fn raise(&mut self, alarm: Alarm, boot: u32, time: BoardMicros) -> Option<AlarmRecord> {
+        let full = usize::from(self.latched) == KEPT;
+        let number = self.count.checked_add(1)?;
+        if full || self.each_latched().any(|record| is_like(&record.alarm, &alarm)) {
+            return None;
+        }
+        let record = AlarmRecord { number, boot, time, alarm };
+        self.count = number;
+        self.latched += 1;
+        self.kept[number as usize % KEPT] = Some(record);
+        Some(record)
+    }
+
+    fn each_latched(&self) -> impl Iterator<Item = &AlarmRecord> {
+        let latched = u32::from(self.latched);
+        (0..latched).filter_map(|ago| self.kept[self.count.wrapping_sub(ago) as usize % KEPT].as_ref())
+    }
+
+    /// An alarm that is kept; 0 = the last.
+    pub(crate) fn read(&self, number: u32) -> Result<AlarmRecord, RequestError> {
+        let number = if number == 0 { self.count } else { number };
+        let kept = self.kept[number as usize % KEPT].filter(|record| record.number == number);
+        kept.ok_or_else(|| self.unknown())
+    }
+
+    /// Clears the latched alarm; its cause must be gone.
+    pub(crate) fn clear(
+        &mut self,
+        number: u32,
+        remains: impl FnOnce(&Alarm) -> bool,
+    ) -> Result<(), RequestError> {
+        match self.latched() {
+            Some(latched) if latched.number == number => {
+                if remains(&latched.alarm) {
+                    return Err(RequestError::AlarmRemains { alarm: latched.alarm });
+                }
+                self.latched -= 1;
+                Ok(())
+            }
+            _ => Err(self.unknown()),
+        }
+    }
+
+    fn unknown(&self) -> RequestError {
+        RequestError::NoSuchAlarm {
+            latched: self.latched().map_or(0, |record| record.number),
+            last: self.count,
+        }
+    }
+}
+
+/// The same thing happened, though perhaps with other figures.
+fn is_like(one: &Alarm, other: &Alarm) -> bool {
+    use Alarm::{Following, HostSilence};
+    match (one, other) {
+        (Following { axis, .. }, Following { axis: of_other, .. }) => axis == of_other,
+        (HostSilence { .. }, HostSilence { .. }) => true,
+        _ => one == other,
+    }
+}
+
+/// The alarm that a stepper's fault is; `None` for what is a failure of the work alone.
+pub(crate) const fn of_fault(axis: Axis, fault: Failure) -> Option<Alarm> {
+    match fault {
+        Failure::Following { error } => Some(Alarm::Following { axis, error }),
+        Failure::DriverFault => Some(Alarm::DriverFault { axis }),
+        Failure::StepUnderrun => Some(Alarm::StepUnderrun { axis }),
+        Failure::FarSwitch => Some(Alarm::UnexpectedSwitch { axis, far: true }),
+        Failure::HomeSwitch => Some(Alarm::UnexpectedSwitch { axis, far: false }),
+        _ => None,
+    }
+}
+
+/// The axis that an alarm is about and what its work fails with; other work fails with the alarm's number.
+pub(crate) const fn as_failure(alarm: &Alarm) -> Option<(Axis, Failure)> {
+    match *alarm {
+        Alarm::Following { axis, error } => Some((axis, Failure::Following { error })),
+        Alarm::DriverFault { axis } => Some((axis, Failure::DriverFault)),
+        Alarm::StepUnderrun { axis } => Some((axis, Failure::StepUnderrun)),
+        Alarm::UnexpectedSwitch { axis, far: true } => Some((axis, Failure::FarSwitch)),
+        Alarm::UnexpectedSwitch { axis, far: false } => Some((axis, Failure::HomeSwitch)),
+        Alarm::Gauge => Some((Axis::SensorFine, Failure::Gauge)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farnear_protocol::Nanometres;
+    use proptest::prelude::*;
+
+    const STOP: Alarm = Alarm::EmergencyStop;
+
+    fn raise(alarms: &mut Alarms, alarm: Alarm) -> Option<u32> {
+        alarms.raise(alarm, 3, BoardMicros(5)).map(|record| record.number)
+    }
+
+    #[test]
+    fn the_first_is_seen_first_and_each_is_cleared_by_its_number() {
+        let mut alarms = Alarms::new();
+        assert_eq!(alarms.latched(), None);
+        let unknown = RequestError::NoSuchAlarm { latched: 0, last: 0 };
+        assert_eq!(alarms.read(0), Err(unknown.clone()));
+        assert_eq!(alarms.clear(0, |_| false), Err(unknown));
+        assert_eq!(raise(&mut alarms, STOP), Some(1));
+        assert_eq!(raise(&mut alarms, STOP), None, "its like is latched");
+        assert_eq!(raise(&mut alarms, Alarm::Halt), Some(2));
+        assert_eq!(alarms.latched().map(|record| record.alarm), Some(STOP));
+        let wrong = RequestError::NoSuchAlarm { latched: 1, last: 2 };
+        assert_eq!(alarms.clear(2, |_| false), Err(wrong), "not the one that is seen");
+        assert_eq!(alarms.clear(1, |_| true), Err(RequestError::AlarmRemains { alarm: STOP }));
+        assert_eq!(alarms.clear(1, |_| false), Ok(()));
+        assert_eq!(alarms.latched().map(|record| record.number), Some(2));
+        assert_eq!(alarms.clear(2, |_| false), Ok(()));
+        assert_eq!((alarms.latched(), alarms.read(0).map(|record| record.alarm)), (None, Ok(Alarm::Halt)));
+        assert_eq!(raise(&mut alarms, STOP), Some(3));
+    }
+
+    fn any_alarm() -> impl Strategy<Value = Alarm> {
+        let axis = || prop_oneof![Just(Axis::SensorCoarse), Just(Axis::Lens)];
+        prop_oneof![
+            Just(Alarm::EmergencyStop),
+            Just(Alarm::Halt),
+            Just(Alarm::Gauge),
+            Just(Alarm::SupplyLow),
+            Just(Alarm::QueueOverflow),
+            any::<u32>().prop_map(|request| Alarm::HostSilence { request }),
+            axis().prop_map(|axis| Alarm::DriverFault { axis }),
+            axis().prop_map(|axis| Alarm::StepUnderrun { axis }),
+            (axis(), any::<bool>()).prop_map(|(axis, far)| Alarm::UnexpectedSwitch { axis, far }),
+            (axis(), any::<i32>()).prop_map(|(axis, nm)| Alarm::Following { axis, error: Nanometres(nm) }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn no_sequence_loses_a_latched_alarm(
+            steps in prop::collection::vec((any_alarm(), prop::option::weighted(0.4, 0u32..20)), 0..60)) {
+            let mut alarms = Alarms::new();
+            let mut model: std::vec::Vec<AlarmRecord> = std::vec::Vec::new();
+            for (alarm, clear) in steps {
+                match clear {
+                    None => model.extend(alarms.raise(alarm, 1, BoardMicros(0))),
+                    Some(number) => {
+                        let first = model.first().is_some_and(|record| record.number == number);
+                        prop_assert_eq!(alarms.clear(number, |_| false).is_ok(), first);
+                        if first {
+                            model.remove(0);
+                        }
+                    }
+                }
+                prop_assert_eq!(alarms.latched(), model.first());
+                prop_assert!(model.len() <= KEPT);
+                for record in &model {
+                    prop_assert_eq!(alarms.read(record.number), Ok(*record), "what is latched can be read");
+                }
+                let records = alarms.kept().iter().flatten().copied();
+                let restored = Alarms::restored(alarms.count(), alarms.latched_count(), records);
+                prop_assert_eq!(&restored, &alarms, "the memory brings it back");
+            }
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Calibration: routines by which the board measures its own mechanics.
+//!
+//! Each occupies the whole rig. What it finds, travel apart, becomes a setting; an axis is homed when its routine ends.
+
+mod backlash;
+mod sweep;
+mod travel;
+
+use farnear_protocol::message::{Axis, Calibration, Failure, Routine, SettingKey};
+
+use self::backlash::Backlash;
+use self::sweep::Sweep;
+use self::travel::Travel;
+use crate::motion::stage::Stage;
+use crate::settings::Settings;
+
+/// A routine under way.
+#[derive(Clone, Debug)]
+pub(crate) enum Calibrating {
+    Travel(Travel),
+    Backlash(Backlash),
+    Piezo(Sweep),
+}
+
+/// What a tick of a routine brought.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Step {
+    /// It goes on.
+    On,
+    /// It goes on with this setting.
+    Set(SettingKey, i32),
+    /// It is over.
+    Done(Calibration),
+    /// It cannot be done.
+    Failed(Axis, Failure),
+}
+
+impl Calibrating {
+    /// Begins with the next tick. `None` where the axis has no such routine.
+    pub(crate) const fn new(routine: Routine) -> Option<Self> {
+        match routine {
+            Routine::Travel { axis: Axis::SensorFine } | Routine::Backlash { axis: Axis::SensorFine } => None,
+            Routine::Travel { axis } => Some(Self::Travel(Travel::new(axis))),
+            Routine::Backlash { axis } => Some(Self::Backlash(Backlash::new(axis))),
+            Routine::Piezo => Some(Self::Piezo(Sweep::new())),
+        }
+    }
+
+    /// The stepper axis that moves.
+    pub(crate) const fn stepper(&self) -> Option<Axis> {
+        match self {
+            Self::Travel(travel) => Some(travel.axis()),
+            Self::Backlash(backlash) => Some(backlash.axis()),
+            Self::Piezo(_) => None,
+        }
+    }
+
+    /// Goes on.
+    pub(crate) fn tick(&mut self, stage: &mut Stage, settings: &Settings) -> Step {
+        match self {
+            Self::Travel(travel) => travel.tick(stage, settings),
+            Self::Backlash(backlash) => backlash.tick(stage, settings),
+            Self::Piezo(sweep) => sweep.tick(&mut stage.fine),
+        }
+    }
+}

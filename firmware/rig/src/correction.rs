@@ -1,0 +1,291 @@
+//! Depth correction over the link: a row in, the row corrected, the row out; and the fit of its coefficients.
+//!
+//! One correction is open, one is kept in the memory. The mathematics is `farnear_maths::clsf`, here is its state: the
+//! coefficients, a row, and scratch memory, which holds either a correction's table or a fit's sums.
+//!
+//! RAM: 15 KiB. Cost: a row of 640 pixels 9,000 to 15,000 instructions; where the row is the first of a region, up to
+//! 160,000 more for the table; a solution 730,000. Therefore none of this while a stepper moves.
+
+use farnear_maths::clsf::{
+    Blend, Coefficient, Columns, Error, FULL_TERMS, Frame, Full, FullFit, REGION_TERMS, REGIONS,
+    RegionCoefficients, RegionFit, Regions, TableState,
+};
+use farnear_protocol::message::{
+    CODES_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,
+};
+
+use crate::memory::contents;
+use crate::memory::record::Block;
+
+/// Widest row.
+pub const ROW_PIXELS_MAX: u16 = 1024;
+/// Coefficients of the largest form.
+const COEFFICIENTS: usize = REGIONS * REGIONS * REGION_TERMS;
+/// Blocks in which a correction is kept: its info, and eight coefficients each.
+pub(crate) const CORRECTION_BLOCKS: usize = 1 + COEFFICIENTS.div_ceil(8);
+const TABLE_WORDS: usize = Full::table_words(ROW_PIXELS_MAX);
+
+/// A correction: what it is for, and its coefficients.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Kept {
+    info: CorrectionInfo,
+    bits: [i32; COEFFICIENTS],
+}
+
+impl Kept {
+    /// For the memory.
+    pub(crate) fn block(&self, index: usize) -> Block {
+        match index.checked_sub(1) {
+            Some(index) => contents::values(&self.bits, index),
+            None => {
+                let form = match self.info.form {
+                    CorrectionForm::Regions => 1,
+                    CorrectionForm::Blend => 2,
+                    CorrectionForm::Full => 3,
+                };
+                let CorrectionInfo { width, height, centre_um, half_span_um, .. } = self.info;
+                contents::values(&[form, i32::from(width), i32::from(height), centre_um, half_span_um], 0)
+            }
+        }
+    }
+
+    /// From the memory; `None` where none is kept.
+    pub(crate) fn from_blocks(block: impl Fn(usize) -> Block) -> Option<Self> {
+        let head = block(0);
+        let form = match contents::u32_at(&head, 0) {
+            1 => CorrectionForm::Regions,
+            2 => CorrectionForm::Blend,
+            3 => CorrectionForm::Full,
+            _ => return None,
+        };
+        let info = CorrectionInfo {
+            form,
+            width: contents::u32_at(&head, 4) as u16,
+            height: contents::u32_at(&head, 8) as u16,
+            centre_um: contents::u32_at(&head, 12) as i32,
+            half_span_um: contents::u32_at(&head, 16) as i32,
+        };
+        frame(&info).ok()?;
+        let bits = core::array::from_fn(|i| contents::u32_at(&block(1 + i / 8), i % 8 * 4) as i32);
+        Some(Self { info, bits })
+    }
+
+    fn coefficient(&self, index: usize) -> Coefficient {
+        // Bits are checked when they come in.
+        Coefficient::from_bits(self.bits[index]).unwrap_or_default()
+    }
+
+    fn of_regions(&self) -> RegionCoefficients {
+        core::array::from_fn(|row| {
+            core::array::from_fn(|column| {
+                core::array::from_fn(|term| self.coefficient((row * REGIONS + column) * REGION_TERMS + term))
+            })
+        })
+    }
+
+    fn set(&mut self, coefficients: &[Coefficient]) {
+        for (bits, coefficient) in self.bits.iter_mut().zip(coefficients) {
+            *bits = coefficient.to_bits();
+        }
+    }
+
+    /// Places of the coefficients from `first`, all of which the form has.
+    fn places(&self, first: u8, count: usize) -> Result<core::ops::Range<usize>, CorrectionFault> {
+        let (start, end) = (usize::from(first), usize::from(first) + count);
+        if end > usize::from(self.info.form.coefficients()) {
+            return Err(CorrectionFault::Coefficient);
+        }
+        Ok(start..end)
+    }
+
+    /// Places of the pixels from `first`, all of which a row has.
+    fn pixels(&self, first: u16, count: usize) -> Result<core::ops::Range<usize>, CorrectionFault> {
+        let (start, end) = (usize::from(first), usize::from(first) + count);
+        if end > usize::from(self.info.width) {
+            return Err(CorrectionFault::Place);
+        }
+        Ok(start..end)
+    }
+}
+
+/// A frame whose rows fit the buffer.
+fn frame(info: &CorrectionInfo) -> Result<Frame, CorrectionFault> {
+    match Frame::new(info.width, info.height) {
+        Ok(frame) if info.width <= ROW_PIXELS_MAX => Ok(frame),
+        _ => Err(CorrectionFault::Size),
+    }
+}
+
+/// What the scratch memory holds.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one place for all, there is no heap to put the large one on")]
+enum Scratch {
+    Empty,
+    Table { words: [i32; TABLE_WORDS], state: TableState },
+    RegionFit(RegionFit),
+    FullFit(FullFit),
+}
+
+/// The open correction and the kept one.
+#[derive(Clone, Debug)]
+pub(crate) struct Correction {
+    stored: Option<Kept>,
+    open: Option<Kept>,
+    row: [i16; ROW_PIXELS_MAX as usize],
+    scratch: Scratch,
+}
+
+impl Correction {
+    /// None open. Inlined, so that its 15 KiB are made in their place.
+    #[inline(always)]
+    pub(crate) const fn new(stored: Option<Kept>) -> Self {
+        Self { stored, open: None, row: [0; ROW_PIXELS_MAX as usize], scratch: Scratch::Empty }
+    }
+
+    /// The one that is kept in the memory.
+    pub(crate) const fn stored(&self) -> Option<&Kept> {
+        self.stored.as_ref()
+    }
+
+    /// Opens an empty correction.
+    pub(crate) fn open(&mut self, info: CorrectionInfo) -> Result<(), CorrectionFault> {
+        frame(&info)?;
+        if info.half_span_um <= 0 {
+            return Err(CorrectionFault::Size);
+        }
+        self.open = Some(Kept { info, bits: [0; COEFFICIENTS] });
+        self.scratch = Scratch::Empty;
+        Ok(())
+    }
+
+    /// Opens the kept correction.
+    pub(crate) fn load(&mut self) -> Result<CorrectionInfo, CorrectionFault> {
+        let stored = self.stored.as_ref().ok_or(CorrectionFault::None)?;
+        self.open = Some(stored.clone());
+        self.scratch = Scratch::Empty;
+        Ok(stored.info)
+    }
+
+    /// Keeps the open correction; the caller has it written.
+    pub(crate) fn store(&mut self) -> Result<(), CorrectionFault> {
+        self.stored = Some(self.open.clone().ok_or(CorrectionFault::None)?);
+        Ok(())
+    }
+
+    /// Sets coefficients.
+    pub(crate) fn put(&mut self, first: u8, bits: &CoefficientBits) -> Result<(), CorrectionFault> {
+        let open = self.open.as_mut().ok_or(CorrectionFault::None)?;
+        let places = open.places(first, bits.len())?;
+        if bits.iter().any(|bits| Coefficient::from_bits(*bits).is_err()) {
+            return Err(CorrectionFault::Coefficient);
+        }
+        open.bits[places].copy_from_slice(bits);
+        self.scratch = Scratch::Empty;
+        Ok(())
+    }
+
+    /// Reads coefficients.
+    pub(crate) fn get(&self, first: u8, count: u8) -> Result<CoefficientBits, CorrectionFault> {
+        let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
+        let places = open.places(first, usize::from(count))?;
+        CoefficientBits::from_slice(&open.bits[places]).map_err(|_| CorrectionFault::Coefficient)
+    }
+
+    /// Adds samples to the fit, which they begin.
+    pub(crate) fn add_samples(
+        &mut self,
+        row: u16,
+        columns: Columns,
+        codes: &Codes,
+        truth: i16,
+    ) -> Result<(), CorrectionFault> {
+        let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
+        let frame = frame(&open.info)?;
+        if !matches!(self.scratch, Scratch::RegionFit(_) | Scratch::FullFit(_)) {
+            self.scratch = match open.info.form {
+                CorrectionForm::Regions | CorrectionForm::Blend => Scratch::RegionFit(RegionFit::new(frame)),
+                CorrectionForm::Full => Scratch::FullFit(FullFit::new(frame)),
+            };
+        }
+        match &mut self.scratch {
+            Scratch::RegionFit(fit) => fit.add_row(row, columns, codes, truth),
+            Scratch::FullFit(fit) => fit.add_row(row, columns, codes, truth),
+            Scratch::Empty | Scratch::Table { .. } => Ok(()), // was replaced above
+        }
+        .map_err(fault)
+    }
+
+    /// Solves the fit; more samples may follow.
+    pub(crate) fn solve(&mut self) -> Result<(), CorrectionFault> {
+        let open = self.open.as_mut().ok_or(CorrectionFault::None)?;
+        match &self.scratch {
+            Scratch::RegionFit(fit) => {
+                open.set(fit.solve().map_err(fault)?.as_flattened().as_flattened());
+            }
+            Scratch::FullFit(fit) => open.set(&fit.solve().map_err(fault)?),
+            Scratch::Empty | Scratch::Table { .. } => return Err(CorrectionFault::Underdetermined),
+        }
+        Ok(())
+    }
+
+    /// Puts pixels into the row buffer.
+    pub(crate) fn put_row(&mut self, first: u16, codes: &Codes) -> Result<(), CorrectionFault> {
+        let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
+        let pixels = open.pixels(first, codes.len())?;
+        self.row[pixels].copy_from_slice(codes);
+        Ok(())
+    }
+
+    /// Corrects the row buffer. Ends a fit.
+    pub(crate) fn correct_row(&mut self, row: u16) -> Result<(), CorrectionFault> {
+        let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
+        let frame = frame(&open.info)?;
+        if row >= frame.height() {
+            return Err(CorrectionFault::Place);
+        }
+        if !matches!(self.scratch, Scratch::Table { .. }) {
+            self.scratch = Scratch::Table { words: [0; TABLE_WORDS], state: TableState::EMPTY };
+        }
+        let Scratch::Table { words, state } = &mut self.scratch else { return Ok(()) }; // was put there just now
+        let pixels = &mut self.row[..usize::from(open.info.width)];
+        match open.info.form {
+            CorrectionForm::Regions => {
+                let mut form = Regions::resume(open.of_regions(), frame, words, *state).map_err(fault)?;
+                form.correct_row(row, pixels).map_err(fault)?;
+                *state = form.table_state();
+            }
+            CorrectionForm::Blend => {
+                let mut form = Blend::resume(open.of_regions(), frame, words, *state).map_err(fault)?;
+                form.correct_row(row, pixels).map_err(fault)?;
+                *state = form.table_state();
+            }
+            CorrectionForm::Full => {
+                let terms = core::array::from_fn::<_, FULL_TERMS, _>(|term| open.coefficient(term));
+                let mut form = Full::resume(terms, frame, words, *state).map_err(fault)?;
+                form.correct_row(row, pixels).map_err(fault)?;
+                *state = form.table_state();
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads pixels from the row buffer.
+    pub(crate) fn get_row(&self, first: u16, count: u8) -> Result<Codes, CorrectionFault> {
+        let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
+        let pixels = open.pixels(first, usize::from(count))?;
+        if pixels.len() > CODES_MAX {
+            return Err(CorrectionFault::Place);
+        }
+        Codes::from_slice(&self.row[pixels]).map_err(|_| CorrectionFault::Place)
+    }
+}
+
+fn fault(error: Error) -> CorrectionFault {
+    match error {
+        Error::NoSuchRow { .. } | Error::RowLength { .. } => CorrectionFault::Place,
+        Error::Underdetermined { .. } => CorrectionFault::Underdetermined,
+        Error::TooManySamples { .. } => CorrectionFault::TooManySamples,
+        Error::CoefficientTooLarge { .. } => CorrectionFault::CoefficientTooLarge,
+        _ => CorrectionFault::Size,
+    }
+}

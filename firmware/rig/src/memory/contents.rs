@@ -1,0 +1,200 @@
+//! What is in the records: the rig's values as blocks, and back.
+//!
+//! Numbers are little-endian at fixed places; shots and alarms are in postcard, one a block, as on the wire.
+
+use farnear_protocol::message::{AlarmRecord, Counters, RecordName, Shot};
+use serde::{Serialize, de::DeserializeOwned};
+
+use crate::alarms::{Alarms, KEPT};
+use crate::correction::Kept;
+use crate::io::MEMORY_BYTES;
+use crate::memory::record::{self, BLOCK, Block, Found};
+use crate::program::{SHOTS_MAX, Shots};
+use crate::settings::{KEYS, Settings, Values};
+
+/// Values in a block.
+const VALUES: usize = BLOCK / 4;
+
+/// Everything that is kept.
+#[derive(Debug)]
+pub(crate) struct Contents<'r> {
+    pub(crate) counters: Counters,
+    /// A bit for each axis that may be moving: 1 = stage A's stepper, 2 = stage B's.
+    pub(crate) in_motion: u8,
+    pub(crate) alarms: &'r Alarms,
+    pub(crate) values: &'r Values,
+    pub(crate) shots: &'r Shots,
+    pub(crate) correction: Option<&'r Kept>,
+}
+
+impl Contents<'_> {
+    /// A block of a record.
+    pub(crate) fn block(&self, record: RecordName, index: usize) -> Block {
+        match record {
+            RecordName::Counters => self.counters(index),
+            RecordName::Alarms => match index.checked_sub(1) {
+                None => {
+                    let mut block = [0; BLOCK];
+                    block[..4].copy_from_slice(&self.alarms.count().to_le_bytes());
+                    block[4] = self.alarms.latched_count();
+                    block
+                }
+                Some(index) => item(self.alarms.kept().get(index).and_then(Option::as_ref)),
+            },
+            RecordName::Settings => values(self.values.raw(), index),
+            RecordName::Program => item(self.shots.get(index as u8)), // an index is below SHOTS_MAX
+            RecordName::Correction => self.correction.map_or([0; BLOCK], |kept| kept.block(index)),
+        }
+    }
+
+    fn counters(&self, index: usize) -> Block {
+        let Counters { boots, alarms, triggers, coarse_steps, lens_steps, homings, repaired } = self.counters;
+        let mut block = [0; BLOCK];
+        if index == 0 {
+            block[..4].copy_from_slice(&boots.to_le_bytes());
+            block[4..8].copy_from_slice(&alarms.to_le_bytes());
+            block[8..12].copy_from_slice(&homings.to_le_bytes());
+            block[12..16].copy_from_slice(&repaired.to_le_bytes());
+            block[16] = self.in_motion;
+        } else {
+            block[..8].copy_from_slice(&triggers.to_le_bytes());
+            block[8..16].copy_from_slice(&coarse_steps.to_le_bytes());
+            block[16..24].copy_from_slice(&lens_steps.to_le_bytes());
+        }
+        block
+    }
+}
+
+/// What was kept: everything that could be read.
+#[derive(Debug)]
+pub(crate) struct Restored {
+    pub(crate) counters: Counters,
+    pub(crate) in_motion: u8,
+    pub(crate) alarms: Alarms,
+    pub(crate) values: Values,
+    pub(crate) shots: Shots,
+    pub(crate) correction: Option<Kept>,
+}
+
+impl Restored {
+    /// What a board has that was never used.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            counters: Counters::default(),
+            in_motion: 0,
+            alarms: Alarms::new(),
+            values: Values::DEFAULT,
+            shots: Shots::new(),
+            correction: None,
+        }
+    }
+
+    /// Reads the memory; `parts` are the settings that are not kept.
+    pub(crate) fn from(memory: &[u8; MEMORY_BYTES], parts: &Settings) -> Self {
+        let mut restored = Self::nothing();
+        let copy = |record| match record::find(memory, record) {
+            Found::Good { copy, .. } => Some(copy),
+            Found::Blank | Found::Lost => None,
+        };
+        if let Some(copy) = copy(RecordName::Counters) {
+            let [first, second] = [0, 1].map(|i| record::block(memory, RecordName::Counters, copy, i));
+            restored.counters = Counters {
+                boots: u32_at(&first, 0),
+                alarms: u32_at(&first, 4),
+                homings: u32_at(&first, 8),
+                repaired: u32_at(&first, 12),
+                triggers: u64_at(&second, 0),
+                coarse_steps: u64_at(&second, 8),
+                lens_steps: u64_at(&second, 16),
+            };
+            restored.in_motion = first[16];
+        }
+        if let Some(copy) = copy(RecordName::Alarms) {
+            let block = |i| record::block(memory, RecordName::Alarms, copy, i);
+            let head = block(0);
+            let records = (1..=KEPT).filter_map(|i| from_item::<AlarmRecord>(&block(i)));
+            restored.alarms = Alarms::restored(u32_at(&head, 0), head[4], records);
+        }
+        if let Some(copy) = copy(RecordName::Settings) {
+            let values = core::array::from_fn::<i32, KEYS, _>(|i| {
+                let block = record::block(memory, RecordName::Settings, copy, i / VALUES);
+                u32_at(&block, i % VALUES * 4) as i32
+            });
+            restored.values = Values::restored(values);
+        }
+        if let Some(copy) = copy(RecordName::Program) {
+            let settings = parts.with(&restored.values);
+            for index in 0..SHOTS_MAX {
+                let block = record::block(memory, RecordName::Program, copy, index);
+                if let Some(shot) = from_item::<Shot>(&block) {
+                    restored.shots.restore(index, shot, &settings);
+                }
+            }
+        }
+        if let Some(copy) = copy(RecordName::Correction) {
+            let block = |i| record::block(memory, RecordName::Correction, copy, i);
+            restored.correction = Kept::from_blocks(block);
+        }
+        restored
+    }
+}
+
+/// Eight values of a list; 0 beyond its end.
+pub(crate) fn values(list: &[i32], index: usize) -> Block {
+    let mut block = [0; BLOCK];
+    for (bytes, value) in block.chunks_exact_mut(4).zip(list.iter().skip(index * VALUES)) {
+        bytes.copy_from_slice(&value.to_le_bytes());
+    }
+    block
+}
+
+/// A number in a block; 0 beyond its end.
+pub(crate) fn u32_at(block: &Block, at: usize) -> u32 {
+    block.get(at..at + 4).and_then(|bytes| bytes.try_into().ok()).map_or(0, u32::from_le_bytes)
+}
+
+fn u64_at(block: &Block, at: usize) -> u64 {
+    block.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_le_bytes)
+}
+
+/// A message in a block: its length, then its bytes; length 0 = none.
+fn item<T: Serialize>(item: Option<&T>) -> Block {
+    let mut block = [0; BLOCK];
+    let (length, bytes) = block.split_at_mut(1);
+    if let Some(written) = item.and_then(|item| postcard::to_slice(item, bytes).ok()) {
+        length[0] = written.len() as u8; // below BLOCK
+    }
+    block
+}
+
+fn from_item<T: DeserializeOwned>(block: &Block) -> Option<T> {
+    match block[0] {
+        0 => None,
+        length => postcard::from_bytes(block.get(1..=usize::from(length))?).ok(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farnear_protocol::message::{Alarm, Axis, TriggerMode};
+    use farnear_protocol::{BoardMicros, Micros, Nanometres};
+
+    #[test]
+    fn the_longest_messages_fit_a_block() {
+        let shot = Shot {
+            axis: Axis::Lens,
+            target: Nanometres(i32::MIN),
+            exposure: Micros(u32::MAX),
+            settle_window: Nanometres(i32::MIN),
+            settle_dwell: Micros(u32::MAX),
+            repeat: u16::MAX,
+            mode: TriggerMode::FreeRunning,
+        };
+        assert_eq!(from_item(&item(Some(&shot))), Some(shot));
+        let alarm = Alarm::Following { axis: Axis::Lens, error: Nanometres(i32::MIN) };
+        let record = AlarmRecord { number: u32::MAX, boot: u32::MAX, time: BoardMicros(u64::MAX), alarm };
+        assert_eq!(from_item(&item(Some(&record))), Some(record));
+        assert_eq!(from_item::<Shot>(&item::<Shot>(None)), None);
+    }
+}

@@ -1,0 +1,184 @@
+//! Form and place of the records.
+//!
+//! A copy is a header and the record's blocks, 32 bytes each, little-endian:
+//! ```text
+//! header: magic "fnR1" | record u8 | version u8 | blocks u8 | 0 | sequence u32 | CRC-32 | 0...
+//! ```
+//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two copies, one behind
+//! the other, and a place of its own from address 0 up. The copy with the newer sequence number counts; the other
+//! is the one that is written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and
+//! the one before untouched. A record's first write is of both copies, one after the other.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use farnear_protocol::message::RecordName;
+
+use crate::correction::CORRECTION_BLOCKS;
+use crate::io::MEMORY_BYTES;
+use crate::program::SHOTS_MAX;
+
+/// Bytes of a block.
+pub(crate) const BLOCK: usize = 32;
+/// A block.
+pub(crate) type Block = [u8; BLOCK];
+/// How many records there are.
+pub(crate) const RECORDS: usize = 5;
+/// Version of the records' contents; another one is not read.
+const VERSION: u8 = 1;
+const MAGIC: [u8; 4] = *b"fnR1";
+/// Bytes of the header that the CRC covers.
+const COVERED: usize = 12;
+
+static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// All records, in the order of their places and of their urgency: what moves is known first.
+pub(crate) const ALL: [RecordName; RECORDS] = [
+    RecordName::Counters,
+    RecordName::Alarms,
+    RecordName::Settings,
+    RecordName::Program,
+    RecordName::Correction,
+];
+
+/// A record's place in [`ALL`].
+pub(crate) const fn index(record: RecordName) -> usize {
+    match record {
+        RecordName::Counters => 0,
+        RecordName::Alarms => 1,
+        RecordName::Settings => 2,
+        RecordName::Program => 3,
+        RecordName::Correction => 4,
+    }
+}
+
+/// Blocks of a record, its header not counted.
+pub(crate) const fn blocks(record: RecordName) -> usize {
+    match record {
+        RecordName::Counters => 2,
+        RecordName::Alarms => 1 + crate::alarms::KEPT,
+        RecordName::Settings => 4, // 32 values
+        RecordName::Program => SHOTS_MAX,
+        RecordName::Correction => CORRECTION_BLOCKS,
+    }
+}
+
+/// Address of a copy (0 or 1) of a record.
+pub(crate) const fn address(record: RecordName, copy: usize) -> usize {
+    let mut address = 0;
+    let mut i = 0;
+    while i < index(record) {
+        address += 2 * (1 + blocks(ALL[i])) * BLOCK;
+        i += 1;
+    }
+    address + copy * (1 + blocks(record)) * BLOCK
+}
+
+const _: () = assert!(address(RecordName::Correction, 2) <= MEMORY_BYTES);
+
+/// The CRC of a copy, block by block.
+#[derive(Clone)]
+pub(crate) struct Checksum(Digest<'static, u32, Table<1>>);
+
+impl Checksum {
+    /// Of a header and what follows.
+    pub(crate) fn new(header: &Block) -> Self {
+        let mut digest = CRC.digest();
+        digest.update(&header[..COVERED]);
+        Self(digest)
+    }
+
+    /// Takes the next block.
+    pub(crate) fn push(&mut self, block: &Block) {
+        self.0.update(block);
+    }
+
+    /// The header with its CRC.
+    pub(crate) fn finish(self, mut header: Block) -> Block {
+        header[COVERED..COVERED + 4].copy_from_slice(&self.0.finalize().to_le_bytes());
+        header
+    }
+}
+
+impl core::fmt::Debug for Checksum {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Checksum")
+    }
+}
+
+/// The header of a copy, its CRC not yet filled in.
+pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
+    let mut header = [0; BLOCK];
+    header[..4].copy_from_slice(&MAGIC);
+    header[4..7].copy_from_slice(&[index(record) as u8, VERSION, blocks(record) as u8]);
+    header[8..COVERED].copy_from_slice(&sequence.to_le_bytes());
+    header
+}
+
+/// What lies in the place of a copy.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Copy {
+    /// Never written.
+    Blank,
+    Good {
+        sequence: u32,
+    },
+    Bad,
+}
+
+/// What was found of a record.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Found {
+    /// Never written: defaults, and nothing is wrong.
+    Blank,
+    /// A good copy, the newer of two, and whether the other was bad.
+    Good { copy: usize, sequence: u32, repaired: bool },
+    /// No copy is good.
+    Lost,
+}
+
+/// Looks for the good copy of a record.
+pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
+    match [look(memory, record, 0), look(memory, record, 1)] {
+        [Copy::Good { sequence: first }, Copy::Good { sequence: second }] => {
+            let newer = (second.wrapping_sub(first) as i32) > 0;
+            let (copy, sequence) = if newer { (1, second) } else { (0, first) };
+            Found::Good { copy, sequence, repaired: false }
+        }
+        [Copy::Good { sequence }, other] => Found::Good { copy: 0, sequence, repaired: other == Copy::Bad },
+        [other, Copy::Good { sequence }] => Found::Good { copy: 1, sequence, repaired: other == Copy::Bad },
+        // The first write is of both copies, so a blank one says that it was torn: there was nothing to lose.
+        [Copy::Blank, _] | [_, Copy::Blank] => Found::Blank,
+        [Copy::Bad, Copy::Bad] => Found::Lost,
+    }
+}
+
+/// Looks for all records, in the order of [`ALL`].
+pub(crate) fn find_all(memory: &[u8; MEMORY_BYTES]) -> [Found; RECORDS] {
+    ALL.map(|record| find(memory, record))
+}
+
+/// A block of a copy.
+pub(crate) fn block(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize, block: usize) -> Block {
+    at(memory, address(record, copy) + (1 + block) * BLOCK)
+}
+
+fn at(memory: &[u8; MEMORY_BYTES], address: usize) -> Block {
+    let mut block = [0; BLOCK];
+    if let Some(bytes) = memory.get(address..address + BLOCK) {
+        block.copy_from_slice(bytes);
+    }
+    block
+}
+
+fn look(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> Copy {
+    let found = at(memory, address(record, copy));
+    if found == [0; BLOCK] || found == [0xFF; BLOCK] {
+        return Copy::Blank;
+    }
+    let sequence = u32::from_le_bytes([found[8], found[9], found[10], found[11]]);
+    let expected = header(record, sequence);
+    let mut checksum = Checksum::new(&expected);
+    for index in 0..blocks(record) {
+        checksum.push(&block(memory, record, copy, index));
+    }
+    if checksum.finish(expected) == found { Copy::Good { sequence } } else { Copy::Bad }
+}

@@ -1,0 +1,16 @@
+//! Motion of the stages: two steppers and a piezo, ways to positions, homing.
+
+pub(crate) mod axis;
+pub(crate) mod home;
+pub(crate) mod positioning;
+mod ramp;
+pub(crate) mod settle;
+pub(crate) mod stage;
+pub(crate) mod steps;
+
+use farnear_protocol::{BoardMicros, Micros};
+
+/// Time from one moment to a later one; saturates.
+pub(crate) fn since(earlier: BoardMicros, now: BoardMicros) -> Micros {
+    Micros(u32::try_from(now.0.saturating_sub(earlier.0)).unwrap_or(u32::MAX))
+}

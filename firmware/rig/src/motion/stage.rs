@@ -1,0 +1,149 @@
+//! Both stages: two steppers and a piezo, sensed and driven together.
+
+use farnear_protocol::message::{Axis, AxisStatus, PositionState};
+use farnear_protocol::{BoardMicros, Nanometres};
+
+use crate::io::{Inputs, Outputs, TICK_US};
+use crate::motion::axis::Stepper;
+use crate::motion::since;
+use crate::piezo::Piezo;
+use crate::settings::{Settings, StepperSettings};
+
+/// All axes.
+#[derive(Clone, Debug)]
+pub(crate) struct Stage {
+    pub(crate) coarse: Stepper,
+    pub(crate) lens: Stepper,
+    pub(crate) fine: Piezo,
+    /// When the piezo's loop ran last, and whether it runs in this tick.
+    looped: Option<BoardMicros>,
+    on_time: bool,
+}
+
+impl Stage {
+    pub(crate) const fn new(settings: &Settings) -> Self {
+        Self {
+            coarse: Stepper::new(settings.coarse),
+            lens: Stepper::new(settings.lens),
+            fine: Piezo::new(settings.fine),
+            looped: None,
+            on_time: true,
+        }
+    }
+
+    /// Takes other numbers; everything stands still.
+    pub(crate) fn apply(&mut self, settings: &Settings) {
+        self.coarse.apply(settings.coarse);
+        self.lens.apply(settings.lens);
+        self.fine.apply(settings.fine);
+    }
+
+    /// Reads the board.
+    pub(crate) fn sense(&mut self, inputs: &Inputs) {
+        self.coarse.sense(&inputs.coarse);
+        self.lens.sense(&inputs.lens);
+        // Ticks that catch up after a long calculation follow each other faster than the loop's model of the piezo knows.
+        let since = self.looped.map_or(TICK_US, |looped| since(looped, inputs.now).0);
+        self.on_time = since >= TICK_US / 2;
+        if self.on_time {
+            self.looped = Some(inputs.now);
+            self.fine.sense(inputs.gauge_code);
+        }
+    }
+
+    /// Orders the board.
+    pub(crate) fn act(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        self.coarse.act(&inputs.coarse.stepper, &mut outputs.coarse);
+        self.lens.act(&inputs.lens.stepper, &mut outputs.lens);
+        outputs.piezo_dac = if self.on_time { self.fine.act() } else { self.fine.code() };
+    }
+
+    /// A stepper axis; the piezo is none.
+    pub(crate) const fn stepper(&self, axis: Axis) -> Option<&Stepper> {
+        match axis {
+            Axis::SensorCoarse => Some(&self.coarse),
+            Axis::Lens => Some(&self.lens),
+            Axis::SensorFine => None,
+        }
+    }
+
+    /// A stepper axis, to be moved.
+    pub(crate) const fn stepper_mut(&mut self, axis: Axis) -> Option<&mut Stepper> {
+        match axis {
+            Axis::SensorCoarse => Some(&mut self.coarse),
+            Axis::Lens => Some(&mut self.lens),
+            Axis::SensorFine => None,
+        }
+    }
+
+    /// A stepper axis to be moved, with its numbers.
+    pub(crate) const fn with_numbers<'s>(
+        &mut self,
+        axis: Axis,
+        settings: &'s Settings,
+    ) -> Option<(&mut Stepper, &'s StepperSettings)> {
+        match axis {
+            Axis::SensorCoarse => Some((&mut self.coarse, &settings.coarse)),
+            Axis::Lens => Some((&mut self.lens, &settings.lens)),
+            Axis::SensorFine => None,
+        }
+    }
+
+    /// Where the encoder or gauge says the axis is.
+    pub(crate) const fn measured(&self, axis: Axis) -> Nanometres {
+        match self.stepper(axis) {
+            Some(stepper) => stepper.measured(),
+            None => self.fine.measured(),
+        }
+    }
+
+    /// What is known of the axis' position. The gauge is absolute.
+    pub(crate) const fn state(&self, axis: Axis) -> PositionState {
+        match self.stepper(axis) {
+            Some(stepper) => stepper.state(),
+            None => PositionState::Homed,
+        }
+    }
+
+    /// For the status answer.
+    pub(crate) fn status(&self, axis: Axis, request: Option<u32>) -> AxisStatus {
+        let (asked, moving) = match self.stepper(axis) {
+            Some(stepper) => (stepper.target(), !stepper.is_still()),
+            None => (self.fine.target(), !self.fine.arrived()),
+        };
+        AxisStatus { state: self.state(axis), asked, measured: self.measured(axis), moving, request }
+    }
+
+    /// Ends all motion: the steppers brake, the piezo stays where it is.
+    pub(crate) fn stop(&mut self) {
+        self.coarse.stop();
+        self.lens.stop();
+        self.fine.hold();
+    }
+
+    /// Ends all motion within a millisecond.
+    pub(crate) fn abort(&mut self) {
+        self.coarse.abort();
+        self.lens.abort();
+        self.fine.hold();
+    }
+
+    /// Whether no pulse comes any more on an axis.
+    pub(crate) fn is_still(&self, axis: Axis) -> bool {
+        self.stepper(axis).is_none_or(Stepper::is_still)
+    }
+
+    /// Whether no pulse comes any more.
+    pub(crate) const fn steppers_still(&self) -> bool {
+        self.coarse.is_still() && self.lens.is_still()
+    }
+}
+
+/// Smallest and largest position of an axis.
+pub(crate) const fn limits(settings: &Settings, axis: Axis) -> (Nanometres, Nanometres) {
+    match axis {
+        Axis::SensorCoarse => (settings.coarse.min, settings.coarse.max),
+        Axis::Lens => (settings.lens.min, settings.lens.max),
+        Axis::SensorFine => (settings.fine.min, settings.fine.max),
+    }
+}

@@ -1,0 +1,129 @@
+//! How long work goes on, tick by tick, and ends.
+
+use farnear_protocol::BoardMicros;
+use farnear_protocol::message::{Axis, EventKind, Failure, RecordName};
+
+use crate::calibrate::Step;
+use crate::program::Progress;
+use crate::rig::Rig;
+use crate::work::{AXES, AxisWork, WholeWork};
+
+impl Rig {
+    /// Takes all work one tick further.
+    pub(crate) fn advance(&mut self, now: BoardMicros) {
+        for axis in AXES {
+            self.advance_axis(axis, now);
+        }
+        self.advance_whole(now);
+    }
+
+    fn advance_axis(&mut self, axis: Axis, now: BoardMicros) {
+        let Some(mut active) = self.works.on(axis).take() else { return };
+        let request = active.request;
+        let end = match &mut active.work {
+            AxisWork::Home(homing) => match self.stage.with_numbers(axis, &self.settings) {
+                None => None, // only steppers are homed
+                Some((stepper, settings)) => match homing.tick(stepper, settings) {
+                    None => None,
+                    Some(Ok(shift)) => {
+                        self.counters.homings = self.counters.homings.saturating_add(1);
+                        Some(EventKind::Homed { request, axis, shift })
+                    }
+                    Some(Err(reason)) => {
+                        active.work = AxisWork::Ending(reason);
+                        None
+                    }
+                },
+            },
+            AxisWork::Move { target, positioning } => match positioning.tick(&self.stage, now) {
+                None => None,
+                Some(Ok(_)) => {
+                    let measured = self.stage.measured(axis);
+                    Some(EventKind::MoveDone { request, axis, asked: *target, measured })
+                }
+                Some(Err(reason)) => {
+                    active.work = AxisWork::Ending(reason);
+                    None
+                }
+            },
+            AxisWork::Ending(reason) if self.stage.is_still(axis) => {
+                Some(EventKind::Failed { request, axis: named(axis, *reason), reason: *reason })
+            }
+            AxisWork::Ending(_) => None,
+        };
+        match end {
+            None => *self.works.on(axis) = Some(active),
+            Some(terminal) => self.events.push(now, terminal),
+        }
+    }
+
+    fn advance_whole(&mut self, now: BoardMicros) {
+        let Some(mut active) = self.works.whole.take() else { return };
+        let request = active.request;
+        let end = match &mut active.work {
+            WholeWork::Program(run) => {
+                let progress = run.tick(&self.shots, &mut self.stage, &mut self.camera, &self.settings, now);
+                let (index, repeat, shot) = run.shot();
+                match progress {
+                    Progress::On => None,
+                    Progress::Ready { number } => {
+                        let (trigger_number, exposure) = (number, shot.exposure);
+                        let kind = EventKind::ShotReady { request, index, repeat, trigger_number, exposure };
+                        self.events.push(now, kind);
+                        None
+                    }
+                    Progress::Paused => {
+                        self.events.push(now, EventKind::Paused { request, index });
+                        None
+                    }
+                    Progress::Taken { shot, end } => {
+                        self.events.push(now, EventKind::ShotDone { request, shot });
+                        end.map(|exposures| EventKind::ProgramDone { request, exposures })
+                    }
+                    Progress::Failed { axis, reason } => {
+                        self.stage.stop();
+                        active.work = WholeWork::Ending { axis, reason };
+                        None
+                    }
+                }
+            }
+            WholeWork::Calibration(routine) => match routine.tick(&mut self.stage, &self.settings) {
+                Step::On => None,
+                Step::Set(key, value) => {
+                    match self.values.set(key, value) {
+                        Ok(()) => self.apply_settings(),
+                        Err(_) => {
+                            active.work = WholeWork::Ending { axis: None, reason: Failure::Implausible };
+                        }
+                    }
+                    None
+                }
+                Step::Done(result) => Some(EventKind::Calibrated { request, result }),
+                Step::Failed(axis, reason) => {
+                    active.work = WholeWork::Ending { axis: Some(axis), reason };
+                    None
+                }
+            },
+            WholeWork::Ending { axis, reason } if self.stage.steppers_still() => {
+                Some(EventKind::Failed { request, axis: *axis, reason: *reason })
+            }
+            WholeWork::Ending { .. } => None,
+        };
+        match end {
+            None => self.works.whole = Some(active),
+            Some(terminal) => {
+                self.events.push(now, terminal);
+                self.camera.give_up();
+                self.store.mark(RecordName::Counters); // triggers
+            }
+        }
+    }
+}
+
+/// The axis of a failure; a stop concerns none, and an alarm says itself what it is about.
+const fn named(axis: Axis, reason: Failure) -> Option<Axis> {
+    match reason {
+        Failure::Stopped | Failure::Alarm { .. } => None,
+        _ => Some(axis),
+    }
+}

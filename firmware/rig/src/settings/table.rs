@@ -1,0 +1,249 @@
+//! Settings by key: the numbers that the host may change and the memory keeps, with their ranges.
+
+use farnear_protocol::message::{Setting, SettingKey};
+use farnear_protocol::{Micros, Nanometres};
+
+use super::{STEP_PM, Settings, StepperSettings};
+
+/// How many settings there are.
+pub(crate) const KEYS: usize = SettingKey::ALL.len();
+
+/// The values of all settings, in the order of [`SettingKey::ALL`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Values([i32; KEYS]);
+
+impl Values {
+    /// A board that was never set.
+    pub const DEFAULT: Self = {
+        let mut values = [0; KEYS];
+        let mut i = 0;
+        while i < KEYS {
+            values[i] = range(SettingKey::ALL[i]).0;
+            i += 1;
+        }
+        Self(values)
+    };
+
+    /// A setting's value.
+    pub const fn get(&self, key: SettingKey) -> i32 {
+        self.0[key as usize]
+    }
+
+    /// A setting as the host is told it. Largest and smallest position of an axis bound each other.
+    pub fn setting(&self, key: SettingKey) -> Setting {
+        use SettingKey::{CoarseMaxNm, CoarseMinNm, FineMaxNm, FineMinNm, LensMaxNm, LensMinNm};
+        let (default, mut min, mut max) = range(key);
+        match key {
+            CoarseMinNm => max = self.get(CoarseMaxNm),
+            CoarseMaxNm => min = self.get(CoarseMinNm),
+            LensMinNm => max = self.get(LensMaxNm),
+            LensMaxNm => min = self.get(LensMinNm),
+            FineMinNm => max = self.get(FineMaxNm),
+            FineMaxNm => min = self.get(FineMinNm),
+            _ => {}
+        }
+        Setting { key, value: self.get(key), default, min, max }
+    }
+
+    /// Changes a setting.
+    ///
+    /// # Errors
+    /// The setting with the range that the value is outside of.
+    pub fn set(&mut self, key: SettingKey, value: i32) -> Result<(), Setting> {
+        let setting = self.setting(key);
+        if !(setting.min..=setting.max).contains(&value) {
+            return Err(setting);
+        }
+        self.0[key as usize] = value;
+        Ok(())
+    }
+
+    /// Values from the memory: what is outside its range, perhaps written by another firmware, is the default.
+    pub(crate) fn restored(values: [i32; KEYS]) -> Self {
+        let mut restored = Self::DEFAULT;
+        for (key, value) in SettingKey::ALL.into_iter().zip(values) {
+            let (_, min, max) = range(key);
+            if (min..=max).contains(&value) {
+                restored.0[key as usize] = value;
+            }
+        }
+        for (low, high) in [
+            (SettingKey::CoarseMinNm, SettingKey::CoarseMaxNm),
+            (SettingKey::LensMinNm, SettingKey::LensMaxNm),
+            (SettingKey::FineMinNm, SettingKey::FineMaxNm),
+        ] {
+            if restored.get(low) > restored.get(high) {
+                restored.0[low as usize] = range(low).0;
+                restored.0[high as usize] = range(high).0;
+            }
+        }
+        restored
+    }
+
+    pub(crate) const fn raw(&self) -> &[i32; KEYS] {
+        &self.0
+    }
+}
+
+/// Default, smallest and largest value. Values that come with a reason in [`Settings`] are not explained again.
+const fn range(key: SettingKey) -> (i32, i32, i32) {
+    match key {
+        // The thesis' lens (f = 50 mm) needs 52.8 to 53.0 mm (Li 2014, chapter 4): 5.9 mm into the travel.
+        SettingKey::DatumNm => (47_000_000, 10_000_000, 200_000_000),
+        // Half a millimetre of over-travel at the home switch is the least that the stages come to at homing.
+        SettingKey::DistanceMinNm => (46_500_000, 0, 200_000_000),
+        SettingKey::CoarseMinNm | SettingKey::LensMinNm => (0, 0, TRAVEL_NM),
+        SettingKey::CoarseMaxNm | SettingKey::LensMaxNm => (TRAVEL_NM, 0, TRAVEL_NM),
+        // 6.25 mm/s is 40 kHz: 13 mm in 2.2 s, and 750 rpm, where such a motor still has torque at 24 V.
+        SettingKey::CoarseSpeedNmPerS | SettingKey::LensSpeedNmPerS => (6_250_000, 160_000, 6_250_000),
+        // 50 mm/s2, a tenth of what the motor's torque allows.
+        SettingKey::CoarseAccelerationUmPerS2 | SettingKey::LensAccelerationUmPerS2 => {
+            (50_000, 1_000, 400_000)
+        }
+        // Bends of 31 ms, two periods of the lowest resonance that such a stage may have.
+        SettingKey::CoarseJerkUmPerS3 | SettingKey::LensJerkUmPerS3 => (1_600_000, 10_000, 100_000_000),
+        // Of the screw in the parts list; the calibration measures the real one.
+        SettingKey::CoarseBacklashNm | SettingKey::LensBacklashNm => (4_000, 0, 100_000),
+        // A stalled motor slips by four full steps (10 um) at a time; load angle and latency stay below 4 um.
+        SettingKey::CoarseFollowingNm | SettingKey::LensFollowingNm => (6_000, 1_000, 100_000),
+        SettingKey::FineMinNm => (FINE_MIN_NM, FINE_MIN_NM, FINE_MAX_NM),
+        SettingKey::FineMaxNm => (FINE_MAX_NM, FINE_MIN_NM, FINE_MAX_NM),
+        // 200 um over 65535 codes.
+        SettingKey::PiezoGainPmPerCode => (3_052, 2_000, 4_000),
+        // Not measured yet: the loop alone takes hysteresis and creep out.
+        SettingKey::PiezoHysteresisPpm => (0, 0, 300_000),
+        SettingKey::PiezoCreepPpmPerDecade => (0, 0, 100_000),
+        // The sensor is read out in 10 ms, which overlaps the next move; 5 % for its clock.
+        SettingKey::CameraReadoutUs => (10_500, 0, 1_000_000),
+        // Latency 20 us; a camera that has not answered after 5 ms did not hear.
+        SettingKey::StrobeDeadlineUs => (5_000, 100, 1_000_000),
+    }
+}
+
+/// The micrometers' travel; the far switches sit beyond it.
+const TRAVEL_NM: i32 = 13_000_000;
+/// 5 um at each end of the 200 um stroke are kept for the loop: hysteresis and creep move the ends of the free stroke,
+/// and a saturated amplifier cannot damp the resonance.
+const FINE_MIN_NM: i32 = 5_000;
+const FINE_MAX_NM: i32 = 195_000;
+
+impl Settings {
+    /// These numbers with the values of the settings.
+    pub const fn with(mut self, values: &Values) -> Self {
+        self.datum = Nanometres(values.get(SettingKey::DatumNm));
+        self.distance_min = Nanometres(values.get(SettingKey::DistanceMinNm));
+        self.coarse = self.coarse.with(
+            values,
+            [
+                SettingKey::CoarseMinNm,
+                SettingKey::CoarseMaxNm,
+                SettingKey::CoarseSpeedNmPerS,
+                SettingKey::CoarseAccelerationUmPerS2,
+                SettingKey::CoarseJerkUmPerS3,
+                SettingKey::CoarseBacklashNm,
+                SettingKey::CoarseFollowingNm,
+            ],
+        );
+        self.lens = self.lens.with(
+            values,
+            [
+                SettingKey::LensMinNm,
+                SettingKey::LensMaxNm,
+                SettingKey::LensSpeedNmPerS,
+                SettingKey::LensAccelerationUmPerS2,
+                SettingKey::LensJerkUmPerS3,
+                SettingKey::LensBacklashNm,
+                SettingKey::LensFollowingNm,
+            ],
+        );
+        self.fine.min = Nanometres(values.get(SettingKey::FineMinNm));
+        self.fine.max = Nanometres(values.get(SettingKey::FineMaxNm));
+        self.fine.gain_pm_per_code = values.get(SettingKey::PiezoGainPmPerCode) as u32;
+        self.fine.hysteresis_ppm = values.get(SettingKey::PiezoHysteresisPpm) as u32;
+        self.fine.creep_ppm_per_decade = values.get(SettingKey::PiezoCreepPpmPerDecade) as u32;
+        self.camera.readout = Micros(values.get(SettingKey::CameraReadoutUs) as u32);
+        self.camera.strobe_deadline = Micros(values.get(SettingKey::StrobeDeadlineUs) as u32);
+        self
+    }
+}
+
+impl StepperSettings {
+    /// Keys: smallest, largest position, speed, acceleration, jerk, backlash, following error.
+    const fn with(mut self, values: &Values, keys: [SettingKey; 7]) -> Self {
+        let [min, max, speed, acceleration, jerk, backlash, following] = keys;
+        self.min = Nanometres(values.get(min));
+        self.max = Nanometres(values.get(max));
+        self.speed = pulses(values.get(speed), 1_000);
+        // A rig that was told to go slowly also homes slowly.
+        self.home_search_speed = smaller(self.home_search_speed, self.speed);
+        self.home_leave_speed = smaller(self.home_leave_speed, self.speed);
+        self.acceleration = pulses(values.get(acceleration), 1_000_000);
+        self.jerk = pulses(values.get(jerk), 1_000_000);
+        self.backlash = Nanometres(values.get(backlash));
+        self.following = Nanometres(values.get(following));
+        self
+    }
+}
+
+const fn smaller(a: u32, b: u32) -> u32 {
+    if a < b { a } else { b }
+}
+
+/// A length in units of `pm` picometres as pulses; the ranges keep it positive and within 32 bits.
+const fn pulses(value: i32, pm: u64) -> u32 {
+    (value as u64 * pm / STEP_PM as u64) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_keys_are_in_the_order_of_their_numbers_and_the_defaults_in_their_ranges() {
+        for (index, key) in SettingKey::ALL.into_iter().enumerate() {
+            assert_eq!(key as usize, index);
+            let setting = Values::DEFAULT.setting(key);
+            assert!((setting.min..=setting.max).contains(&setting.default), "{setting:?}");
+            assert_eq!(setting.value, setting.default);
+        }
+    }
+
+    #[test]
+    fn speeds_become_pulses() {
+        let settings = Settings::DEFAULT;
+        let stepper = settings.coarse;
+        assert_eq!((stepper.speed, stepper.acceleration, stepper.jerk), (40_000, 320_000, 10_240_000));
+        assert_eq!(settings.coarse, settings.lens);
+    }
+
+    #[test]
+    fn a_slow_rig_homes_slowly() {
+        let mut values = Values::DEFAULT;
+        values.set(SettingKey::LensSpeedNmPerS, 500_000).expect("within its range");
+        let settings = Settings::DEFAULT.with(&values);
+        assert_eq!((settings.lens.home_search_speed, settings.lens.home_leave_speed), (3_200, 3_200));
+        assert_eq!(settings.coarse.home_search_speed, Settings::DEFAULT.coarse.home_search_speed);
+    }
+
+    #[test]
+    fn a_value_outside_its_range_changes_nothing_and_is_told_the_range() {
+        let mut values = Values::DEFAULT;
+        let refused = values.set(SettingKey::CoarseMaxNm, 13_000_001);
+        assert!(matches!(refused, Err(Setting { max: 13_000_000, min: 0, .. })), "{refused:?}");
+        assert_eq!(values, Values::DEFAULT);
+        values.set(SettingKey::CoarseMaxNm, 5_000_000).expect("within the travel");
+        assert_eq!(values.setting(SettingKey::CoarseMinNm).max, 5_000_000, "they bound each other");
+        assert!(values.set(SettingKey::CoarseMinNm, 5_000_001).is_err());
+    }
+
+    #[test]
+    fn what_the_memory_holds_beyond_its_range_becomes_the_default() {
+        let mut raw = *Values::DEFAULT.raw();
+        (raw[0], raw[2]) = (i32::MIN, 1_000);
+        let values = Values::restored(raw);
+        assert_eq!(
+            (values.get(SettingKey::DatumNm), values.get(SettingKey::CoarseMinNm)),
+            (47_000_000, 1_000)
+        );
+    }
+}

@@ -1,0 +1,69 @@
+//! The host's silence: whoever moves things must stay in touch.
+//!
+//! Each request that moves something says for how long the host may say nothing. The shortest of those under way counts.
+//! Half-way the host is reminded, once; any good frame of it starts the time anew.
+
+use farnear_protocol::{BoardMicros, Micros};
+
+use crate::motion::since;
+
+/// When the host was last heard.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Silence {
+    heard: BoardMicros,
+    reminded: bool,
+}
+
+/// What is to be done about it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Verdict {
+    /// Nothing.
+    Fine,
+    /// Say [`farnear_protocol::EventKind::StillThere`] with this request.
+    Remind(u32),
+    /// Stop: this request's deadline has passed.
+    Expired(u32),
+}
+
+impl Silence {
+    pub(crate) const fn new(now: BoardMicros) -> Self {
+        Self { heard: now, reminded: false }
+    }
+
+    /// A good frame came.
+    pub(crate) const fn hear(&mut self, now: BoardMicros) {
+        *self = Self::new(now);
+    }
+
+    /// Looks at the clock, with the request under way that allows the shortest silence.
+    pub(crate) fn check(&mut self, now: BoardMicros, shortest: Option<(u32, Micros)>) -> Verdict {
+        let Some((request, allowed)) = shortest else { return Verdict::Fine };
+        let silent = since(self.heard, now);
+        if silent >= allowed {
+            Verdict::Expired(request)
+        } else if !self.reminded && silent.0 >= allowed.0 / 2 {
+            self.reminded = true;
+            Verdict::Remind(request)
+        } else {
+            Verdict::Fine
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reminds_once_half_way_and_expires_at_the_end() {
+        let mut silence = Silence::new(BoardMicros(1_000));
+        let allowed = Some((7, Micros(100_000)));
+        assert_eq!(silence.check(BoardMicros(900_000), None), Verdict::Fine, "nothing is under way");
+        assert_eq!(silence.check(BoardMicros(50_999), allowed), Verdict::Fine);
+        assert_eq!(silence.check(BoardMicros(51_000), allowed), Verdict::Remind(7));
+        assert_eq!(silence.check(BoardMicros(100_999), allowed), Verdict::Fine);
+        silence.hear(BoardMicros(100_999));
+        assert_eq!(silence.check(BoardMicros(150_999), allowed), Verdict::Remind(7), "a new period");
+        assert_eq!(silence.check(BoardMicros(200_999), allowed), Verdict::Expired(7));
+    }
+}

@@ -1,0 +1,132 @@
+//! Counts the instructions of the on-board routines: runs `farnear-count`, a firmware made for that, and reads what it
+//! noted. Here one instruction takes one cycle, so its cycle counter counts instructions, the same number every time. A
+//! real board takes longer (flash wait states, branches, divisions): a time made of these counts is a lower bound.
+
+use std::path::Path;
+
+use object::{Object, ObjectSymbol};
+use rigless::{
+    emulator::{self, Host, Memory, Settled, Start, Stop, run},
+    image::Image,
+    session::Session,
+    soc::Width,
+    time::VirtualNanos,
+};
+
+use crate::{board::RigBoard, chips::SharedPlant, error::SimError, plant::Plant, serial::Line};
+
+/// Where the counting program lays its routines and its counts.
+const ROUTINES: &str = "FARNEAR_ROUTINES";
+const COUNTS: &str = "FARNEAR_COUNTS";
+/// Bytes of a routine's description and of a count.
+const ROUTINE_BYTES: u64 = 24;
+const COUNT_BYTES: u64 = 4;
+/// Longer than all routines together take.
+const PATIENCE_NS: u64 = 10_000_000_000;
+/// Between two looks whether it has ended.
+const LOOK_NS: u64 = 1_000_000;
+
+/// What a routine takes.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Count {
+    /// What it does.
+    pub routine: String,
+    /// What it does that to.
+    pub unit: String,
+    /// How many of these a run had.
+    pub units: u32,
+    /// Instructions of the whole run.
+    pub instructions: u32,
+}
+
+impl Count {
+    /// Instructions for one unit.
+    pub fn per_unit(&self) -> f64 {
+        f64::from(self.instructions) / f64::from(self.units.max(1))
+    }
+}
+
+/// Address and length of a variable of the program.
+fn place(elf: &object::File<'_>, name: &str) -> Option<(u64, u64)> {
+    let found = elf.symbols().find(|symbol| symbol.name() == Ok(name))?;
+    Some((found.address(), found.size()))
+}
+
+/// Lets the program run until its last count is there.
+struct Counting {
+    routines: u64,
+    counts: u64,
+    number: u64,
+    result: Option<Vec<Count>>,
+}
+
+fn word(host: &mut dyn Host, address: u64) -> u32 {
+    Memory::read(host, address, Width::W32).map_or(0, |word| word as u32)
+}
+
+fn text(host: &mut dyn Host, at: u32, length: u32) -> String {
+    let bytes = (0..u64::from(length.min(200)))
+        .filter_map(|i| Memory::read(host, u64::from(at) + i, Width::W8).ok())
+        .map(|byte| byte as u8);
+    String::from_utf8_lossy(&bytes.collect::<Vec<u8>>()).into_owned()
+}
+
+impl Counting {
+    fn read(&self, host: &mut dyn Host) -> Vec<Count> {
+        (0..self.number)
+            .map(|i| {
+                let [name, name_length, unit, unit_length, units] = std::array::from_fn(|field| {
+                    word(host, self.routines + i * ROUTINE_BYTES + 4 * field as u64)
+                });
+                Count {
+                    routine: text(host, name, name_length),
+                    unit: text(host, unit, unit_length),
+                    units,
+                    instructions: word(host, self.counts + i * COUNT_BYTES),
+                }
+            })
+            .collect()
+    }
+}
+
+impl emulator::Driver<RigBoard> for Counting {
+    fn on_settled(&mut self, _session: &mut Session<RigBoard>, _host: &mut dyn Host, _settled: Settled) {}
+
+    fn on_stop(
+        &mut self,
+        _session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<VirtualNanos> {
+        if word(host, self.counts + (self.number - 1) * COUNT_BYTES) != 0 {
+            self.result = Some(self.read(host));
+            return None;
+        }
+        (stop.at.0 < PATIENCE_NS).then_some(VirtualNanos(stop.at.0 + LOOK_NS))
+    }
+}
+
+/// Runs the counting program.
+///
+/// # Errors
+/// [`SimError::Firmware`] where the file is no such program, or does not end.
+pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
+    let unusable = |reason: String| SimError::Firmware { path: path.into(), reason };
+    let bytes = std::fs::read(path).map_err(|error| unusable(error.to_string()))?;
+    let elf = object::File::parse(&*bytes).map_err(|error| unusable(error.to_string()))?;
+    let missing = |name: &str| unusable(format!("it has no {name}: is it farnear-count?"));
+    let (routines, _) = place(&elf, ROUTINES).ok_or_else(|| missing(ROUTINES))?;
+    let (counts, length) = place(&elf, COUNTS).ok_or_else(|| missing(COUNTS))?;
+    let number = length / COUNT_BYTES;
+    if number == 0 {
+        return Err(missing(COUNTS));
+    }
+    let image = Image::read(path, None).map_err(|error| unusable(error.to_string()))?;
+    let plant = SharedPlant::new(Plant::new(1).into());
+    let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
+    let board = RigBoard::new(&plant, Line::default(), 1).map_err(|error| emulator(&error))?;
+    let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
+    let counting = Counting { routines, counts, number, result: None };
+    let finished = run(session, &Start::new(&[image]), counting).map_err(|error| emulator(&error))?;
+    finished.driver.result.ok_or_else(|| unusable("it did not come to its end".into()))
+}

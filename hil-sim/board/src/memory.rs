@@ -1,0 +1,138 @@
+//! The board's FRAM, Cypress FM25V02 (the emulator's model of it), and what can happen to such a chip: its supply fails
+//! in the middle of a write, a bit flips, somebody solders in a new one.
+
+use rigless::{
+    chip::{
+        Timeline,
+        fram::{Fm25v02, POWER_UP, SIZE},
+        spi::Peer,
+    },
+    snapshot::Store,
+    time::{EventId, VirtualNanos},
+};
+
+/// Opcode of a write; two bytes of address follow it.
+const WRITE: u32 = 0x02;
+
+/// The chip behind its select.
+#[derive(Debug)]
+pub struct MemoryChip {
+    chip: Fm25v02,
+    /// Bytes of the command under way, and whether it is a write.
+    command: (u32, bool),
+    written: u64,
+    /// The supply fails when so many bytes have been written.
+    fails_at: Option<u64>,
+    failed: bool,
+}
+
+impl MemoryChip {
+    /// A new chip: all zero.
+    pub fn new() -> Self {
+        Self { chip: Fm25v02::new(), command: (0, false), written: 0, fails_at: None, failed: false }
+    }
+
+    /// What it holds.
+    pub fn contents(&self) -> &[u8] {
+        self.chip.stored()
+    }
+
+    /// Bytes written since power-on of the rig.
+    pub fn written(&self) -> u64 {
+        self.written
+    }
+
+    /// Lets the supply fail when this many more bytes have been written: the last of them still lands.
+    pub fn fail_after(&mut self, bytes: u64) {
+        self.fails_at = Some(self.written + bytes);
+    }
+
+    /// Whether the supply has failed as [`MemoryChip::fail_after`] asked; said once.
+    pub fn take_failure(&mut self) -> bool {
+        self.failed && self.fails_at.take().is_some()
+    }
+
+    /// Puts these contents into the chip.
+    pub fn set_contents(&mut self, contents: &[u8; SIZE]) {
+        self.rebuild(contents, VirtualNanos(0));
+    }
+
+    /// The supply has come back.
+    pub fn power_up(&mut self, at: VirtualNanos) {
+        let contents = self.chip.stored().to_vec();
+        self.rebuild(&contents, VirtualNanos(at.0 + POWER_UP.0));
+        self.failed = false;
+        self.fails_at = None;
+    }
+
+    /// The emulator's chip has no door for this, so a new one is made from its description.
+    fn rebuild(&mut self, contents: &[u8], ready_at: VirtualNanos) {
+        let described = serde_json::to_value(Fm25v02::new()).and_then(|mut chip| {
+            chip["memory"] = contents.into();
+            chip["ready_at"] = serde_json::to_value(ready_at)?;
+            serde_json::from_value(chip)
+        });
+        match described {
+            Ok(chip) => self.chip = chip,
+            Err(error) => unreachable!("the chip's own description does not fit it: {error}"),
+        }
+    }
+}
+
+impl Default for MemoryChip {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Peer for MemoryChip {
+    fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        if self.failed {
+            return (1 << bits) - 1;
+        }
+        let (count, writes) = &mut self.command;
+        if *count == 0 {
+            *writes = mosi == WRITE;
+        }
+        *count += 1;
+        if *writes && *count > 3 {
+            self.written += 1;
+            self.failed = self.fails_at.is_some_and(|at| self.written >= at);
+        }
+        self.chip.transfer(mosi, bits, context)
+    }
+
+    fn select(&mut self, context: &mut Timeline<'_, '_>) {
+        self.command = (0, false);
+        self.chip.select(context);
+    }
+
+    fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
+        self.chip.deselect(context);
+    }
+
+    fn on_event(&mut self, event: EventId, context: &mut Timeline<'_, '_>) {
+        self.chip.on_event(event, context);
+    }
+
+    fn restarted(&mut self, context: &mut Timeline<'_, '_>) {
+        self.chip.restarted(context);
+    }
+}
+
+impl Store for MemoryChip {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contents_can_be_put_in_and_survive_a_loss_of_power() {
+        let mut chip = MemoryChip::new();
+        let mut contents = [0; SIZE];
+        contents[77] = 0xa5;
+        chip.set_contents(&contents);
+        chip.power_up(VirtualNanos(1_000_000_000));
+        assert_eq!(chip.contents(), contents);
+    }
+}

@@ -1,0 +1,225 @@
+//! A motorised stage: motor, screw, encoder on the motor's shaft, end switches at the stage.
+//!
+//! Micrometres from the true home edge, positive = sensor and lens away from each other. The encoder sees the rotor,
+//! not the screw's error nor its play; the switches see the stage.
+
+use super::{
+    Noise,
+    motor::{MICROSTEPS_PER_TURN, Motor},
+    screw::{MICROSTEP_UM, Screw, TRAVEL_UM},
+};
+
+/// Counts of the encoder per turn.
+const COUNTS_PER_TURN: f64 = 4000.0;
+/// The carriage runs against rubber this far beyond either switch: the motor stalls.
+const END_STOP_UM: f64 = 700.0;
+/// The far switch closes this far beyond the travel.
+const FAR_SWITCH_UM: f64 = TRAVEL_UM + 150.0;
+/// Repeatability of the home switch, standard deviation in micrometres.
+const HOME_SD_UM: f64 = 0.3;
+/// Way from where the home switch closes to where it opens again (a precision switch of the Baumer My-Com
+/// class has micrometres; a snap-action one has 0.1 mm).
+const HOME_DIFFERENTIAL_UM: f64 = 2.0;
+
+/// Which of the two stages.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StageName {
+    /// Stage A: carries the sensor with its piezo.
+    Sensor,
+    /// Stage B: carries the lens.
+    Lens,
+}
+
+/// A switch with its own repeatability.
+#[derive(Debug)]
+struct HomeSwitch {
+    noise: Noise,
+    offset_um: f64,
+    closed: bool,
+}
+
+impl HomeSwitch {
+    /// Each closing is at another place: that is the repeatability.
+    fn update(&mut self, um: f64) {
+        if !self.closed && um <= self.offset_um {
+            self.closed = true;
+        } else if self.closed && um > self.offset_um + HOME_DIFFERENTIAL_UM {
+            self.closed = false;
+            self.offset_um = HOME_SD_UM * self.noise.normal();
+        }
+    }
+}
+
+/// See the module.
+#[derive(Debug)]
+pub struct Stage {
+    motor: Motor,
+    screw: Screw,
+    home: HomeSwitch,
+    stuck_home: Option<bool>,
+    stuck_far: Option<bool>,
+    step_edges: u64,
+}
+
+impl Stage {
+    /// A stage somewhere in the first half of its travel.
+    pub fn new(name: StageName, seed: u64) -> Self {
+        let (screw, switch) = match name {
+            StageName::Sensor => ("screw", "home switch"),
+            StageName::Lens => ("lens screw", "lens home switch"),
+        };
+        let mut noise = Noise::new(seed, screw);
+        let start_um = noise.between(500.0, TRAVEL_UM / 2.0);
+        let mut home = HomeSwitch { noise: Noise::new(seed, switch), offset_um: 0.0, closed: false };
+        home.offset_um = HOME_SD_UM * home.noise.normal();
+        let microsteps = libm::round(start_um / MICROSTEP_UM) as i64;
+        let mut screw = Screw::new(&mut noise);
+        // It came from its lower end.
+        screw.turn(microsteps as f64);
+        Self { motor: Motor::new(microsteps), screw, home, stuck_home: None, stuck_far: None, step_edges: 0 }
+    }
+
+    /// A STEP pulse reaches the driver while it is on.
+    pub fn step(&mut self, away: bool) {
+        self.step_edges += 1;
+        self.motor.step(away);
+    }
+
+    /// Lets time pass until `now_ns`.
+    pub fn advance(&mut self, now_ns: u64) {
+        let Self { motor, screw, home, .. } = self;
+        motor.advance(now_ns, |rotor| {
+            let held = rotor.clamp(-END_STOP_UM / MICROSTEP_UM, (TRAVEL_UM + END_STOP_UM) / MICROSTEP_UM);
+            screw.turn(held);
+            home.update(screw.stage_um());
+            held
+        });
+    }
+
+    /// Where the stage really is, micrometres from the true home edge.
+    pub fn position_um(&self) -> f64 {
+        self.screw.stage_um()
+    }
+
+    /// Where the driver's sequencer stands, microsteps from the true home edge.
+    pub fn microsteps(&self) -> i64 {
+        self.motor.field()
+    }
+
+    /// Steps that the motor has lost: where the driver believes the rotor, less where it is, microsteps.
+    pub fn lost_microsteps(&self) -> f64 {
+        self.motor.field() as f64 - self.motor.rotor()
+    }
+
+    /// The encoder's count on the rotor.
+    pub fn encoder_counts(&self) -> i64 {
+        libm::floor(self.motor.rotor() * (COUNTS_PER_TURN / MICROSTEPS_PER_TURN)) as i64
+    }
+
+    /// The home switch is closed.
+    pub fn home_closed(&self) -> bool {
+        self.stuck_home.unwrap_or(self.home.closed)
+    }
+
+    /// The far switch is closed.
+    pub fn far_closed(&self) -> bool {
+        self.stuck_far.unwrap_or(self.position_um() >= FAR_SWITCH_UM)
+    }
+
+    /// STEP edges that reached the driver while it was on.
+    pub fn step_edges(&self) -> u64 {
+        self.step_edges
+    }
+
+    /// Blocks the motor, or frees it.
+    pub fn set_stalled(&mut self, stalled: bool) {
+        self.motor.set_blocked(stalled);
+    }
+
+    /// The share of its torque that the motor has left.
+    pub fn set_torque(&mut self, share: f64) {
+        self.motor.set_torque(share);
+    }
+
+    /// Another play of the screw's nut.
+    pub fn set_backlash_um(&mut self, um: f64) {
+        self.screw.set_backlash_um(um);
+    }
+
+    /// Breaks the home switch so that it says this for ever, or repairs it.
+    pub fn set_stuck_home(&mut self, says: Option<bool>) {
+        self.stuck_home = says;
+    }
+
+    /// Breaks the far switch so that it says this for ever, or repairs it.
+    pub fn set_stuck_far(&mut self, says: Option<bool>) {
+        self.stuck_far = says;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps at 4 kHz, 0.6 mm/s.
+    struct Turned {
+        stage: Stage,
+        now_ns: u64,
+    }
+
+    impl Turned {
+        fn new(seed: u64) -> Self {
+            Self { stage: Stage::new(StageName::Sensor, seed), now_ns: 0 }
+        }
+
+        fn step(&mut self, away: bool) {
+            self.now_ns += 250_000;
+            self.stage.advance(self.now_ns);
+            self.stage.step(away);
+        }
+    }
+
+    #[test]
+    fn the_encoder_counts_five_per_four_steps_and_the_stops_hold() {
+        let mut turned = Turned::new(1);
+        let start = turned.stage.encoder_counts();
+        for _ in 0..401 {
+            turned.step(true);
+        }
+        // A floor on either side, and the rotor within a microstep: within two counts of 500.
+        assert!((turned.stage.encoder_counts() - start - 500).abs() <= 2);
+        for _ in 0..60_000 {
+            turned.step(false);
+        }
+        let stage = &turned.stage;
+        assert!(stage.position_um() > -END_STOP_UM - 5.0 && stage.home_closed() && !stage.far_closed());
+        assert!(stage.lost_microsteps() < -1000.0, "the motor has stalled against its stop");
+        assert_eq!(stage.step_edges(), 60_401);
+    }
+
+    #[test]
+    fn the_home_switch_repeats_to_its_standard_deviation() {
+        let mut turned = Turned::new(5);
+        let mut places = Vec::new();
+        for _ in 0..400 {
+            while !turned.stage.home_closed() {
+                turned.step(false);
+            }
+            places.push(turned.stage.position_um());
+            while turned.stage.position_um() < 20.0 {
+                turned.step(true);
+            }
+        }
+        let mean = places.iter().sum::<f64>() / 400.0;
+        let sd = (places.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / 400.0).sqrt();
+        // 0.3 um and the microstep's 0.156/sqrt(12); five standard errors of an SD over 400.
+        assert!((sd - 0.303).abs() < 0.055, "{sd}");
+    }
+
+    #[test]
+    fn the_two_stages_are_not_the_same() {
+        let at = |name| Stage::new(name, 1).position_um();
+        assert_ne!(at(StageName::Sensor), at(StageName::Lens));
+    }
+}

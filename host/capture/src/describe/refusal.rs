@@ -1,0 +1,107 @@
+//! Why the board refused, with what to do.
+
+use farnear_protocol::RequestError;
+use farnear_protocol::message::{CorrectionFault, ShotFault};
+
+use super::{alarm_text, axis_name, program_name, state_name, um};
+
+/// Why the board refused.
+pub fn refusal_text(error: &RequestError) -> String {
+    match error {
+        RequestError::Version { min, current } => format!("it speaks protocol {min} to {current}"),
+        RequestError::Boot { current } => {
+            format!("the request was made for another boot; this one is {current}")
+        }
+        RequestError::Malformed => "it did not understand the request".into(),
+        RequestError::IdReused => {
+            "the request's id was already used: does another program talk to the board?".into()
+        }
+        RequestError::OutOfRange { axis, asked, min, max } => format!(
+            "{:.3} um is outside the limits of the {}, {:.3} to {:.3} um",
+            um(*asked),
+            axis_name(*axis),
+            um(*min),
+            um(*max)
+        ),
+        RequestError::NotHomed { axis, state } => {
+            format!("the position of the {} is {}; home it first", axis_name(*axis), state_name(*state))
+        }
+        RequestError::Busy { request } => format!(
+            "it is still busy with request {request}; wait for its end or stop it (`farnear rig stop`)"
+        ),
+        RequestError::CannotHome { axis } => {
+            format!("the {} has no home switch and needs no homing", axis_name(*axis))
+        }
+        RequestError::Shot { index, reason } => format!("shot {index}: {}", shot_fault_text(*reason)),
+        RequestError::EventGone { oldest, next } => {
+            format!("it remembers the events from {oldest} to just before {next} only")
+        }
+        RequestError::Alarm { number, alarm } => format!(
+            "alarm {number} is latched: {}; then clear it with `farnear rig alarms --clear {number}`",
+            alarm_text(*alarm)
+        ),
+        RequestError::NoSuchAlarm { latched: 0, last: 0 } => "there never was an alarm".into(),
+        RequestError::NoSuchAlarm { latched: 0, last } => {
+            format!("no such alarm is latched or kept; the last one was number {last}")
+        }
+        RequestError::NoSuchAlarm { latched, .. } => {
+            format!("the latched alarm is number {latched}: read it, then clear that number")
+        }
+        RequestError::AlarmRemains { alarm } => {
+            format!("the alarm's cause is still there: {}", alarm_text(*alarm))
+        }
+        RequestError::TooClose { distance, min } => format!(
+            "sensor and lens would come within {:.4} mm of each other on the way, at least {:.4} mm are allowed \
+             (setting distance_min_nm)",
+            um(*distance) / 1e3,
+            um(*min) / 1e3
+        ),
+        RequestError::Silence { min, max } => format!(
+            "the deadline for the host's silence must lie between {} and {} ms",
+            min.0 / 1000,
+            max.0 / 1000
+        ),
+        RequestError::Program { state } => {
+            format!("the exposure program is {}, which does not go with this", program_name(*state))
+        }
+        RequestError::SettingRange(setting) => format!(
+            "{} must lie between {} and {}; it stays {} (default {})",
+            setting.key.name(),
+            setting.min,
+            setting.max,
+            setting.value,
+            setting.default
+        ),
+        RequestError::Correction(fault) => correction_fault_text(*fault).into(),
+        RequestError::NotFitted { axis } => format!("this rig has no {}", axis_name(*axis)),
+        RequestError::NoSuchRoutine => "this routine is not possible on that axis".into(),
+    }
+}
+
+fn shot_fault_text(fault: ShotFault) -> &'static str {
+    match fault {
+        ShotFault::Index => "there is no such place in the program, or the program has no shots",
+        ShotFault::Missing => "it was never loaded",
+        ShotFault::Exposure => "the exposure time is outside the board's limits",
+        ShotFault::Settle => "the settle window or its time is not possible",
+        ShotFault::Repeat => "the repeat count is 0",
+    }
+}
+
+fn correction_fault_text(fault: CorrectionFault) -> &'static str {
+    match fault {
+        CorrectionFault::None => "no depth correction is open or stored on the board",
+        CorrectionFault::Size => "the depth map is too small, or wider than the board's row buffer",
+        CorrectionFault::Place => "the row lies outside the depth map, or the pixels outside the row",
+        CorrectionFault::Coefficient => "a coefficient is out of its range or number",
+        CorrectionFault::Underdetermined => {
+            "the samples do not determine the correction: at least four depths, and pixels in every region, are needed"
+        }
+        CorrectionFault::TooManySamples => {
+            "more samples than the board's sums can hold; take fewer pixels of each row"
+        }
+        CorrectionFault::CoefficientTooLarge => {
+            "a coefficient of the fit is too large: the depth scale does not suit the samples"
+        }
+    }
+}

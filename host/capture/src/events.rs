@@ -1,0 +1,78 @@
+//! The board's events in order, and what they say about work.
+
+use std::collections::BTreeMap;
+
+use farnear_protocol::Event;
+use farnear_protocol::frame::Packet;
+use farnear_protocol::message::{EventKind, Status};
+
+use crate::error::ClientError;
+
+/// An event further ahead of the due one cannot come from a sane board, whose memory is smaller.
+const AHEAD_MAX: u32 = 4096;
+
+/// The events of one boot, in order.
+#[derive(Default)]
+pub(crate) struct Events {
+    pub boot: u32,
+    /// Number of the event that is to be given out next.
+    pub due: u32,
+    /// What has arrived and was not given out.
+    pub arrived: BTreeMap<u32, Event>,
+}
+
+impl Events {
+    /// Keeps an event, unless it is old. An event of another boot means that the board was reset.
+    pub(crate) fn take(&mut self, packet: &Packet, during: &str) -> Result<(), ClientError> {
+        let event = packet.message::<Event>();
+        if packet.header.boot != self.boot {
+            let cause = match event {
+                Some(Event { kind: EventKind::Started { cause }, .. }) => Some(cause),
+                _ => None,
+            };
+            let (was, now) = (self.boot, packet.header.boot);
+            return Err(ClientError::Reset { during: during.into(), was, now, cause });
+        }
+        let event = event.ok_or_else(|| ClientError::Nonsense {
+            during: during.into(),
+            answer: format!("event {:02x?}", packet.body.as_slice()),
+        })?;
+        if packet.header.id.wrapping_sub(self.due) < AHEAD_MAX {
+            self.arrived.insert(packet.header.id, event);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<(u32, Event)> {
+        let event = self.arrived.remove(&self.due)?;
+        self.due += 1;
+        Some((self.due - 1, event))
+    }
+}
+
+/// Whether the board works on this request. While a program or a routine runs, not every axis need name it.
+pub(crate) fn is_under_way(request: u32, status: &Status) -> bool {
+    use farnear_protocol::message::ProgramState::{Paused, Running};
+    let axes = [&status.coarse, &status.fine, &status.lens];
+    axes.iter().any(|axis| axis.request == Some(request) || axis.moving)
+        || matches!(status.program.state, Running | Paused)
+}
+
+/// The request that an event is about, and whether it ends it.
+pub(crate) fn request_of(kind: &EventKind) -> Option<(u32, bool)> {
+    match *kind {
+        EventKind::Homed { request, .. }
+        | EventKind::MoveDone { request, .. }
+        | EventKind::ProgramDone { request, .. }
+        | EventKind::Calibrated { request, .. }
+        | EventKind::Failed { request, .. } => Some((request, true)),
+        EventKind::ShotDone { request, .. }
+        | EventKind::ShotReady { request, .. }
+        | EventKind::Paused { request, .. }
+        | EventKind::StillThere { request } => Some((request, false)),
+        EventKind::Started { .. }
+        | EventKind::Alarm(_)
+        | EventKind::AlarmCleared { .. }
+        | EventKind::RecordRepaired { .. } => None,
+    }
+}

@@ -1,0 +1,152 @@
+//! Running an exposure program together with a camera: each exposure with its image, in order.
+
+use std::time::{Duration, Instant};
+
+use farnear_protocol::message::{EventKind, Limits, Shot, ShotRecord, TriggerMode};
+use farnear_protocol::units::Micros;
+
+use crate::camera::{Camera, CameraError, Image};
+use crate::client::Client;
+use crate::error::ClientError;
+use crate::plan::PlanError;
+
+/// Longest single wait for an image, so that an interruption by the user is seen soon.
+const SLICE: Duration = Duration::from_millis(200);
+
+/// Images could not be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// The board, or the way to it.
+    #[error(transparent)]
+    Board(#[from] ClientError),
+    /// The rig does not reach that far.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The two images do not belong together.
+    #[error(
+        "the far image has {far_width}x{far_height} pixels of {far_bits} bits, the near one {near_width}x{near_height} of {near_bits}"
+    )]
+    Unlike {
+        /// Width of the far image.
+        far_width: usize,
+        /// Height of the far image.
+        far_height: usize,
+        /// Bits of the far image.
+        far_bits: u8,
+        /// Width of the near image.
+        near_width: usize,
+        /// Height of the near image.
+        near_height: usize,
+        /// Bits of the near image.
+        near_bits: u8,
+    },
+    /// The board ended the program with another number of exposures than asked for.
+    #[error("the board told of {told} exposures where {asked} were asked for")]
+    Count {
+        /// How many.
+        told: usize,
+        /// How many there should have been.
+        asked: usize,
+    },
+    /// A program whose shots come about in different ways: no camera does that.
+    #[error(
+        "shot {index} is triggered by {found}, the ones before by {first}; a program's shots must have one trigger"
+    )]
+    MixedTriggers {
+        /// The first shot that differs.
+        index: usize,
+        /// Its trigger.
+        found: &'static str,
+        /// The trigger of the first.
+        first: &'static str,
+    },
+}
+
+/// Runs a program of shots and gives each exposure with its image to `on_image`, which may break off: the rig is stopped
+/// then. Waits for each image at most `image_wait`.
+///
+/// # Errors
+/// [`CaptureError`], or what `on_image` gives.
+pub fn expose<E: From<CaptureError> + From<ClientError>>(
+    client: &Client,
+    camera: &mut dyn Camera,
+    shots: &[Shot],
+    image_wait: Duration,
+    mut on_image: impl FnMut(ShotRecord, Image) -> Result<(), E>,
+) -> Result<(), E> {
+    let (mode, exposure) = one_trigger(shots)?;
+    let camera_failed = |error: CameraError| CaptureError::Camera(error);
+    camera.arm(mode, exposure).map_err(camera_failed)?;
+    let mut told = 0;
+    let run = client.run_program(shots, |kind| -> Result<(), E> {
+        match kind {
+            EventKind::ShotReady { trigger_number, exposure, .. } => {
+                camera.trigger(*trigger_number, *exposure).map_err(camera_failed)?;
+            }
+            EventKind::ShotDone { shot, .. } => {
+                told += 1;
+                on_image(*shot, wait_for_image(client, camera, shot, image_wait)?)?;
+            }
+            _ => {}
+        }
+        Ok(())
+    });
+    if mode == TriggerMode::FreeRunning {
+        // Whatever happened, the camera is to heed its trigger line again.
+        let disarmed = camera.arm(TriggerMode::Hardware, exposure).map_err(camera_failed);
+        run?;
+        disarmed?;
+    } else {
+        run?;
+    }
+    let asked = shots.iter().map(|shot| usize::from(shot.repeat)).sum();
+    if told != asked {
+        return Err(CaptureError::Count { told, asked }.into());
+    }
+    Ok(())
+}
+
+fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), CaptureError> {
+    let Some(first) = shots.first() else { return Ok((TriggerMode::Hardware, Micros(0))) };
+    match shots.iter().position(|shot| shot.mode != first.mode) {
+        None => Ok((first.mode, first.exposure)),
+        Some(index) => Err(CaptureError::MixedTriggers {
+            index,
+            found: crate::describe::trigger_name(shots[index].mode),
+            first: crate::describe::trigger_name(first.mode),
+        }),
+    }
+}
+
+/// Sensor distance from the lens' principal plane at an exposure, by encoders and gauge, in mm.
+pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
+    let parts = [limits.datum, record.coarse, record.fine, record.lens];
+    parts.iter().map(|part| f64::from(part.0)).sum::<f64>() / 1e6
+}
+
+fn wait_for_image(
+    client: &Client,
+    camera: &mut dyn Camera,
+    record: &ShotRecord,
+    allowed: Duration,
+) -> Result<Image, CaptureError> {
+    let until = Instant::now() + allowed;
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        match camera.image(record, left.min(SLICE)) {
+            Err(CameraError::Late { camera, trigger_number, .. }) => {
+                if client.interrupted() {
+                    let during = "waiting for the camera's image".into();
+                    return Err(ClientError::Interrupted { during }.into());
+                }
+                if Instant::now() >= until {
+                    return Err(CameraError::Late { camera, trigger_number, waited: allowed }.into());
+                }
+            }
+            result => return Ok(result?),
+        }
+    }
+}

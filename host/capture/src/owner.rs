@@ -1,0 +1,475 @@
+//! The one owner of a port: a thread that sends requests, receives frames and hands them to whom they concern.
+//!
+//! Handles ([`crate::Client`]) give it commands over a channel. It keeps the events in order and without gaps, answers
+//! the board's [`EventKind::StillThere`] as long as somebody holds the work that is asked about, and says hello anew
+//! after a reset or an unplugging. A new hello begins a new *session*: what belongs to the old one, a handle or running
+//! work, gets an error and has to decide for itself, because the rig may have lost its position.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use farnear_protocol::frame::{Kind, Packet};
+use farnear_protocol::message::{EventKind, Hello, ResetCause, Status};
+use farnear_protocol::{Event, Log, Request, RequestError, Response};
+
+use crate::error::{ClientError, PortError};
+use crate::events::{Events, is_under_way, request_of};
+use crate::handshake::shake_hands;
+use crate::link::Link;
+use crate::stream::{Audience, LogPart, News};
+use crate::timing::Timing;
+use crate::transport::Transport;
+
+/// Opens the line to the board, the first time and after it broke.
+pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Send>;
+
+/// Longest wait for a command while events are awaited, and so the delay of an event.
+const ALERT: Duration = Duration::from_millis(1);
+/// Longest wait for a command while nobody awaits an event.
+const IDLE: Duration = Duration::from_millis(50);
+/// Longest look for bytes between two commands.
+const GLANCE: Duration = Duration::from_millis(1);
+/// From one attempt to reach the board again to the next.
+const RECONNECT: Duration = Duration::from_millis(500);
+/// A board between two hellos.
+#[derive(Clone)]
+pub(crate) struct Session {
+    /// Counts the sessions of this owner.
+    pub number: u32,
+    pub hello: Arc<Hello>,
+    pub version: u8,
+}
+
+/// What ended a session.
+#[derive(Clone, Debug)]
+pub(crate) enum Break {
+    Gone(Arc<io::Error>),
+    Reset { was: u32, now: u32, cause: Option<ResetCause> },
+}
+
+impl Break {
+    pub(crate) fn error(&self, port: &str, during: &str) -> ClientError {
+        let during = during.into();
+        match self.clone() {
+            Self::Gone(source) => ClientError::Gone { port: port.into(), during, source },
+            Self::Reset { was, now, cause } => ClientError::Reset { during, was, now, cause },
+        }
+    }
+}
+
+/// What running work is told.
+pub(crate) enum Note {
+    Event(EventKind),
+    Broken(Break),
+    EventsLost {
+        from: u32,
+        to: u32,
+    },
+    /// The board says that it is not working on it, and no event tells how it ended.
+    NoEnd,
+}
+
+/// Where notes about work go.
+pub(crate) struct Listener {
+    pub notes: Sender<Note>,
+    /// Gone when nobody holds the work any more.
+    pub held: Weak<()>,
+}
+
+/// What handles ask of the owner.
+pub(crate) enum Command {
+    Ask {
+        session: u32,
+        request: Box<Request>,
+        during: String,
+        listener: Option<Listener>,
+        answer: SyncSender<Result<(u32, Response), ClientError>>,
+    },
+    /// Gives the present session; says hello anew where it is still the known one, or none.
+    Join {
+        known: u32,
+        answer: SyncSender<Result<Session, ClientError>>,
+    },
+    Events(SyncSender<News>),
+    Logs(SyncSender<LogPart>),
+}
+
+pub(crate) struct Owner {
+    link: Link,
+    connect: Connect,
+    inbox: Receiver<Command>,
+    timing: Arc<Mutex<Timing>>,
+    session: Session,
+    /// Set while there is no session.
+    broken: Option<Break>,
+    /// What ended the session before this one.
+    last_break: Option<Break>,
+    next_attempt: Instant,
+    events: Events,
+    works: BTreeMap<u32, Listener>,
+    news: Audience<News>,
+    logs: Audience<LogPart>,
+    next_log: Option<u32>,
+    still_there: bool,
+    last_heard: Instant,
+}
+
+impl Owner {
+    /// Opens the line and says hello.
+    pub(crate) fn start(
+        mut connect: Connect,
+        port: &str,
+        emulated: bool,
+        timing: impl FnOnce(&Hello) -> Arc<Mutex<Timing>>,
+        inbox: Receiver<Command>,
+    ) -> Result<Self, ClientError> {
+        let mut link = Link::new(connect()?, port);
+        let (hello, version) = shake_hands(&mut link, emulated)?;
+        let timing = timing(&hello);
+        let events = Events { boot: hello.boot, ..Events::default() };
+        let session = Session { number: 1, hello: Arc::new(hello), version };
+        let now = Instant::now();
+        let mut owner = Self {
+            link,
+            connect,
+            inbox,
+            timing,
+            session,
+            broken: None,
+            last_break: None,
+            next_attempt: now,
+            events,
+            works: BTreeMap::new(),
+            news: Audience::default(),
+            logs: Audience::default(),
+            next_log: None,
+            still_there: false,
+            last_heard: now,
+        };
+        owner.join_events()?;
+        Ok(owner)
+    }
+
+    pub(crate) fn session(&self) -> Session {
+        self.session.clone()
+    }
+
+    /// Works until the last handle has gone.
+    pub(crate) fn run(mut self) {
+        loop {
+            let awaited = !self.works.is_empty() || !self.news.is_empty() || !self.logs.is_empty();
+            match self.inbox.recv_timeout(if awaited { ALERT } else { IDLE }) {
+                Ok(command) => self.obey(command),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            if self.broken.is_some() {
+                self.try_again_when_due();
+                continue;
+            }
+            self.glance();
+            self.give_out();
+            self.poll_when_quiet();
+        }
+    }
+
+    fn timing(&self) -> Timing {
+        *self.timing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Ask { session, request, during, listener, answer } => {
+                let result = self.ask_for(session, &request, &during, listener);
+                let _ = answer.send(result); // who asked may have gone
+            }
+            Command::Join { known, answer } => {
+                let result = self.join(known);
+                let _ = answer.send(result);
+            }
+            Command::Events(sender) => self.news.add(sender),
+            Command::Logs(sender) => self.logs.add(sender),
+        }
+    }
+
+    fn ask_for(
+        &mut self,
+        session: u32,
+        request: &Request,
+        during: &str,
+        listener: Option<Listener>,
+    ) -> Result<(u32, Response), ClientError> {
+        if let Some(broken) = self.break_of(session) {
+            return Err(broken.error(self.link.port(), during));
+        }
+        let (id, response) = self.ask(request, during)?;
+        if let (Some(listener), Response::Accepted) = (listener, &response) {
+            // Before any event is given out, so that even work that has ended already is told its end.
+            self.works.insert(id, listener);
+        }
+        self.give_out();
+        Ok((id, response))
+    }
+
+    /// Why a handle of this session may not go on.
+    fn break_of(&self, session: u32) -> Option<Break> {
+        if self.broken.is_some() {
+            return self.broken.clone();
+        }
+        // The board is back, but the handle has not been told yet.
+        self.last_break.clone().filter(|_| session != self.session.number)
+    }
+
+    /// Sends a request until its answer comes.
+    fn ask(&mut self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
+        let timing = self.timing();
+        let waits = vec![timing.reply; timing.retries as usize + 1];
+        let address = (self.session.version, self.session.hello.boot);
+        let (events, mut logs) = (&mut self.events, Vec::new());
+        let asked = self.link.ask(address, request, &waits, during, &mut |packet| match packet.header.kind {
+            Kind::Event => events.take(packet, during),
+            _ => {
+                logs.push(packet.clone());
+                Ok(())
+            }
+        });
+        logs.iter().for_each(|packet| self.take_log(packet));
+        let (id, packet) = asked.inspect_err(|error| self.break_off(error))?;
+        self.last_heard = Instant::now();
+        let unreadable = || ClientError::Nonsense {
+            during: during.into(),
+            answer: format!("{:?} {:02x?}", packet.header.kind, packet.body.as_slice()),
+        };
+        if packet.header.kind == Kind::Response {
+            return Ok((id, packet.message().ok_or_else(unreadable)?));
+        }
+        Err(match packet.message().ok_or_else(unreadable)? {
+            RequestError::Boot { current } => {
+                let was = self.session.hello.boot;
+                let error = ClientError::Reset { during: during.into(), was, now: current, cause: None };
+                self.break_off(&error);
+                error
+            }
+            error => ClientError::Refused { during: during.into(), error },
+        })
+    }
+
+    fn status(&mut self, during: &str) -> Result<Status, ClientError> {
+        match self.ask(&Request::Status, during)? {
+            (_, Response::Status(status)) => Ok(status),
+            (_, other) => Err(nonsense(during, &other)),
+        }
+    }
+
+    /// Ends the session where the error does.
+    fn break_off(&mut self, error: &ClientError) {
+        let broken = match error {
+            ClientError::Gone { source, .. } => Break::Gone(Arc::clone(source)),
+            ClientError::Reset { was, now, cause, .. } => {
+                Break::Reset { was: *was, now: *now, cause: *cause }
+            }
+            _ => return,
+        };
+        for (_, work) in std::mem::take(&mut self.works) {
+            let _ = work.notes.send(Note::Broken(broken.clone()));
+        }
+        self.news.tell(&News::Broken(error.clone()));
+        self.events.arrived.clear();
+        self.still_there = false;
+        // A board that was reset is there; one that was unplugged takes a while.
+        let pause = if matches!(broken, Break::Gone(_)) { RECONNECT } else { Duration::ZERO };
+        self.next_attempt = Instant::now() + pause;
+        self.last_break = Some(broken.clone());
+        self.broken = Some(broken);
+    }
+
+    fn try_again_when_due(&mut self) {
+        // The port of a simulator that has ended may be anybody's next.
+        let nobodys = matches!(self.broken, Some(Break::Gone(_))) && self.session.hello.emulated;
+        if !nobodys && Instant::now() >= self.next_attempt {
+            // It is tried again, for as long as anybody holds a handle.
+            let _ = self.reconnect();
+        }
+    }
+
+    fn join(&mut self, known: u32) -> Result<Session, ClientError> {
+        if self.broken.is_some() {
+            self.reconnect()?;
+        } else if known == self.session.number {
+            self.say_hello()?;
+        }
+        Ok(self.session.clone())
+    }
+
+    fn reconnect(&mut self) -> Result<(), ClientError> {
+        if matches!(self.broken, Some(Break::Gone(_))) {
+            let opened = (self.connect)();
+            self.next_attempt = Instant::now() + RECONNECT;
+            self.link.replace(opened?);
+        }
+        let result = self.say_hello();
+        self.next_attempt = Instant::now() + RECONNECT;
+        result
+    }
+
+    fn say_hello(&mut self) -> Result<(), ClientError> {
+        let before = self.session.hello.boot;
+        let shaken = shake_hands(&mut self.link, self.session.hello.emulated);
+        let (hello, version) = shaken.inspect_err(|error| self.break_off(error))?;
+        let was_broken = self.broken.take().is_some();
+        self.session.version = version;
+        if hello.boot == before && !was_broken {
+            self.session.hello = Arc::new(hello);
+            return Ok(()); // the same session: work goes on, and events that were drained are fetched
+        }
+        if !was_broken {
+            let (was, now, cause) = (before, hello.boot, Some(hello.reset_cause));
+            self.break_off(&ClientError::Reset { during: "saying hello".into(), was, now, cause });
+            self.broken = None;
+        }
+        self.session.number += 1;
+        self.events = Events { boot: hello.boot, ..Events::default() };
+        self.next_log = None;
+        self.session.hello = Arc::new(hello);
+        self.join_events()?;
+        self.news.tell(&News::Joined(Arc::clone(&self.session.hello)));
+        Ok(())
+    }
+
+    /// Events count from now on.
+    fn join_events(&mut self) -> Result<(), ClientError> {
+        let due = self.status("reading the status")?.next_event;
+        self.events.due = due;
+        self.events.arrived.retain(|number, _| *number >= due);
+        Ok(())
+    }
+
+    /// Takes what has arrived by itself.
+    fn glance(&mut self) {
+        loop {
+            match self.link.receive(Instant::now() + GLANCE, "listening") {
+                Ok(Some(packet)) => {
+                    let taken = match packet.header.kind {
+                        Kind::Event => {
+                            self.last_heard = Instant::now();
+                            self.events.take(&packet, "listening")
+                        }
+                        Kind::Log => {
+                            self.take_log(&packet);
+                            Ok(())
+                        }
+                        Kind::Request | Kind::Response | Kind::Error => Ok(()),
+                    };
+                    if let Err(error) = taken {
+                        return self.break_off(&error);
+                    }
+                }
+                Ok(None) => return,
+                Err(error) => return self.break_off(&error),
+            }
+        }
+    }
+
+    fn take_log(&mut self, packet: &Packet) {
+        let Some(log) = packet.message::<Log>() else { return };
+        let number = packet.header.id;
+        let missing = self.next_log.map_or(0, |next| number.wrapping_sub(next));
+        self.next_log = Some(number.wrapping_add(1));
+        self.logs.tell(&LogPart { number, missing, bytes: log.bytes.to_vec() });
+    }
+
+    /// Gives the events out that are due, fetches those that got lost, and answers the board's question.
+    fn give_out(&mut self) {
+        while self.broken.is_none() {
+            if let Some((number, event)) = self.events.pop() {
+                self.deliver(number, event);
+            } else if !self.events.arrived.is_empty() {
+                self.fetch_due_event();
+            } else if std::mem::take(&mut self.still_there) {
+                // Any good frame would do; what goes wrong ends the session, or is seen by the next poll.
+                let _ = self.status("answering whether this program is still there");
+            } else {
+                return;
+            }
+        }
+    }
+
+    fn deliver(&mut self, number: u32, event: Event) {
+        let kind = &event.kind;
+        match request_of(kind) {
+            Some((request, ends)) => {
+                if let Some(work) = self.works.get(&request) {
+                    let held = work.held.strong_count() > 0;
+                    if matches!(kind, EventKind::StillThere { .. }) {
+                        self.still_there |= held;
+                    } else {
+                        let _ = work.notes.send(Note::Event(kind.clone()));
+                    }
+                    if ends || !held {
+                        self.works.remove(&request);
+                    }
+                }
+            }
+            None if matches!(kind, EventKind::Alarm(_)) => {
+                for work in self.works.values() {
+                    let _ = work.notes.send(Note::Event(kind.clone()));
+                }
+            }
+            None => {}
+        }
+        self.news.tell(&News::Event { number, event });
+    }
+
+    /// Asks the board for the due event, which did not arrive by itself.
+    fn fetch_due_event(&mut self) {
+        let number = self.events.due;
+        match self.ask(&Request::ReadEvent { number }, "reading an event that got lost") {
+            Ok((_, Response::Event(event))) => {
+                self.events.arrived.insert(number, event);
+            }
+            Err(ClientError::Refused { error: RequestError::EventGone { oldest, next }, .. }) => {
+                let to = oldest.saturating_sub(1).max(number);
+                self.events.due = (to + 1).min(next.max(number + 1));
+                for (_, work) in std::mem::take(&mut self.works) {
+                    let _ = work.notes.send(Note::EventsLost { from: number, to });
+                }
+                let during = "listening".into();
+                self.news.tell(&News::Broken(ClientError::EventsLost { during, from: number, to }));
+            }
+            // Nobody answers: pass over the event, so that the rest is given out. The session's end is known already.
+            Ok(_) | Err(_) => self.events.due += 1,
+        }
+    }
+
+    /// While work is under way and nothing was heard for long: an event that got lost is fetched, and where the board
+    /// is not working any more and no event is left, its end is unknown.
+    fn poll_when_quiet(&mut self) {
+        self.works.retain(|_, work| work.held.strong_count() > 0);
+        if self.works.is_empty() || self.last_heard.elapsed() < self.timing().poll {
+            return;
+        }
+        self.last_heard = Instant::now();
+        let Ok(status) = self.status("asking for events that got lost") else { return };
+        if !self.events.arrived.is_empty() {
+            return;
+        }
+        if status.next_event > self.events.due {
+            return self.fetch_due_event();
+        }
+        self.works.retain(|id, work| {
+            let goes_on = is_under_way(*id, &status);
+            if !goes_on {
+                let _ = work.notes.send(Note::NoEnd);
+            }
+            goes_on
+        });
+    }
+}
+
+/// An answer that is none to what was asked.
+pub(crate) fn nonsense(during: &str, response: &Response) -> ClientError {
+    ClientError::Nonsense { during: during.into(), answer: format!("{response:?}") }
+}

@@ -1,0 +1,264 @@
+//! Exposure programs from a file, and focus stacks: shots, and the folder with their images.
+//!
+//! ```toml
+//! exposure_us = 5000            # of shots that do not say otherwise; so are the next four
+//! settle_window_nm = 100
+//! settle_dwell_us = 2000
+//! repeat = 1
+//! trigger = "hardware"          # hardware, software, free-running; the same for all shots
+//!
+//! [[shot]]
+//! axis = "coarse"               # coarse, fine, lens
+//! to_um = 5800.0
+//!
+//! [[shot]]
+//! axis = "fine"
+//! to_um = 120.0
+//! exposure_us = 2000
+//! ```
+
+use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
+use farnear_protocol::units::{Micros, Nanometres};
+use serde::Deserialize;
+
+use crate::camera::Image;
+
+/// How shots are taken that do not say otherwise.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ShotDefaults {
+    /// Length of the exposure.
+    pub exposure: Micros,
+    /// Settle window; where none is given it depends on the axis.
+    pub settle_window: Option<Nanometres>,
+    /// Settle dwell.
+    pub settle_dwell: Micros,
+    /// Exposures at a position.
+    pub repeat: u16,
+    /// How exposures come about.
+    pub mode: TriggerMode,
+}
+
+impl Default for ShotDefaults {
+    fn default() -> Self {
+        Self {
+            exposure: Micros(5_000),
+            settle_window: None,
+            settle_dwell: Micros(2_000),
+            repeat: 1,
+            mode: TriggerMode::Hardware,
+        }
+    }
+}
+
+impl ShotDefaults {
+    /// A shot at a position.
+    pub fn shot(&self, axis: Axis, target: Nanometres) -> Shot {
+        // A stepper holds still to a count of its encoder, the piezo's loop to a few nanometres.
+        let usual = Nanometres(if axis == Axis::SensorFine { 100 } else { 1_000 });
+        Shot {
+            axis,
+            target,
+            exposure: self.exposure,
+            settle_window: self.settle_window.unwrap_or(usual),
+            settle_dwell: self.settle_dwell,
+            repeat: self.repeat,
+            mode: self.mode,
+        }
+    }
+
+    /// A focus stack: `steps` shots from one position to another, both included. With one step only the first.
+    pub fn stack(&self, axis: Axis, from: Nanometres, to: Nanometres, steps: usize) -> Vec<Shot> {
+        let span = i64::from(to.0) - i64::from(from.0);
+        let intervals = steps.saturating_sub(1).max(1) as i64;
+        (0..steps as i64)
+            .map(|step| {
+                let offset = (span * step * 2 + intervals * span.signum()) / (intervals * 2);
+                self.shot(axis, Nanometres((i64::from(from.0) + offset) as i32))
+            })
+            .collect()
+    }
+}
+
+/// A program file is of no use.
+#[derive(Debug, thiserror::Error)]
+pub enum ProgramError {
+    /// It is no TOML of this kind.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// It has no shots.
+    #[error("it has no [[shot]]")]
+    Empty,
+    /// A position that the wire cannot carry.
+    #[error("shot {index}: {to_um} um is no position: expected a number between -2147483 and 2147483 um")]
+    Position {
+        /// Which shot, from 0.
+        index: usize,
+        /// What it says.
+        to_um: f64,
+    },
+}
+
+// The options stand in both, because serde cannot refuse unknown keys beside a flattened struct.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProgramFile {
+    exposure_us: Option<u32>,
+    settle_window_nm: Option<i32>,
+    settle_dwell_us: Option<u32>,
+    repeat: Option<u16>,
+    trigger: Option<Trigger>,
+    #[serde(default)]
+    shot: Vec<ShotEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ShotEntry {
+    axis: AxisEntry,
+    to_um: f64,
+    exposure_us: Option<u32>,
+    settle_window_nm: Option<i32>,
+    settle_dwell_us: Option<u32>,
+    repeat: Option<u16>,
+    trigger: Option<Trigger>,
+}
+
+/// What is said of how shots are taken.
+struct Options {
+    exposure_us: Option<u32>,
+    settle_window_nm: Option<i32>,
+    settle_dwell_us: Option<u32>,
+    repeat: Option<u16>,
+    trigger: Option<Trigger>,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum Trigger {
+    Hardware,
+    Software,
+    FreeRunning,
+}
+
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum AxisEntry {
+    Coarse,
+    Fine,
+    Lens,
+}
+
+impl Options {
+    fn over(&self, defaults: &ShotDefaults) -> ShotDefaults {
+        ShotDefaults {
+            exposure: self.exposure_us.map_or(defaults.exposure, Micros),
+            settle_window: self.settle_window_nm.map(Nanometres).or(defaults.settle_window),
+            settle_dwell: self.settle_dwell_us.map_or(defaults.settle_dwell, Micros),
+            repeat: self.repeat.unwrap_or(defaults.repeat),
+            mode: self.trigger.map_or(defaults.mode, |trigger| match trigger {
+                Trigger::Hardware => TriggerMode::Hardware,
+                Trigger::Software => TriggerMode::Software,
+                Trigger::FreeRunning => TriggerMode::FreeRunning,
+            }),
+        }
+    }
+}
+
+/// A position in micrometres as the wire carries it; `None` where it does not.
+pub fn nanometres(position_um: f64) -> Option<Nanometres> {
+    let nm = (position_um * 1e3).round();
+    (nm.is_finite() && nm.abs() <= f64::from(i32::MAX)).then_some(Nanometres(nm as i32))
+}
+
+/// The shots of a program file; the board checks them when it is armed.
+///
+/// # Errors
+/// [`ProgramError`].
+pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
+    let ProgramFile { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger, shot } =
+        toml::from_str(text)?;
+    let options = Options { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger };
+    if shot.is_empty() {
+        return Err(ProgramError::Empty);
+    }
+    let defaults = options.over(&ShotDefaults::default());
+    let shots = shot.into_iter().enumerate().map(|(index, entry)| {
+        let ShotEntry { axis, to_um, exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger } =
+            entry;
+        let options = Options { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger };
+        let axis = match axis {
+            AxisEntry::Coarse => Axis::SensorCoarse,
+            AxisEntry::Fine => Axis::SensorFine,
+            AxisEntry::Lens => Axis::Lens,
+        };
+        let target = nanometres(to_um).ok_or(ProgramError::Position { index, to_um })?;
+        Ok(options.over(&defaults).shot(axis, target))
+    });
+    shots.collect()
+}
+
+/// One exposure of a sequence.
+#[derive(Clone, PartialEq, Debug)]
+pub struct SequenceShot {
+    /// Name of its file.
+    pub name: String,
+    /// What the board measured.
+    pub record: ShotRecord,
+    /// How it was triggered.
+    pub mode: TriggerMode,
+    /// The picture.
+    pub image: Image,
+}
+
+/// Name of the file for an exposure.
+pub fn image_name(record: &ShotRecord, repeats: u16) -> String {
+    match repeats {
+        0..=1 => format!("shot-{:02}.png", record.index),
+        _ => format!("shot-{:02}-{:03}.png", record.index, record.repeat),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_file_gives_shots_with_its_defaults() {
+        let shots = read_program(
+            "exposure_us = 3000\ntrigger = \"software\"\n\
+             [[shot]]\naxis = \"coarse\"\nto_um = 5800.0\nsettle_window_nm = 700\n\
+             [[shot]]\naxis = \"fine\"\nto_um = -0.5\nexposure_us = 20\nrepeat = 3\n",
+        )
+        .unwrap();
+        let modes = shots.iter().all(|shot| shot.mode == TriggerMode::Software);
+        assert!(modes && shots.len() == 2);
+        assert_eq!(
+            (shots[0].axis, shots[0].target.0, shots[0].exposure.0),
+            (Axis::SensorCoarse, 5_800_000, 3000)
+        );
+        assert_eq!((shots[0].settle_window.0, shots[1].settle_window.0), (700, 100));
+        assert_eq!((shots[1].target.0, shots[1].exposure.0, shots[1].repeat), (-500, 20, 3));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_program_is_said() {
+        for (text, phrase) in [
+            ("exposure_us = 3", "no [[shot]]"),
+            ("[[shot]]\naxis = \"z\"\nto_um = 1.0", "unknown variant `z`"),
+            ("[[shot]]\naxis = \"fine\"", "to_um"),
+            ("[[shot]]\naxis = \"fine\"\nto_um = 1e12", "shot 0: 1000000000000 um is no position"),
+            ("exposre_us = 3\n[[shot]]\naxis = \"fine\"\nto_um = 1.0", "exposre_us"),
+            ("[[shot]]\naxis = \"fine\"\nto_um = 1.0\nexposre_us = 3", "exposre_us"),
+        ] {
+            let error = read_program(text).unwrap_err().to_string();
+            assert!(error.contains(phrase), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_stack_has_both_its_ends() {
+        let stack = ShotDefaults::default().stack(Axis::Lens, Nanometres(100), Nanometres(-900), 4);
+        assert_eq!(stack.iter().map(|shot| shot.target.0).collect::<Vec<_>>(), [100, -233, -567, -900]);
+        assert_eq!(ShotDefaults::default().stack(Axis::Lens, Nanometres(5), Nanometres(9), 1).len(), 1);
+    }
+}

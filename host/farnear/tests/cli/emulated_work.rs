@@ -1,0 +1,164 @@
+//! What the board does at length, on the emulated rig: focusing, programs, calibration, mathematics, the checklist.
+
+use std::fs;
+
+use ndarray::Array2;
+use ndarray_npy::{read_npy, write_npy};
+
+use crate::common::{Folder, fails, farnear, figures, has_emulated_rig, number, rig_optics, succeeds};
+
+fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
+    let mut command = farnear(&["rig"]);
+    command.args(arguments).args(["--port", "sim"]);
+    command
+}
+
+/// Where the sensor really stands at the end of a trace, in mm from the lens.
+fn true_sensor_mm(trace: &str) -> f64 {
+    let last = trace.lines().last().expect("lines");
+    let columns: Vec<&str> = trace.lines().next().expect("a header").split(',').collect();
+    let values: Vec<&str> = last.split(',').collect();
+    let um = |name: &str| -> f64 {
+        let at = columns.iter().position(|column| *column == name).expect("a column");
+        values[at].parse().expect("a number")
+    };
+    47.0 + (um("coarse_um") + um("lens_um") + um("piezo_um")) / 1e3
+}
+
+#[test]
+fn focusing_from_a_millimetre_off_is_quick_and_lands_where_the_image_is_sharpest() {
+    if !has_emulated_rig() {
+        return;
+    }
+    // The image of a plane at 900 mm before the 50 mm lens.
+    let best_mm = 50.0 * 900.0 / 850.0;
+    for start_mm in [best_mm - 0.99, best_mm + 0.6] {
+        let folder = Folder::new();
+        let (trace, start) = (folder.text("trace.csv"), start_mm.to_string());
+        let mut command = on_the_rig(&["focus", "--scene", "plane:900", "--optics", rig_optics(), "--json"]);
+        let found = figures(command.args(["--start-mm", &start, "--trace", &trace]));
+        assert!(number(&found, "board_ms") <= 1_500.0, "{found}");
+        // By the plant's own truth, screw errors included.
+        let stands = true_sensor_mm(&fs::read_to_string(&trace).expect("a trace"));
+        assert!((stands - best_mm).abs() <= 0.002, "{stands} where {best_mm} is best: {found}");
+        let (m1, m2) = (number(&found, "m1_mm"), number(&found, "m2_mm"));
+        // 2 Fe Rmax = 2 * 3.90625 * 2.703 * 7.4 um (Li 2014, eqs. 4.3 and 4.4).
+        assert!(
+            (m2 - m1 - 0.156267).abs() < 2e-6 && (number(&found, "far_mm") - 900.0).abs() < 1.0,
+            "{found}"
+        );
+    }
+}
+
+#[test]
+fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    // Near the focus: pictures from afar take the simulator long to draw.
+    let out = folder.text("stack");
+    let stack =
+        ["sequence", "--axis", "coarse", "--from", "5790", "--to", "5830", "--steps", "3", "--out", &out];
+    let found = figures(on_the_rig(&stack).args(["--optics", rig_optics(), "--json"]));
+    assert_eq!(number(&found, "exposures"), 3.0);
+    assert!(number(&found, "largest_error_um") <= 1.0, "{found}");
+    assert_eq!(folder.listing().iter().filter(|name| name.ends_with(".png")).count(), 3);
+    let record: toml::Table =
+        fs::read_to_string(folder.path("stack/capture.toml")).expect("a record").parse().expect("TOML");
+    let shots = record["exposure"].as_array().expect("exposures");
+    let asked: Vec<_> = shots.iter().filter_map(|shot| shot["asked_um"].as_float()).collect();
+    assert_eq!(asked, [5790.0, 5810.0, 5830.0]);
+
+    // Twice the same armed program, whose exposures the host triggers.
+    let program = "trigger = \"software\"\n[[shot]]\naxis = \"coarse\"\nto_um = 5810.0\n\
+                   [[shot]]\naxis = \"fine\"\nto_um = 150.0\nrepeat = 2\n\
+                   [[shot]]\naxis = \"fine\"\nto_um = 20.0\n";
+    let (file, out) = (folder.file("program.toml", program), folder.text("program"));
+    let run = ["sequence", "--program", &file, "--runs", "2", "--out", &out, "--json"];
+    assert_eq!(number(&figures(&mut on_the_rig(&run)), "exposures"), 8.0);
+    let bad = folder.file("bad.toml", "[[shot]]\naxis = \"fine\"\nto_um = 300.0\n");
+    let run = ["sequence", "--program", &bad, "--out", &folder.text("bad")];
+    fails(&mut on_the_rig(&run), 1, &["refused", "300.000 um", "195.000 um"]);
+    assert!(!folder.path("bad").exists());
+}
+
+#[test]
+fn flat_targets_are_captured_listed_and_not_captured_twice() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    let out = folder.text("series");
+    let targets = |distances: &str| {
+        let series =
+            ["calibrate", "targets", "--optics", rig_optics(), "--distances", distances, "--out", &out];
+        figures(on_the_rig(&series).arg("--json"))
+    };
+    assert_eq!(number(&targets("900"), "captured"), 1.0);
+    let both = targets("900,920");
+    assert_eq!((number(&both, "captured"), number(&both, "targets")), (1.0, 2.0));
+    assert!(number(&both, "rmse_mm") < 2.0, "{both}");
+    let map: Array2<f32> = read_npy(folder.path("series/target-920.000/depth.npy")).expect("a map");
+    assert_eq!(map.dim(), (480, 640));
+}
+
+#[test]
+fn the_board_corrects_and_fits_with_the_hosts_bits() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let folder = Folder::new();
+    let mut list = String::new();
+    for (number, true_mm) in [890.0, 900.0, 910.0, 920.0, 930.0].into_iter().enumerate() {
+        // A bowl whose height depends on the depth.
+        let map = Array2::from_shape_fn((18, 24), |(row, column)| {
+            let (x, y) = (column as f32 / 11.5 - 1.0, row as f32 / 8.5 - 1.0);
+            true_mm + (0.8 + 0.01 * (true_mm - 910.0)) * (x * x + y * y)
+        });
+        write_npy(folder.path(&format!("{number}.npy")), &map).expect("a writable folder");
+        list += &format!("[[pattern]]\ndepth = \"{number}.npy\"\ntrue_mm = {true_mm:.1}\n");
+    }
+    let (list, correction) = (folder.file("PATTERNS.toml", list), folder.text("correction.toml"));
+    let fitted = ["calibrate", "fit", &list, "--method", "clsf", "--step", "1", "--store", "--json"];
+    let fitted = figures(&mut on_the_rig(&fitted));
+    assert_eq!((number(&fitted, "coefficients"), number(&fitted, "different")), (90.0, 0.0));
+    for method in ["clsf-blend", "clsf-full"] {
+        let learn = ["calibrate", "correction", &list, "--method", method, "--out", &correction];
+        succeeds(&mut farnear(&learn));
+        let (map, out) = (folder.text("4.npy"), folder.text("corrected.npy"));
+        let correct = ["correct", &map, "--correction", &correction, "--out", &out, "--json"];
+        let corrected = figures(&mut on_the_rig(&correct));
+        assert_eq!((&corrected["method"], number(&corrected, "different_pixels")), (&method.into(), 0.0));
+    }
+    let sun = ["sun", "--lat", "52.38", "--lon=-1.56", "--time", "2012-07-17T12:00:00Z", "--azimuth", "135"];
+    assert_eq!(figures(on_the_rig(&sun).arg("--json"))["same_bits"], true);
+}
+
+#[test]
+fn the_checklist_passes_and_the_mechanics_are_measured() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let checked = figures(&mut on_the_rig(&["check", "--json"]));
+    assert_eq!((number(&checked, "failed"), number(&checked, "passed")), (0.0, 12.0), "{checked}");
+    // The plant's screw has 4 um of backlash.
+    let backlash = ["calibrate", "backlash", "--axis", "coarse", "--json"];
+    let backlash = figures(&mut on_the_rig(&backlash));
+    assert!((number(&backlash, "backlash_um") - 4.0).abs() < 1.0, "{backlash}");
+}
+
+#[test]
+fn the_firmwares_log_is_decoded_with_its_elf() {
+    if !has_emulated_rig() {
+        return;
+    }
+    let elf = std::env::var_os("FARNEAR_FIRMWARE")
+        .map_or_else(|| crate::common::beside("farnear-nucleo-f429zi.elf"), Into::into);
+    let elf = elf.to_str().expect("a plain path");
+    let (text, _) = succeeds(&mut on_the_rig(&["log", "--elf", elf, "--reset", "--seconds", "4"]));
+    assert!(text.contains("boot 2, emulated: true"), "{text}");
+    let folder = Folder::new();
+    let wrong = folder.file("wrong.elf", "no program");
+    fails(&mut on_the_rig(&["log", "--elf", &wrong]), 1, &["wrong.elf", "is not the firmware's ELF file"]);
+}

@@ -1,0 +1,45 @@
+//! The long tests on the emulated board: those of `hil-sim/board/tests` with more of everything, once per seed.
+
+use anyhow::Result;
+
+use crate::{
+    firmware,
+    run::{cargo, finish, step},
+};
+
+/// What `cargo xtask campaign` can be told.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// How many rigs, each with its own mechanics: seeds 1, 2, 3 ...
+    #[arg(long, default_value_t = 3)]
+    seeds: u64,
+    /// Random moves of each axis on each rig.
+    #[arg(long, default_value_t = 1_000)]
+    moves: u32,
+    /// STEP pulses at 40 kHz on both axes together.
+    #[arg(long, default_value_t = 1_000_000)]
+    steps: u32,
+    /// Wall-clock seconds for which each rig's link is fuzzed.
+    #[arg(long, default_value_t = 60)]
+    fuzz_seconds: u64,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let elf = firmware::build()?;
+    for seed in 1..=arguments.seeds {
+        step(&format!("campaign, seed {seed}"));
+        let tests = ["--test", "steps", "--test", "accuracy", "--test", "memory", "--test", "fuzz"];
+        let mut command = cargo(["test", "--locked", "--package", "farnear-sim"].iter().chain(&tests));
+        command
+            .args(["--", "--nocapture", "--test-threads", "2"])
+            .env("FARNEAR_FIRMWARE", &elf)
+            .env("FARNEAR_CAMPAIGN", "1")
+            .env("FARNEAR_SEED", seed.to_string())
+            .env("FARNEAR_MOVES", arguments.moves.to_string())
+            .env("FARNEAR_STEPS", arguments.steps.to_string())
+            .env("FARNEAR_FUZZ_SECONDS", arguments.fuzz_seconds.to_string());
+        finish(&mut command)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,122 @@
+//! The table of instructions in `docs/instructions.md`: written from a count on the emulated board, and checked against
+//! one, so that a routine that has become slower is seen.
+
+use std::fmt::Write;
+
+use anyhow::{Context, Result, bail};
+
+use crate::{
+    firmware,
+    run::{ROOT, cargo, output, step},
+};
+
+/// Where the table lies.
+const PAGE: &str = "docs/instructions.md";
+/// A count may differ from the page by this share: another compiler makes other code.
+const TOLERANCE: f64 = 0.10;
+/// And by this much: short routines change by whole instructions.
+const SLACK: f64 = 4.0;
+/// The chip's clock.
+const MHZ: f64 = 168.0;
+
+/// A line of the count: what `farnear-sim count` prints.
+struct Counted {
+    routine: String,
+    unit: String,
+    units: f64,
+    instructions: f64,
+}
+
+impl Counted {
+    fn parse(line: &str) -> Option<Self> {
+        let mut fields = line.split('\t');
+        let mut number = || fields.next()?.parse().ok();
+        let (instructions, units) = (number()?, number()?);
+        let (unit, routine) = (fields.next()?.into(), fields.next()?.into());
+        Some(Self { routine, unit, units, instructions })
+    }
+
+    fn per_unit(&self) -> f64 {
+        self.instructions / self.units
+    }
+
+    fn row(&self) -> String {
+        let each = self.per_unit();
+        let digits = if each < 100.0 { 1 } else { 0 };
+        let us = self.instructions / MHZ;
+        format!("| {} | {each:.digits$} | {} | {:.0} | {us:.1} |", self.routine, self.unit, self.instructions)
+    }
+}
+
+fn count() -> Result<Vec<Counted>> {
+    step("instructions of the on-board routines");
+    let elf = firmware::counter()?;
+    let mut program = cargo(["run", "--quiet", "--locked", "--package", "farnear-sim", "--", "count"]);
+    let text = output(program.arg(elf))?;
+    let lines: Option<Vec<Counted>> = text.lines().map(Counted::parse).collect();
+    lines.filter(|lines| !lines.is_empty()).context("farnear-sim count printed no table")
+}
+
+fn page(counts: &[Counted]) -> String {
+    let mut page = String::from(
+        "# Instructions\n\n\
+         Counted on the emulated board by `cargo xtask sizes --write`; `cargo xtask test` holds each to this page within \
+         10 %. The times are a lower bound: the counts at one instruction per cycle of 168 MHz, as if there were no \
+         flash wait states, no taken branches and no long divisions. A control tick comes every 33,600 cycles.\n\n\
+         | routine | instructions | per | one run | us |\n|---|--:|---|--:|--:|\n",
+    );
+    for counted in counts {
+        // Writing to a string cannot fail.
+        let _ = writeln!(page, "{}", counted.row());
+    }
+    page
+}
+
+/// The figure of a routine on the page.
+fn on_page(page: &str, routine: &str) -> Option<f64> {
+    let row = page.lines().find(|line| line.starts_with(&format!("| {routine} |")))?;
+    row.split('|').nth(4)?.trim().parse().ok()
+}
+
+/// Counts, and writes the page or compares with it.
+pub fn run(write: bool) -> Result<()> {
+    let counts = count()?;
+    let path = ROOT.join(PAGE);
+    if write {
+        std::fs::write(&path, page(&counts)).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let page = std::fs::read_to_string(&path)
+        .with_context(|| format!("cannot read {}: `cargo xtask sizes --write` makes it", path.display()))?;
+    let mut wrong = Vec::new();
+    for counted in &counts {
+        println!("{}", counted.row());
+        let Some(known) = on_page(&page, &counted.routine) else {
+            wrong.push(format!("{} is not in it", counted.routine));
+            continue;
+        };
+        if (counted.instructions - known).abs() > TOLERANCE * known + SLACK {
+            wrong.push(format!(
+                "{}: {:.0} instructions, {known:.0} there",
+                counted.routine, counted.instructions
+            ));
+        }
+    }
+    if !wrong.is_empty() {
+        bail!(
+            "{PAGE} is not what was counted; `cargo xtask sizes --write` renews it\n  {}",
+            wrong.join("\n  ")
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_found_again() {
+        let counted = Counted::parse("8655\t640\tpixel\tCLSF, ten terms").expect("a line");
+        assert_eq!(on_page(&page(&[counted]), "CLSF, ten terms"), Some(8655.0));
+    }
+}
