@@ -25,14 +25,14 @@ pub fn target_folder() -> PathBuf {
     }
 }
 
-/// A cargo call in the root workspace. For `build`, `test` and `clippy` the flag that lets the emulator build on
+/// A cargo call in the root workspace. For what compiles the flag that lets the emulator build on
 /// an older compiler is added where the compiler is older; no cargo configuration key can do that.
 pub fn cargo<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     let mut arguments = arguments.into_iter();
     if let Some(job) = arguments.next() {
         command.arg(&job);
-        let compiles = ["build", "test", "clippy", "doc"].iter().any(|known| job.as_ref() == *known);
+        let compiles = ["build", "run", "test", "clippy", "doc"].iter().any(|known| job.as_ref() == *known);
         if compiles && host_rust_minor().is_some_and(|minor| minor < EMULATOR_RUST_MINOR) {
             command.arg("--ignore-rust-version");
         }
