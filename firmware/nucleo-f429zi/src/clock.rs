@@ -25,14 +25,6 @@ pub fn start() -> Peripherals {
     })
 }
 
-/// Lets the core count its cycles.
-pub fn start_cycle_counter() {
-    if let Some(mut core) = cortex_m::Peripherals::take() {
-        core.DCB.enable_trace();
-        core.DWT.enable_cycle_counter();
-    }
-}
-
 // Each log line carries the board's time.
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 

@@ -82,7 +82,12 @@ async fn main(spawner: Spawner) {
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
     let p = clock::start();
-    clock::start_cycle_counter();
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        registers::guard_stack(&mut core.MPU);
+        // The control loop counts its cycles.
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+    }
     Interrupt::USART3.set_priority(Priority::P2);
     Interrupt::TIM5.set_priority(Priority::P3);
 

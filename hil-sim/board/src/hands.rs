@@ -20,9 +20,7 @@ use crate::{
 const STACK_PAINT: u64 = 0xcccc_cccc;
 /// Where the firmware's stack lies, see its `memory.x`: first address and length.
 pub const STACK: (u64, u64) = (0x2000_0000, 128 << 10);
-/// The firmware's flash, and RAM that it does not use: its variables end well before.
-const FLASH: u64 = 0x0800_0000;
-const FLASH_BYTES: u32 = 2 << 20;
+/// RAM that the firmware does not use: its variables end well before.
 const FREE_RAM: u64 = 0x2002_f000;
 /// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 2.93 V).
 const LOW_SUPPLY_MV: u32 = 2800;
@@ -195,12 +193,17 @@ impl Hands<'_, '_> {
         let _ = Memory::write(self.host, address, Width::W32, u64::from(value));
     }
 
-    /// Lets a task of the firmware go on with this code, as a stray pointer would: the code is laid into free RAM, and the
-    /// first pointer to a function in the task's variable is made to point there. `false` where there is none.
-    pub fn lead_astray(&mut self, (task, length): (u64, u64), code: &[u16]) -> bool {
-        let is_code = |word: u32| (FLASH as u32..FLASH as u32 + FLASH_BYTES).contains(&word) && word & 1 == 1;
-        let words: Vec<u64> = (task..task + length).step_by(4).collect();
-        let found = words.into_iter().find(|at| self.read_word(*at).is_some_and(is_code));
+    /// Lets the firmware go on with this code, as a stray pointer would: the code is laid into free RAM, and the first
+    /// word of a variable (its address and length) that `is_function` takes for a pointer to a function is made to point
+    /// there. `false` where there is none.
+    pub fn lead_astray(
+        &mut self,
+        (variable, length): (u64, u64),
+        is_function: impl Fn(u32) -> bool,
+        code: &[u16],
+    ) -> bool {
+        let mut words = (variable..variable + length).step_by(4);
+        let found = words.find(|at| self.read_word(*at).is_some_and(&is_function));
         let Some(at) = found else { return false };
         for (half, i) in code.iter().zip(0..) {
             if Memory::write(self.host, FREE_RAM + 2 * i, Width::W16, u64::from(*half)).is_err() {

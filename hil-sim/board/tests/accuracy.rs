@@ -10,8 +10,8 @@ use farnear_sim::{Report, plant::Noise};
 const MOVES: u32 = 40;
 /// A tick's period in cycles.
 const TICK_CYCLES: u32 = 33_600;
-/// Cycles of a period that a tick may take while something moves.
-const TICK_BUDGET: u32 = TICK_CYCLES * 3 / 4;
+/// Cycles of it that the longest tick in motion may take: an answer, an event and a piece of memory in one.
+const TICK_BUDGET: u32 = TICK_CYCLES * 9 / 10;
 
 fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
@@ -44,6 +44,7 @@ fn errors_um(bench: &mut Bench, axis: Axis, (low_um, high_um): (f64, f64), moves
 #[test]
 fn random_moves_end_where_they_should() {
     let mut bench = Bench::new(amount("FARNEAR_SEED", 1));
+    bench.forget_longest_tick();
     bench.home();
     let moves = amount("FARNEAR_MOVES", MOVES);
     // Short ones where there are few, the whole travel in the campaign.
@@ -57,7 +58,7 @@ fn random_moves_end_where_they_should() {
             rms(&errors),
             rms(&spread)
         );
-        assert!(rms(&spread) <= 1.0, "{axis:?}: {} um RMS about the mean", rms(&spread));
+        assert!(rms(&errors) <= 2.0 && rms(&spread) <= 1.0, "{axis:?}: {} um RMS about the mean", rms(&spread));
     }
     let errors = errors_um(&mut bench, Axis::SensorFine, (6.0, 194.0), moves);
     println!("SensorFine: {moves} moves, RMS {:.4} um", rms(&errors));

@@ -3,12 +3,15 @@
 
 mod common;
 
-use common::{Bench, go, request_frame};
+use std::collections::HashSet;
+
+use common::{Bench, go, request_frame, symbols};
 use farnear_protocol::{
     EventKind, Request, RequestError,
     message::{Alarm, Axis, PositionState, ResetCause},
 };
 use farnear_sim::Hands;
+use object::{ObjectSymbol, SymbolKind};
 
 /// TIM5, which keeps the firmware's time.
 const TIM5_CR1: u64 = 0x4000_0c00;
@@ -101,10 +104,11 @@ fn astray(code: &'static [u16], alarm: Alarm) {
     let mut bench = Bench::new(1);
     let resets = bench.report().resets;
     let task = bench.variable("__embassy_main");
-    assert!(
-        bench.peek(move |hands| hands.lead_astray(task, code)),
-        "the task's function is found and replaced"
-    );
+    let functions: HashSet<u64> =
+        symbols(|symbol| symbol.kind() == SymbolKind::Text).into_iter().map(|(at, _)| at & !1).collect();
+    let is_function = move |word: u32| word & 1 == 1 && functions.contains(&u64::from(word & !1));
+    let replaced = bench.peek(move |hands| hands.lead_astray(task, is_function, code));
+    assert!(replaced, "the task's function is found and replaced");
     for _ in 0..100 {
         bench.rig.advance_us(100).expect("runs");
     }
@@ -118,4 +122,10 @@ fn astray(code: &'static [u16], alarm: Alarm) {
 fn a_fault_of_the_program_is_told() {
     // UDF: an instruction that is none.
     astray(&[0xde00], Alarm::Panic);
+}
+
+#[test]
+fn a_stack_overflow_is_told_and_reaches_no_variable() {
+    // PUSH {R0-R7, LR}, again and again.
+    astray(&[0xb5ff, 0xe7fd], Alarm::StackOverflow);
 }

@@ -7,7 +7,7 @@ use farnear_protocol::{
     message::{Alarm, AlarmRecord, Axis, Hello, Shot, Status, TriggerMode},
 };
 use farnear_sim::{EmulatedRig, Hands, Report, RigConfig};
-use object::{Object, ObjectSymbol};
+use object::{Object, ObjectSymbol, Symbol, SymbolKind};
 
 /// Long enough that no test's host is silent for so long, unless silence is what it tests.
 pub const SILENCE: Micros = Micros(60_000_000);
@@ -158,20 +158,24 @@ impl Bench {
 
     /// Address and length of a variable of the firmware, by a part of its name.
     pub fn variable(&mut self, part: &str) -> (u64, u64) {
-        let elf = farnear_sim::firmware::find(None).expect("a firmware");
-        let bytes = std::fs::read(elf).expect("readable");
-        let elf = object::File::parse(&*bytes).expect("an ELF");
-        let symbol = elf.symbols().find(|symbol| {
-            symbol.address() >= 0x2000_0000 && symbol.name().is_ok_and(|name| name.contains(part))
+        let found = symbols(|symbol| {
+            let named =
+                symbol.kind() == SymbolKind::Data && symbol.name().is_ok_and(|name| name.contains(part));
+            named && symbol.address() >= 0x2000_0000
         });
-        let symbol = symbol.unwrap_or_else(|| panic!("the firmware has no {part}"));
-        (symbol.address(), symbol.size())
+        *found.first().unwrap_or_else(|| panic!("the firmware has no {part}"))
     }
 
     /// Cycles of the firmware's longest control tick since its reset.
     pub fn longest_tick(&mut self) -> u32 {
         let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
         self.peek(move |hands| hands.read_word(at)).expect("RAM")
+    }
+
+    /// Counts the longest tick anew.
+    pub fn forget_longest_tick(&mut self) {
+        let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
+        self.hands(move |hands| hands.write_word(at, 0));
     }
 
     /// The alarm that is latched.
@@ -235,4 +239,13 @@ pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32
 /// How much of something a test does: what the environment says (`cargo xtask campaign` says more), or else this.
 pub fn amount<T: std::str::FromStr>(variable: &str, else_this: T) -> T {
     std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(else_this)
+}
+
+/// Address and length of the firmware's symbols that `wanted` takes.
+pub fn symbols(wanted: impl Fn(&Symbol<'_, '_>) -> bool) -> Vec<(u64, u64)> {
+    let elf = farnear_sim::firmware::find(None).expect("a firmware");
+    let bytes = std::fs::read(elf).expect("readable");
+    let elf = object::File::parse(&*bytes).expect("an ELF");
+    let found = elf.symbols().filter(|symbol| wanted(symbol));
+    found.map(|symbol| (symbol.address(), symbol.size())).collect()
 }
