@@ -58,7 +58,11 @@ fn random_moves_end_where_they_should() {
             rms(&errors),
             rms(&spread)
         );
-        assert!(rms(&errors) <= 2.0 && rms(&spread) <= 1.0, "{axis:?}: {} um RMS about the mean", rms(&spread));
+        assert!(
+            rms(&errors) <= 2.0 && rms(&spread) <= 1.0,
+            "{axis:?}: {} um RMS about the mean",
+            rms(&spread)
+        );
     }
     let errors = errors_um(&mut bench, Axis::SensorFine, (6.0, 194.0), moves);
     println!("SensorFine: {moves} moves, RMS {:.4} um", rms(&errors));
