@@ -137,7 +137,7 @@ fn a_fit_on_the_board_has_the_same_bits() {
         both(&mut bench, &mut here, &Request::OpenCorrection(info));
         for depth in 0..5i16 {
             let truth = (depth - 2) * 10_000;
-            for row in (8..HEIGHT).step_by(48) {
+            for row in (8..HEIGHT).step_by(24) {
                 let codes = (0..72).map(|_| truth + (noise.bits() as i16) / 512).collect();
                 both(&mut bench, &mut here, &Request::FitSamples { row, first: 0, step: 8, truth, codes });
             }
