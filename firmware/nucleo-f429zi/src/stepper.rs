@@ -15,7 +15,7 @@ use core::cell::RefCell;
 
 use critical_section::Mutex;
 use embassy_stm32::{
-    Peri,
+    Peri, PeripheralType,
     gpio::{AfType, Flex, Input, Level, Output, OutputType, Pin, Pull, Speed},
     interrupt,
     interrupt::{Interrupt, Priority},
@@ -194,17 +194,24 @@ impl StepTimer {
 }
 
 /// The pins of a motor's driver chip.
-pub struct DriverPins<STEP, DIR, EN, DIAG, STOP> {
+pub struct DriverPins<S, D, E, G, B>
+where
+    S: PeripheralType + 'static,
+    D: PeripheralType + 'static,
+    E: PeripheralType + 'static,
+    G: PeripheralType + 'static,
+    B: PeripheralType + 'static,
+{
     /// STEP.
-    pub step: STEP,
+    pub step: Peri<'static, S>,
     /// DIR.
-    pub direction: DIR,
+    pub direction: Peri<'static, D>,
     /// EN.
-    pub enable: EN,
+    pub enable: Peri<'static, E>,
     /// DIAG.
-    pub diagnosis: DIAG,
+    pub diagnosis: Peri<'static, G>,
     /// Break input: the emergency stop.
-    pub stop: STOP,
+    pub stop: Peri<'static, B>,
 }
 
 /// One axis' motor.
@@ -220,13 +227,7 @@ impl<T: StepInstance> Stepper<T> {
     /// Sets the timer and the pins up; the driver is off.
     pub fn new(
         _timer: Peri<'static, T>,
-        pins: DriverPins<
-            Peri<'static, impl TimerPin<T, Ch1>>,
-            Peri<'static, impl Pin>,
-            Peri<'static, impl Pin>,
-            Peri<'static, impl Pin>,
-            Peri<'static, impl BreakInputPin<T, BkIn1>>,
-        >,
+        pins: DriverPins<impl TimerPin<T, Ch1>, impl Pin, impl Pin, impl Pin, impl BreakInputPin<T, BkIn1>>,
     ) -> Self {
         rcc::enable_and_reset::<T>();
         let function = pins.stop.af_num();

@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{Bench, fine_shot};
+use common::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{
-    EventKind, Micros, Nanometres,
-    message::{Shot, ShotRecord},
+    EventKind, Micros, Nanometres, Request,
+    message::{Shot, ShotRecord, TriggerMode},
 };
 
 /// Far and near setting of the 50 mm lens are this far apart (933 and 886.81 mm).
@@ -84,4 +84,68 @@ fn exposures_are_as_long_as_asked_from_the_shortest_on() {
         }
     }
     assert_eq!(bench.report().missed_triggers, 0);
+}
+
+#[test]
+fn the_cameras_host_triggers_it_and_the_strobe_ends_the_shot() {
+    let mut bench = Bench::new(3);
+    bench.arm(&[Shot { mode: TriggerMode::Software, repeat: 2, ..fine_shot(60_000, 4_000, 100, 1_000) }]);
+    let run = bench.send(&Request::RunProgram { silence: SILENCE });
+    let mut answered = 0;
+    for _ in 0..1_000 {
+        bench.rig.advance_us(500).expect("runs");
+        bench.answers();
+        let ready: Vec<u32> = bench
+            .events
+            .iter()
+            .filter_map(|event| match event.kind {
+                EventKind::ShotReady { request, trigger_number, .. } if request == run => {
+                    Some(trigger_number)
+                }
+                _ => None,
+            })
+            .collect();
+        for id in ready.into_iter().skip(answered) {
+            answered += 1;
+            bench.hands(move |hands| hands.expose(4_000, id));
+        }
+    }
+    let records = records(&bench);
+    let shots = bench.rig.take_shots();
+    assert_eq!((answered, records.len(), shots.len()), (2, 2, 2), "{:?}", bench.events.last());
+    for (record, shot) in records.iter().zip(&shots) {
+        assert_eq!(record.trigger_number, shot.id);
+        assert!(record.strobe_start.0.abs_diff(shot.board_us) <= 1);
+        assert_eq!(record.strobe_end.0 - record.strobe_start.0, 4_000);
+    }
+    assert_eq!(bench.report().triggers, 0, "the board's own line stayed still");
+}
+
+#[test]
+fn of_a_camera_that_runs_freely_the_first_exposure_after_settling_is_the_shot() {
+    let mut bench = Bench::new(4);
+    bench.hands(|hands| hands.run_camera_freely(40_000, 5_000));
+    bench.arm(
+        &[20_000, 150_000]
+            .map(|target| Shot { mode: TriggerMode::FreeRunning, ..fine_shot(target, 5_000, 100, 1_000) }),
+    );
+    let end = bench.run();
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
+    let shots = bench.rig.take_shots();
+    for record in records(&bench) {
+        let shot = shots.iter().find(|shot| record.strobe_start.0.abs_diff(shot.board_us) <= 1);
+        let shot = shot.unwrap_or_else(|| panic!("no exposure of the camera fits {record:?}"));
+        let asked_um = f64::from(record.asked.0) * 1e-3;
+        for um in [shot.truth.piezo_min_um, shot.truth.piezo_max_um] {
+            assert!((um - asked_um).abs() <= 0.1, "{um} um during the exposure, {asked_um} um asked");
+        }
+    }
+}
+
+fn records(bench: &Bench) -> Vec<ShotRecord> {
+    let records = bench.events.iter().filter_map(|event| match &event.kind {
+        EventKind::ShotDone { shot, .. } => Some(*shot),
+        _ => None,
+    });
+    records.collect()
 }
