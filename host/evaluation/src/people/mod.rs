@@ -26,7 +26,7 @@ pub const PARTS: [Part; 9] = [
     ("utkinect", |page, data| recognition::measure_real(page, data, sets::utkinect, "UTKinect")),
     ("florence", |page, data| recognition::measure_real(page, data, sets::florence, "Florence")),
     ("weizmann", |page, data| recognition::measure_real(page, data, sets::weizmann, "the Weizmann strips")),
-    ("robustness", |page, _| robustness::measure(page)),
+    ("robustness", robustness::measure),
     ("broken-silhouettes", broken::measure),
     ("layout", |page, _| layout::measure(page)),
     ("shadows", shadows::measure),

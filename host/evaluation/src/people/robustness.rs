@@ -1,7 +1,9 @@
-//! What shuffled frames, other speeds and bad masks cost, on synthetic people.
+//! What shuffled frames, other speeds and bad masks cost, on synthetic people, and the first two on measured joints as well.
 //!
 //! Per left-out subject one recogniser is trained on the others' clean clips and answers every changed copy of the left-out
 //! subject's clips; settings are the defaults, as in a user's hands.
+
+use std::collections::BTreeSet;
 
 use anyhow::Result;
 use farnear_activity::{
@@ -22,7 +24,8 @@ use rayon::prelude::*;
 
 use super::{
     damage::{Damage, damaged},
-    sets::{PEOPLE, RATE_HZ, VIEWS},
+    data::Data,
+    sets::{self, PEOPLE, RATE_HZ, VIEWS},
 };
 use crate::page::Page;
 
@@ -50,7 +53,7 @@ const CHANGES: [(&str, Change); 8] = [
     ("broken and ragged", Change::Masks(&[Damage::Broken, Damage::Ragged])),
 ];
 
-pub fn measure(page: &mut Page) -> Result<()> {
+pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     page.heading("What order, speed and bad masks cost");
     page.paragraph(&format!(
         "The {PEOPLE} synthetic people again, leave-one-subject-out with the default settings and an SVC: trained on clean clips at one speed, tested on changed ones. Half speed is the same \
@@ -58,19 +61,36 @@ pub fn measure(page: &mut Page) -> Result<()> {
          and in one frame of ten a side cut off; *ragged* outlines have 30 % of all pixels within 2 px of the outline turned over (1 px is 10 mm). Asked for: shuffling changes \
          nothing order-free; half and double speed cost at most 5 points; damage costs at most 3."
     ));
+    let changed = |views| CHANGES.iter().map(|(_, change)| clips(*change, views)).collect::<Vec<_>>();
+    table(page, &CHANGES.map(|(name, _)| name), changed)?;
+
+    let Some(real) = sets::utkinect(data)? else { return Ok(()) };
+    page.paragraph(
+        "These people are recognised too well for a small cost to show. On UTKinect's joints, likewise with the default settings; half speed shows each frame twice, \
+         double speed every other one.",
+    );
+    let resampled = |views: usize| {
+        RESAMPLED
+            .map(|(_, order)| real.clips.iter().map(|clip| of_views(clip, views, order)).collect::<Vec<_>>())
+    };
+    table(page, &RESAMPLED.map(|(name, _)| name), |views| resampled(views).to_vec())
+}
+
+/// A row per change, both modes in one and in all views; `sets` gives the changed clips, unchanged ones first.
+fn table(page: &mut Page, names: &[&str], sets: impl Fn(usize) -> Vec<Vec<Clip>>) -> Result<()> {
     let mut head = vec!["left-out clips".to_owned()];
     let mut columns: Vec<Vec<Confusion>> = Vec::new();
     for (name, mode) in [("order-free", Mode::OrderFree), ("ordered", Mode::Ordered)] {
         for views in [1, VIEWS] {
             let seen = if views == 1 { "one view" } else { "four views" };
             head.extend([format!("{name}, {seen}, %"), "cost".into()]);
-            columns.push(accuracies(mode, views)?);
+            columns.push(accuracies(mode, &sets(views))?);
         }
     }
-    let rows: Vec<Vec<String>> = CHANGES
+    let rows: Vec<Vec<String>> = names
         .iter()
         .enumerate()
-        .map(|(k, (name, _))| {
+        .map(|(k, name)| {
             let cells = columns.iter().flat_map(|column| {
                 let percent = |confusion: &Confusion| 100.0 * confusion.accuracy();
                 let cost = percent(&column[0]) - percent(&column[k]);
@@ -86,22 +106,42 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// One matrix per change.
-fn accuracies(mode: Mode, views: usize) -> Result<Vec<Confusion>> {
-    let sets: Vec<Vec<Clip>> = CHANGES.iter().map(|(_, change)| clips(*change, views)).collect();
+/// Which frames of how many are shown, in which order.
+type Resampled = fn(usize) -> Vec<usize>;
+
+/// Changes that need no masks.
+const RESAMPLED: [(&str, Resampled); 4] = [
+    ("as they are", |frames| (0..frames).collect()),
+    ("frames shuffled", |frames| {
+        let mut order: Vec<usize> = (0..frames).collect();
+        order.shuffle(&mut ChaCha8Rng::seed_from_u64(frames as u64));
+        order
+    }),
+    ("half speed", |frames| (0..2 * frames).map(|frame| frame / 2).collect()),
+    ("double speed", |frames| (0..frames).step_by(2).collect()),
+];
+
+/// A clip's first views, resampled.
+fn of_views(clip: &Clip, views: usize, resampled: Resampled) -> Clip {
+    let mut clip = clip.select(resampled);
+    clip.views.truncate(views);
+    clip
+}
+
+/// One matrix per set of changed clips; training is on the first, which is unchanged.
+fn accuracies(mode: Mode, sets: &[Vec<Clip>]) -> Result<Vec<Confusion>> {
     let settings = RecogniserSettings {
         space: SpaceSettings { mode, ..SpaceSettings::default() },
         ..RecogniserSettings::default()
     };
-    let classes: Vec<String> = {
-        let mut names = ACTIVITIES.map(String::from).to_vec();
-        names.sort();
-        names
+    let names = |name: fn(&Clip) -> &String| -> Vec<String> {
+        sets[0].iter().map(name).collect::<BTreeSet<_>>().into_iter().cloned().collect()
     };
-    let folds = (0..PEOPLE)
-        .into_par_iter()
+    let (classes, subjects) = (names(|clip| &clip.activity), names(|clip| &clip.subject));
+    let folds = subjects
+        .par_iter()
         .map(|left_out| {
-            let of = |clip: &&Clip| clip.subject == subject(left_out);
+            let of = |clip: &&Clip| clip.subject == *left_out;
             let others: Vec<Clip> = sets[0].iter().filter(|clip| !of(clip)).cloned().collect();
             let recogniser = Recogniser::train(&others, &settings)?;
             sets.iter()
@@ -118,7 +158,7 @@ fn accuracies(mode: Mode, views: usize) -> Result<Vec<Confusion>> {
                 .collect()
         })
         .collect::<Result<Vec<Vec<Confusion>>>>()?;
-    let mut sums = vec![Confusion::new(classes); CHANGES.len()];
+    let mut sums = vec![Confusion::new(classes); sets.len()];
     for fold in &folds {
         sums.iter_mut().zip(fold).for_each(|(sum, found)| sum.add(found));
     }
