@@ -87,7 +87,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     for (name, mode) in [("order-free", Mode::OrderFree), ("ordered", Mode::Ordered)] {
         rows.push(row(name, mode, &passages)?);
     }
-    page.table(1, &["mode", "passages", "`walk`", "`walk` or `bag`", "of these called unknown"], &rows);
+    page.table(1, &["mode", "passages", "`walk`", "`walk` or `bag`", "called unknown, of all"], &rows);
     Ok(())
 }
 
