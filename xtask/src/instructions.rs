@@ -12,8 +12,9 @@ use crate::{
 
 /// Where the table lies.
 const PAGE: &str = "docs/instructions.md";
-/// A count may differ from the page by this share: another compiler makes other code.
-const TOLERANCE: f64 = 0.10;
+/// A count may differ from the page by this share: two compilers that build the firmware (Rust 1.95 and Debian's 1.96) differ
+/// by up to 17 %.
+const TOLERANCE: f64 = 0.20;
 /// And by this much: short routines change by whole instructions.
 const SLACK: f64 = 4.0;
 /// The chip's clock.
@@ -61,7 +62,7 @@ fn page(counts: &[Counted]) -> String {
     let mut page = String::from(
         "# Instructions\n\n\
          Counted on the emulated board by `cargo xtask sizes --write`; `cargo xtask test` holds each to this page within \
-         10 %. The times are a lower bound: the counts at one instruction per cycle of 168 MHz, as if there were no \
+         20 %, for compilers differ by that. The times are a lower bound: the counts at one instruction per cycle of 168 MHz, as if there were no \
          flash wait states, no taken branches and no long divisions. A control tick comes every 33,600 cycles.\n\n\
          | routine | instructions | per | one run | us |\n|---|--:|---|--:|--:|\n",
     );
