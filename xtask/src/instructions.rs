@@ -17,6 +17,15 @@ const PAGE: &str = "docs/instructions.md";
 const TOLERANCE: f64 = 0.20;
 /// And by this much: short routines change by whole instructions.
 const SLACK: f64 = 4.0;
+/// What a routine may cost per unit on any compiler: rows are corrected as fast as they come, and all of a control tick fits
+/// between two ticks.
+const CEILINGS: [(&str, f64); 5] = [
+    ("CLSF, ten terms in 3x3 regions", 16.0),
+    ("CLSF, blended", 24.0),
+    ("CLSF, twenty terms", 24.0),
+    ("sun, shadow angle and its standard deviation", 25_000.0),
+    ("control tick, both steppers at 40 kHz and the piezo, the longest", 33_600.0),
+];
 /// The chip's clock.
 const MHZ: f64 = 168.0;
 
@@ -91,6 +100,15 @@ pub fn run(write: bool) -> Result<()> {
     let mut wrong = Vec::new();
     for counted in &counts {
         println!("{}", counted.row());
+        let ceiling = CEILINGS.iter().find(|(routine, _)| *routine == counted.routine);
+        if let Some((_, ceiling)) = ceiling.filter(|(_, ceiling)| counted.per_unit() > *ceiling) {
+            wrong.push(format!(
+                "{}: {:.1} per {}, at most {ceiling} are allowed",
+                counted.routine,
+                counted.per_unit(),
+                counted.unit
+            ));
+        }
         let Some(known) = on_page(&page, &counted.routine) else {
             wrong.push(format!("{} is not in it", counted.routine));
             continue;
