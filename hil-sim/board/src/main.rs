@@ -71,7 +71,8 @@ struct Run {
     /// The firmware; without it the one that lies beside this program.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// TOML file with faults of the line: bit_error_rate, garbage, unplug_after_ms.
+    /// TOML file with faults: bit_error_rate, garbage, unplug_after_ms, and [[happens]] tables (after_ms, what, stage), e.g.
+    /// what = "emergency-stop", "power-loss" or "motor-stalls".
     #[arg(long, value_name = "FILE")]
     faults: Option<PathBuf>,
     /// Let the board's time follow the wall clock, for a person who watches; without it time passes only while

@@ -21,6 +21,11 @@ fn ten_thousand_requests_over_a_bad_line() {
         asked += 1;
         if asked % RUN_EVERY == 0 {
             // The position does not matter, so that it is settled at once; the trigger is what counts.
+            // Loading has disarmed it.
+            match bench.try_ask(&Request::ArmProgram { shots: 1 }) {
+                Some(Ok(Response::Accepted)) => {}
+                other => panic!("the program was not armed but {other:?}"),
+            }
             match bench.try_ask(&Request::RunProgram { silence: SILENCE }) {
                 Some(Ok(Response::Accepted)) => {}
                 other => panic!("a run was not accepted but {other:?}"),

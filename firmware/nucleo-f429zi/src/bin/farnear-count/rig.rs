@@ -1,0 +1,264 @@
+//! The link's frames and the rig's control tick.
+
+use core::hint::black_box;
+
+use farnear_protocol::{
+    BoardMicros, Event, EventKind, Micros, Nanometres, PROTOCOL_CURRENT, Request,
+    frame::{Decoder, Header, Kind, encode},
+    message::{Axis, ResetCause},
+};
+use farnear_rig::{
+    Identity, Rig,
+    io::{
+        GAUGE_CODE_ZERO, Inputs, MotorInputs, MotorOutputs, STEP_TIMER_HZ, Segment, StepperState, TICK_HZ,
+        TICK_US,
+    },
+};
+
+use crate::{cycles, fail};
+
+fn event() -> Event {
+    let (axis, asked) = (Axis::SensorFine, Nanometres(156_270));
+    let kind = EventKind::MoveDone { request: 7, axis, asked, measured: Nanometres(156_268) };
+    Event { time: BoardMicros(123_456_789), kind }
+}
+
+const HEADER: Header = Header { version: PROTOCOL_CURRENT, kind: Kind::Event, id: 12, boot: 3 };
+
+pub fn frame_encoded() -> u32 {
+    let event = black_box(event());
+    cycles(|| encode(HEADER, &event))
+}
+
+/// Per byte: the whole of it divided by its length.
+pub fn frame_received() -> u32 {
+    let Some(bytes) = encode(HEADER, &event()) else { fail() };
+    let mut decoder = Decoder::new();
+    let all = cycles(|| {
+        bytes
+            .iter()
+            .filter_map(|byte| decoder.push(*byte)?.ok())
+            .last()
+            .and_then(|packet| packet.message::<Event>())
+    });
+    all / bytes.len() as u32
+}
+
+fn identity() -> Identity {
+    Identity {
+        board: "count",
+        firmware: env!("CARGO_PKG_VERSION"),
+        unique_id: [0; 12],
+        boot: 1,
+        reset_cause: ResetCause::PowerOn,
+        emulated: true,
+        last_words: None,
+    }
+}
+
+fn inputs(now: u64) -> Inputs {
+    let stepper = StepperState { pulses: 0, idle: true, underrun: false, room: 8 };
+    let motor = MotorInputs {
+        encoder_counts: 0,
+        home_switch: false,
+        far_switch: false,
+        driver_fault: false,
+        stepper,
+    };
+    Inputs {
+        now: BoardMicros(now),
+        coarse: motor,
+        lens: motor,
+        gauge_code: Some(GAUGE_CODE_ZERO),
+        emergency_stop: false,
+        supply_low: false,
+        link_overflow: false,
+        exposure: None,
+        strobe: None,
+    }
+}
+
+pub fn tick_at_rest() -> u32 {
+    let mut rig = Rig::new(identity(), None, BoardMicros(0));
+    let mut now = 0;
+    for _ in 0..100 {
+        now += u64::from(TICK_US);
+        black_box(rig.tick(&inputs(now)));
+        while rig.transmit().is_some() {}
+    }
+    let inputs = black_box(inputs(now + u64::from(TICK_US)));
+    cycles(|| rig.tick(&inputs))
+}
+
+/// What moves.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Work {
+    Coarse,
+    Lens,
+    Fine,
+}
+
+/// A motor that is where its pulses take it, with its home switch at 0.
+struct Motor {
+    queue: heapless::Deque<Segment, 8>,
+    left: u32,
+    pulses: u32,
+    away: bool,
+    position: i32,
+}
+
+impl Motor {
+    const fn new() -> Self {
+        Self { queue: heapless::Deque::new(), left: 0, pulses: 0, away: true, position: 600 }
+    }
+
+    fn inputs(&self) -> MotorInputs {
+        let room = (8 - self.queue.len()) as u8;
+        let stepper =
+            StepperState { pulses: self.pulses, idle: self.queue.is_empty(), underrun: false, room };
+        MotorInputs {
+            encoder_counts: self.position * 5 / 4,
+            home_switch: self.position <= 0,
+            far_switch: false,
+            driver_fault: false,
+            stepper,
+        }
+    }
+
+    fn run(&mut self, outputs: &MotorOutputs) {
+        self.away = outputs.direction_away;
+        if outputs.abort_steps && !self.queue.is_empty() {
+            fail();
+        }
+        for segment in &outputs.segments {
+            if self.queue.is_empty() {
+                self.left = u32::from(segment.pulses) * u32::from(segment.period_ticks);
+            }
+            if self.queue.push_back(*segment).is_err() {
+                fail();
+            }
+        }
+        let mut time = STEP_TIMER_HZ / TICK_HZ;
+        while let Some(segment) = self.queue.front().copied() {
+            if time < self.left {
+                self.left -= time;
+                return;
+            }
+            time -= self.left;
+            let pulses = u32::from(segment.pulses);
+            self.pulses = self.pulses.wrapping_add(pulses);
+            self.position += if self.away { pulses as i32 } else { -(pulses as i32) };
+            let _ = self.queue.pop_front();
+            self.left =
+                self.queue.front().map_or(0, |next| u32::from(next.pulses) * u32::from(next.period_ticks));
+        }
+    }
+}
+
+/// A rig with hardware that does what it is told.
+struct Bench {
+    rig: Rig,
+    now: u64,
+    id: u32,
+    coarse: Motor,
+    lens: Motor,
+    piezo: u32,
+    longest: u32,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let rig = Rig::new(identity(), None, BoardMicros(0));
+        Self { rig, now: 0, id: 0, coarse: Motor::new(), lens: Motor::new(), piezo: 0, longest: 0 }
+    }
+
+    fn tick(&mut self) {
+        self.now += u64::from(TICK_US);
+        let mut inputs = inputs(self.now);
+        (inputs.coarse, inputs.lens) = (self.coarse.inputs(), self.lens.inputs());
+        inputs.gauge_code = Some(GAUGE_CODE_ZERO + self.piezo);
+        let inputs = black_box(inputs);
+        let mut outputs = None;
+        let rig = &mut self.rig;
+        let count = cycles(|| outputs = Some(rig.tick(&inputs)));
+        self.longest = self.longest.max(count);
+        let Some(outputs) = outputs else { fail() };
+        self.coarse.run(&outputs.coarse);
+        self.lens.run(&outputs.lens);
+        self.piezo = u32::from(outputs.piezo_dac) * 3_052 / 1_000;
+        while self.rig.transmit().is_some() {}
+    }
+
+    /// Sends a request; gives the cycles of its last byte.
+    fn ask(&mut self, request: &Request) -> u32 {
+        self.id += 1;
+        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.id, boot: 1 };
+        let Some(bytes) = encode(header, request) else { fail() };
+        let now = BoardMicros(self.now);
+        let mut last = 0;
+        for byte in bytes {
+            let rig = &mut self.rig;
+            last = cycles(|| rig.receive(byte, now));
+        }
+        last
+    }
+
+    fn run(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.tick();
+        }
+    }
+
+    fn home(&mut self, axis: Axis) {
+        self.ask(&Request::Home { axis, silence: SILENCE });
+        self.run(4 * TICK_HZ);
+    }
+}
+
+const SILENCE: Micros = Micros(60_000_000);
+
+fn go(axis: Axis, nm: i32) -> Request {
+    Request::Move { axis, target: Nanometres(nm), silence: SILENCE }
+}
+
+/// The longest tick of half a second of moves, which take all phases of the ramps.
+pub fn longest_tick(works: &[Work]) -> u32 {
+    let mut bench = Bench::new();
+    for work in works {
+        match work {
+            Work::Coarse => bench.home(Axis::SensorCoarse),
+            Work::Lens => bench.home(Axis::Lens),
+            Work::Fine => {
+                bench.ask(&go(Axis::SensorFine, 20_000));
+                bench.run(TICK_HZ / 10);
+            }
+        }
+    }
+    for (work, axis, nm) in [
+        (Work::Coarse, Axis::SensorCoarse, 3_000_000),
+        (Work::Lens, Axis::Lens, 3_000_000),
+        (Work::Fine, Axis::SensorFine, 176_270),
+    ] {
+        if works.contains(&work) {
+            bench.ask(&go(axis, nm));
+        }
+    }
+    bench.longest = 0;
+    bench.run(TICK_HZ);
+    if works.contains(&Work::Coarse) && bench.coarse.position < 10_000 {
+        fail(); // it did not move
+    }
+    bench.longest
+}
+
+pub fn move_request() -> u32 {
+    let mut bench = Bench::new();
+    bench.home(Axis::SensorCoarse);
+    bench.ask(&go(Axis::SensorCoarse, 3_000_000))
+}
+
+pub fn start() -> u32 {
+    static BLANK: [u8; farnear_rig::io::MEMORY_BYTES] = [0; farnear_rig::io::MEMORY_BYTES];
+    let identity = black_box(identity());
+    cycles(|| Rig::new(identity, Some(&BLANK), BoardMicros(0)))
+}
