@@ -7,7 +7,7 @@ use farnear_protocol::{
 };
 use serde::Serialize;
 
-use crate::{
+use super::{
     answers::{hello, status},
     parts::CORRECTION,
 };

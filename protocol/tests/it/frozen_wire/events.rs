@@ -6,7 +6,7 @@ use farnear_protocol::{
     message::{Axis, Calibration, Failure, RecordName, ResetCause},
 };
 
-use crate::{
+use super::{
     check, lists_every_variant,
     parts::{ALARMS, RECORD, alarm},
     wire,

@@ -9,7 +9,7 @@ use farnear_protocol::{
     },
 };
 
-use crate::lists_every_variant;
+use super::lists_every_variant;
 
 pub const SHOT: Shot = Shot {
     axis: Axis::SensorFine,

@@ -6,13 +6,13 @@ use farnear_protocol::{
     message::{Axis, Routine, SettingKey, SunQuery},
 };
 
-use crate::{
+use super::{
     check, lists_every_variant,
     parts::{CORRECTION, SHADOW, SHOT, SUN},
     wire,
 };
 
-fn table() -> Vec<Request> {
+pub fn table() -> Vec<Request> {
     let silence = Micros(2_000_000);
     let codes = || [0, -1, 300, i16::MIN].as_slice().try_into().expect("it fits");
     vec![

@@ -10,7 +10,7 @@ use farnear_protocol::{
     },
 };
 
-use crate::{
+use super::{
     check, lists_every_variant,
     parts::{AXIS, CORRECTION, PROGRAM, SETTING, alarm},
     wire,

@@ -5,11 +5,11 @@
 //! The first frame was also put together by hand from `docs/protocol.md` (see `by_hand`), with the CRC from an
 //! independent calculation (Python's `zlib.crc32`).
 
-mod answers;
+pub mod answers;
 mod events;
 mod largest;
-mod parts;
-mod requests;
+pub mod parts;
+pub mod requests;
 
 use farnear_protocol::{
     BoardMicros, Log, Micros, Nanometres, Request,
