@@ -1,10 +1,11 @@
 //! Cameras: what gives an image for a trigger of the board. One file per kind.
 
-use std::path::PathBuf;
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 
-use farnear_protocol::message::{ShotRecord, TriggerMode};
-use farnear_protocol::units::Micros;
+use farnear_protocol::{
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
 use ndarray::Array2;
 
 pub mod folder;

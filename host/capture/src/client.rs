@@ -6,20 +6,28 @@
 //! request gives [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`] says that this is understood,
 //! for the rig may have lost its position. See `docs/protocol.md`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::{
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{Sender, channel, sync_channel},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::message::{Hello, Status};
-use farnear_protocol::{Request, Response};
+use farnear_protocol::{
+    Request, Response,
+    message::{Hello, Status},
+};
 
-use crate::error::ClientError;
-use crate::owner::{Command, Connect, Listener, Owner, Session, nonsense};
-use crate::stream::{LogPart, News, Stream};
-use crate::timing::Timing;
-use crate::transport::{SerialTransport, Transport};
+use crate::{
+    error::ClientError,
+    owner::{Command, Connect, Listener, Owner, Session, nonsense},
+    stream::{LogPart, News, Stream},
+    timing::Timing,
+    transport::{SerialTransport, Transport},
+};
 
 /// From one attempt to reach a board that restarts to the next.
 const NEXT_ATTEMPT: Duration = Duration::from_millis(50);

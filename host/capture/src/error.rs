@@ -1,10 +1,11 @@
 //! What can go wrong between this program and the rig, each with what was seen and what to do.
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-use farnear_protocol::RequestError;
-use farnear_protocol::message::{AlarmRecord, Axis, Failure, ResetCause};
+use farnear_protocol::{
+    RequestError,
+    message::{AlarmRecord, Axis, Failure, ResetCause},
+};
 
 use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
 

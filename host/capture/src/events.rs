@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use farnear_protocol::Event;
-use farnear_protocol::frame::Packet;
-use farnear_protocol::message::{EventKind, Status};
+use farnear_protocol::{
+    Event,
+    frame::Packet,
+    message::{EventKind, Status},
+};
 
 use crate::error::ClientError;
 

@@ -2,13 +2,17 @@
 
 use std::time::{Duration, Instant};
 
-use farnear_protocol::message::{EventKind, Limits, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::Micros;
+use farnear_protocol::{
+    message::{EventKind, Limits, Shot, ShotRecord, TriggerMode},
+    units::Micros,
+};
 
-use crate::camera::{Camera, CameraError, Image};
-use crate::client::Client;
-use crate::error::ClientError;
-use crate::plan::PlanError;
+use crate::{
+    camera::{Camera, CameraError, Image},
+    client::Client,
+    error::ClientError,
+    plan::PlanError,
+};
 
 /// Longest single wait for an image, so that an interruption by the user is seen soon.
 const SLICE: Duration = Duration::from_millis(200);

@@ -11,18 +11,24 @@ mod model;
 
 use std::time::Duration;
 
-use farnear_depth::focus_measure::{FocusError, FocusMeasure, peak};
-use farnear_depth::optics::Optics;
-use farnear_depth::psf::Psf;
-use farnear_protocol::message::{Axis, Limits, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::{Micros, Nanometres};
+use farnear_depth::{
+    focus_measure::{FocusError, FocusMeasure, peak},
+    optics::Optics,
+    psf::Psf,
+};
+use farnear_protocol::{
+    message::{Axis, Limits, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
 use ndarray::{Array2, s};
 
-use crate::camera::{Camera, Image};
-use crate::client::Client;
-use crate::describe::um;
-use crate::error::ClientError;
-use crate::expose::{CaptureError, expose};
+use crate::{
+    camera::{Camera, Image},
+    client::Client,
+    describe::um,
+    error::ClientError,
+    expose::{CaptureError, expose},
+};
 use model::{Spectrum, estimate};
 
 /// Places of the stepper before the search is given up.

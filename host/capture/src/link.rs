@@ -2,15 +2,18 @@
 //!
 //! Knows no session: which boot and version a request carries, and what an event means, is the caller's.
 
-use std::io::{self, ErrorKind};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::{
+    io::{self, ErrorKind},
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::Request;
-use farnear_protocol::frame::{Decoder, Header, Kind, Packet, encode};
+use farnear_protocol::{
+    Request,
+    frame::{Decoder, Header, Kind, Packet, encode},
+};
 
-use crate::error::ClientError;
-use crate::transport::Transport;
+use crate::{error::ClientError, transport::Transport};
 
 /// Silence on the line that tells that nothing older is still under way.
 const QUIET: Duration = Duration::from_millis(5);

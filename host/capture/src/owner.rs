@@ -5,23 +5,31 @@
 //! after a reset or an unplugging. A new hello begins a new *session*: what belongs to the old one, a handle or running
 //! work, gets an error and has to decide for itself, because the rig may have lost its position.
 
-use std::collections::BTreeMap;
-use std::io;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::{
+    collections::BTreeMap,
+    io,
+    sync::{
+        Arc, Mutex, PoisonError, Weak,
+        mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender},
+    },
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::frame::{Kind, Packet};
-use farnear_protocol::message::{EventKind, Hello, ResetCause, Status};
-use farnear_protocol::{Event, Log, Request, RequestError, Response};
+use farnear_protocol::{
+    Event, Log, Request, RequestError, Response,
+    frame::{Kind, Packet},
+    message::{EventKind, Hello, ResetCause, Status},
+};
 
-use crate::error::{ClientError, PortError};
-use crate::events::{Events, is_under_way, request_of};
-use crate::handshake::shake_hands;
-use crate::link::Link;
-use crate::stream::{Audience, LogPart, News};
-use crate::timing::Timing;
-use crate::transport::Transport;
+use crate::{
+    error::{ClientError, PortError},
+    events::{Events, is_under_way, request_of},
+    handshake::shake_hands,
+    link::Link,
+    stream::{Audience, LogPart, News},
+    timing::Timing,
+    transport::Transport,
+};
 
 /// Opens the line to the board, the first time and after it broke.
 pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Send>;

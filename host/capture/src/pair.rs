@@ -2,16 +2,20 @@
 
 use std::time::Duration;
 
-use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::{Micros, Nanometres};
+use farnear_protocol::{
+    message::{Axis, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
 
-use crate::camera::{Camera, Image};
-use crate::client::Client;
-use crate::describe::um;
-use crate::expose::{expose, sensor_mm};
-use crate::plan::{SensorPair, coarse_for, fine_for};
-use crate::ready::{base_nm, base_when_homed_nm, ensure_homed};
-use crate::work::Moved;
+use crate::{
+    camera::{Camera, Image},
+    client::Client,
+    describe::um,
+    expose::{expose, sensor_mm},
+    plan::{SensorPair, coarse_for, fine_for},
+    ready::{base_nm, base_when_homed_nm, ensure_homed},
+    work::Moved,
+};
 
 pub use crate::expose::CaptureError;
 

@@ -2,9 +2,11 @@
 
 use farnear_protocol::message::{Axis, AxisStatus, Capabilities, PositionState, Status};
 
-use crate::client::Client;
-use crate::describe::{axis_name, state_name};
-use crate::error::ClientError;
+use crate::{
+    client::Client,
+    describe::{axis_name, state_name},
+    error::ClientError,
+};
 
 /// The axes with a home switch that this rig has.
 pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {

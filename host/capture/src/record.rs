@@ -5,19 +5,21 @@
 
 use std::path::Path;
 
-use farnear_protocol::message::{Axis, Hello, SCHEMA_KEY, ShotRecord};
-use serde::{Deserialize, Serialize};
-
-use crate::camera::Image;
-use crate::client::Client;
-use crate::describe::{cause_name, trigger_name, um};
-use crate::expose::sensor_mm;
-use crate::pair::{Pair, Taken};
-use crate::sequence::SequenceShot;
 use farnear_files::{
     EncodeError,
     image_file::encode_png,
     staging::{Staging, StagingError},
+};
+use farnear_protocol::message::{Axis, Hello, SCHEMA_KEY, ShotRecord};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    camera::Image,
+    client::Client,
+    describe::{cause_name, trigger_name, um},
+    expose::sensor_mm,
+    pair::{Pair, Taken},
+    sequence::SequenceShot,
 };
 
 /// Name of the record in a capture folder.

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use farnear_protocol::message::{AlarmRecord, Counters, Setting, SettingKey, SunAnswer, SunQuery};
-use farnear_protocol::{Request, RequestError, Response};
+use farnear_protocol::{
+    Request, RequestError, Response,
+    message::{AlarmRecord, Counters, Setting, SettingKey, SunAnswer, SunQuery},
+};
 
-use crate::client::Client;
-use crate::error::ClientError;
-use crate::owner::nonsense;
+use crate::{client::Client, error::ClientError, owner::nonsense};
 
 /// Longest wait for a reset board to answer again.
 const RESTART: Duration = Duration::from_secs(5);

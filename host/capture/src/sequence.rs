@@ -17,8 +17,10 @@
 //! exposure_us = 2000
 //! ```
 
-use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::{Micros, Nanometres};
+use farnear_protocol::{
+    message::{Axis, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
 use serde::Deserialize;
 
 use crate::camera::Image;

@@ -1,11 +1,14 @@
 //! Events and log frames as streams, for whoever wants to follow what the board says.
 
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel};
-use std::time::Duration;
+use std::{
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel},
+    },
+    time::Duration,
+};
 
-use farnear_protocol::Event;
-use farnear_protocol::message::Hello;
+use farnear_protocol::{Event, message::Hello};
 
 use crate::error::ClientError;
 

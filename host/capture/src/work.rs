@@ -5,21 +5,27 @@
 //! ([`crate::Timing::silence`]). Every wait has a deadline computed from the work ([`crate::timing`]); at the deadline,
 //! and when the user interrupts, the board is told to stop before the error is returned.
 
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
-
-use farnear_protocol::message::{
-    AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotRecord,
+use std::{
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvTimeoutError, channel},
+    },
+    time::{Duration, Instant},
 };
-use farnear_protocol::units::{Micros, Nanometres};
-use farnear_protocol::{Request, Response};
 
-use crate::client::Client;
-use crate::describe::{axis_name, routine_name, um};
-use crate::error::ClientError;
-use crate::owner::{Listener, Note, nonsense};
-use crate::timing::{calibration_time, homing_time, move_time, program_time};
+use farnear_protocol::{
+    Request, Response,
+    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotRecord},
+    units::{Micros, Nanometres},
+};
+
+use crate::{
+    client::Client,
+    describe::{axis_name, routine_name, um},
+    error::ClientError,
+    owner::{Listener, Note, nonsense},
+    timing::{calibration_time, homing_time, move_time, program_time},
+};
 
 /// Longest single wait for an event, so that an interruption by the user is seen soon.
 const SLICE: Duration = Duration::from_millis(50);

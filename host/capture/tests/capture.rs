@@ -3,22 +3,28 @@
 
 mod peer;
 
-use std::fs;
-use std::io::{Read, Write};
-use std::net::TcpListener;
-use std::path::Path;
-use std::thread;
-use std::time::Duration;
+use std::{
+    fs,
+    io::{Read, Write},
+    net::TcpListener,
+    path::Path,
+    thread,
+    time::Duration,
+};
 
-use farnear_capture::camera::{Camera, CameraError, FolderCamera, Image, SimCamera};
-use farnear_capture::pair::{CaptureError, Exposures, capture_pair};
-use farnear_capture::plan::SensorPair;
-use farnear_capture::record::{Circumstances, begin_folder, finish_folder, read_record, record_of};
-use farnear_capture::{Client, ClientError};
+use farnear_capture::{
+    Client, ClientError,
+    camera::{Camera, CameraError, FolderCamera, Image, SimCamera},
+    pair::{CaptureError, Exposures, capture_pair},
+    plan::SensorPair,
+    record::{Circumstances, begin_folder, finish_folder, read_record, record_of},
+};
 use farnear_files::image_file::encode_png;
-use farnear_protocol::camera::FrameHeader;
-use farnear_protocol::message::{ShotRecord, TriggerMode};
-use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
+use farnear_protocol::{
+    camera::FrameHeader,
+    message::{ShotRecord, TriggerMode},
+    units::{BoardMicros, Micros, Nanometres},
+};
 use ndarray::Array2;
 use peer::{Faults, Peer};
 

@@ -3,16 +3,17 @@
 
 mod peer;
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::{Duration, Instant},
+};
 
 use farnear_capture::{Client, ClientError, LogPart, News, Step, Timing};
-use farnear_protocol::message::{
-    Alarm, Axis, EventKind, Failure, ResetCause, SettingKey, Shot, Status, TriggerMode,
+use farnear_protocol::{
+    RequestError, Response,
+    message::{Alarm, Axis, EventKind, Failure, ResetCause, SettingKey, Shot, Status, TriggerMode},
+    units::{Micros, Nanometres},
 };
-use farnear_protocol::units::{Micros, Nanometres};
-use farnear_protocol::{RequestError, Response};
 use peer::{Faults, Peer};
 use proptest::prelude::*;
 

@@ -1,7 +1,9 @@
 //! Why the board refused, with what to do.
 
-use farnear_protocol::RequestError;
-use farnear_protocol::message::{CorrectionFault, ShotFault};
+use farnear_protocol::{
+    RequestError,
+    message::{CorrectionFault, ShotFault},
+};
 
 use super::{alarm_text, axis_name, program_name, state_name, um};
 

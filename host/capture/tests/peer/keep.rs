@@ -1,7 +1,9 @@
 //! What the scripted board keeps and calculates: alarms, settings, counters. It has no mathematics.
 
-use farnear_protocol::message::{Alarm, CorrectionFault, EventKind, Failure, Setting, SettingKey};
-use farnear_protocol::{Request, RequestError, Response};
+use farnear_protocol::{
+    Request, RequestError, Response,
+    message::{Alarm, CorrectionFault, EventKind, Failure, Setting, SettingKey},
+};
 
 use super::Board;
 

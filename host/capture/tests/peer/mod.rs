@@ -7,19 +7,23 @@
 #![allow(dead_code)]
 #![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 
-use std::collections::{BTreeMap, VecDeque};
-use std::io;
-use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
+use std::{
+    collections::{BTreeMap, VecDeque},
+    io,
+    sync::{Arc, Mutex, MutexGuard},
+    time::Duration,
+};
 
 use farnear_capture::Transport;
-use farnear_protocol::frame::{Decoder, Header, Kind, Packet, encode};
-use farnear_protocol::message::{
-    Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
-    LinkCounters, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot, Status,
+use farnear_protocol::{
+    Event, Log, Request, RequestError, Response,
+    frame::{Decoder, Header, Kind, Packet, encode},
+    message::{
+        Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
+        LinkCounters, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot, Status,
+    },
+    units::{BoardMicros, Micros, Nanometres},
 };
-use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
-use farnear_protocol::{Event, Log, Request, RequestError, Response};
 use serde::Serialize;
 
 mod keep;

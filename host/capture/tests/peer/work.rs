@@ -1,12 +1,14 @@
 //! What the scripted board does: homing, moves, programs, calibrations. All of it ends at once, unless a fault says
 //! otherwise.
 
-use farnear_protocol::message::{
-    Alarm, AlarmRecord, Axis, Calibration, EventKind, Failure, Limits, PositionState, ProgramState,
-    ResetCause, Routine, Shot, ShotFault, ShotRecord, TriggerMode,
+use farnear_protocol::{
+    Request, RequestError, Response,
+    message::{
+        Alarm, AlarmRecord, Axis, Calibration, EventKind, Failure, Limits, PositionState, ProgramState,
+        ResetCause, Routine, Shot, ShotFault, ShotRecord, TriggerMode,
+    },
+    units::{BoardMicros, Micros, Nanometres},
 };
-use farnear_protocol::units::{BoardMicros, Micros, Nanometres};
-use farnear_protocol::{Request, RequestError, Response};
 
 use super::Board;
 
