@@ -44,7 +44,7 @@ pub trait Camera {
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
     /// No camera answers at the address.
-    #[error("no camera at {address}: {reason}; is `farnear-sim` running, and is this its `camera` address?")]
+    #[error("no camera at {address}: {reason}; does a simulator run, and is this its camera's address?")]
     Connect {
         /// The address.
         address: String,

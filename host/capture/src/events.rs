@@ -45,10 +45,10 @@ impl Events {
         Ok(())
     }
 
-    pub(crate) fn pop(&mut self) -> Option<(u32, Event)> {
+    pub(crate) fn pop(&mut self) -> Option<Event> {
         let event = self.arrived.remove(&self.due)?;
         self.due += 1;
-        Some((self.due - 1, event))
+        Some(event)
     }
 }
 

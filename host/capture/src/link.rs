@@ -15,9 +15,9 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, transport::Transport};
 
-/// Silence on the line that tells that nothing older is still under way.
+/// Quiet on the line that tells that nothing older is still under way.
 const QUIET: Duration = Duration::from_millis(5);
-/// Longest time to wait for that silence.
+/// Longest time to wait for that quiet.
 const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 /// Shortest time allowed for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
@@ -129,7 +129,7 @@ impl Link {
         }
     }
 
-    /// Reads until the line is silent, so that no answer meant for an earlier program is taken for ours.
+    /// Reads until the line is quiet, so that no answer meant for an earlier program is taken for ours.
     pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
         self.transport.discard_input().map_err(|source| self.gone(source, during))?;
         let until = Instant::now() + QUIET_AT_MOST;

@@ -30,22 +30,6 @@ impl Client {
         self.expect_accepted(&Request::Halt, "halting")
     }
 
-    /// Stands still after the exposure that is under way.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub fn pause_program(&self) -> Result<(), ClientError> {
-        self.expect_accepted(&Request::PauseProgram, "pausing the exposure program")
-    }
-
-    /// Goes on after a pause.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub fn resume_program(&self) -> Result<(), ClientError> {
-        self.expect_accepted(&Request::ResumeProgram, "resuming the exposure program")
-    }
-
     /// Resets the board and says hello to it again.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use farnear_protocol::{
     units::{BoardMicros, Micros, Nanometres},
 };
 
-use super::Board;
+use crate::Board;
 
 impl Board {
     pub(super) fn prepare(&mut self, id: u32, request: Request) {
@@ -78,7 +78,7 @@ impl Board {
         if silence < silence_min || silence > silence_max {
             return Some(RequestError::Silence { min: silence_min, max: silence_max });
         }
-        self.silences.push(silence);
+        self.keep_alives.push(silence);
         if matches!(request, Request::RunProgram { .. }) && self.armed == 0 {
             return Some(RequestError::Program { state: ProgramState::Idle });
         }

@@ -5,7 +5,7 @@ use farnear_protocol::{
     message::{Alarm, CorrectionFault, EventKind, Failure, Setting, SettingKey},
 };
 
-use super::Board;
+use crate::Board;
 
 impl Board {
     pub(super) fn keep(&mut self, id: u32, request: Request) {

@@ -1,10 +1,9 @@
-//! A scripted board at the other end of an in-memory line, with the faults a line and a board can have.
+//! A scripted board at the other end of a line, with the faults a line and a board can have: for tests and examples.
 //!
 //! It keeps the protocol's promises (an id acts once, events are numbered and can be read again), so that what
-//! the client makes of a fault is seen, not what the peer makes of it. Work ends at once.
+//! the client makes of a fault is seen, not what the peer makes of it. Work ends at once. The line is in memory
+//! ([`Peer::connect`]) or, on Linux, a pseudo-terminal (`plug_in`). How a rig really behaves is `farnear-sim`'s to show.
 
-// Each test binary uses its own part.
-#![allow(dead_code)]
 #![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 
 use std::{
@@ -27,7 +26,12 @@ use farnear_protocol::{
 use serde::Serialize;
 
 mod keep;
+#[cfg(target_os = "linux")]
+mod port;
 mod work;
+
+#[cfg(target_os = "linux")]
+pub use port::plug_in;
 
 /// What is wrong with the line or the board.
 #[derive(Default, Clone)]
@@ -64,28 +68,47 @@ pub struct Faults {
     pub other_version: Option<u8>,
 }
 
+/// The board: what it is, where it stands, what it was told.
 pub struct Board {
+    /// What it says of itself.
     pub hello: Hello,
+    /// What is wrong with it and its line.
     pub faults: Faults,
+    /// Its clock since the reset, us.
     pub time: u64,
+    /// Where the sensor's coarse axis stands.
     pub coarse: Nanometres,
+    /// Where the piezo stands.
     pub fine: Nanometres,
+    /// Where the lens stage stands.
     pub lens: Nanometres,
+    /// Whether the coarse axis was homed.
     pub homed: bool,
+    /// Whether the lens stage was homed.
     pub lens_homed: bool,
     /// Homings, moves and programs that were carried out.
     pub acts: u32,
+    /// How often it was told to stop.
     pub stops: u32,
+    /// How often it was halted.
     pub halts: u32,
-    /// Deadlines of the host's silence that came with work.
-    pub silences: Vec<Micros>,
+    /// Keep-alive timeouts that came with work.
+    pub keep_alives: Vec<Micros>,
+    /// The shots that were loaded, by their place.
     pub program: Vec<Option<Shot>>,
+    /// How many of them are armed.
     pub armed: u8,
+    /// What happened, from the first event on.
     pub events: Vec<Event>,
+    /// Exposures that were triggered.
     pub triggers: u32,
+    /// Alarms that came up.
     pub alarms: Vec<AlarmRecord>,
+    /// Whether the last of them is latched.
     pub latched: bool,
+    /// Settings that were changed, by name.
     pub settings: BTreeMap<&'static str, i32>,
+    /// What it has counted.
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
     pub still_there: u32,
@@ -104,6 +127,7 @@ pub struct Board {
 pub struct Peer(Arc<Mutex<Board>>);
 
 impl Peer {
+    /// A board that is at rest and was not homed yet.
     pub fn new(faults: Faults) -> Self {
         let limits = Limits {
             datum: Nanometres(47_000_000),
@@ -156,7 +180,7 @@ impl Peer {
             acts: 0,
             stops: 0,
             halts: 0,
-            silences: Vec::new(),
+            keep_alives: Vec::new(),
             program: vec![None; 16],
             armed: 0,
             events: vec![started],
@@ -188,6 +212,10 @@ impl Peer {
         })
     }
 
+    /// The board, to look at it or to change it.
+    ///
+    /// # Panics
+    /// Where a thread that had it panicked.
     pub fn board(&self) -> MutexGuard<'_, Board> {
         self.0.lock().unwrap()
     }
@@ -357,6 +385,7 @@ impl Board {
         }
     }
 
+    /// The board starts anew, in its next boot.
     pub fn reset(&mut self, cause: ResetCause) {
         self.hello.boot += 1;
         self.hello.reset_cause = cause;
@@ -375,6 +404,9 @@ impl Board {
     }
 
     /// Says something into the log.
+    ///
+    /// # Panics
+    /// Where it does not fit a frame.
     pub fn log(&mut self, bytes: &[u8]) {
         let log = Log { bytes: bytes.try_into().unwrap() };
         let number = self.logs;
