@@ -2,14 +2,14 @@
 
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
 use farnear_capture::{
     describe::{axis_name, um},
-    ready::{axis_status, steppers},
+    ready::steppers,
 };
-use farnear_protocol::message::{Alarm, Axis, Status};
+use farnear_protocol::message::{Alarm, Status};
 
-use super::{Checkup, Found, Verdict, failed, passed, passed_over};
+use super::{Checkup, Found, failed, passed, passed_over};
+use crate::error::Result;
 
 /// How long somebody may take to press or turn something.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -29,17 +29,8 @@ fn wait_for(checkup: &Checkup<'_>, what: impl Fn(&Status) -> bool) -> Result<Opt
         if Instant::now() >= until {
             return Ok(None);
         }
-        if checkup.client().interrupted() {
-            anyhow::bail!("interrupted");
-        }
+        checkup.context.cancel.check("waiting for somebody's hands")?;
         std::thread::sleep(LOOK);
-    }
-}
-
-fn switches_of(status: &Status, axis: Axis) -> [bool; 2] {
-    match axis {
-        Axis::Lens => [status.lens_home_switch, status.lens_far_switch],
-        Axis::SensorCoarse | Axis::SensorFine => [status.home_switch, status.far_switch],
     }
 }
 
@@ -47,7 +38,7 @@ pub(super) fn switches(checkup: &mut Checkup<'_>) -> Found {
     let axes = steppers(&checkup.client().hello().capabilities);
     let status = checkup.client().status()?;
     for axis in &axes {
-        if switches_of(&status, *axis) == [true, true] {
+        if status.switches(*axis) == [true, true] {
             return failed(format!(
                 "both end switches of the {} read as reached: a plug or a wire is off (they are normally closed to ground)",
                 axis_name(*axis)
@@ -59,15 +50,15 @@ pub(super) fn switches(checkup: &mut Checkup<'_>) -> Found {
     }
     for axis in &axes {
         for (which, name) in ["home", "far"].into_iter().enumerate() {
-            eprintln!("   press the {name} switch of the {}", axis_name(*axis));
-            let Some(status) = wait_for(checkup, |status| switches_of(status, *axis)[which])? else {
+            checkup.say(&format!("press the {name} switch of the {}", axis_name(*axis)));
+            let Some(status) = wait_for(checkup, |status| status.switches(*axis)[which])? else {
                 return failed(format!("the {name} switch of the {} was not seen", axis_name(*axis)));
             };
-            if switches_of(&status, *axis)[1 - which] {
+            if status.switches(*axis)[1 - which] {
                 return failed(format!("both switches of the {} closed at once", axis_name(*axis)));
             }
-            eprintln!("   seen; release it");
-            if wait_for(checkup, |status| !switches_of(status, *axis)[which])?.is_none() {
+            checkup.say("seen; release it");
+            if wait_for(checkup, |status| !status.switches(*axis)[which])?.is_none() {
                 return failed(format!("the {name} switch of the {} does not open again", axis_name(*axis)));
             }
         }
@@ -87,7 +78,7 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
             "the input is closed; nobody is there to press it (the halt below does the same)",
         );
     }
-    eprintln!("   press the emergency stop");
+    checkup.say("press the emergency stop");
     let pressed = wait_for(checkup, |status| status.emergency_stop && status.alarm.is_some())?;
     let Some(record) = pressed.and_then(|status| status.alarm) else {
         return failed("it was not seen, or raised no alarm");
@@ -98,7 +89,7 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
     if checkup.client().clear_alarm(record.number).is_ok() {
         return failed("the alarm could be cleared while the button was pressed");
     }
-    eprintln!("   seen; release it");
+    checkup.say("seen; release it");
     if wait_for(checkup, |status| !status.emergency_stop)?.is_none() {
         return failed("the input does not close again");
     }
@@ -115,12 +106,12 @@ pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
     checkup.ask("disconnect the motors from their drivers (supply off), leave the encoders connected")?;
     let axes = steppers(&checkup.client().hello().capabilities);
     for axis in &axes {
-        let place = |status: &Status| um(axis_status(status, *axis).measured);
+        let place = |status: &Status| um(status.axis(*axis).measured);
         let before = place(&checkup.client().status()?);
-        eprintln!(
-            "   turn the motor of the {} by hand so that its stage moves AWAY from home",
+        checkup.say(&format!(
+            "turn the motor of the {} by hand so that its stage moves AWAY from home",
             axis_name(*axis)
-        );
+        ));
         let turned = wait_for(checkup, |status| (place(status) - before).abs() >= TURNED_UM)?;
         let Some(status) = turned else {
             return failed(format!(
@@ -145,7 +136,7 @@ pub(super) fn connect_motors(checkup: &mut Checkup<'_>) -> Found {
     checkup.ask("supply off, connect the motors, stages somewhere in the middle, hands off, supply on")?;
     let status = checkup.client().status()?;
     match status.alarm {
-        None => Ok((Verdict::Passed, "no driver reports a fault".into())),
+        None => passed("no driver reports a fault"),
         Some(record) => failed(format!("alarm {}: {:?}", record.number, record.alarm)),
     }
 }

@@ -1,41 +1,35 @@
 //! What moves: homing, full speed, halt, piezo, camera.
 
-use std::time::Duration;
-
-use anyhow::Result;
 use farnear_capture::{
     ClientError,
-    camera::Camera,
     describe::{axis_name, um},
     expose::{CaptureError, expose},
     ready::steppers,
     sequence::ShotDefaults,
 };
 use farnear_protocol::{
-    Micros, Nanometres,
+    Micros, Nanometres, Settle,
     message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord},
 };
 
-use super::{Checkup, Found, failed, passed, passed_over};
+use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
 
 /// Speed of the first move, a twelfth of the usual one.
 const SLOW_NM_PER_S: i32 = 500_000;
 /// Two homings agree within this.
 const REPEATS_UM: f64 = 1.5;
-/// A stepper stands where it was sent within this.
-const STEPPER_UM: f64 = 1.0;
-/// And the piezo within this.
-const PIEZO_UM: f64 = 0.05;
-/// Exposures of the strobe's check, and how far the strobe may be from the exposure asked for.
+/// Exposures of the strobe's check, and how far the strobe's length may be from the exposure asked for.
 const EXPOSURES: u16 = 5;
 const STROBE_US: u64 = 200;
 
 fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
-    match axis {
-        Axis::SensorCoarse => (limits.coarse_min.0, limits.coarse_max.0),
-        Axis::SensorFine => (limits.fine_min.0, limits.fine_max.0),
-        Axis::Lens => (limits.lens_min.0, limits.lens_max.0),
-    }
+    let (min, max) = limits.of(axis);
+    (min.0, max.0)
+}
+
+/// Where an axis may stand from where it was sent: within the window in which the board calls a move settled.
+fn tolerance_um(axis: Axis) -> f64 {
+    um(Settle::of_move(axis).window)
 }
 
 fn speed_key(axis: Axis) -> SettingKey {
@@ -95,7 +89,7 @@ pub(super) fn full_speed(checkup: &mut Checkup<'_>) -> Found {
         let moved = client.move_to(axis, target)?;
         let error = um(Nanometres(moved.measured.0 - target.0));
         said.push(format!("{} {error:+.3} um", axis_name(axis)));
-        if error.abs() > STEPPER_UM {
+        if error.abs() > tolerance_um(axis) {
             return failed(format!("the {} stands {error:+.3} um off", axis_name(axis)));
         }
     }
@@ -154,27 +148,26 @@ pub(super) fn toggle(checkup: &mut Checkup<'_>) -> Found {
         let moved = client.move_to(Axis::SensorFine, Nanometres(target))?;
         worst = worst.max(um(Nanometres(moved.measured.0 - target)).abs());
     }
-    if worst > PIEZO_UM {
+    if worst > tolerance_um(Axis::SensorFine) {
         return failed(format!("the piezo stands up to {worst:.3} um off"));
     }
     passed(format!("within {:.0} nm of where it was sent", worst * 1e3))
 }
 
-pub(super) fn strobe(checkup: &mut Checkup<'_>, camera: &mut dyn Camera) -> Found {
-    let client = checkup.client();
+pub(super) fn strobe(checkup: &mut Checkup<'_>) -> Found {
+    let camera_settings = &checkup.settings.camera;
+    let EquippedRig { camera, rig } = &mut checkup.equipped;
+    let client = &rig.client;
     if !client.hello().capabilities.strobe {
         return passed_over("the rig measures no strobe");
     }
-    let defaults = ShotDefaults {
-        exposure: checkup.arguments.camera.exposure(),
-        repeat: EXPOSURES,
-        ..ShotDefaults::default()
-    };
+    let exposure = camera_settings.exposure;
+    let defaults = ShotDefaults { exposure, repeat: EXPOSURES, ..ShotDefaults::default() };
     let (min, max) = range(Axis::SensorFine, &client.hello().limits);
     let shot = defaults.shot(Axis::SensorFine, Nanometres((min + max) / 2));
     let mut records: Vec<ShotRecord> = Vec::new();
-    let wait: Duration = checkup.arguments.camera.image_wait();
-    expose(client, camera, &[shot], wait, |record, _| -> Result<(), CaptureError> {
+    let wait = camera_settings.image_wait;
+    expose(client, camera.as_mut(), &[shot], wait, |record, _| -> Result<(), CaptureError> {
         records.push(record);
         Ok(())
     })?;

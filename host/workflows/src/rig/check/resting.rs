@@ -9,7 +9,7 @@ use super::{Checkup, Found, failed, passed, passed_over};
 
 /// Questions that are asked to judge the line.
 const QUESTIONS: u32 = 200;
-/// A board of flesh and blood answers within this.
+/// A real board answers within this.
 const ANSWER: Duration = Duration::from_millis(50);
 
 pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
@@ -60,11 +60,7 @@ pub(super) fn alarms(checkup: &mut Checkup<'_>) -> Found {
     }
     match status.alarm {
         None => passed(format!("none is latched, {} are kept", client.alarms()?.len())),
-        Some(record) => failed(format!(
-            "alarm {0} is latched: {1}; then `farnear rig alarms --clear {0}`",
-            record.number,
-            alarm_text(record.alarm)
-        )),
+        Some(record) => failed(format!("alarm {} is latched: {}", record.number, alarm_text(record.alarm))),
     }
 }
 
@@ -77,7 +73,7 @@ pub(super) fn memory(checkup: &mut Checkup<'_>) -> Found {
     let (old, boots) = (checkup.client().setting(key)?, checkup.client().counters()?.boots);
     let other = if old.value < old.max { old.value + 1 } else { old.value - 1 };
     checkup.client().set_setting(key, other)?;
-    checkup.rig.client.reboot()?;
+    checkup.equipped.rig.client.reboot()?;
     let (kept, boots_now) = (checkup.client().setting(key)?.value, checkup.client().counters()?.boots);
     checkup.client().set_setting(key, old.value)?;
     if kept != other {
