@@ -8,7 +8,10 @@ use farnear_capture::{
     focus::FocusSearchError, log_stream::LogEnded, plan::PlanError, record::RecordError,
     sequence::ProgramError,
 };
-use farnear_depth::{operators::DesignError, optics::OpticsError};
+use farnear_depth::{
+    baselines::BaselineError, calibrate::CalibrationError, corrections::CorrectionError,
+    metrics::CompareError, operators::DesignError, optics::OpticsError, run::RunError,
+};
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,
     video::VideoError,
@@ -104,6 +107,16 @@ pub enum WorkflowError {
         /// The pair's far-focused image.
         far: PathBuf,
     },
+    /// Images that are not a pair.
+    #[error("{} and {}: {reason}", far.display(), near.display())]
+    Pair {
+        /// The image that was given as far-focused.
+        far: PathBuf,
+        /// The image that was given as near-focused.
+        near: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// The same, about something.
     #[error("{about}: {source}")]
     About {
@@ -118,6 +131,21 @@ pub enum WorkflowError {
     /// A design of operators that cannot be.
     #[error(transparent)]
     Design(#[from] DesignError),
+    /// A pair that gives no depth.
+    #[error(transparent)]
+    Depth(#[from] RunError),
+    /// The same with a method to compare with.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
+    /// A correction that cannot be learned or does not fit.
+    #[error(transparent)]
+    Correction(#[from] CorrectionError),
+    /// Images that give no point spread function.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// Maps that cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
     /// A text that is not TOML of the expected kind.
     #[error(transparent)]
     Parse(#[from] toml::de::Error),

@@ -6,12 +6,18 @@
 //! keyboard or listens for a signal.
 //!
 //! - [`rig`]: connecting, and all that a rig does; [`simulator`]: starting the emulated one.
+//! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
+//! - [`calibrate`]: learning the point spread function and corrections.
 //! - [`context`], [`error`]: the way to the face and back.
 
+pub mod calibrate;
 pub mod clock;
+pub mod compare;
 pub mod context;
+pub mod correct;
 pub mod correction_file;
+pub mod depth;
 pub mod error;
 pub mod figures;
 mod operator_cache;

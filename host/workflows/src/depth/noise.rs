@@ -1,9 +1,7 @@
-//! `--uncertainty`: the noise of the images and the standard deviation of depth that follows from it.
+//! The noise of the images and the standard deviation of depth that follows from it.
 
 use std::{fmt, str::FromStr};
 
-use anyhow::Result;
-use farnear_capture::image_file::Samples;
 use farnear_depth::{
     corrections::Correction,
     fill::FILLED_CONFIDENCE,
@@ -12,15 +10,17 @@ use farnear_depth::{
     run::{DepthMap, Settings},
     uncertainty::{Noise, standard_deviation_mm},
 };
+use farnear_files::image_file::Samples;
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 
-use crate::report;
+use super::pair::Pair;
+use crate::{error::Result, figures::rounded};
 
 /// Step in mm over which a correction's slope is taken: far above rounding, far below what a correction bends over.
 const SLOPE_STEP_MM: f32 = 0.5;
 
-/// The noise as `--uncertainty` names it.
+/// Where the noise of the images is known from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraNoise {
     /// From what the pair itself leaves unexplained.
@@ -36,44 +36,57 @@ pub enum CameraNoise {
     },
 }
 
-impl FromStr for CameraNoise {
-    type Err = String;
+/// A text that names no noise.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{reason}")]
+pub struct NoiseError {
+    /// The text.
+    pub text: String,
+    /// What is wrong with it, and what was expected.
+    pub reason: String,
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        const EXPECTED: &str = "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12)";
-        if text == "estimated" {
-            return Ok(Self::Estimated);
-        }
-        let values = text.strip_prefix("camera:").ok_or(EXPECTED)?;
-        let [mut full_well, mut read_noise, mut bits] = [None; 3];
-        for part in values.split(',') {
-            let (name, value) = part.split_once('=').ok_or(EXPECTED)?;
-            let place = match name {
-                "full_well_e" => &mut full_well,
-                "read_noise_e" => &mut read_noise,
-                "bits" => &mut bits,
-                _ => return Err(format!("unknown {name}: {EXPECTED}")),
-            };
-            let number: f64 =
-                value.parse().map_err(|_| format!("{name} = {value} is no number: {EXPECTED}"))?;
-            if place.replace(number).is_some() {
-                return Err(format!("{name} is given twice"));
-            }
-        }
-        let [Some(full_well_e), Some(read_noise_e)] = [full_well, read_noise] else {
-            return Err(format!("full_well_e and read_noise_e are both needed: {EXPECTED}"));
-        };
-        if !(full_well_e.is_finite() && full_well_e > 0.0 && read_noise_e.is_finite() && read_noise_e >= 0.0)
-        {
-            return Err("full_well_e must be above 0 and read_noise_e 0 or more electrons".into());
-        }
-        let bits = match bits {
-            Some(bits) if bits.fract() == 0.0 && (4.0..=16.0).contains(&bits) => Some(bits as u8),
-            Some(bits) => return Err(format!("bits = {bits}: a camera has 4 to 16")),
-            None => None,
-        };
-        Ok(Self::Camera { full_well_e, read_noise_e, bits })
+impl FromStr for CameraNoise {
+    type Err = NoiseError;
+
+    fn from_str(text: &str) -> Result<Self, NoiseError> {
+        parse(text).map_err(|reason| NoiseError { text: text.into(), reason })
     }
+}
+
+fn parse(text: &str) -> Result<CameraNoise, String> {
+    const EXPECTED: &str = "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12)";
+    if text == "estimated" {
+        return Ok(CameraNoise::Estimated);
+    }
+    let values = text.strip_prefix("camera:").ok_or(EXPECTED)?;
+    let [mut full_well, mut read_noise, mut bits] = [None; 3];
+    for part in values.split(',') {
+        let (name, value) = part.split_once('=').ok_or(EXPECTED)?;
+        let place = match name {
+            "full_well_e" => &mut full_well,
+            "read_noise_e" => &mut read_noise,
+            "bits" => &mut bits,
+            _ => return Err(format!("unknown {name}: {EXPECTED}")),
+        };
+        let number: f64 =
+            value.parse().map_err(|_| format!("{name} = {value} is not a number: {EXPECTED}"))?;
+        if place.replace(number).is_some() {
+            return Err(format!("{name} is given twice"));
+        }
+    }
+    let [Some(full_well_e), Some(read_noise_e)] = [full_well, read_noise] else {
+        return Err(format!("full_well_e and read_noise_e are both needed: {EXPECTED}"));
+    };
+    if !(full_well_e.is_finite() && full_well_e > 0.0 && read_noise_e.is_finite() && read_noise_e >= 0.0) {
+        return Err("full_well_e must be above 0 and read_noise_e 0 or more electrons".into());
+    }
+    let bits = match bits {
+        Some(bits) if bits.fract() == 0.0 && (4.0..=16.0).contains(&bits) => Some(bits as u8),
+        Some(bits) => return Err(format!("bits = {bits}: a camera has 4 to 16")),
+        None => None,
+    };
+    Ok(CameraNoise::Camera { full_well_e, read_noise_e, bits })
 }
 
 impl fmt::Display for CameraNoise {
@@ -104,8 +117,8 @@ impl CameraNoise {
     }
 }
 
-/// What `--uncertainty` found.
-#[derive(Clone, Serialize)]
+/// What the standard deviations come to.
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Uncertainty {
     /// Where the noise is from.
     pub noise: String,
@@ -118,9 +131,7 @@ pub struct Uncertainty {
 /// What the standard deviation follows from.
 pub struct Source<'a> {
     /// Far- and near-focused image.
-    pub pair: [&'a Array2<f32>; 2],
-    /// How both files stored them.
-    pub samples: Samples,
+    pub pair: &'a Pair,
     /// What the depth was computed with.
     pub operators: &'a Operators,
     /// See there.
@@ -131,20 +142,23 @@ pub struct Source<'a> {
 
 /// Standard deviation of `raw` (before `correction`), mm; NaN where there is no depth and where it was filled in from
 /// elsewhere.
+///
+/// # Errors
+/// [`crate::WorkflowError::Depth`], [`crate::WorkflowError::Correction`].
 pub fn deviation(
     noise: CameraNoise,
     source: &Source<'_>,
     raw: &DepthMap,
     correction: Option<&Correction>,
 ) -> Result<(Array2<f32>, Uncertainty)> {
-    let [far, near] = source.pair;
+    let pair = source.pair;
     let mut deviation = standard_deviation_mm(
-        far.view(),
-        near.view(),
+        pair.far.view(),
+        pair.near.view(),
         source.operators,
         source.optics,
         source.settings,
-        noise.of(source.samples),
+        noise.of(pair.samples),
     )?;
     let filled = |confidence: f32| source.settings.fill && confidence == FILLED_CONFIDENCE;
     Zip::from(&mut deviation).and(&raw.depth_mm).and(&raw.confidence).for_each(
@@ -165,7 +179,7 @@ pub fn deviation(
     finite.sort_unstable_by(f32::total_cmp);
     let quantile = |part: f64| {
         let last = finite.len().checked_sub(1).map_or(0, |last| (part * last as f64).round() as usize);
-        report::rounded(finite.get(last).map_or(f64::NAN, |value| f64::from(*value)), 4)
+        rounded(finite.get(last).map_or(f64::NAN, |value| f64::from(*value)), 4)
     };
     let found =
         Uncertainty { noise: noise.to_string(), median_sd_mm: quantile(0.5), p95_sd_mm: quantile(0.95) };
@@ -193,7 +207,7 @@ mod tests {
             ("camera:full_well_e=1,read_noise_e=1,bits=17", "4 to 16"),
         ] {
             let error = wrong.parse::<CameraNoise>().unwrap_err();
-            assert!(error.contains(phrase), "{wrong}: {error}");
+            assert!(error.reason.contains(phrase), "{wrong}: {error}");
         }
     }
 
