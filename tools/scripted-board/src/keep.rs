@@ -27,6 +27,9 @@ impl Board {
                 found.map(|record| Response::Alarm(*record)).ok_or_else(|| self.no_such_alarm())
             }
             Request::ClearAlarm { number } => match self.alarms.last() {
+                Some(last) if self.latched && last.number == number && self.emergency_stop => {
+                    Err(RequestError::AlarmRemains { alarm: last.alarm })
+                }
                 Some(last) if self.latched && last.number == number => {
                     self.latched = false;
                     self.event(EventKind::AlarmCleared { number });

@@ -108,6 +108,12 @@ pub struct Board {
     pub latched: bool,
     /// Settings that were changed, by name.
     pub settings: BTreeMap<&'static str, i32>,
+    /// Whether the home and the far switch of the coarse axis are closed.
+    pub switches: [bool; 2],
+    /// The same of the lens stage.
+    pub lens_switches: [bool; 2],
+    /// Whether the emergency stop is pressed.
+    pub emergency_stop: bool,
     /// What it has counted.
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
@@ -188,6 +194,9 @@ impl Peer {
             alarms: Vec::new(),
             latched: false,
             settings: BTreeMap::new(),
+            switches: [false; 2],
+            lens_switches: [false; 2],
+            emergency_stop: false,
             counters: Counters { boots: 7, ..Counters::default() },
             still_there: 0,
             gone: false,
@@ -434,11 +443,11 @@ impl Board {
             coarse: AxisStatus { request: active, ..axis(self.homed, self.coarse) },
             fine: axis(true, self.fine),
             lens: axis(self.lens_homed, self.lens),
-            home_switch: false,
-            far_switch: false,
-            lens_home_switch: false,
-            lens_far_switch: false,
-            emergency_stop: false,
+            home_switch: self.switches[0],
+            far_switch: self.switches[1],
+            lens_home_switch: self.lens_switches[0],
+            lens_far_switch: self.lens_switches[1],
+            emergency_stop: self.emergency_stop,
             supply_low: false,
             alarm: self.alarms.last().copied().filter(|_| self.latched),
             program: ProgramStatus { state, shots: self.armed, index: 0, exposures: 0 },

@@ -66,7 +66,7 @@ pub enum MoveFigures {
 /// [`WorkflowError::Parameter`] outside the wire's range.
 pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
     sequence::nanometres(position_um).ok_or_else(|| {
-        let expected = "is no position, expected a number between -2147483 and 2147483 um";
+        let expected = "expected a position of -2147483 to 2147483 um";
         WorkflowError::parameter(name, position_um, expected)
     })
 }

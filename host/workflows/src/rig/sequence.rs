@@ -82,7 +82,7 @@ pub struct SequenceFigures {
 /// Parameters, program, optics, folder, camera, rig: in this order.
 pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<SequenceFigures> {
     if settings.runs == 0 {
-        return Err(WorkflowError::parameter("runs", 0, "takes no images"));
+        return Err(WorkflowError::parameter("runs", 0, "it takes no images, expected 1 or more"));
     }
     let shots = shots(&settings.program, settings.camera.exposure)?;
     let optics = settings.optics.as_deref().map(GivenOptics::read).transpose()?;
@@ -131,7 +131,9 @@ fn shots(program: &Program, exposure: Micros) -> Result<Vec<Shot>> {
             let text = fs::read_to_string(path).map_err(WorkflowError::read("the program", path))?;
             read_program(&text).about(|| format!("the program {}", path.display()))
         }
-        Program::Stack { steps: 0, .. } => Err(WorkflowError::parameter("steps", 0, "takes no images")),
+        Program::Stack { steps: 0, .. } => {
+            Err(WorkflowError::parameter("steps", 0, "it takes no images, expected 1 or more"))
+        }
         Program::Stack { axis, from_um, to_um, steps } => {
             let (from, to) = (nanometres("from", *from_um)?, nanometres("to", *to_um)?);
             Ok(ShotDefaults { exposure, ..ShotDefaults::default() }.stack(*axis, from, to, *steps))
