@@ -5,15 +5,13 @@
 
 use farnear_depth::corrections::{BoardCorrection, CorrectionError, Method};
 use farnear_maths::clsf::{DepthScale, Frame};
-use farnear_protocol::message::{
-    CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionForm, CorrectionInfo,
+use farnear_protocol::{
+    Request, Response,
+    message::{CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionForm, CorrectionInfo},
 };
-use farnear_protocol::{Request, Response};
 use ndarray::{Array2, ArrayView2};
 
-use crate::client::Client;
-use crate::error::ClientError;
-use crate::owner::nonsense;
+use crate::{client::Client, error::ClientError, owner::nonsense};
 
 /// The board could not correct.
 #[derive(Debug, thiserror::Error)]
