@@ -32,15 +32,21 @@ pub fn counter() -> Result<PathBuf> {
     built(COUNTER)
 }
 
-/// Builds the firmware; gives the path of its ELF.
+/// Builds the firmware and the program that counts instructions; gives the path of the firmware's ELF.
 pub fn build() -> Result<PathBuf> {
     step("firmware for the NUCLEO-F429ZI");
-    build_with(Way::find()?)
+    build_with(Way::find()?, &[])
 }
 
-/// Builds the firmware in a way that was found before.
-pub fn build_with(way: Way) -> Result<PathBuf> {
-    finish(way.cargo(&folder(), "build").args(["--release", "--locked"]))?;
+/// Builds the firmware alone, which is quicker.
+pub fn build_program() -> Result<PathBuf> {
+    step("firmware for the NUCLEO-F429ZI");
+    build_with(Way::find()?, &["--bin", PROGRAM])
+}
+
+/// Builds, in a way that was found before, what `selection` names (all, where that is nothing).
+pub fn build_with(way: Way, selection: &[&str]) -> Result<PathBuf> {
+    finish(way.cargo(&folder(), "build").args(["--release", "--locked"]).args(selection))?;
     let elf = built(PROGRAM)?;
     for profile in ["debug", "release"] {
         let beside = target_folder().join(profile);

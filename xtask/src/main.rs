@@ -8,6 +8,7 @@ mod demo;
 mod evaluate;
 mod firmware;
 mod fuzz;
+mod host;
 mod install;
 mod instructions;
 mod run;
