@@ -58,8 +58,10 @@ pub struct OperatorFigures {
 /// # Errors
 /// [`WorkflowError::Parameter`] for a drawing of another kind; optics; [`WorkflowError::Design`]; files.
 pub fn design(settings: &OperatorSettings, context: &Context<'_>) -> Result<OperatorFigures> {
-    let plot = settings.plot.as_deref().map(|file| Ok((file, Format::of(file)?)));
-    let plot = plot.transpose()?;
+    let plot = match &settings.plot {
+        Some(file) => Some((file, Format::of(file)?)),
+        None => None,
+    };
     let optics = optics::read(&settings.optics)?;
     let psf = settings.psf.unwrap_or(optics.psf());
     let request = Request {

@@ -32,13 +32,13 @@ struct Output {
 const OUTPUTS: &[Output] = &[
     Output { names: &["npy"], file: "depth.npy", bytes: |results| Ok(Some(npy::write(results.depth()))) },
     Output { names: &["tiff"], file: "depth.tiff", bytes: |results| Ok(Some(map::tiff(results.depth())?)) },
-    Output { names: &["png"], file: "depth.png", bytes: Results::png },
+    Output { names: &["png"], file: "depth.png", bytes: |results| results.png() },
     // A map does not travel without its confidence; depth.exr and view.png hold it themselves.
     Output { names: &["npy", "tiff", "png"], file: "confidence.npy", bytes: |results| Ok(Some(npy::write(results.confidence()))) },
     Output { names: &["npy", "tiff", "png"], file: "uncertainty.npy", bytes: |results| Ok(results.deviation().map(npy::write)) },
     Output { names: &["mesh"], file: "mesh.ply", bytes: |results| Ok(Some(results.mesh())) },
     Output { names: &["view"], file: "view.png", bytes: |results| Ok(Some(view::view_png(results.depth(), results.confidence())?)) },
-    Output { names: &["exr"], file: "depth.exr", bytes: Results::exr },
+    Output { names: &["exr"], file: "depth.exr", bytes: |results| results.exr() },
 ];
 
 /// What is written where nothing else is asked for.
