@@ -7,19 +7,27 @@
 //!
 //! - [`rig`]: connecting, and all that a rig does; [`simulator`]: starting the emulated one.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
+//! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
+//!   [`sun`] stands; [`activity`]: what the person does.
 //! - [`context`], [`error`]: the way to the face and back.
 
+pub mod activity;
 pub mod clock;
 pub mod context;
 pub mod correction_file;
+mod counter;
 pub mod error;
 pub mod figures;
 mod operator_cache;
 pub mod operator_plot;
 pub mod operators;
 pub mod optics;
+mod parameters;
 pub mod rig;
+pub mod shadow;
+pub mod silhouettes;
 pub mod simulator;
+pub mod sun;
 
 pub use context::{Cancel, Context, Nobody, Progress, Questions};
 pub use error::{Result, WorkflowError};

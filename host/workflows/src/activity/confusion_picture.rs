@@ -2,11 +2,9 @@
 
 use std::io::Cursor;
 
-use anyhow::Result;
 use farnear_activity::evaluation::confusion::Confusion;
+use farnear_files::{EncodeError, text::Writer};
 use image::{ImageFormat, Rgb, RgbImage, imageops};
-
-use crate::picture::text::Writer;
 
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
 const INK: Rgb<u8> = Rgb([0, 0, 0]);
@@ -17,7 +15,7 @@ const GAP_PX: u32 = 8;
 ///
 /// # Errors
 /// An encoder that refuses.
-pub fn picture(confusion: &Confusion) -> Result<Vec<u8>> {
+pub fn png(confusion: &Confusion) -> Result<Vec<u8>, EncodeError> {
     let mut writer = Writer::new(TEXT_PX)?;
     let line = writer.height();
     let widest = confusion.classes.iter().map(|class| writer.width(class)).max().unwrap_or(0);
@@ -52,7 +50,7 @@ pub fn picture(confusion: &Confusion) -> Result<Vec<u8>> {
         }
     }
     let mut png = Cursor::new(Vec::new());
-    picture.write_to(&mut png, ImageFormat::Png)?;
+    picture.write_to(&mut png, ImageFormat::Png).map_err(EncodeError::of("the confusion matrix"))?;
     Ok(png.into_inner())
 }
 
@@ -66,7 +64,7 @@ mod tests {
         (0..4).for_each(|_| confusion.count(0, 0));
         confusion.count(1, 1);
         let picture =
-            image::load_from_memory(&picture(&confusion).expect("a picture")).expect("PNG").into_rgb8();
+            image::load_from_memory(&png(&confusion).expect("a picture")).expect("PNG").into_rgb8();
         // The lower right corner lies in the cell of the last class; the one above it is empty.
         let at = |up: u32| picture[(picture.width() - GAP_PX - 4, picture.height() - GAP_PX - 4 - up)];
         let dark = |pixel: Rgb<u8>| pixel.0.iter().map(|&v| u32::from(v)).sum::<u32>() < 300;

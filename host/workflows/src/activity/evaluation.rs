@@ -1,215 +1,237 @@
-//! `farnear activity evaluate`: how well the method recognises subjects that it was not trained on.
+//! How well the method recognises subjects that it was not trained on.
 
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
-use anyhow::{Context, Result};
-use clap::Args;
 use farnear_activity::{
     evaluation::{
-        choice::{Views, names},
         confusion::Confusion,
-        experiment::Experiment,
-        leave_one_out::{Choice, EvaluationError, train_on_others},
+        leave_one_out::{Choice, EvaluationError, Outcome, train_on_others},
     },
     mask::Mask,
     recognition::{
+        choice::{Views, names},
         clip::{Clip, Track},
         model::Recogniser,
     },
 };
-use farnear_capture::aside::Aside;
+use farnear_files::{masks, staging::Staging};
 use serde::Serialize;
 
 use super::{
-    confusion,
+    confusion_picture,
     method::Method,
-    samples::{SCALING, Samples, are_full_frames},
-    train::fused,
+    samples::{SCALING, Samples, SamplesError, are_full_frames},
 };
-use crate::{masks, report};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
 
-/// Evaluates the method: every subject is recognised by what was learned from the others.
-///
-/// With --leave-one-subject-out each subject in turn is left out of the training, in which everything that can be
-/// chosen is chosen by cross-validation over the remaining subjects. --train gives other samples to learn from (clean
-/// masks for damaged ones of the same people, say; a subject's own are left out as before). Without
-/// --leave-one-subject-out but with --train all of that is learned from, and the subjects must be others.
-#[derive(Args)]
-#[command(
-    after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json"
-)]
-pub struct Arguments {
-    /// The samples, TOML (see farnear activity train --help).
-    samples: PathBuf,
-    /// Leave every subject out in turn.
-    #[arg(long)]
-    leave_one_subject_out: bool,
-    /// Learn from these samples instead.
-    #[arg(long, value_name = "SAMPLES")]
-    train: Option<PathBuf>,
-    #[command(flatten)]
-    method: Method,
-    /// each: every view by itself, answers counted together; fused: all views of a clip at once [default: fused, or each where clips
-    /// differ in their views].
-    #[arg(long)]
-    views: Option<Views>,
-    /// Folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold).
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Print figures as JSON.
-    #[arg(long)]
-    json: bool,
+/// How often the time of an answer is taken; the shortest counts.
+const TIMINGS: usize = 3;
+
+/// What is evaluated, how, and where to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct EvaluationSettings {
+    /// The samples that are recognised, TOML.
+    pub samples: PathBuf,
+    /// What is learned from.
+    pub learn_from: LearnFrom,
+    /// How activities are told apart.
+    pub method: Method,
+    /// Which views are recognised together; without it fused, or each by itself where clips differ in their views.
+    pub views: Option<Views>,
+    /// A new folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold).
+    pub out: Option<PathBuf>,
 }
 
-#[derive(Serialize)]
-struct Figures {
-    /// Share of right answers, 0 to 1, and its 95 % interval (Wilson).
-    accuracy: f64,
-    confidence_interval: [f64; 2],
-    right: u32,
-    answers: u32,
-    clips: usize,
-    subjects: usize,
-    views: Views,
-    mode: &'static str,
-    full_frames: bool,
-    frames: usize,
-    empty_frames: usize,
+/// What is learned from; never the subject that is recognised.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum LearnFrom {
+    /// The other subjects, each left out in turn.
+    OtherSubjects,
+    /// Other samples of other people.
+    Samples(PathBuf),
+    /// Other samples, of which the subject's own are left out in turn.
+    SamplesOfOthers(PathBuf),
+}
+
+impl LearnFrom {
+    fn path(&self) -> Option<&Path> {
+        match self {
+            Self::OtherSubjects => None,
+            Self::Samples(path) | Self::SamplesOfOthers(path) => Some(path),
+        }
+    }
+}
+
+/// How well people were recognised.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct EvaluationFigures {
+    /// Share of right answers, 0 to 1.
+    pub accuracy: f64,
+    /// Its 95 % interval (Wilson).
+    pub confidence_interval: [f64; 2],
+    /// Right answers.
+    pub right: u32,
+    /// Answers.
+    pub answers: u32,
+    /// Clips.
+    pub clips: usize,
+    /// People.
+    pub subjects: usize,
+    /// Which views were recognised together.
+    pub views: Views,
+    /// The method's name.
+    pub mode: &'static str,
+    /// Whether masks are full frames, so that the box's motion counts.
+    pub full_frames: bool,
+    /// Masks.
+    pub frames: usize,
+    /// Masks without anybody.
+    pub empty_frames: usize,
     /// From a mask in memory to its part of an answer, one thread.
-    seconds_per_frame: f64,
-    seconds: f64,
+    pub seconds_per_frame: f64,
+    /// Time for all.
+    pub seconds: f64,
     /// `counts[truth][answer]`.
-    confusion: Confusion,
+    pub confusion: Confusion,
 }
 
 /// `evaluation.toml`: nothing that differs between two runs.
 #[derive(Serialize)]
-struct Record {
+struct Record<'a> {
     accuracy: f64,
     confidence_interval: [f64; 2],
     mode: &'static str,
     views: Views,
-    fold: Vec<Choice>,
+    fold: &'a [Choice],
 }
 
-/// Runs the command.
+/// Recognises every subject by what was learned from others.
 ///
 /// # Errors
 /// Samples that cannot be read or used, too few subjects, results that cannot be written.
-pub fn run(arguments: &Arguments) -> Result<()> {
-    if !arguments.leave_one_subject_out && arguments.train.is_none() {
-        let what =
-            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both";
-        return Err(report::Usage(what.into()).into());
-    }
+pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<EvaluationFigures> {
     let start = Instant::now();
-    let out = arguments.out.as_deref().map(Aside::new_folder).transpose()?;
-    let shown = arguments.samples.display().to_string();
-    let test = Samples::read(&arguments.samples)?;
-    let train = arguments.train.as_deref().map(Samples::read).transpose()?;
+    let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
+    let test = Samples::read(&settings.samples, context)?;
+    let train = settings.learn_from.path().map(|path| Samples::read(path, context)).transpose()?;
     let (frames, empty_frames, full_frames) = (test.frames, test.empty_frames, test.full_frames);
     let folders = test.folders.clone();
-    if let Some(train) = &train {
-        anyhow::ensure!(
-            train.full_frames == full_frames,
-            "{shown} and --train differ: one holds full frames, the other cut-out silhouettes"
-        );
-    }
-    let alike = test.views.is_some() && train.as_ref().is_none_or(|train| train.views == test.views);
-    let views = arguments.views.unwrap_or(if alike { Views::Fused } else { Views::Each });
-    let (test, train) = match (views, alike) {
-        // Views that correspond each have a classifier of their own; others share one.
-        (Views::Each, false) => (test.split(), train.map(Samples::split)),
-        _ => {
-            anyhow::ensure!(
-                alike || test.views.is_none() || train.is_none(),
-                "{shown} and --train hold other views; `--views each` takes every view by itself"
-            );
-            (fused(test, &shown)?, train.map(|train| fused(train, "--train")).transpose()?)
-        }
-    };
+    let Clips { views, test, train } = Clips::of(test, train, settings.views)?;
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
-    check_subjects(arguments, &subjects, learned)?;
-    arguments.method.announce();
-    let experiment = arguments.method.experiment();
-    let outcome = train_on_others(learned, &test, &experiment, &[views])?;
-    let confusion = if views == Views::Each { outcome.each } else { outcome.fused };
+    check_subjects(settings, &subjects, learned)?;
+    let outcome = train_on_others(learned, &test, &settings.method.experiment(), &[views])?;
+    let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
     let (low, high) = confusion.interval();
     let (right, answers) = confusion.right_of();
-    let accuracy = report::rounded(confusion.accuracy(), 5);
-    let confidence_interval = [report::rounded(low, 5), report::rounded(high, 5)];
-    if let Some(out) = out {
-        let record = Record {
-            accuracy,
-            confidence_interval,
-            mode: arguments.method.name(),
-            views,
-            fold: outcome.chosen,
-        };
-        out.write("confusion.png", &confusion::picture(&confusion)?)?;
-        out.write("confusion.md", confusion.to_markdown().as_bytes())?;
-        out.write("evaluation.toml", toml::to_string(&record)?.as_bytes())?;
-        out.finish()?;
-        eprintln!("wrote {}", arguments.out.as_deref().unwrap_or(&arguments.samples).display());
-    }
-    let figures = Figures {
-        accuracy,
-        confidence_interval,
+    let mut figures = EvaluationFigures {
+        accuracy: rounded(confusion.accuracy(), 5),
+        confidence_interval: [rounded(low, 5), rounded(high, 5)],
         right,
         answers,
         clips: test.len(),
         subjects: subjects.len(),
         views,
-        mode: arguments.method.name(),
+        mode: settings.method.name(),
         full_frames,
         frames,
         empty_frames,
-        seconds_per_frame: seconds_per_frame(learned, experiment, &folders)?,
-        seconds: report::rounded(start.elapsed().as_secs_f64(), 3),
-        confusion,
+        seconds_per_frame: 0.0,
+        seconds: 0.0,
+        confusion: confusion.clone(),
     };
-    if arguments.json {
-        return report::print(&figures, true);
+    if let (Some(staged), Some(out)) = (out, &settings.out) {
+        keep(&figures, &outcome, staged)?;
+        context.say(&format!("wrote {}", out.display()));
     }
-    report::to_stdout(
-        format!("{}\n{}", toml::to_string(&figures)?, figures.confusion.to_markdown()).as_bytes(),
-    )
+    figures.seconds_per_frame = seconds_per_frame(learned, &settings.method, &folders, context)?;
+    figures.seconds = rounded(start.elapsed().as_secs_f64(), 3);
+    Ok(figures)
+}
+
+/// The clips of an evaluation, and which of their views are recognised together.
+struct Clips {
+    views: Views,
+    test: Vec<Clip>,
+    /// What is learned from, where that is not the same.
+    train: Option<Vec<Clip>>,
+}
+
+impl Clips {
+    fn of(test: Samples, train: Option<Samples>, asked: Option<Views>) -> Result<Self> {
+        if let Some(train) = &train {
+            test.check_kind(train)?;
+        }
+        let alike = test.views.is_some() && train.as_ref().is_none_or(|train| train.views == test.views);
+        let views = asked.unwrap_or(if alike { Views::Fused } else { Views::Each });
+        // Views that correspond each have a classifier of their own; others share one.
+        if views == Views::Each && !alike {
+            return Ok(Self { views, test: test.split(), train: train.map(Samples::split) });
+        }
+        if let (false, Some(_), Some(train)) = (alike, &test.views, &train) {
+            let (test, train) = (test.path.clone(), train.path.clone());
+            return Err(SamplesError::OtherViews { test, train }.into());
+        }
+        Ok(Self { views, test: test.fused()?, train: train.map(Samples::fused).transpose()? })
+    }
 }
 
 /// Refuses evaluations whose answers would mean nothing.
-fn check_subjects(arguments: &Arguments, subjects: &[String], learned: &[Clip]) -> Result<()> {
-    let known = names(learned.iter().map(|clip| &clip.subject));
-    if arguments.leave_one_subject_out {
-        if arguments.train.is_none() && subjects.len() < 3 {
-            return Err(EvaluationError::Subjects(subjects.len()).into());
+fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &[Clip]) -> Result<()> {
+    match &settings.learn_from {
+        LearnFrom::OtherSubjects if subjects.len() < 3 => Err(EvaluationError::Subjects(subjects.len()).into()),
+        LearnFrom::OtherSubjects | LearnFrom::SamplesOfOthers(_) => Ok(()),
+        LearnFrom::Samples(train) => {
+            let known = names(learned.iter().map(|clip| &clip.subject));
+            let Some(both) = subjects.iter().find(|subject| known.contains(subject)) else { return Ok(()) };
+            let (test, train) = (settings.samples.clone(), train.clone());
+            Err(SamplesError::SamePerson { subject: both.clone(), test, train }.into())
         }
-        return Ok(());
     }
-    if let Some(both) = subjects.iter().find(|subject| known.contains(subject)) {
-        anyhow::bail!(
-            "subject `{both}` is in both the samples and --train: recognising people by themselves says nothing; add \
-             --leave-one-subject-out to leave them out of the training in turn"
-        );
-    }
-    Ok(())
+}
+
+fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<()> {
+    let record = Record {
+        accuracy: figures.accuracy,
+        confidence_interval: figures.confidence_interval,
+        mode: figures.mode,
+        views: figures.views,
+        fold: &outcome.chosen,
+    };
+    out.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
+    out.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
+    out.write("evaluation.toml", toml::to_string(&record)?.as_bytes())?;
+    Ok(out.finish()?)
 }
 
 /// One thread's time from masks in memory to an answer, over the frames of the first clip.
-fn seconds_per_frame(clips: &[Clip], experiment: Experiment, folders: &[PathBuf]) -> Result<f64> {
+fn seconds_per_frame(
+    clips: &[Clip],
+    method: &Method,
+    folders: &[PathBuf],
+    context: &Context<'_>,
+) -> Result<f64> {
     let views = clips.first().map_or(0, |clip| clip.views.len());
-    let (model, _) = Recogniser::train_searched(clips, &experiment.fixed(), SCALING)?;
-    let sequences: Result<Vec<Vec<Mask>>> = folders
+    let (model, _) = Recogniser::train_searched(clips, &method.experiment().fixed(), SCALING)?;
+    let sequences = folders
         .iter()
         .take(views)
         .map(|folder| Ok(masks::read_all(folder)?.into_iter().map(|named| named.mask).collect()))
-        .collect();
-    let sequences = sequences?;
+        .collect::<Result<Vec<Vec<Mask>>>>()?;
     let frames: usize = sequences.iter().map(Vec::len).sum();
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().context("cannot start a thread")?;
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let one = one.map_err(|error| WorkflowError::Thread { reason: error.to_string() })?;
     let best = one.install(|| -> Result<f64> {
         let mut best = f64::INFINITY;
-        for _ in 0..3 {
+        for _ in 0..TIMINGS {
+            context.cancel.check("taking the time of an answer")?;
             let start = Instant::now();
             let tracks: Vec<Track> = sequences
                 .iter()
@@ -220,5 +242,5 @@ fn seconds_per_frame(clips: &[Clip], experiment: Experiment, folders: &[PathBuf]
         }
         Ok(best)
     })?;
-    Ok(report::rounded(best / frames.max(1) as f64, 7))
+    Ok(rounded(best / frames.max(1) as f64, 7))
 }

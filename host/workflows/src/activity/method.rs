@@ -1,73 +1,54 @@
-//! How activities are told apart: the flags that training and evaluation share.
+//! How activities are told apart: what training and evaluation share.
 
-use std::io::IsTerminal;
-
-use clap::{Args, ValueEnum};
-use farnear_activity::{
-    evaluation::experiment::Experiment,
-    recognition::{frames::Mode, space::SpaceSettings},
+use farnear_activity::recognition::{
+    classifier::Family, experiment::Experiment, frames::Mode, space::SpaceSettings,
 };
 
 /// The method.
-#[derive(Args)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Method {
-    /// Whether the order of frames counts: order-free (the thesis' promise) or ordered (sitting down is not standing up).
-    #[arg(long, default_value = "order-free")]
-    mode: Mode,
-    /// Patterns as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
-    #[arg(long, value_name = "PATTERN", conflicts_with_all = ["mode", "classifier"])]
-    epl: Option<Epl>,
-    /// svc (linear support vectors) or knn (nearest neighbours).
-    #[arg(long, default_value = "svc")]
-    classifier: Classifier,
-    /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
-    #[arg(long)]
-    no_search: bool,
+    /// What clips are turned into.
+    pub pattern: Pattern,
+    /// Choose the settings by cross-validation over the training subjects, instead of taking the defaults (quicker).
+    pub search: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Epl {
+/// What clips are turned into, and by what they are told apart.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Pattern {
+    /// Soft assignments to a codebook.
+    Codebook {
+        /// Whether the order of frames counts.
+        mode: Mode,
+        /// What tells patterns apart.
+        classifier: Family,
+    },
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
     Thesis,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Classifier {
-    Knn,
-    Svc,
 }
 
 impl Method {
     /// What is tried and chosen from.
     pub fn experiment(&self) -> Experiment {
-        let experiment = match (self.epl, self.no_search) {
-            (Some(Epl::Thesis), _) => Experiment::thesis(),
-            (None, false) => Experiment::searched(self.mode),
-            (None, true) => {
-                Experiment::codebook(SpaceSettings { mode: self.mode, ..SpaceSettings::default() })
+        let experiment = match (self.pattern, self.search) {
+            (Pattern::Thesis, _) => Experiment::thesis(),
+            (Pattern::Codebook { mode, classifier }, true) => {
+                Experiment::searched(mode).with_classifier(classifier)
+            }
+            (Pattern::Codebook { mode, classifier }, false) => {
+                Experiment::codebook(SpaceSettings { mode, ..SpaceSettings::default() })
+                    .with_classifier(classifier)
             }
         };
-        let experiment = match (self.epl, self.classifier) {
-            (None, Classifier::Knn) => experiment.with_neighbours(),
-            _ => experiment,
-        };
-        if self.no_search { experiment.fixed() } else { experiment }
-    }
-
-    /// Says on a terminal what takes so long.
-    pub fn announce(&self) {
-        if !self.no_search && std::io::stderr().is_terminal() {
-            eprintln!(
-                "choosing settings by cross-validation over the subjects (--no-search takes the defaults) ..."
-            );
-        }
+        if self.search { experiment } else { experiment.fixed() }
     }
 
     /// Its name among figures.
     pub fn name(&self) -> &'static str {
-        match (self.epl, self.mode) {
-            (Some(Epl::Thesis), _) => "thesis",
-            (None, Mode::OrderFree) => "order-free",
-            (None, Mode::Ordered) => "ordered",
+        match self.pattern {
+            Pattern::Thesis => "thesis",
+            Pattern::Codebook { mode: Mode::OrderFree, .. } => "order-free",
+            Pattern::Codebook { mode: Mode::Ordered, .. } => "ordered",
         }
     }
 }

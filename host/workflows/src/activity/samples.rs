@@ -6,21 +6,23 @@
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
     fs,
-    io::IsTerminal,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicUsize, Ordering},
 };
 
-use anyhow::{Context, Result, bail, ensure};
 use farnear_activity::{
     embedding::descriptor::Scaling,
     mask::{Mask, centre::SIDE_PX},
     recognition::clip::{Clip, Track},
 };
+use farnear_files::masks;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use crate::masks;
+use crate::{
+    context::Context,
+    counter::Counter,
+    error::{About, Result, WorkflowError},
+};
 
 /// How all masks are scaled before they are described.
 pub const SCALING: Scaling = Scaling::KeepAspect;
@@ -47,8 +49,81 @@ fn first() -> u32 {
     1
 }
 
+/// Why samples cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SamplesError {
+    /// Nothing in it.
+    #[error("it has no [[sample]] (masks, subject, activity, view)")]
+    None,
+    /// A sample without a person or without an activity.
+    #[error("a sample has an empty subject or activity")]
+    Nameless,
+    /// A folder in which nobody is seen.
+    #[error("{}: all {count} masks are empty", folder.display())]
+    NobodySeen {
+        /// The folder.
+        folder: PathBuf,
+        /// Its masks.
+        count: usize,
+    },
+    /// Full frames beside cut-out silhouettes.
+    #[error(
+        "the masks of {} are full frames, those of {} cut out at 100x100; samples must be alike", full.display(), cut_out.display()
+    )]
+    Kinds {
+        /// A folder, or a file of samples, with full frames.
+        full: PathBuf,
+        /// One with cut-out silhouettes.
+        cut_out: PathBuf,
+    },
+    /// Two samples for one view of a clip.
+    #[error("clip `{clip}` of {subject} at {activity} has view {view} twice")]
+    Twice {
+        /// The clip's name.
+        clip: String,
+        /// Who.
+        subject: String,
+        /// What.
+        activity: String,
+        /// The view.
+        view: u32,
+    },
+    /// Clips with other views, where all views were to be fused.
+    #[error(
+        "clips differ in their views (from {least} to {most} of them): fused views must be the same in all clips"
+    )]
+    Views {
+        /// Fewest views of a clip.
+        least: usize,
+        /// Most.
+        most: usize,
+    },
+    /// Samples to test with other views than those to learn from.
+    #[error("{} and {} hold other views, which cannot be fused", test.display(), train.display())]
+    OtherViews {
+        /// Samples to test with.
+        test: PathBuf,
+        /// Samples to learn from.
+        train: PathBuf,
+    },
+    /// The same person in what is learned and what is tested.
+    #[error(
+        "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()
+    )]
+    SamePerson {
+        /// Who.
+        subject: String,
+        /// Samples to test with.
+        test: PathBuf,
+        /// Samples to learn from.
+        train: PathBuf,
+    },
+}
+
 /// What a file of samples holds.
 pub struct Samples {
+    /// The file.
+    pub path: PathBuf,
     /// Clips whose views are in the order of their numbers.
     pub clips: Vec<Clip>,
     /// Numbers of the views of every clip; `None` where clips differ in that.
@@ -73,48 +148,64 @@ impl Samples {
     ///
     /// # Errors
     /// Files, folders and masks that cannot be read or hold nothing, samples of which some are full frames and others are not.
-    pub fn read(path: &Path) -> Result<Self> {
-        let shown = path.display();
-        let text = fs::read_to_string(path).with_context(|| format!("cannot read {shown}"))?;
-        let file: File = toml::from_str(&text).with_context(|| format!("{shown}"))?;
-        ensure!(!file.samples.is_empty(), "{shown}: it has no [[sample]] (masks, subject, activity, view)");
+    pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
+        let file: File = toml::from_str(&text).about(|| path.display().to_string())?;
         let base = path.parent().unwrap_or(Path::new(""));
-        let folders: Vec<PathBuf> = file.samples.iter().map(|sample| base.join(&sample.masks)).collect();
-        let done = AtomicUsize::new(0);
-        let progress = std::io::stderr().is_terminal();
+        Self::described(file.samples, base, path, context).about(|| path.display().to_string())
+    }
+
+    fn described(samples: Vec<Sample>, base: &Path, path: &Path, context: &Context<'_>) -> Result<Self> {
+        if samples.is_empty() {
+            return Err(SamplesError::None.into());
+        }
+        let folders: Vec<PathBuf> = samples.iter().map(|sample| base.join(&sample.masks)).collect();
+        let counter = Counter::new(context, "samples read", folders.len());
         let described: Result<Vec<(Track, bool)>> = folders
             .par_iter()
             .map(|folder| {
+                counter.check("reading samples")?;
                 let described = described(folder);
-                let done = 1 + done.fetch_add(1, Ordering::Relaxed);
-                if progress {
-                    eprint!("\r{done} of {} samples read", folders.len());
-                }
+                counter.one();
                 described
             })
             .collect();
-        if progress {
-            eprintln!();
-        }
-        let described = described.with_context(|| format!("{shown}"))?;
+        let described = described?;
         let full_frames = described[0].1;
         if let Some(other) = described.iter().position(|(_, full)| *full != full_frames) {
-            let kind = |full| if full { "full frames" } else { "cut out at 100x100" };
-            bail!(
-                "{shown}: the masks of {} are {}, those of {} {}; samples must be alike",
-                folders[0].display(),
-                kind(full_frames),
-                folders[other].display(),
-                kind(!full_frames)
-            );
+            return Err(kinds(&folders[0], &folders[other], full_frames).into());
         }
         let frames = described.iter().map(|(track, _)| track.frames() + track.empty_frames).sum();
         let empty_frames = described.iter().map(|(track, _)| track.empty_frames).sum();
         let tracks = described.into_iter().map(|(track, _)| track);
-        let (clips, views) = grouped(file.samples.iter().zip(tracks)).with_context(|| format!("{shown}"))?;
+        let (clips, views) = grouped(samples.iter().zip(tracks))?;
         let count = views.as_ref().map_or(1, Vec::len);
-        let folders = first_folders(&file.samples, &folders, count);
-        Ok(Self { clips, views, frames, empty_frames, full_frames, folders })
+        let folders = first_folders(&samples, &folders, count);
+        Ok(Self { path: path.into(), clips, views, frames, empty_frames, full_frames, folders })
+    }
+
+    /// Whether these and others are both full frames, or both cut out.
+    ///
+    /// # Errors
+    /// [`SamplesError::Kinds`].
+    pub fn check_kind(&self, other: &Self) -> Result<(), SamplesError> {
+        if self.full_frames == other.full_frames {
+            return Ok(());
+        }
+        Err(kinds(&self.path, &other.path, self.full_frames))
+    }
+
+    /// Clips that all have the same views.
+    ///
+    /// # Errors
+    /// [`SamplesError::Views`], with the file.
+    pub fn fused(self) -> Result<Vec<Clip>> {
+        if self.views.is_some() {
+            return Ok(self.clips);
+        }
+        let counts = || self.clips.iter().map(|clip| clip.views.len());
+        let (least, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+        Err(SamplesError::Views { least, most }).about(|| self.path.display().to_string())
     }
 
     /// Every view of every clip as a clip of its own.
@@ -131,23 +222,35 @@ impl Samples {
     }
 }
 
+/// Of two places that differ in it, which holds full frames and which cut-out silhouettes.
+fn kinds(one: &Path, other: &Path, one_is_full: bool) -> SamplesError {
+    let (full, cut_out) = if one_is_full { (one, other) } else { (other, one) };
+    SamplesError::Kinds { full: full.into(), cut_out: cut_out.into() }
+}
+
 /// The track of a folder of masks, and whether they are full frames.
 fn described(folder: &Path) -> Result<(Track, bool)> {
     let read: Vec<Mask> = masks::read_all(folder)?.into_iter().map(|named| named.mask).collect();
     let full = are_full_frames(&read);
     let track = Track::from_masks(&read, SCALING, full);
-    ensure!(track.frames() > 0, "{}: all {} masks are empty", folder.display(), read.len());
+    if track.frames() == 0 {
+        return Err(SamplesError::NobodySeen { folder: folder.into(), count: read.len() }.into());
+    }
     Ok((track, full))
 }
 
 /// Clips in the order in which they first appear, and the views that all of them have.
-fn grouped<'a>(samples: impl Iterator<Item = (&'a Sample, Track)>) -> Result<(Vec<Clip>, Option<Vec<u32>>)> {
+fn grouped<'a>(
+    samples: impl Iterator<Item = (&'a Sample, Track)>,
+) -> Result<(Vec<Clip>, Option<Vec<u32>>), SamplesError> {
     let mut seen: HashMap<(&str, &str, u32), usize> = HashMap::new();
     let mut places: HashMap<(&str, &str, String), usize> = HashMap::new();
     let mut clips: Vec<(&Sample, BTreeMap<u32, Track>)> = Vec::new();
     for (sample, track) in samples {
         let (subject, activity) = (sample.subject.as_str(), sample.activity.as_str());
-        ensure!(!subject.is_empty() && !activity.is_empty(), "a sample has an empty subject or activity");
+        if subject.is_empty() || activity.is_empty() {
+            return Err(SamplesError::Nameless);
+        }
         let name = match &sample.clip {
             Some(name) => name.clone(),
             None => {
@@ -160,12 +263,14 @@ fn grouped<'a>(samples: impl Iterator<Item = (&'a Sample, Track)>) -> Result<(Ve
             clips.push((sample, BTreeMap::new()));
             clips.len() - 1
         });
-        ensure!(
-            clips[place].1.insert(sample.view, track).is_none(),
-            "clip `{}` of {subject} at {activity} has view {} twice",
-            sample.clip.as_deref().unwrap_or_default(),
-            sample.view
-        );
+        if clips[place].1.insert(sample.view, track).is_some() {
+            return Err(SamplesError::Twice {
+                clip: sample.clip.clone().unwrap_or_default(),
+                subject: subject.into(),
+                activity: activity.into(),
+                view: sample.view,
+            });
+        }
     }
     let kinds: BTreeSet<Vec<u32>> = clips.iter().map(|(_, views)| views.keys().copied().collect()).collect();
     let common = (kinds.len() == 1).then(|| kinds.into_iter().next().unwrap_or_default());

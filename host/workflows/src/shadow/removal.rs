@@ -1,10 +1,12 @@
-//! `farnear shadow remove`: takes a person's shadow off masks by where the sun stands and how the camera does.
+//! Taking a person's shadow off masks by where the sun stands and how the camera does.
 
-use std::{fs, path::PathBuf, time::Instant};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
-use anyhow::{Context, Result, bail};
 use chrono::TimeDelta;
-use clap::Args;
 use farnear_activity::{
     mask::{
         Mask,
@@ -19,69 +21,64 @@ use farnear_activity::{
     },
     sun::{Model, SunPosition, position},
 };
-use farnear_capture::aside::Aside;
+use farnear_files::{masks, staging::Staging};
 use serde::Serialize;
 
-use crate::{commands::sun::Moment, masks, report};
+use crate::{
+    context::Context,
+    counter::Counter,
+    error::{About, Result, WorkflowError},
+    figures::rounded,
+    parameters::within,
+    sun::Moment,
+};
+
+/// What the file is called that says how a camera stands.
+pub const CAMERA_FILE: &str = "the camera file";
 
 /// Above this share of a silhouette removed the cut is doubted, 0 to 1.
 const MUCH: f64 = 0.6;
 
-/// Takes a person's shadow off masks: the sun's place and the camera's tell where the shadow falls.
-///
-/// The camera file says how the camera stands:
-///
-///     [camera]
-///     height_m = 0.8              # lens above the ground
-///     azimuth_deg = 140.0         # viewing direction, anticlockwise from north
-///     pitch_deg = 0.0             # downwards positive
-///     focal_length_mm = 4.0
-///     pixel_um = 6.0
-///     width_px = 640
-///     height_px = 480
-///
-/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17) and `standard_deviations`, what differs from the usual. Frames whose cut is doubtful (nobody or several people in it, the shadow behind the person or cut off by the picture's
-/// lower edge, much removed, an angle too unsure) are flagged in `shadow.toml` beside the masks.
-#[derive(Args)]
-#[command(
-    verbatim_doc_comment,
-    after_help = "Example: farnear shadow remove masks/ --camera camera.toml --time 2014-06-23T11:30:00Z --lat 52.38 \
-                  --lon -1.56 --out clean/"
-)]
-pub struct Arguments {
+/// What shadow is taken off, and where to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RemovalSettings {
     /// Masks of a person with their shadow: a folder of pictures or one picture, full frames.
-    masks: PathBuf,
+    pub masks: PathBuf,
     /// How the camera stands, TOML.
-    #[arg(long, value_name = "FILE")]
-    camera: PathBuf,
-    #[command(flatten)]
-    moment: Moment,
-    /// Masks per second: with it `--time` is the first mask's and the sun moves on.
-    #[arg(long, value_name = "HZ", value_parser = rate)]
-    rate_hz: Option<f64>,
-    /// hybrid, or thesis (as printed in Li 2014).
-    #[arg(long, default_value = "hybrid")]
-    method: Method,
-    /// Folder for the masks without shadow; must not exist or be empty.
-    #[arg(long)]
-    out: PathBuf,
-    /// Print figures as JSON.
-    #[arg(long)]
-    json: bool,
+    pub camera: PathBuf,
+    /// Where the camera stands, and the first mask's time.
+    pub moment: Moment,
+    /// Masks per second, 0.001 to a million; without it all have one time.
+    pub rate_hz: Option<f64>,
+    /// How shadow is cut off.
+    pub method: Method,
+    /// The new folder for the masks without shadow.
+    pub out: PathBuf,
 }
 
-#[derive(Serialize)]
-struct Figures {
-    frames: usize,
-    cut: usize,
-    flagged: usize,
-    empty: usize,
-    sun_elevation_deg: f64,
-    sun_azimuth_deg: f64,
-    sun_in_view: bool,
-    removed_percent: Option<f64>,
-    cut_ms_per_frame: f64,
-    seconds: f64,
+/// What was cut.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RemovalFigures {
+    /// Masks.
+    pub frames: usize,
+    /// Masks that were cut.
+    pub cut: usize,
+    /// Masks with something doubtful.
+    pub flagged: usize,
+    /// Masks without a subject.
+    pub empty: usize,
+    /// The sun above the horizon at the first mask.
+    pub sun_elevation_deg: f64,
+    /// The sun clockwise from north.
+    pub sun_azimuth_deg: f64,
+    /// Whether the camera looks into the sun.
+    pub sun_in_view: bool,
+    /// Mean share of the silhouettes that were cut off, of those that were cut.
+    pub removed_percent: Option<f64>,
+    /// Time for one cut.
+    pub cut_ms_per_frame: f64,
+    /// Time for all.
+    pub seconds: f64,
 }
 
 /// `shadow.toml`.
@@ -119,67 +116,70 @@ struct Cut {
     removed_percent: f64,
 }
 
-/// Runs the command.
+/// Cuts the shadow off all masks and writes them with `shadow.toml`, which flags the doubtful ones.
 ///
 /// # Errors
-/// Missing or wrong camera files and masks, a sun too low for shadows, masks that cannot be written; then `--out` is left as it was.
-pub fn run(arguments: &Arguments) -> Result<()> {
+/// Missing or wrong camera files and masks, a sun too low for shadows, masks that cannot be written; then the new folder is
+/// not there.
+pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
-    let shown = arguments.camera.display();
-    let text = fs::read_to_string(&arguments.camera)
-        .with_context(|| format!("cannot read the camera file {shown} (see farnear shadow remove --help)"))?;
-    let camera = CameraFile::parse(&text).with_context(|| format!("{shown}"))?;
-    let sun = position(arguments.moment.time, arguments.moment.place(), Model::Psa)?;
+    if let Some(rate_hz) = settings.rate_hz {
+        within("masks per second", rate_hz, &(1e-3..=1e6), "")?;
+    }
+    let camera = camera(&settings.camera)?;
+    let sun = position(settings.moment.time, settings.moment.place, Model::Psa)?;
     // Before any mask is read: without a usable sun there is nothing to do.
     on_ground(sun, camera.subject.height_m, &camera.camera)?;
     let in_view = camera.camera.sees_sun(sun);
     if in_view {
-        eprintln!(
+        context.say(&format!(
             "the camera looks into the sun (elevation {:.1} deg): expect glare in the masks and shadows that come straight at it",
             sun.elevation_deg
-        );
+        ));
     }
-    let all = masks::read_all(&arguments.masks)?;
-    let out = Aside::new_folder(&arguments.out)?;
-    let mut work = Work { arguments, camera: &camera, chooser: None, cut_seconds: 0.0 };
-    let mut index = Index {
-        sun: Sun {
-            elevation_deg: report::rounded(sun.elevation_deg, 4),
-            azimuth_deg: report::rounded(sun.azimuth_deg, 4),
-            in_view,
-        },
-        frame: Vec::with_capacity(all.len()),
-    };
+    let all = masks::read_all(&settings.masks)?;
+    let out = Staging::new_folder(&settings.out)?;
+    let mut work = Work { settings, camera: &camera, chooser: None, cut_seconds: 0.0 };
+    let (elevation_deg, azimuth_deg) = (rounded(sun.elevation_deg, 4), rounded(sun.azimuth_deg, 4));
+    let sun = Sun { elevation_deg, azimuth_deg, in_view };
+    let mut index = Index { sun, frame: Vec::with_capacity(all.len()) };
+    let counter = Counter::new(context, "masks", all.len());
     for (number, named) in all.iter().enumerate() {
+        counter.check("cutting shadow off")?;
         let file = format!("{}.png", named.name);
-        let (mask, entry) = work.frame(number, &named.mask, file).with_context(|| named.name.clone())?;
+        let (mask, entry) = work.frame(number, &named.mask, file).about(|| named.name.clone())?;
         out.write(&entry.file, &masks::png(&mask)?)?;
         index.frame.push(entry);
+        counter.one();
     }
     out.write("shadow.toml", toml::to_string(&index)?.as_bytes())?;
     out.finish()?;
-    eprintln!("wrote {}", arguments.out.display());
+    context.say(&format!("wrote {}", settings.out.display()));
     let removed: Vec<f64> =
         index.frame.iter().filter_map(|entry| Some(entry.cut.as_ref()?.removed_percent)).collect();
     let mean = removed.iter().sum::<f64>() / removed.len().max(1) as f64;
-    let figures = Figures {
+    Ok(RemovalFigures {
         frames: all.len(),
         cut: removed.len(),
         flagged: index.frame.iter().filter(|entry| !entry.flags.is_empty()).count(),
         empty: all.len() - removed.len(),
-        sun_elevation_deg: index.sun.elevation_deg,
-        sun_azimuth_deg: index.sun.azimuth_deg,
+        sun_elevation_deg: elevation_deg,
+        sun_azimuth_deg: azimuth_deg,
         sun_in_view: in_view,
-        removed_percent: (!removed.is_empty()).then(|| report::rounded(mean, 2)),
-        cut_ms_per_frame: report::rounded(1e3 * work.cut_seconds / removed.len().max(1) as f64, 3),
-        seconds: report::rounded(start.elapsed().as_secs_f64(), 3),
-    };
-    report::print(&figures, arguments.json)
+        removed_percent: (!removed.is_empty()).then(|| rounded(mean, 2)),
+        cut_ms_per_frame: rounded(1e3 * work.cut_seconds / removed.len().max(1) as f64, 3),
+        seconds: rounded(start.elapsed().as_secs_f64(), 3),
+    })
+}
+
+fn camera(path: &Path) -> Result<CameraFile> {
+    let text = fs::read_to_string(path).map_err(WorkflowError::read(CAMERA_FILE, path))?;
+    CameraFile::parse(&text).about(|| path.display().to_string())
 }
 
 /// What goes on from frame to frame.
 struct Work<'a> {
-    arguments: &'a Arguments,
+    settings: &'a RemovalSettings,
     camera: &'a CameraFile,
     chooser: Option<SubjectChooser>,
     cut_seconds: f64,
@@ -195,9 +195,9 @@ impl Work<'_> {
         let several = chosen.flags.iter().any(|flag| matches!(flag, Flag::SeveralPeople { .. }));
         // With several people in it, what is cut for one would be cut off the others.
         let mask = if several { &chosen.mask } else { mask };
-        let passed_s = self.arguments.rate_hz.map_or(0.0, |rate| number as f64 / rate);
-        let time = self.arguments.moment.time + TimeDelta::microseconds((1e6 * passed_s) as i64);
-        let place = self.arguments.moment.place();
+        let passed_s = self.settings.rate_hz.map_or(0.0, |rate| number as f64 / rate);
+        let Moment { place, time } = self.settings.moment;
+        let time = time + TimeDelta::microseconds((1e6 * passed_s) as i64);
         let sun = position(time, place, Model::Psa)?;
         let start = Instant::now();
         let subject = match subject_of(mask, self.camera) {
@@ -208,27 +208,23 @@ impl Work<'_> {
                 }
                 return Ok((mask.clone(), Entry { file, flags, cut: None }));
             }
-            Err(error) => bail!(error),
+            Err(error) => return Err(error.into()),
         };
         let sure = propagate(self.camera, time, place, Model::Psa, subject)?;
-        let (clean, cut) = remove(mask, self.camera, sun, sure.beta_rad, self.arguments.method)?;
+        let (clean, cut) = remove(mask, self.camera, sun, sure.beta_rad, self.settings.method)?;
         self.cut_seconds += start.elapsed().as_secs_f64();
         flags.extend(doubts(&cut, sun).into_iter().map(str::to_owned));
         if !sure.first_order_holds {
             flags.push("angle-unsure".into());
         }
-        let entry = Entry {
-            file,
-            flags,
-            cut: Some(Cut {
-                shadow_direction_deg: report::rounded(cut.shadow.eta_rad.to_degrees(), 2),
-                beta_deg: report::rounded(cut.beta_rad.to_degrees(), 2),
-                beta_sd_deg: sure.first_order_holds.then(|| report::rounded(sure.beta_rad.to_degrees(), 3)),
-                distance_m: report::rounded(cut.subject.distance_m, 2),
-                removed_percent: report::rounded(100.0 * cut.removed_fraction, 2),
-            }),
-        };
-        Ok((clean, entry))
+        let cut = Some(Cut {
+            shadow_direction_deg: rounded(cut.shadow.eta_rad.to_degrees(), 2),
+            beta_deg: rounded(cut.beta_rad.to_degrees(), 2),
+            beta_sd_deg: sure.first_order_holds.then(|| rounded(sure.beta_rad.to_degrees(), 3)),
+            distance_m: rounded(cut.subject.distance_m, 2),
+            removed_percent: rounded(100.0 * cut.removed_fraction, 2),
+        });
+        Ok((clean, Entry { file, flags, cut }))
     }
 }
 
@@ -243,11 +239,4 @@ fn doubts(cut: &CutReport, sun: SunPosition) -> Vec<&'static str> {
         (sun.elevation_deg < LOW_DEG, "low-sun"),
     ];
     found.into_iter().filter_map(|(holds, name)| holds.then_some(name)).collect()
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if (1e-3..=1e6).contains(&value) => Ok(value),
-        _ => Err("expected masks per second, above 0.001".into()),
-    }
 }

@@ -1,86 +1,94 @@
-//! `farnear silhouettes video`: masks of the person who moves in a video, one PNG per frame.
+//! Masks of the person who moves in a video, one picture per frame.
+//!
+//! A background model learns what stands still; what moves is cleaned and the person chosen. Memory does not grow with the
+//! video's length but for the index.
 
-use std::{io::IsTerminal, path::PathBuf, time::Instant};
+use std::{path::PathBuf, time::Instant};
 
-use anyhow::{Result, bail, ensure};
-use clap::Args;
 use farnear_activity::{
     background::Label,
     mask::{
         Mask,
-        centre::{SIDE_PX, centred},
         extractor::{Extracted, Extractor, ExtractorSettings},
         subject::Flag,
     },
     shadow_detectors::{Detector, Images, Method},
 };
-use farnear_capture::aside::Aside;
+use farnear_files::{
+    masks,
+    staging::Staging,
+    video::{Pixels, Video, VideoError, VideoFrame},
+};
 use ndarray::{Array3, Axis};
 use serde::Serialize;
 
-use crate::{
-    masks, report,
-    video::{Pixels, Video, VideoFrame},
-};
+use super::{SilhouettesError, cut_out, frame_of};
+use crate::{context::Context, error::Result, figures::rounded};
 
-/// Masks of the person who moves in a video, one PNG per frame (255 = person).
-///
-/// A background model learns what stands still; what moves is cleaned and the person chosen. Frames with nobody, with
-/// several people, of a changed scene or from before the background is known are flagged in `silhouettes.toml` beside
-/// the masks; where nobody can be told the mask is empty.
-#[derive(Args)]
-#[command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")]
-pub struct Arguments {
-    /// A folder of pictures, a .y4m file, or any video if ffmpeg is installed.
-    video: PathBuf,
-    /// Folder for the masks; must not exist or be empty.
-    #[arg(long)]
-    out: PathBuf,
-    /// Watch the whole video once to learn the background before the masks are made; no frame is lost to learning.
-    #[arg(long)]
-    learn_first: bool,
+/// From one sign of progress to the next, frames.
+const PROGRESS_FRAMES: usize = 50;
+/// What is under way where the work is cancelled.
+const DURING: &str = "making masks";
+
+/// What masks are made of, how, and where to.
+#[derive(Clone, Debug)]
+pub struct VideoSettings {
+    /// A folder of pictures, a Y4M file, or what an installed ffmpeg reads.
+    pub video: PathBuf,
+    /// The new folder of masks.
+    pub out: PathBuf,
+    /// Watch the whole video once to learn the background before masks are made.
+    pub learn_first: bool,
     /// Frames at the beginning that only teach the background.
-    #[arg(long, default_value_t = 10)]
-    learning_frames: u32,
+    pub learning_frames: u32,
     /// Frames that the background model remembers.
-    #[arg(long, default_value_t = 500)]
-    history_frames: u32,
-    /// Count what is merely darker than the background as the person, not as shadow.
-    #[arg(long)]
-    keep_shadow: bool,
-    /// Take shadow off with one of the image-based detectors instead of the background model's own test (colour only):
-    /// chromaticity, physical, geometry, small-region-texture or large-region-texture.
-    #[arg(long, value_name = "METHOD", conflicts_with = "keep_shadow")]
-    shadow_detector: Option<Method>,
-    /// Write masks of 100x100 pixels with the person centred, instead of full frames.
-    #[arg(long)]
-    centred: bool,
-    /// Also write the background model's own labels here, before cleaning: 0 background, 127 shadow, 255 foreground.
-    #[arg(long, value_name = "DIR")]
-    labels: Option<PathBuf>,
+    pub history_frames: u32,
+    /// What becomes of the person's shadow.
+    pub shadow: ShadowTreatment,
+    /// Masks of 100x100 pixels with the person centred, instead of full frames.
+    pub centred: bool,
+    /// A new folder for the background model's labels before cleaning: 0 background, 127 shadow, 255 foreground.
+    pub labels: Option<PathBuf>,
     /// Average colour to grey first.
-    #[arg(long)]
-    grey: bool,
-    /// Print figures as JSON.
-    #[arg(long)]
-    json: bool,
+    pub grey: bool,
 }
 
-/// The figures.
-#[derive(Debug, Default, Serialize)]
-struct Figures {
-    frames: usize,
-    silhouettes: usize,
-    learning: usize,
-    empty: usize,
-    several_people: usize,
-    cut_by_edge: usize,
-    scene_changed: usize,
-    seconds: f64,
-    frames_per_second: f64,
+/// What becomes of a person's shadow.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum ShadowTreatment {
+    /// The background model tells it by colour; in grey it stays.
+    #[default]
+    ByModel,
+    /// What is merely darker than the background counts as the person.
+    Keep,
+    /// An image-based detector takes it off; colour only.
+    Detector(Method),
 }
 
-impl Figures {
+/// How many frames were what.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+pub struct VideoFigures {
+    /// Frames of the video.
+    pub frames: usize,
+    /// Frames with a usable silhouette.
+    pub silhouettes: usize,
+    /// Frames that only taught the background.
+    pub learning: usize,
+    /// Frames with nobody.
+    pub empty: usize,
+    /// Frames with several people.
+    pub several_people: usize,
+    /// Frames whose person is cut by the picture's edge.
+    pub cut_by_edge: usize,
+    /// Frames in which most of the picture changed.
+    pub scene_changed: usize,
+    /// Time for all.
+    pub seconds: f64,
+    /// Frames over that time.
+    pub frames_per_second: f64,
+}
+
+impl VideoFigures {
     fn count(&mut self, flags: &[Flag]) {
         self.frames += 1;
         self.silhouettes += usize::from(!flags.iter().any(|flag| flag.spoils()));
@@ -111,67 +119,76 @@ struct Entry {
     top_left_bottom_right: Option<[usize; 4]>,
 }
 
-/// Runs the command.
+/// Makes a mask of every frame (255 = person) and `silhouettes.toml`, which flags what is doubtful.
 ///
 /// # Errors
-/// Where the video cannot be read, its frames differ, or the masks cannot be written; then `--out` is left as it was.
-pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = Aside::new_folder(&arguments.out)?;
-    let labels = arguments.labels.as_deref().map(Aside::new_folder).transpose()?;
-    let mut video = Video::open(&arguments.video)?;
-    let Some(first) = video.next() else { bail!("{}: no frame in this video", arguments.video.display()) };
-    let first = prepared(first?, arguments.grey);
-    let mut work = Work::new(&first, arguments)?;
+/// Where the video cannot be read, its frames differ, or the masks cannot be written; then the new folder is not there.
+pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoFigures> {
+    let out = Staging::new_folder(&settings.out)?;
+    let labels = settings.labels.as_deref().map(Staging::new_folder).transpose()?;
+    let mut video = Video::open(&settings.video)?;
+    let none = || VideoError::NoFrames { path: settings.video.clone() };
+    let first = prepared(video.next().ok_or_else(none)??, settings.grey);
+    let mut work = Work::new(&first, settings)?;
     let start = Instant::now();
-    if arguments.learn_first {
-        for frame in Video::open(&arguments.video)? {
-            work.extractor.learn(prepared(frame?, arguments.grey).pixels.frame())?;
+    if settings.learn_first {
+        for frame in Video::open(&settings.video)? {
+            context.cancel.check("learning the background")?;
+            work.extractor.learn(frame_of(&prepared(frame?, settings.grey).pixels))?;
         }
     }
-    let mut figures = Figures::default();
+    let mut figures = VideoFigures::default();
     let mut index = Index::default();
-    let progress = std::io::stderr().is_terminal() && !arguments.json;
     for frame in std::iter::once(Ok(first)).chain(video) {
-        let frame = prepared(frame?, arguments.grey);
+        context.cancel.check(DURING)?;
+        let frame = prepared(frame?, settings.grey);
         let (found, mask) = work.mask(&frame)?;
         figures.count(&found.subject.flags);
-        let file = format!("{}.png", frame.name);
-        let picture = if arguments.centred {
-            centred(mask.view(), SIDE_PX).unwrap_or_else(|| Mask::from_elem((SIDE_PX, SIDE_PX), false))
-        } else {
-            mask
-        };
-        out.write(&file, &masks::png(&picture)?)?;
-        if let Some(labels) = &labels {
-            let levels = masks::encoded(&found.labels, |label| match label {
-                Label::Background => 0,
-                Label::Shadow => 127,
-                Label::Foreground => 255,
-            })?;
-            labels.write(&file, &levels)?;
-        }
-        index.frame.push(Entry {
-            file,
-            flags: found.subject.flags.iter().map(Flag::to_string).collect(),
-            top_left_bottom_right: found.subject.bounds.map(|b| [b.top, b.left, b.bottom, b.right]),
-        });
-        if progress && figures.frames % 50 == 0 {
-            eprint!("\r{} frames", figures.frames);
+        index.frame.push(keep(&frame.name, &found, &mask, settings.centred, &out, labels.as_ref())?);
+        if figures.frames % PROGRESS_FRAMES == 0 {
+            context.progress.advance("frames", figures.frames, None);
         }
     }
-    if progress && figures.frames >= 50 {
-        eprintln!();
+    if figures.frames >= PROGRESS_FRAMES {
+        context.progress.advance("frames", figures.frames, Some(figures.frames));
     }
     let seconds = start.elapsed().as_secs_f64();
-    figures.seconds = report::rounded(seconds, 3);
-    figures.frames_per_second = report::rounded(figures.frames as f64 / seconds, 1);
+    figures.seconds = rounded(seconds, 3);
+    figures.frames_per_second = rounded(figures.frames as f64 / seconds, 1);
     out.write("silhouettes.toml", toml::to_string(&index)?.as_bytes())?;
     if let Some(labels) = labels {
         labels.finish()?;
     }
     out.finish()?;
-    eprintln!("wrote {}", arguments.out.display());
-    report::print(&figures, arguments.json)
+    context.say(&format!("wrote {}", settings.out.display()));
+    Ok(figures)
+}
+
+/// Writes a frame's mask and, where asked for, the labels it was made of.
+fn keep(
+    name: &str,
+    found: &Extracted,
+    mask: &Mask,
+    centred: bool,
+    out: &Staging,
+    labels: Option<&Staging>,
+) -> Result<Entry> {
+    let file = format!("{name}.png");
+    let png = if centred { masks::png(&cut_out(mask))? } else { masks::png(mask)? };
+    out.write(&file, &png)?;
+    if let Some(labels) = labels {
+        let levels = masks::encoded(&found.labels, |label| match label {
+            Label::Background => 0,
+            Label::Shadow => 127,
+            Label::Foreground => 255,
+        })?;
+        labels.write(&file, &levels)?;
+    }
+    Ok(Entry {
+        file,
+        flags: found.subject.flags.iter().map(Flag::to_string).collect(),
+        top_left_bottom_right: found.subject.bounds.map(|b| [b.top, b.left, b.bottom, b.right]),
+    })
 }
 
 /// Grey where asked for: the mean of the three channels.
@@ -195,30 +212,27 @@ struct Work {
 }
 
 impl Work {
-    fn new(first: &VideoFrame, arguments: &Arguments) -> Result<Self> {
-        let frame = first.pixels.frame();
+    fn new(first: &VideoFrame, asked: &VideoSettings) -> Result<Self> {
+        let frame = frame_of(&first.pixels);
         let mut settings = ExtractorSettings::for_frame(frame);
-        settings.learning_frames = arguments.learning_frames;
-        settings.background.history_frames = arguments.history_frames;
-        if arguments.keep_shadow || arguments.shadow_detector.is_some() {
+        settings.learning_frames = asked.learning_frames;
+        settings.background.history_frames = asked.history_frames;
+        if asked.shadow != ShadowTreatment::ByModel {
             settings.background.shadow = None;
         }
-        if let Some(method) = arguments.shadow_detector {
-            ensure!(
-                matches!(first.pixels, Pixels::Rgb(_)),
-                "--shadow-detector {} compares colours, but the video is grey",
-                method.name()
-            );
-        }
-        Ok(Self {
-            extractor: Extractor::like(frame, settings)?,
-            detector: arguments.shadow_detector.map(Detector::new),
-        })
+        let detector = match (asked.shadow, &first.pixels) {
+            (ShadowTreatment::Detector(method), Pixels::Grey(_)) => {
+                return Err(SilhouettesError::NeedsColour { method }.into());
+            }
+            (ShadowTreatment::Detector(method), Pixels::Rgb(_)) => Some(Detector::new(method)),
+            _ => None,
+        };
+        Ok(Self { extractor: Extractor::like(frame, settings)?, detector })
     }
 
     /// The frame's extraction and the mask to write.
     fn mask(&mut self, frame: &VideoFrame) -> Result<(Extracted, Mask)> {
-        let found = self.extractor.extract(frame.pixels.frame())?;
+        let found = self.extractor.extract(frame_of(&frame.pixels))?;
         let mut mask = found.subject.mask.clone();
         if let (Some(detector), Pixels::Rgb(pixels)) = (&mut self.detector, &frame.pixels) {
             let background: Array3<u8> = self.extractor.background().background();
