@@ -20,6 +20,15 @@ pub(crate) fn within<T: PartialOrd + Display>(
     Err(WorkflowError::parameter(name, value, expected))
 }
 
+/// # Errors
+/// [`WorkflowError::Parameter`] for a value below the least; `unit` is what stands after the number.
+pub(crate) fn at_least(name: &'static str, value: usize, least: usize, unit: &str) -> Result<()> {
+    match value >= least {
+        true => Ok(()),
+        false => Err(WorkflowError::parameter(name, value, format!("expected {least} {unit} or more"))),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -34,5 +43,7 @@ mod tests {
         }
         let error = within("views", 0, &(1..=72), "").expect_err("outside");
         assert_eq!(error.to_string(), "views 0: expected 1 to 72");
+        let error = at_least("window", 4, 5, "frames").expect_err("too few");
+        assert_eq!(error.to_string(), "window 4: expected 5 frames or more");
     }
 }

@@ -21,7 +21,7 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
-    parameters::within,
+    parameters::at_least,
 };
 
 /// A model and the file it comes from.
@@ -155,7 +155,7 @@ impl<'m> Recognition<'m> {
             return Err(ViewsError { model: path.clone(), expected, found }.into());
         }
         if let Some(window) = settings.window {
-            within("window", window, &(1..=usize::MAX), "frames")?;
+            at_least("window", window, 1, "frames")?;
         }
         let views = settings.views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
         let window = settings.window.unwrap_or(model.typical_frames).max(1);

@@ -19,7 +19,7 @@ use crate::{
     context::Context,
     error::{About, Result},
     figures::rounded,
-    parameters::within,
+    parameters::at_least,
 };
 
 /// Fewest frames of a window that shows something.
@@ -79,7 +79,7 @@ pub struct TrainingFigures {
 /// Samples that cannot be read or used, a model that cannot be written.
 pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<TrainingFigures> {
     if let Some(window) = settings.window {
-        within("window", window, &(WINDOW_MIN..=usize::MAX), "frames")?;
+        at_least("window", window, WINDOW_MIN, "frames")?;
     }
     let start = Instant::now();
     let samples = Samples::read(&settings.samples, context)?;

@@ -33,7 +33,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
-    parameters::within,
+    parameters::{at_least, within},
 };
 
 /// What is drawn, how, and where to.
@@ -76,7 +76,8 @@ impl MarkersSettings {
         if let Some(close_mm) = self.close_mm {
             within("closed gap", close_mm, &(0.0..=1000.0), "mm")?;
         }
-        within("step between frames", self.every, &(1..=usize::MAX), "")
+        at_least("kept silhouettes", self.keep.unwrap_or(1), 1, "pictures")?;
+        at_least("step between frames", self.every, 1, "frames")
     }
 
     fn views(&self) -> Vec<View> {

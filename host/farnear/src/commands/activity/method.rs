@@ -1,0 +1,46 @@
+//! How activities are told apart: the flags that training and evaluation share.
+
+use std::io::IsTerminal;
+
+use clap::{Args, ValueEnum};
+use farnear_activity::recognition::{classifier::Family, frames::Mode};
+use farnear_workflows::activity::method::{Method, Pattern};
+
+/// The method.
+#[derive(Args)]
+pub struct MethodArguments {
+    /// Whether the order of frames counts: order-free (the thesis' promise) or ordered (sitting down is not standing up).
+    #[arg(long, default_value = "order-free")]
+    mode: Mode,
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
+    #[arg(long, value_name = "PATTERN", conflicts_with_all = ["mode", "classifier"])]
+    epl: Option<Epl>,
+    /// svc (linear support vectors) or knn (nearest neighbours).
+    #[arg(long, default_value = "svc")]
+    classifier: Family,
+    /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
+    #[arg(long)]
+    no_search: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Epl {
+    Thesis,
+}
+
+impl MethodArguments {
+    /// As a workflow takes it. Says on a terminal what will take long.
+    pub fn method(&self) -> Method {
+        let search = !self.no_search;
+        if search && std::io::stderr().is_terminal() {
+            eprintln!(
+                "settings are chosen by cross-validation over the subjects (--no-search takes the defaults) ..."
+            );
+        }
+        let pattern = match self.epl {
+            Some(Epl::Thesis) => Pattern::Thesis,
+            None => Pattern::Codebook { mode: self.mode, classifier: self.classifier },
+        };
+        Method { pattern, search }
+    }
+}

@@ -1,0 +1,77 @@
+//! `farnear activity recognise`: a running answer over masks or video, then windows and the whole.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use farnear_workflows::activity::{
+    recognition::{Model, Recognition, RecognitionSettings},
+    views::{View, ViewKind},
+};
+
+use crate::{report, terminal};
+
+/// Recognises what a person does, frame by frame.
+///
+/// For every frame one JSON line: the answer for the frames so far (at most `--window` of them), its confidence from 0 to 1, and its
+/// strangeness, the distance from all training data over what is known (above 1 the activity is null: unknown). The last line
+/// answers for the whole and, window by window, for a recording that nobody cut. With `--json` only that object is printed.
+#[derive(Args)]
+#[command(after_help = "Example: farnear activity recognise masks/ --model model.fnm\n\
+                  \x20        farnear activity recognise walk.y4m --model model.fnm --window 50")]
+pub struct Arguments {
+    /// Folders of masks or videos (what `farnear silhouettes video` reads), one per view of the model, in its order.
+    #[arg(required = true, value_name = "MASKS|VIDEO")]
+    views: Vec<PathBuf>,
+    /// The model.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// Frames of the running answer and of windows over a long recording [default: as many as a training clip had].
+    #[arg(long, value_name = "FRAMES")]
+    window: Option<usize>,
+    /// What the folders hold; by default pictures of black and white alone are masks, others video.
+    #[arg(long = "as", value_name = "KIND")]
+    kind: Option<Kind>,
+    /// Print the last object only.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Kind {
+    Masks,
+    Video,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Models and frames that cannot be read or do not belong together.
+pub fn run(arguments: Arguments) -> Result<()> {
+    let model = Model::read(&arguments.model)?;
+    let views = arguments.views.into_iter().map(|path| Ok(View { kind: kind(&path, arguments.kind)?, path }));
+    let settings = RecognitionSettings { views: views.collect::<Result<_>>()?, window: arguments.window };
+    let context = terminal::context()?;
+    let mut work = Recognition::begin(&model, &settings)?;
+    while let Some(answer) = work.next(&context)? {
+        if !arguments.json {
+            report::print(&answer, true)?;
+        }
+    }
+    report::print(&work.finish()?, true)
+}
+
+/// What a view is; a guess is said.
+fn kind(path: &Path, named: Option<Kind>) -> Result<ViewKind> {
+    let kind = match named {
+        Some(Kind::Masks) => return Ok(ViewKind::Masks),
+        Some(Kind::Video) => return Ok(ViewKind::Video),
+        None => ViewKind::guess(path)?,
+    };
+    let (is, other) = match kind {
+        ViewKind::Masks => ("masks", "video"),
+        ViewKind::Video => ("video", "masks"),
+    };
+    eprintln!("{}: read as {is} (--as {other} otherwise)", path.display());
+    Ok(kind)
+}
