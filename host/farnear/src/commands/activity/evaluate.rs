@@ -6,14 +6,14 @@ use anyhow::{Context, Result};
 use clap::Args;
 use farnear_activity::{
     evaluation::{
-        choice::{Views, names},
         confusion::Confusion,
-        experiment::Experiment,
         leave_one_out::{Choice, EvaluationError, train_on_others},
     },
     mask::Mask,
     recognition::{
+        choice::{Views, names},
         clip::{Clip, Track},
+        experiment::Experiment,
         model::Recogniser,
     },
 };

@@ -3,9 +3,8 @@
 use std::io::IsTerminal;
 
 use clap::{Args, ValueEnum};
-use farnear_activity::{
-    evaluation::experiment::Experiment,
-    recognition::{frames::Mode, space::SpaceSettings},
+use farnear_activity::recognition::{
+    classifier::Family, experiment::Experiment, frames::Mode, space::SpaceSettings,
 };
 
 /// The method.
@@ -14,12 +13,12 @@ pub struct Method {
     /// Whether the order of frames counts: order-free (the thesis' promise) or ordered (sitting down is not standing up).
     #[arg(long, default_value = "order-free")]
     mode: Mode,
-    /// Patterns as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
     #[arg(long, value_name = "PATTERN", conflicts_with_all = ["mode", "classifier"])]
     epl: Option<Epl>,
     /// svc (linear support vectors) or knn (nearest neighbours).
     #[arg(long, default_value = "svc")]
-    classifier: Classifier,
+    classifier: Family,
     /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
     #[arg(long)]
     no_search: bool,
@@ -28,12 +27,6 @@ pub struct Method {
 #[derive(Clone, Copy, ValueEnum)]
 enum Epl {
     Thesis,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Classifier {
-    Knn,
-    Svc,
 }
 
 impl Method {
@@ -46,9 +39,10 @@ impl Method {
                 Experiment::codebook(SpaceSettings { mode: self.mode, ..SpaceSettings::default() })
             }
         };
-        let experiment = match (self.epl, self.classifier) {
-            (None, Classifier::Knn) => experiment.with_neighbours(),
-            _ => experiment,
+        // The thesis' pattern keeps the thesis' classifier.
+        let experiment = match self.epl {
+            None => experiment.with_classifier(self.classifier),
+            Some(Epl::Thesis) => experiment,
         };
         if self.no_search { experiment.fixed() } else { experiment }
     }

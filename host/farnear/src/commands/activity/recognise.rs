@@ -163,7 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         confidence: share(answer.confidence),
         strangeness: strangeness(&answer),
         shares: answer
-            .shares
+            .probabilities
             .into_iter()
             .map(|(activity, value)| Share { activity, share: share(value) })
             .collect(),
@@ -201,7 +201,7 @@ fn share(value: f32) -> f64 {
 
 /// JSON has no infinity: nothing was seen.
 fn strangeness(answer: &Answer) -> Option<f64> {
-    answer.strangeness.is_finite().then(|| share(answer.strangeness))
+    answer.outlier_score.is_finite().then(|| share(answer.outlier_score))
 }
 
 fn print<T: Serialize>(line: &T) -> Result<()> {

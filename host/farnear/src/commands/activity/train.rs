@@ -4,13 +4,11 @@ use std::{path::PathBuf, time::Instant};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use farnear_activity::{
-    evaluation::choice::names,
-    recognition::{
-        clip::Clip,
-        model::Recogniser,
-        space::{Map, PatternKind},
-    },
+use farnear_activity::recognition::{
+    choice::names,
+    clip::Clip,
+    model::Recogniser,
+    space::{Map, PatternKind},
 };
 use farnear_capture::aside;
 use serde::Serialize;

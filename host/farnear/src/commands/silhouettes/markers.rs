@@ -14,10 +14,14 @@ use farnear_activity::{
         Mask,
         centre::{SIDE_PX, centred},
     },
-    readers::{c3d, csv, markers::Markers, trc},
+    readers::{
+        self,
+        recording::{Choices, Recording, Unit, Up},
+    },
     silhouette::{
         capsule::Point3,
-        markers::{self, Fill},
+        parts::{self, Fill},
+        redundant::remove_redundant,
         template::Template,
         view::{Canvas, View, views_round},
     },
@@ -31,7 +35,7 @@ use crate::{masks, report};
 /// Pixels kept free round the subject.
 const MARGIN_PX: usize = 2;
 
-/// Silhouettes of a marker recording (C3D, TRC or CSV) from views at equal steps round the subject.
+/// Silhouettes of a motion-capture recording (C3D, TRC, CSV or BVH) from views at equal steps round the subject.
 ///
 /// A template says which markers make which part of the body; parts are filled and the gaps between them closed. Every view
 /// gets a folder `view1`, `view2`, ... of masks, one PNG per frame, all on one canvas so that the subject moves in it as in a
@@ -41,9 +45,9 @@ const MARGIN_PX: usize = 2;
     after_help = "Example: farnear silhouettes markers walk.c3d --template plug-in-gait --views 8 --out masks/"
 )]
 pub struct Arguments {
-    /// The recording: .c3d, .trc, or .csv with columns NAME_x, NAME_y, NAME_z in mm.
+    /// The recording: .c3d, .trc, .bvh, or .csv with columns NAME_x, NAME_y, NAME_z in mm.
     file: PathBuf,
-    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, or a TOML file of `[[part]] name, markers, thickness_mm`.
+    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, or a TOML file of `[[part]] name, markers, thickness_mm`.
     #[arg(long, value_name = "NAME|FILE")]
     template: String,
     /// Folder for the masks; must not exist or be empty.
@@ -71,9 +75,12 @@ pub struct Arguments {
     /// Take every so-many-th frame.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
-    /// Which axis of the file points up; by default y in TRC files and z in others.
+    /// Which axis of the file points up (x, y or z); by default y in TRC files, what the body says in BVH files, z in others.
     #[arg(long)]
     up: Option<Up>,
+    /// The file's unit of length (mm, cm, m, in, cmu or a number of millimetres), where it states none or another.
+    #[arg(long)]
+    unit: Option<Unit>,
     /// Write masks of 100x100 pixels with the subject centred, instead of full frames.
     #[arg(long)]
     centred: bool,
@@ -90,12 +97,6 @@ pub struct Arguments {
 enum FillChoice {
     Hull,
     Triplets,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Up {
-    Y,
-    Z,
 }
 
 #[derive(Serialize)]
@@ -139,13 +140,14 @@ struct Flagged {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let template = template(&arguments.template)?;
-    let recording = recording(&arguments.file, arguments.up)?;
+    let choices = Choices { unit: arguments.unit, up: arguments.up };
+    let recording = recording(&arguments.file, choices)?;
     let shown = arguments.file.display();
     if let Err(error) = template.check(&recording.names) {
-        let fits = |name: &&str| {
+        let fits = |name: &&'static str| {
             Template::named(name).is_ok_and(|template| template.check(&recording.names).is_ok())
         };
-        let hint = Template::NAMES.iter().find(|name| fits(name));
+        let hint = Template::names().find(|name| fits(name));
         let hint = hint.map_or(String::new(), |name| format!("; the built-in template `{name}` fits it"));
         bail!("{shown}: {error}{hint}");
     }
@@ -225,15 +227,15 @@ impl Job<'_> {
             FillChoice::Hull => Fill::Hull,
             FillChoice::Triplets => Fill::Triplets,
         };
-        let drawn = markers::draw(frame, self.template, view, canvas, fill);
+        let drawn = parts::draw(frame, self.template, view, canvas, fill);
         let thick = self.template.parts.iter().any(|part| part.thickness_mm > 0.0);
         let close_mm = self.arguments.close_mm.unwrap_or(if thick { 40.0 } else { 126.0 });
         let gap_px = (close_mm / self.arguments.mm_per_px).round() as usize;
-        markers::close(&drawn.mask, gap_px)
+        parts::close(&drawn.mask, gap_px)
     }
 
     fn canvas(&self, view: &View) -> Result<Canvas> {
-        let reach = markers::extent(self.frames, self.template, view);
+        let reach = parts::extent(self.frames, self.template, view);
         let canvas = Canvas::fitting(&reach, self.arguments.mm_per_px, MARGIN_PX);
         canvas.with_context(|| {
             let [low, high] = [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| {
@@ -277,7 +279,7 @@ impl Job<'_> {
             })
             .collect();
         let (names, pictures): (Vec<String>, Vec<Mask>) = all?.into_iter().flatten().unzip();
-        let kept = markers::remove_redundant(&pictures, keep);
+        let kept = remove_redundant(&pictures, keep);
         for &index in &kept {
             out.write(&names[index], &masks::png(&pictures[index])?)?;
         }
@@ -296,7 +298,7 @@ struct Missing {
     per_frame: Vec<Vec<String>>,
 }
 
-fn missing_parts(template: &Template, recording: &Markers, frames: &[HashMap<&str, Point3>]) -> Missing {
+fn missing_parts(template: &Template, recording: &Recording, frames: &[HashMap<&str, Point3>]) -> Missing {
     let short = |name: &str| name.rsplit_once(':').map_or(name, |(_, short)| short).to_owned();
     let recorded =
         |marker: &String| recording.names.iter().any(|name| name == marker || short(name) == *marker);
@@ -317,34 +319,21 @@ fn missing_parts(template: &Template, recording: &Markers, frames: &[HashMap<&st
 
 fn template(name: &str) -> Result<Template> {
     let path = Path::new(name);
-    if Template::NAMES.contains(&name) || !path.is_file() {
+    if Template::names().any(|known| known == name) || !path.is_file() {
         return Ok(Template::named(name)?);
     }
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
     Template::parse(&text).with_context(|| name.to_owned())
 }
 
-fn recording(path: &Path, up: Option<Up>) -> Result<Markers> {
+fn recording(path: &Path, choices: Choices) -> Result<Recording> {
     let shown = path.display();
     let bytes = fs::read(path).with_context(|| format!("cannot read {shown}"))?;
-    let text = || {
-        String::from_utf8(bytes.clone())
-            .with_context(|| format!("{shown}: not a text file, although its name says so"))
-    };
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let (mut read, z_up_by_default) = match ending.as_str() {
-        "c3d" => (c3d::read(&bytes), true),
-        "trc" => (trc::read(&text()?, false), false),
-        "csv" => (csv::read(&text()?), true),
-        other => bail!("{shown}: `.{other}` is no marker recording; expected .c3d, .trc or .csv"),
-    };
-    let up = up.unwrap_or(if z_up_by_default { Up::Z } else { Up::Y });
-    if let (Ok(read), Up::Y) = (&mut read, up) {
-        for [_, y, z] in read.frames.iter_mut().flatten().flatten() {
-            (*y, *z) = (-*z, *y);
-        }
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    let read = readers::read(&bytes, &ending, choices).with_context(|| format!("{shown}"))?;
+    for remark in read.remarks() {
+        eprintln!("{shown}: {remark} (--unit and --up name others)");
     }
-    let read = read.with_context(|| format!("{shown}"))?;
     ensure!(!read.frames.is_empty(), "{shown}: the recording holds no frame");
     Ok(read)
 }
