@@ -4,7 +4,7 @@
 //!
 //! - [`transport`], [`client`], [`work`], [`stream`]: the serial port, handles of the board behind it, long work with its
 //!   end, and the board's events and log.
-//! - [`camera`], [`image_file`], [`aside`]: images, their files, and files that are whole or not there.
+//! - [`camera`]: where images come from.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, where the axes go for a pair, taking it, and the folder it is kept in.
 //! - [`expose`], [`focus`], [`sequence`]: programs with a camera: finding the focus, focus stacks, programs from a file.
 //! - [`board_correction`]: depth correction by the board's own mathematics.
@@ -20,7 +20,6 @@
 //! # Ok::<(), farnear_capture::ClientError>(())
 //! ```
 
-pub mod aside;
 pub mod board_correction;
 pub mod camera;
 pub mod client;
@@ -30,7 +29,6 @@ mod events;
 pub mod expose;
 pub mod focus;
 mod handshake;
-pub mod image_file;
 mod link;
 mod owner;
 pub mod pair;

@@ -8,14 +8,17 @@ use std::path::Path;
 use farnear_protocol::message::{Axis, Hello, SCHEMA_KEY, ShotRecord};
 use serde::{Deserialize, Serialize};
 
-use crate::aside::{Aside, AsideError};
 use crate::camera::Image;
 use crate::client::Client;
 use crate::describe::{cause_name, trigger_name, um};
 use crate::expose::sensor_mm;
-use crate::image_file::{ImageError, encode_png};
 use crate::pair::{Pair, Taken};
 use crate::sequence::SequenceShot;
+use farnear_files::{
+    EncodeError,
+    image_file::encode_png,
+    staging::{Staging, StagingError},
+};
 
 /// Name of the record in a capture folder.
 pub const CAPTURE_FILE: &str = "capture.toml";
@@ -176,10 +179,10 @@ pub struct Circumstances {
 pub enum RecordError {
     /// The folder or a file in it.
     #[error(transparent)]
-    Aside(#[from] AsideError),
+    Staging(#[from] StagingError),
     /// An image.
     #[error(transparent)]
-    Image(#[from] ImageError),
+    Image(#[from] EncodeError),
     /// The record cannot be put into TOML.
     #[error("cannot write the capture's record: {0}")]
     Toml(#[from] toml::ser::Error),
@@ -298,36 +301,35 @@ fn exposure_record(name: &str, record: &ShotRecord, sensor_measured_mm: f64) -> 
 }
 
 /// Begins a capture folder; call it before the rig moves, so that a folder that cannot be written is known.
-pub fn begin_folder(folder: &Path) -> Result<Aside, RecordError> {
-    Ok(Aside::new_folder(folder)?)
+pub fn begin_folder(folder: &Path) -> Result<Staging, RecordError> {
+    Ok(Staging::new_folder(folder)?)
 }
 
 /// Writes pair and record into the folder and puts it in place.
-pub fn finish_folder(aside: Aside, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
-    finish_with(aside, [("far.png", &pair.far.image), ("near.png", &pair.near.image)], record)
+pub fn finish_folder(staged: Staging, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
+    finish_with(staged, [("far.png", &pair.far.image), ("near.png", &pair.near.image)], record)
 }
 
 /// Writes a sequence's images and record into the folder and puts it in place.
 pub fn finish_sequence(
-    aside: Aside,
+    staged: Staging,
     shots: &[SequenceShot],
     record: &CaptureRecord,
 ) -> Result<(), RecordError> {
-    finish_with(aside, shots.iter().map(|shot| (shot.name.as_str(), &shot.image)), record)
+    finish_with(staged, shots.iter().map(|shot| (shot.name.as_str(), &shot.image)), record)
 }
 
 fn finish_with<'a>(
-    aside: Aside,
+    staged: Staging,
     images: impl IntoIterator<Item = (&'a str, &'a Image)>,
     record: &CaptureRecord,
 ) -> Result<(), RecordError> {
     for (name, image) in images {
-        let png = encode_png(image.pixels.view(), image.bits)
-            .map_err(|reason| ImageError::Write { path: aside.path(name), reason })?;
-        aside.write(name, &png)?;
+        let png = encode_png(image.pixels.view(), image.bits)?;
+        staged.write(name, &png)?;
     }
-    aside.write(CAPTURE_FILE, toml::to_string(record)?.as_bytes())?;
-    Ok(aside.finish()?)
+    staged.write(CAPTURE_FILE, toml::to_string(record)?.as_bytes())?;
+    Ok(staged.finish()?)
 }
 
 /// Reads the record of a capture folder; `None` where the folder has none.

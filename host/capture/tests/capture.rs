@@ -11,11 +11,11 @@ use std::thread;
 use std::time::Duration;
 
 use farnear_capture::camera::{Camera, CameraError, FolderCamera, Image, SimCamera};
-use farnear_capture::image_file::encode_png;
 use farnear_capture::pair::{CaptureError, Exposures, capture_pair};
 use farnear_capture::plan::SensorPair;
 use farnear_capture::record::{Circumstances, begin_folder, finish_folder, read_record, record_of};
 use farnear_capture::{Client, ClientError};
+use farnear_files::image_file::encode_png;
 use farnear_protocol::camera::FrameHeader;
 use farnear_protocol::message::{ShotRecord, TriggerMode};
 use farnear_protocol::units::{BoardMicros, Micros, Nanometres};

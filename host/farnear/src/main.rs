@@ -1,25 +1,21 @@
 //! # farnear
 //!
-//! The command line. One file per command in [`commands`]; [`files`] and [`masks`] read and write what users have,
-//! [`picture`] makes `view.png`, [`plot`] draws operators, [`prompt`] asks the user, [`report`] prints figures as text
-//! or JSON, [`simulator`] starts the emulated rig, [`video`] reads
-//! frames.
+//! The command line: parses, shows and asks; what is done lies in `farnear-workflows`. One file per command in [`commands`];
+//! [`terminal`] shows progress, asks, and hears Ctrl-C; [`report`] prints figures as text or JSON; [`hints`] says what to type
+//! after an error; [`scene`] reads scenes for `farnear render`.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
 
 mod commands;
-mod files;
-mod masks;
-mod picture;
-mod plot;
-mod prompt;
+mod hints;
 mod report;
-mod simulator;
-mod video;
+mod scene;
+mod terminal;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use farnear_workflows::WorkflowError;
 
 /// Depth from defocus: design operators, compute depth, drive the rig.
 #[derive(Parser)]
@@ -73,8 +69,11 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
         Err(error) => {
-            eprintln!("farnear: {}", message(&error));
-            if error.is::<report::Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }
+            let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
+            eprintln!("farnear: {}{hint}", message(&error));
+            let usage =
+                error.is::<report::Usage>() || error.downcast_ref().is_some_and(WorkflowError::is_usage);
+            if usage { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }

@@ -28,9 +28,3 @@ pub fn to_stdout(bytes: &[u8]) -> Result<()> {
     let mut stdout = std::io::stdout();
     stdout.write_all(bytes).and_then(|()| stdout.flush()).context("cannot write to the standard output")
 }
-
-/// A number with so many decimals, so that a report does not claim more than is known.
-pub fn rounded(value: f64, decimals: i32) -> f64 {
-    let scale = 10f64.powi(decimals);
-    (value * scale).round() / scale
-}

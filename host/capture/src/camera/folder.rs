@@ -11,7 +11,7 @@ use farnear_protocol::units::Micros;
 
 use super::{Camera, CameraError, Image};
 use crate::describe::trigger_name;
-use crate::image_file::{GreyImage, Samples, decode_grey};
+use farnear_files::image_file::{GreyImage, Samples, decode_grey};
 
 const POLL: Duration = Duration::from_millis(20);
 /// A file that does not change for this long and still is no image will not become one.

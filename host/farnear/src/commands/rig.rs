@@ -3,7 +3,6 @@
 mod alarms;
 mod board;
 mod calibrate;
-mod camera;
 mod capture;
 mod check;
 mod correct;
@@ -14,25 +13,13 @@ mod motion;
 mod sequence;
 mod settings;
 mod sun;
+mod target;
 
-use std::{
-    path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-};
-
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::{Args, Subcommand, ValueEnum};
-use farnear_capture::Client;
-use farnear_depth::psf::Psf;
 use farnear_protocol::message::Axis;
 
-use crate::{
-    report::Usage,
-    simulator::{Scenery, Simulator},
-};
+use target::{CameraArguments, Target};
 
 /// Drive a rig: home, move, focus, capture, calibrate, and everything else the board can do.
 #[derive(Args)]
@@ -84,67 +71,6 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Job::Log(arguments) => log::run(arguments),
         Job::Check(arguments) => check::run(arguments),
     }
-}
-
-/// Which rig.
-#[derive(Args, Clone)]
-pub struct Target {
-    /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig.
-    #[arg(long, value_name = "PORT|sim")]
-    pub port: String,
-    #[command(flatten)]
-    scenery: Scenery,
-}
-
-/// A connected rig. The simulator, where there is one, ends after the client.
-struct Connected {
-    client: Client,
-    simulator: Option<Simulator>,
-}
-
-impl Target {
-    /// Connects; an interruption by the user (Ctrl-C) stops what moves.
-    fn connect(&self, optics: Option<(&Path, Psf)>) -> Result<Connected> {
-        let mut connected = self.connect_uninterrupted(optics)?;
-        connected.client.interrupt_by(listen_for_interruption()?);
-        Ok(connected)
-    }
-
-    /// As [`Target::connect`], for a command that connects several times: a program can listen for an interruption
-    /// only once.
-    fn connect_uninterrupted(&self, optics: Option<(&Path, Psf)>) -> Result<Connected> {
-        let emulated = self.is_emulated();
-        if let Some(flag) = self.scenery.given().filter(|_| !emulated) {
-            bail!(Usage(format!("{flag} goes with --port sim only; {} has a world of its own", self.port)));
-        }
-        let simulator = emulated.then(|| Simulator::start(&self.scenery, optics)).transpose()?;
-        let client = match &simulator {
-            Some(simulator) => Client::open_emulated(simulator.port())?,
-            None => Client::open(&self.port)?,
-        };
-        if let Some(note) = client.firmware_note() {
-            eprintln!("{note}");
-        }
-        Ok(Connected { client, simulator })
-    }
-
-    fn is_emulated(&self) -> bool {
-        self.port == "sim"
-    }
-
-    /// The same rig before another scene; for the emulated one only.
-    fn with_scene(&self, scene: String) -> Self {
-        Self { port: self.port.clone(), scenery: self.scenery.with_scene(scene) }
-    }
-}
-
-/// A flag that the user's interruption (Ctrl-C) sets; to be called once in a program.
-fn listen_for_interruption() -> Result<Arc<AtomicBool>> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
-        .context("cannot listen for an interruption")?;
-    Ok(interrupted)
 }
 
 /// An axis as users name it.

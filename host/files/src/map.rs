@@ -1,67 +1,125 @@
 //! Depth maps and masks in files: `.npy` (f32) and float TIFF.
 
-use std::{io::Cursor, path::Path};
+use std::{
+    io::Cursor,
+    path::{Path, PathBuf},
+};
 
-use anyhow::{Context, Result, bail};
-use farnear_capture::image_file;
 use ndarray::{Array2, ArrayView2};
-use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use ndarray_npy::{ReadNpyError, ReadNpyExt, WriteNpyExt};
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+
+use crate::{
+    EncodeError,
+    image_file::{self, ImageError},
+};
+
+/// A map could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum MapError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file has no bytes.
+    #[error("{} is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An array of another kind.
+    #[error("{} is not a map: a 2-D array of f32 or f64 in C order is needed: {reason}", path.display())]
+    Npy {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Another file format.
+    #[error("{} is neither .npy nor TIFF: {reason}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Integers, whose unit nobody knows.
+    #[error("{} holds {samples} integers, not mm; give the .npy or the float .tiff", path.display())]
+    Integers {
+        /// The file.
+        path: PathBuf,
+        /// How it stores its pixels.
+        samples: image_file::Samples,
+    },
+}
 
 /// What the files begin with.
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Reads a map of numbers: `.npy` with f32 or f64, or a TIFF.
-pub fn read(path: &Path) -> Result<Array2<f32>> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+///
+/// # Errors
+/// [`MapError`].
+pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
+    let bytes = std::fs::read(path).map_err(|source| MapError::Read { path: path.into(), source })?;
     if bytes.is_empty() {
-        bail!("{} is empty", path.display());
+        return Err(MapError::Empty { path: path.into() });
     }
     if bytes.starts_with(NPY_MAGIC) {
-        return read_npy(&bytes).with_context(|| {
-            format!("{} is no map: a 2-D array of f32 or f64 in C order is needed", path.display())
-        });
+        return read_npy(&bytes)
+            .map_err(|error| MapError::Npy { path: path.into(), reason: error.to_string() });
     }
-    let image = image_file::decode_grey(&bytes)
-        .map_err(|reason| anyhow::anyhow!("{} is neither .npy nor TIFF: {reason}", path.display()))?;
+    let image =
+        image_file::decode_grey(&bytes).map_err(|reason| MapError::Format { path: path.into(), reason })?;
     if image.samples != image_file::Samples::Float {
-        bail!(
-            "{} holds {} integers, not mm; give the .npy or the float .tiff",
-            path.display(),
-            image.samples
-        );
+        return Err(MapError::Integers { path: path.into(), samples: image.samples });
     }
     Ok(image.pixels)
 }
 
-fn read_npy(bytes: &[u8]) -> Result<Array2<f32>> {
+fn read_npy(bytes: &[u8]) -> Result<Array2<f32>, ReadNpyError> {
     match Array2::<f32>::read_npy(Cursor::new(bytes)) {
         Ok(map) => Ok(map),
-        Err(ndarray_npy::ReadNpyError::WrongDescriptor(_)) => {
+        Err(ReadNpyError::WrongDescriptor(_)) => {
             Ok(Array2::<f64>::read_npy(Cursor::new(bytes))?.mapv(|value| value as f32))
         }
-        Err(error) => Err(error.into()),
+        Err(error) => Err(error),
     }
 }
 
 /// Reads a mask: what is not black counts.
-pub fn read_mask(path: &Path) -> Result<Array2<bool>> {
+///
+/// # Errors
+/// [`ImageError`].
+pub fn read_mask(path: &Path) -> Result<Array2<bool>, ImageError> {
     Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
 }
 
 /// A map as the bytes of an `.npy` file.
-pub fn npy(map: ArrayView2<f32>) -> Result<Vec<u8>> {
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn npy(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
-    map.write_npy(&mut bytes)?;
+    map.write_npy(&mut bytes).map_err(EncodeError::of(".npy"))?;
     Ok(bytes)
 }
 
 /// A map as the bytes of a float TIFF.
-pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>> {
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     let (height, width) = map.dim();
     let mut bytes = Cursor::new(Vec::new());
     let values: Vec<f32> = map.iter().copied().collect();
-    TiffEncoder::new(&mut bytes)?.write_image::<Gray32Float>(width as u32, height as u32, &values)?;
+    TiffEncoder::new(&mut bytes)
+        .and_then(|mut file| file.write_image::<Gray32Float>(width as u32, height as u32, &values))
+        .map_err(EncodeError::of("a TIFF"))?;
     Ok(bytes.into_inner())
 }
 

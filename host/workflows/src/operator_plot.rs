@@ -1,4 +1,4 @@
-//! `farnear operators --plot`: what the operators were fitted to and how they respond, as SVG or PNG.
+//! What the operators were fitted to and how they respond, as SVG or PNG.
 //!
 //! Upper left the normalised image ratio (NIR) over the normalised depth at five frequencies: dots are the optics', lines
 //! the cubic fit `a1 alpha + a3 alpha^3`. Upper right a1 and a3 over frequency. Below the kernels' responses along a row and
@@ -6,9 +6,11 @@
 
 use std::{f64::consts::PI, path::Path};
 
-use anyhow::{Result, anyhow, bail};
 use farnear_depth::{nir, operators::Operators, psf::Otf};
+use farnear_files::EncodeError;
 use plotters::{coord::Shift, prelude::*, style::register_font};
+
+use crate::error::{Result, WorkflowError};
 
 const SIZE: (u32, u32) = (1100, 820);
 /// Radial frequencies of the NIR curves, rad/px.
@@ -28,8 +30,8 @@ const COLOURS: [RGBColor; 5] = [
 /// For an ending that is neither `.svg` nor `.png`.
 pub fn plot(operators: &Operators, file: &Path) -> Result<Vec<u8>> {
     register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular())
-        .map_err(|_| anyhow!("the built-in font is damaged"))?;
-    let failed = |error: &dyn std::fmt::Display| anyhow!("cannot draw the plot: {error}");
+        .map_err(|_| EncodeError::of("a plot")("the built-in font is damaged"))?;
+    let failed = |error: &dyn std::fmt::Display| EncodeError::of("a plot")(error);
     let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match ending.as_str() {
         "svg" => {
@@ -43,13 +45,13 @@ pub fn plot(operators: &Operators, file: &Path) -> Result<Vec<u8>> {
             draw(&BitMapBackend::with_buffer(&mut pixels, SIZE).into_drawing_area(), operators)
                 .map_err(|error| failed(&error))?;
             let Some(picture) = image::RgbImage::from_raw(SIZE.0, SIZE.1, pixels) else {
-                bail!("the plot has another size than its canvas");
+                return Err(EncodeError::of("a plot")("another size than its canvas").into());
             };
             let mut png = std::io::Cursor::new(Vec::new());
-            picture.write_to(&mut png, image::ImageFormat::Png)?;
+            picture.write_to(&mut png, image::ImageFormat::Png).map_err(EncodeError::of("a plot"))?;
             Ok(png.into_inner())
         }
-        _ => bail!("--plot {}: plots are written as .svg or .png", file.display()),
+        _ => Err(WorkflowError::parameter("plot", file.display(), "plots are written as .svg or .png")),
     }
 }
 

@@ -1,8 +1,9 @@
 //! Text on a picture, in DejaVu Sans.
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
-use anyhow::Result;
 use image::{Rgb, RgbImage};
+
+use crate::EncodeError;
 
 /// Writes text of one size.
 pub struct Writer {
@@ -12,8 +13,12 @@ pub struct Writer {
 
 impl Writer {
     /// Text of this height in pixels.
-    pub fn new(height_px: f32) -> Result<Self> {
-        Ok(Self { font: FontRef::try_from_slice(dejavu::sans::regular())?, scale: PxScale::from(height_px) })
+    ///
+    /// # Errors
+    /// A built-in font that is damaged.
+    pub fn new(height_px: f32) -> Result<Self, EncodeError> {
+        let font = FontRef::try_from_slice(dejavu::sans::regular()).map_err(EncodeError::of("text"))?;
+        Ok(Self { font, scale: PxScale::from(height_px) })
     }
 
     /// Height of a line in pixels.

@@ -12,7 +12,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_activity::background::Frame;
 use ndarray::{Array2, Array3};
 
 /// A frame and where it came from.
@@ -34,18 +33,15 @@ pub enum Pixels {
 }
 
 impl Pixels {
-    /// As the background model takes it.
-    pub fn frame(&self) -> Frame<'_> {
-        match self {
-            Self::Grey(pixels) => Frame::Grey(pixels.view()),
-            Self::Rgb(pixels) => Frame::Rgb(pixels.view()),
-        }
-    }
-
     /// Width and height in pixels, and whether in colour.
     pub fn kind(&self) -> Kind {
-        let (height, width) = self.frame().size();
-        Kind { width, height, colour: matches!(self, Self::Rgb(_)) }
+        match self {
+            Self::Grey(pixels) => Kind { width: pixels.ncols(), height: pixels.nrows(), colour: false },
+            Self::Rgb(pixels) => {
+                let (height, width, _) = pixels.dim();
+                Kind { width, height, colour: true }
+            }
+        }
     }
 }
 

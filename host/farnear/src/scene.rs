@@ -14,10 +14,8 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use farnear_capture::image_file::read_grey;
+use farnear_files::{image_file::read_grey, map};
 use farnear_scene::{Scene, SceneError, SceneFile};
-
-use super::map;
 
 /// A scene as an argument names it.
 #[derive(Clone, Debug)]

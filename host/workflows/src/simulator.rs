@@ -8,12 +8,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use anyhow::{Context, Result, bail};
-use clap::Args;
 use farnear_capture::record::SimulationRecord;
 use farnear_depth::psf::Psf;
-use farnear_scene::{Noise, Scene};
 use serde::Deserialize;
+
+use crate::context::Progress;
 
 /// Name of the program.
 const PROGRAM: &str = "farnear-sim";
@@ -23,58 +22,68 @@ const FAREWELL: Duration = Duration::from_secs(3);
 /// Longest wait for the simulator to say where it listens; it takes about a second.
 const START: Duration = Duration::from_secs(60);
 
-/// What the emulated rig sees; goes with `--port sim` only.
-#[derive(Args, Clone)]
-#[command(next_help_heading = "Emulated rig (--port sim)")]
+/// What the emulated rig is made of; what is left open has the simulator's own defaults. The texts are checked by the
+/// simulator.
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Scenery {
-    /// Scene before the emulated camera: plane:MM, staircase, slant, cone or sphere [default: staircase].
-    #[arg(long, value_parser = checked::<Scene>)]
-    scene: Option<String>,
-    /// Point spread function of the emulated lens [default: the one of the optics file].
-    #[arg(long, value_parser = checked::<Psf>)]
-    psf: Option<String>,
-    /// Noise of the emulated camera: none, 8bit or 12bit [default: 8bit].
-    #[arg(long, value_parser = checked::<Noise>)]
-    noise: Option<String>,
-    /// Decides everything random [default: 1].
-    #[arg(long)]
-    seed: Option<u64>,
+    /// Scene before the emulated camera: `plane:MM`, `staircase`, `slant`, `cone` or `sphere`.
+    pub scene: Option<String>,
+    /// Point spread function of the emulated lens; without it the one of the optics.
+    pub psf: Option<String>,
+    /// Noise of the emulated camera: `none`, `8bit` or `12bit`.
+    pub noise: Option<String>,
+    /// Decides everything random.
+    pub seed: Option<u64>,
     /// The firmware; without it the one that lies beside farnear-sim.
-    #[arg(long, value_name = "ELF")]
-    firmware: Option<PathBuf>,
+    pub firmware: Option<PathBuf>,
     /// Faults of the emulated line, a TOML file.
-    #[arg(long, value_name = "FILE")]
-    faults: Option<PathBuf>,
-    /// Write what the emulated mechanics really did to this CSV file.
-    #[arg(long, value_name = "FILE")]
-    trace: Option<PathBuf>,
-    /// Let the emulated rig's time follow the clock on the wall, to watch it; runs do not repeat then.
-    #[arg(long)]
-    paced: bool,
+    pub faults: Option<PathBuf>,
+    /// Where to write what the emulated mechanics really did, CSV.
+    pub trace: Option<PathBuf>,
+    /// Whether the emulated rig's time follows the clock on the wall; runs do not repeat then.
+    pub paced: bool,
 }
 
-/// Takes the text if it parses as a `T`; the simulator parses it again.
-fn checked<T: std::str::FromStr>(text: &str) -> Result<String, T::Err> {
-    text.parse::<T>().map(|_| text.to_owned())
+/// The simulator could not be started.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulatorError {
+    /// There is no such program.
+    #[error("{PROGRAM} is neither beside this program nor on the PATH")]
+    Missing,
+    /// The system refuses.
+    #[error("cannot start {}: {source}", program.display())]
+    Start {
+        /// The program.
+        program: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It ended without a word on its standard output.
+    #[error("{PROGRAM} ended at once ({status}); its message stands above")]
+    Ended {
+        /// How.
+        status: String,
+    },
+    /// It printed something else than where it listens.
+    #[error("{PROGRAM} printed no address but {line:?}: {reason}")]
+    Address {
+        /// What it printed.
+        line: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// It did not say where it listens.
+    #[error("{PROGRAM} did not say where it listens within {START:?}")]
+    Silent,
+    /// Its output cannot be read.
+    #[error("the output of {PROGRAM} was lost: {reason}")]
+    Lost {
+        /// What the system says.
+        reason: String,
+    },
 }
 
 impl Scenery {
-    /// The first of these flags that was given.
-    pub fn given(&self) -> Option<&'static str> {
-        [
-            ("--scene", self.scene.is_some()),
-            ("--psf", self.psf.is_some()),
-            ("--noise", self.noise.is_some()),
-            ("--seed", self.seed.is_some()),
-            ("--firmware", self.firmware.is_some()),
-            ("--faults", self.faults.is_some()),
-            ("--trace", self.trace.is_some()),
-            ("--paced", self.paced),
-        ]
-        .into_iter()
-        .find_map(|(flag, given)| given.then_some(flag))
-    }
-
     /// The same before another scene.
     pub fn with_scene(&self, scene: String) -> Self {
         Self { scene: Some(scene), ..self.clone() }
@@ -108,9 +117,16 @@ struct Address {
 
 impl Simulator {
     /// Starts the simulator and says so. Without optics it has those of a 50 mm lens.
-    pub fn start(scenery: &Scenery, optics: Option<(&Path, Psf)>) -> Result<Self> {
+    ///
+    /// # Errors
+    /// [`SimulatorError`].
+    pub fn start(
+        scenery: &Scenery,
+        optics: Option<(&Path, Psf)>,
+        progress: &dyn Progress,
+    ) -> Result<Self, SimulatorError> {
         let program = find()?;
-        eprintln!("starting the emulated rig ({PROGRAM}): no hardware is involved");
+        progress.say(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
         let mut command = Command::new(&program);
         let record = scenery.decided(optics.map_or(Psf::Gaussian { k: 0.4578 }, |(_, psf)| psf));
         command.args(["run", "--scene", &record.scene, "--psf", &record.psf, "--noise", &record.noise]);
@@ -135,17 +151,18 @@ impl Simulator {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .with_context(|| format!("cannot start {}", program.display()))?;
+            .map_err(|source| SimulatorError::Start { program, source })?;
         let stdin = child.stdin.take();
-        let stdout = child.stdout.take().context("the simulator has no output")?;
+        let stdout = child.stdout.take();
         let mut simulator = Self { child, stdin, address: Address::default() };
-        let line = first_line(stdout)?;
+        let lost = |reason: String| SimulatorError::Lost { reason };
+        let line = first_line(stdout.ok_or_else(|| lost("it has none".into()))?)?;
         if line.is_empty() {
-            let status = simulator.child.wait().context("the simulator was lost")?;
-            bail!("{PROGRAM} ended at once ({status}); its message stands above");
+            let status = simulator.child.wait().map_err(|error| lost(error.to_string()))?;
+            return Err(SimulatorError::Ended { status: status.to_string() });
         }
         simulator.address = serde_json::from_str(&line)
-            .with_context(|| format!("{PROGRAM} printed no address but {line:?}"))?;
+            .map_err(|error| SimulatorError::Address { line, reason: error.to_string() })?;
         Ok(simulator)
     }
 
@@ -177,7 +194,7 @@ impl Drop for Simulator {
 }
 
 /// The first line of the simulator's output; empty where there is none.
-fn first_line(output: impl Read + Send + 'static) -> Result<String> {
+fn first_line(output: impl Read + Send + 'static) -> Result<String, SimulatorError> {
     let (sender, line) = channel();
     std::thread::spawn(move || {
         let mut line = String::new();
@@ -185,22 +202,19 @@ fn first_line(output: impl Read + Send + 'static) -> Result<String> {
         let _ = sender.send(read.map(|_| line)); // nobody listens after the deadline
     });
     match line.recv_timeout(START) {
-        Ok(line) => line.context("the simulator's output is no text"),
-        Err(RecvTimeoutError::Timeout) => bail!("{PROGRAM} did not say where it listens within {START:?}"),
-        Err(RecvTimeoutError::Disconnected) => bail!("the output of {PROGRAM} was lost"),
+        Ok(line) => line.map_err(|error| SimulatorError::Lost { reason: error.to_string() }),
+        Err(RecvTimeoutError::Timeout) => Err(SimulatorError::Silent),
+        Err(RecvTimeoutError::Disconnected) => {
+            Err(SimulatorError::Lost { reason: "its reader ended".into() })
+        }
     }
 }
 
 /// Beside this program, else on the PATH.
-fn find() -> Result<PathBuf> {
+fn find() -> Result<PathBuf, SimulatorError> {
     let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(&name)));
     let path = std::env::var_os("PATH").unwrap_or_default();
     let on_path = std::env::split_paths(&path).map(|folder| folder.join(&name));
-    beside.into_iter().chain(on_path).find(|place| place.is_file()).with_context(|| {
-        format!(
-            "{PROGRAM} is neither beside this program nor on the PATH; `cargo xtask install` installs both, \
-             `cargo xtask demo` builds them"
-        )
-    })
+    beside.into_iter().chain(on_path).find(|place| place.is_file()).ok_or(SimulatorError::Missing)
 }

@@ -4,13 +4,17 @@
 //! `image` refuses float grey TIFF). What a file is, is told by its first bytes, not by its name. Colour is
 //! averaged to grey, `(R + G + B) / 3`, as Li 2014 does; alpha is ignored.
 
-use std::fs;
-use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    io::Cursor,
+    path::{Path, PathBuf},
+};
 
 use image::{DynamicImage, ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use ndarray::{Array2, ArrayView2};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
+
+use crate::EncodeError;
 
 /// A picture as floating-point grey values.
 #[derive(Clone, PartialEq, Debug)]
@@ -164,7 +168,10 @@ fn grey(size: (usize, usize), values: Vec<f32>, samples: Samples) -> Result<Grey
 
 /// The picture of a camera with `bits` bits as the bytes of a grey PNG: 8 bits as they are, 9 to 16 bits
 /// shifted up to full scale in 16 bits, so that any viewer shows it with the right brightness.
-pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, String> {
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeError> {
     let (height, width) = pixels.dim();
     let (bytes, colour): (Vec<u8>, _) = if bits <= 8 {
         (pixels.iter().map(|value| (*value).min(255) as u8).collect(), ExtendedColorType::L8)
@@ -176,7 +183,7 @@ pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, String> 
     let mut png = Vec::new();
     PngEncoder::new(&mut png)
         .write_image(&bytes, width as u32, height as u32, colour)
-        .map_err(|error| error.to_string())?;
+        .map_err(EncodeError::of("a PNG"))?;
     Ok(png)
 }
 

@@ -1,12 +1,13 @@
 //! Files that are there whole or not at all: written aside, then renamed.
 
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
 
 /// A result could not be put in place.
 #[derive(Debug, thiserror::Error)]
-pub enum AsideError {
+pub enum StagingError {
     /// There is something at the place already.
     #[error("{} exists already and is not empty; name another folder or remove it", path.display())]
     Exists {
@@ -23,7 +24,7 @@ pub enum AsideError {
     },
 }
 
-impl AsideError {
+impl StagingError {
     fn at(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.into(), source }
     }
@@ -35,38 +36,38 @@ const LEFT_BEHIND_MAX: u32 = 100;
 /// A folder that becomes visible under its name only when all its files are written. Dropped before, it leaves
 /// nothing behind.
 #[derive(Debug)]
-pub struct Aside {
+pub struct Staging {
     folder: PathBuf,
     target: PathBuf,
 }
 
-impl Aside {
+impl Staging {
     /// Begins a new folder. Its parents are made where they are missing.
     ///
     /// # Errors
-    /// [`AsideError::Exists`] where something but an empty folder has the name already.
-    pub fn new_folder(target: &Path) -> Result<Self, AsideError> {
+    /// [`StagingError::Exists`] where something but an empty folder has the name already.
+    pub fn new_folder(target: &Path) -> Result<Self, StagingError> {
         let target: PathBuf = target.components().collect(); // without a slash at its end
         if occupied(&target) {
-            return Err(AsideError::Exists { path: target });
+            return Err(StagingError::Exists { path: target });
         }
         let parent = match target.parent() {
             Some(parent) if parent != Path::new("") => parent.to_path_buf(),
             _ => PathBuf::from("."),
         };
-        fs::create_dir_all(&parent).map_err(AsideError::at(&parent))?;
+        fs::create_dir_all(&parent).map_err(StagingError::at(&parent))?;
         let name = target.file_name().unwrap_or_default().to_string_lossy();
         Self::begin(parent.join(partial_name(&name)), target)
     }
 
     /// Begins a set of files that go into a folder together, which is made where it is missing. Files of the
     /// same names are replaced, others stay.
-    pub fn into_folder(target: &Path) -> Result<Self, AsideError> {
-        fs::create_dir_all(target).map_err(AsideError::at(target))?;
+    pub fn into_folder(target: &Path) -> Result<Self, StagingError> {
+        fs::create_dir_all(target).map_err(StagingError::at(target))?;
         Self::begin(target.join(partial_name("files")), target.into())
     }
 
-    fn begin(folder: PathBuf, target: PathBuf) -> Result<Self, AsideError> {
+    fn begin(folder: PathBuf, target: PathBuf) -> Result<Self, StagingError> {
         // A program that was killed may have left the name behind, and a container gives its number out again.
         let mut free = folder.clone();
         for number in 1..LEFT_BEHIND_MAX {
@@ -75,7 +76,7 @@ impl Aside {
             }
             free = folder.with_added_extension(number.to_string());
         }
-        fs::create_dir(&free).map_err(AsideError::at(&target))?;
+        fs::create_dir(&free).map_err(StagingError::at(&target))?;
         Ok(Self { folder: free, target })
     }
 
@@ -85,33 +86,33 @@ impl Aside {
     }
 
     /// Writes a file.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), AsideError> {
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StagingError> {
         let path = self.path(name);
-        fs::write(&path, bytes).map_err(AsideError::at(&self.target.join(name)))
+        fs::write(&path, bytes).map_err(StagingError::at(&self.target.join(name)))
     }
 
     /// Puts everything in place: a new folder with one rename, a set of files with one rename each.
-    pub fn finish(self) -> Result<(), AsideError> {
+    pub fn finish(self) -> Result<(), StagingError> {
         let into_folder = self.folder.parent() == Some(self.target.as_path());
         if !into_folder {
             if occupied(&self.target) {
-                return Err(AsideError::Exists { path: self.target.clone() });
+                return Err(StagingError::Exists { path: self.target.clone() });
             }
             if self.target.is_dir() {
-                fs::remove_dir(&self.target).map_err(AsideError::at(&self.target))?;
+                fs::remove_dir(&self.target).map_err(StagingError::at(&self.target))?;
             }
-            return fs::rename(&self.folder, &self.target).map_err(AsideError::at(&self.target));
+            return fs::rename(&self.folder, &self.target).map_err(StagingError::at(&self.target));
         }
-        for entry in fs::read_dir(&self.folder).map_err(AsideError::at(&self.folder))? {
-            let entry = entry.map_err(AsideError::at(&self.folder))?;
+        for entry in fs::read_dir(&self.folder).map_err(StagingError::at(&self.folder))? {
+            let entry = entry.map_err(StagingError::at(&self.folder))?;
             let place = self.target.join(entry.file_name());
-            fs::rename(entry.path(), &place).map_err(AsideError::at(&place))?;
+            fs::rename(entry.path(), &place).map_err(StagingError::at(&place))?;
         }
         Ok(())
     }
 }
 
-impl Drop for Aside {
+impl Drop for Staging {
     fn drop(&mut self) {
         // After `finish` of a new folder there is nothing left to remove, which is as good.
         let _ = fs::remove_dir_all(&self.folder);
@@ -119,13 +120,13 @@ impl Drop for Aside {
 }
 
 /// Writes one file aside and renames it into place.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), AsideError> {
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let aside = path.with_file_name(partial_name(&name));
-    let written = fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, path));
+    let partial = path.with_file_name(partial_name(&name));
+    let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
     written.map_err(|source| {
-        let _ = fs::remove_file(&aside);
-        AsideError::Io { path: path.into(), source }
+        let _ = fs::remove_file(&partial);
+        StagingError::Io { path: path.into(), source }
     })
 }
 
@@ -158,36 +159,36 @@ mod tests {
     fn a_folder_appears_whole_or_not_at_all() {
         let root = tempfile::tempdir().unwrap();
         let target = root.path().join("deep/er/");
-        let aside = Aside::new_folder(&target).unwrap();
-        aside.write("a", b"1").unwrap();
+        let staged = Staging::new_folder(&target).unwrap();
+        staged.write("a", b"1").unwrap();
         assert!(!target.exists());
-        drop(aside);
+        drop(staged);
         assert_eq!(names(&root.path().join("deep")), Vec::<String>::new());
 
-        let aside = Aside::new_folder(&target).unwrap();
-        aside.write("a", b"1").unwrap();
-        aside.finish().unwrap();
+        let staged = Staging::new_folder(&target).unwrap();
+        staged.write("a", b"1").unwrap();
+        staged.finish().unwrap();
         assert_eq!(names(&target), ["a"]);
-        assert!(matches!(Aside::new_folder(&target), Err(AsideError::Exists { .. })));
+        assert!(matches!(Staging::new_folder(&target), Err(StagingError::Exists { .. })));
     }
 
     #[test]
     fn what_a_killed_program_left_is_in_nobodys_way() {
         let root = tempfile::tempdir().unwrap();
         let target = root.path().join("pair");
-        std::mem::forget(Aside::new_folder(&target).unwrap());
-        let aside = Aside::new_folder(&target).unwrap();
-        aside.write("a", b"1").unwrap();
-        aside.finish().unwrap();
+        std::mem::forget(Staging::new_folder(&target).unwrap());
+        let staged = Staging::new_folder(&target).unwrap();
+        staged.write("a", b"1").unwrap();
+        staged.finish().unwrap();
         assert_eq!(names(&target), ["a"]);
     }
 
     #[test]
     fn an_empty_folder_is_filled() {
         let root = tempfile::tempdir().unwrap();
-        let aside = Aside::new_folder(root.path()).unwrap();
-        aside.write("a", b"1").unwrap();
-        aside.finish().unwrap();
+        let staged = Staging::new_folder(root.path()).unwrap();
+        staged.write("a", b"1").unwrap();
+        staged.finish().unwrap();
         assert_eq!(names(root.path()), ["a"]);
     }
 
@@ -196,10 +197,10 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         fs::write(root.path().join("old"), b"0").unwrap();
         fs::write(root.path().join("b"), b"0").unwrap();
-        let aside = Aside::into_folder(root.path()).unwrap();
-        aside.write("b", b"1").unwrap();
+        let staged = Staging::into_folder(root.path()).unwrap();
+        staged.write("b", b"1").unwrap();
         assert_eq!(fs::read(root.path().join("b")).unwrap(), b"0");
-        aside.finish().unwrap();
+        staged.finish().unwrap();
         assert_eq!(names(root.path()), ["b", "old"]);
         assert_eq!(fs::read(root.path().join("b")).unwrap(), b"1");
         write_file(&root.path().join("b"), b"2").unwrap();

@@ -12,8 +12,8 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use farnear_capture::aside;
 use farnear_depth::operators::{self, DesignError, Operators, Request};
+use farnear_files::staging;
 
 /// Version of an entry's layout: one line with a sum over key and operators, then the operators as TOML.
 const LAYOUT: u32 = 1;
@@ -43,7 +43,7 @@ fn cached(folder: &Path, build: &str, request: &Request) -> Result<Operators, De
     {
         let text = format!("{:016x}\n{body}", sum(&[&key, &body]));
         // Without an entry the next design takes as long as this one did, that is all.
-        let _ = aside::write_file(&entry, text.as_bytes());
+        let _ = staging::write_file(&entry, text.as_bytes());
         drop_oldest(folder);
     }
     Ok(designed)

@@ -4,14 +4,22 @@
 //! through the front focus: a pixel of pitch p sees p (z - F) / F of the object, wherever the sensor stands. x to the
 //! right, y up, z towards the viewer; all in mm, the optical axis in the image's middle.
 
-use farnear_depth::optics::Optics;
 use ndarray::ArrayView2;
 
 /// Neighbours that differ by more than this part of the map's range belong to different surfaces.
 const STEP: f32 = 0.1;
 
-/// The mesh of `depth_mm`, coloured by `grey` (any scale), seen through `optics`.
-pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, optics: &Optics) -> Vec<u8> {
+/// What of the optics decides where a pixel's ray goes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Projection {
+    /// Focal length of the lens.
+    pub focal_length_mm: f64,
+    /// Pitch of the pixels.
+    pub pixel_um: f64,
+}
+
+/// The mesh of `depth_mm`, coloured by `grey` (any scale).
+pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, projection: Projection) -> Vec<u8> {
     let (height, width) = depth_mm.dim();
     let finite = || depth_mm.iter().copied().filter(|value| value.is_finite());
     let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
@@ -28,7 +36,7 @@ pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, optics: &Optics) ->
         }
         index[row * width + column] = count;
         count += 1;
-        let scale = optics.pixel_um() * 1e-3 * (f64::from(z) / optics.focal_length_mm() - 1.0);
+        let scale = projection.pixel_um * 1e-3 * (f64::from(z) / projection.focal_length_mm - 1.0);
         let x = (column as f64 - 0.5 * (width - 1) as f64) * scale;
         let y = (0.5 * (height - 1) as f64 - row as f64) * scale;
         for value in [x as f32, y as f32, -z] {
@@ -80,9 +88,8 @@ mod tests {
     #[test]
     fn holes_have_no_vertices_and_steps_no_faces() {
         let depth = array![[900.0f32, 900.1, f32::NAN], [900.2, 900.1, 890.0]];
-        let text = "[lens]\nfocal_length_mm = 50.0\nf_number = 4.0\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.7";
-        let optics: Optics = toml::from_str(text).unwrap();
-        let bytes = ply(depth.view(), depth.view(), &optics);
+        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4 };
+        let bytes = ply(depth.view(), depth.view(), projection);
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("element vertex 5\n"), "{text}");
         assert!(text.contains("element face 2\n"), "{text}");

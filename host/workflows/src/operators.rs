@@ -2,13 +2,15 @@
 
 use std::{fs, path::Path};
 
-use anyhow::{Context, Result, bail};
 use farnear_depth::{
     operators::{self, Design, Family, Operators, Request},
     optics::Optics,
 };
 
-use super::cache;
+use crate::{
+    error::{About, Result, WorkflowError},
+    operator_cache as cache,
+};
 
 /// Operators for some optics: those that `asked` names (`family:design` or a family alone, e.g. `gro:linear` or
 /// `gro`, or a file saved by `farnear operators`), else the default ones.
@@ -21,9 +23,9 @@ pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
     match named(asked) {
         // A file is a file, whatever it is called.
         Some(name) if !asked.exists() => {
-            let (family, design) = name.with_context(|| format!("operators {}", asked.display()))?;
+            let (family, design) = name.about(|| format!("operators {}", asked.display()))?;
             let request = Request { family, design, ..default };
-            Ok(cache::operators(&request).with_context(|| format!("operators {family}:{design}"))?)
+            cache::operators(&request).about(|| format!("operators {family}:{design}"))
         }
         _ => read(asked),
     }
@@ -42,15 +44,13 @@ fn named(asked: &Path) -> Option<Result<(Family, Design), operators::DesignError
 }
 
 fn read(path: &Path) -> Result<Operators> {
-    let text = fs::read_to_string(path).with_context(|| {
-        format!("cannot read the operators {} (neither a file nor a name such as gro:linear)", path.display())
-    })?;
+    const EXPECTED: &str = "saved operators";
+    // Neither a file nor a name such as gro:linear.
+    let text = fs::read_to_string(path).map_err(WorkflowError::read("the operators", path))?;
     if text.trim().is_empty() {
-        bail!("{} is empty: expected operators saved by `farnear operators --out`", path.display());
+        return Err(WorkflowError::file(path, EXPECTED)("it is empty"));
     }
-    toml::from_str(&text).with_context(|| {
-        format!("{} holds no operators such as `farnear operators --out` saves", path.display())
-    })
+    toml::from_str(&text).map_err(WorkflowError::file(path, EXPECTED))
 }
 
 #[cfg(test)]

@@ -1,15 +1,12 @@
 //! `view.png`: a depth map as a person likes to look at it - near is warm, far is cold, grey where there is no
 //! value, with a scale bar in mm.
 
-pub mod text;
-
 use std::io::Cursor;
 
-use anyhow::Result;
 use image::{Rgb, RgbImage};
 use ndarray::ArrayView2;
 
-use text::Writer;
+use crate::{EncodeError, text::Writer};
 
 /// Small maps are enlarged to at least this height, by a whole number of pixels.
 const MIN_HEIGHT_PX: usize = 320;
@@ -29,13 +26,15 @@ const FAINTEST: f32 = 0.15;
 /// The picture of a depth map in mm as the bytes of a PNG.
 ///
 /// `confidence` (0 to 1, same shape) decides how much of its colour a pixel keeps.
-pub fn view_png(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<Vec<u8>> {
+pub fn view_png(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     let mut png = Cursor::new(Vec::new());
-    draw(depth_mm, confidence)?.write_to(&mut png, image::ImageFormat::Png)?;
+    draw(depth_mm, confidence)?
+        .write_to(&mut png, image::ImageFormat::Png)
+        .map_err(EncodeError::of("view.png"))?;
     Ok(png.into_inner())
 }
 
-fn draw(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage> {
+fn draw(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage, EncodeError> {
     let (rows, columns) = depth_mm.dim();
     let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).max(1) as u32;
     let (width, height) = (columns as u32 * zoom, rows as u32 * zoom);

@@ -1,0 +1,119 @@
+//! Which rig and which camera, as every command of `farnear rig` takes them.
+
+use std::{path::PathBuf, time::Duration};
+
+use anyhow::{Result, bail};
+use clap::Args;
+use farnear_depth::psf::Psf;
+use farnear_protocol::Micros;
+use farnear_scene::{Noise, Scene};
+use farnear_workflows::{
+    rig::{RigAddress, camera::CameraSettings},
+    simulator::Scenery,
+};
+
+use crate::report::Usage;
+
+/// Which rig.
+#[derive(Args, Clone)]
+pub struct Target {
+    /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig.
+    #[arg(long, value_name = "PORT|sim")]
+    pub port: String,
+    #[command(flatten)]
+    scenery: SceneryArguments,
+}
+
+/// What the emulated rig sees; goes with `--port sim` only.
+#[derive(Args, Clone)]
+#[command(next_help_heading = "Emulated rig (--port sim)")]
+struct SceneryArguments {
+    /// Scene before the emulated camera: plane:MM, staircase, slant, cone or sphere [default: staircase].
+    #[arg(long, value_parser = checked::<Scene>)]
+    scene: Option<String>,
+    /// Point spread function of the emulated lens [default: the one of the optics file].
+    #[arg(long, value_parser = checked::<Psf>)]
+    psf: Option<String>,
+    /// Noise of the emulated camera: none, 8bit or 12bit [default: 8bit].
+    #[arg(long, value_parser = checked::<Noise>)]
+    noise: Option<String>,
+    /// Decides everything random [default: 1].
+    #[arg(long)]
+    seed: Option<u64>,
+    /// The firmware; without it the one that lies beside farnear-sim.
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
+    /// Faults of the emulated line, a TOML file.
+    #[arg(long, value_name = "FILE")]
+    faults: Option<PathBuf>,
+    /// Write what the emulated mechanics really did to this CSV file.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Let the emulated rig's time follow the clock on the wall, to watch it; runs do not repeat then.
+    #[arg(long)]
+    paced: bool,
+}
+
+/// Takes the text if it parses as a `T`; the simulator parses it again.
+fn checked<T: std::str::FromStr>(text: &str) -> Result<String, T::Err> {
+    text.parse::<T>().map(|_| text.to_owned())
+}
+
+impl SceneryArguments {
+    /// The first of these flags that was given.
+    fn given(&self) -> Option<&'static str> {
+        [
+            ("--scene", self.scene.is_some()),
+            ("--psf", self.psf.is_some()),
+            ("--noise", self.noise.is_some()),
+            ("--seed", self.seed.is_some()),
+            ("--firmware", self.firmware.is_some()),
+            ("--faults", self.faults.is_some()),
+            ("--trace", self.trace.is_some()),
+            ("--paced", self.paced),
+        ]
+        .into_iter()
+        .find_map(|(flag, given)| given.then_some(flag))
+    }
+}
+
+impl Target {
+    /// The rig's address.
+    pub fn address(&self) -> Result<RigAddress> {
+        if self.port == "sim" {
+            let SceneryArguments { scene, psf, noise, seed, firmware, faults, trace, paced } =
+                self.scenery.clone();
+            let scenery = Scenery { scene, psf, noise, seed, firmware, faults, trace, paced };
+            return Ok(RigAddress::Emulated(scenery));
+        }
+        if let Some(flag) = self.scenery.given() {
+            bail!(Usage(format!("{flag} goes with --port sim only; {} has a world of its own", self.port)));
+        }
+        Ok(RigAddress::Port(self.port.clone()))
+    }
+}
+
+/// Which camera, and how it exposes.
+#[derive(Args, Clone)]
+pub struct CameraArguments {
+    /// Camera: sim (with --port sim), HOST:PORT of a farnear-sim, or folder:DIR where images appear.
+    #[arg(long, value_name = "CAMERA", default_value = "sim")]
+    camera: String,
+    /// Exposure time in microseconds.
+    #[arg(long, value_name = "US", default_value_t = 5_000)]
+    exposure_us: u32,
+    /// Longest wait for an image in seconds.
+    #[arg(long, value_name = "S", default_value_t = 30)]
+    image_wait_s: u64,
+}
+
+impl CameraArguments {
+    /// As a workflow takes it.
+    pub fn settings(&self) -> Result<CameraSettings> {
+        Ok(CameraSettings {
+            address: self.camera.parse()?,
+            exposure: Micros(self.exposure_us),
+            image_wait: Duration::from_secs(self.image_wait_s),
+        })
+    }
+}

@@ -1,0 +1,147 @@
+//! Masks as pictures: grey PNGs (or other pictures), set from level 128 on, one per frame.
+
+use std::{
+    io::Cursor,
+    path::{Path, PathBuf},
+};
+
+use image::{GrayImage, ImageFormat, Luma};
+use ndarray::{Array2, Axis};
+
+use crate::{
+    EncodeError,
+    video::{Pixels, VideoError, pictures},
+};
+
+/// Shape (height, width); true = set.
+pub type Mask = Array2<bool>;
+
+/// Masks could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum MaskError {
+    /// Neither a picture nor a folder.
+    #[error("{}: no such picture or folder", path.display())]
+    Missing {
+        /// The place.
+        path: PathBuf,
+    },
+    /// A picture or folder that cannot be read.
+    #[error(transparent)]
+    Picture(#[from] VideoError),
+    /// Colour where grey levels are needed.
+    #[error("{}: colour {colour:?} at column {column}, row {row}; masks and truths are grey", path.display())]
+    Coloured {
+        /// The picture.
+        path: PathBuf,
+        /// Red, green and blue of the first such pixel.
+        colour: [u8; 3],
+        /// Its place from the left.
+        column: usize,
+        /// Its place from the top.
+        row: usize,
+    },
+    /// A mask of another size than the first.
+    #[error(
+        "{}: the mask is {}x{}, but `{first}` is {}x{}; the masks of a sequence must be alike",
+        path.display(), found.1, found.0, expected.1, expected.0
+    )]
+    Size {
+        /// The picture.
+        path: PathBuf,
+        /// Its height and width.
+        found: (usize, usize),
+        /// Name of the first.
+        first: String,
+        /// Height and width of the first.
+        expected: (usize, usize),
+    },
+}
+
+/// A mask and the name of the frame it belongs to.
+pub struct Named {
+    /// The picture's name without its extension.
+    pub name: String,
+    /// The mask.
+    pub mask: Mask,
+}
+
+/// The pictures of a folder in natural order, or the one picture.
+///
+/// # Errors
+/// A path that is neither, a folder without pictures.
+pub fn listed(path: &Path) -> Result<Vec<PathBuf>, MaskError> {
+    if path.is_dir() {
+        return Ok(pictures::list(path)?);
+    }
+    if !path.is_file() {
+        return Err(MaskError::Missing { path: path.into() });
+    }
+    Ok(vec![path.into()])
+}
+
+/// Grey levels of a picture; one in colour must have equal channels.
+///
+/// # Errors
+/// Pictures that cannot be read, and coloured ones.
+pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
+    match pictures::read(path)? {
+        Pixels::Grey(levels) => Ok(levels),
+        Pixels::Rgb(rgb) => {
+            for ((row, column), pixel) in rgb.map_axis(Axis(2), |p| [p[0], p[1], p[2]]).indexed_iter() {
+                if pixel[0] != pixel[1] || pixel[1] != pixel[2] {
+                    return Err(MaskError::Coloured { path: path.into(), colour: *pixel, column, row });
+                }
+            }
+            Ok(rgb.index_axis_move(Axis(2), 0))
+        }
+    }
+}
+
+/// The mask in a picture.
+///
+/// # Errors
+/// See [`grey`].
+pub fn read(path: &Path) -> Result<Mask, MaskError> {
+    Ok(grey(path)?.mapv(|level| level >= 128))
+}
+
+/// All masks of a folder (or one picture), in natural order; they must have one size.
+///
+/// # Errors
+/// See [`grey`] and [`listed`]; a mask of another size than the first.
+pub fn read_all(path: &Path) -> Result<Vec<Named>, MaskError> {
+    let mut all: Vec<Named> = Vec::new();
+    for file in listed(path)? {
+        let mask = read(&file)?;
+        if let Some(first) = all.first() {
+            let (found, expected) = (mask.dim(), first.mask.dim());
+            if found != expected {
+                return Err(MaskError::Size { path: file, found, first: first.name.clone(), expected });
+            }
+        }
+        all.push(Named { name: pictures::stem(&file), mask });
+    }
+    Ok(all)
+}
+
+/// A mask as PNG: 255 = set.
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn png(mask: &Mask) -> Result<Vec<u8>, EncodeError> {
+    encoded(mask, |&set| if set { 255 } else { 0 })
+}
+
+/// A picture of one grey level per pixel as PNG.
+///
+/// # Errors
+/// An encoder that refuses.
+pub fn encoded<T>(pixels: &Array2<T>, level: impl Fn(&T) -> u8) -> Result<Vec<u8>, EncodeError> {
+    let (height, width) = pixels.dim();
+    let levels = |x: u32, y: u32| Luma([level(&pixels[[y as usize, x as usize]])]);
+    let mut bytes = Vec::new();
+    GrayImage::from_fn(width as u32, height as u32, levels)
+        .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
+        .map_err(EncodeError::of("a mask"))?;
+    Ok(bytes)
+}

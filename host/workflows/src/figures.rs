@@ -1,0 +1,7 @@
+//! Figures as they are reported.
+
+/// A number with so many decimals, so that a report does not claim more than is known.
+pub fn rounded(value: f64, decimals: i32) -> f64 {
+    let scale = 10f64.powi(decimals);
+    (value * scale).round() / scale
+}

@@ -1,0 +1,79 @@
+//! The optics of a rig or of a pair, from `optics.toml` or a capture's record.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use farnear_capture::record::{CAPTURE_FILE, read_record};
+use farnear_depth::{
+    optics::{Optics, OpticsFile},
+    psf::Psf,
+};
+
+use crate::error::{About, Result, WorkflowError};
+
+/// Optics and the file they come from.
+#[derive(Clone, Debug)]
+pub struct GivenOptics {
+    /// The file.
+    pub path: PathBuf,
+    /// What it says, checked.
+    pub optics: Optics,
+    /// What it says, as it was written, for records.
+    pub table: toml::Table,
+}
+
+impl GivenOptics {
+    /// Reads and checks an optics file.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Read`], or which value makes no optics.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(WorkflowError::read("the optics file", path))?;
+        let table = text.parse().about(|| about(path))?;
+        Ok(Self { path: path.into(), optics: check(&text, path)?, table })
+    }
+
+    /// As the emulated rig's lens takes them.
+    pub fn for_emulation(&self) -> (&Path, Psf) {
+        (&self.path, self.optics.psf())
+    }
+}
+
+/// Reads and checks an optics file.
+///
+/// # Errors
+/// As [`GivenOptics::read`].
+pub fn read(path: &Path) -> Result<Optics> {
+    GivenOptics::read(path).map(|given| given.optics)
+}
+
+/// The optics of a pair: the file that is named, else what the far image's folder knows (`capture.toml` or
+/// `optics.toml`).
+///
+/// # Errors
+/// As [`GivenOptics::read`]; [`WorkflowError::NoOptics`] where there is nothing.
+pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<Optics> {
+    if let Some(path) = named {
+        return read(path);
+    }
+    let folder = far.parent().unwrap_or(Path::new(""));
+    if let Some(record) = read_record(folder)? {
+        return check(&toml::to_string(&record.optics)?, &folder.join(CAPTURE_FILE));
+    }
+    let beside = folder.join("optics.toml");
+    if beside.exists() {
+        return read(&beside);
+    }
+    Err(WorkflowError::NoOptics { far: far.into() })
+}
+
+fn check(text: &str, path: &Path) -> Result<Optics> {
+    let file: OpticsFile = toml::from_str(text).about(|| about(path))?;
+    file.check().about(|| about(path))
+}
+
+fn about(path: &Path) -> String {
+    format!("the optics in {}", path.display())
+}

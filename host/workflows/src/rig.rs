@@ -1,0 +1,77 @@
+//! A rig, real or emulated: connecting to it, and what it can be made to do. One file per job.
+
+pub mod camera;
+pub mod pair;
+
+use std::path::Path;
+
+use farnear_capture::Client;
+use farnear_depth::psf::Psf;
+
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    simulator::{Scenery, Simulator},
+};
+
+/// Where a rig is.
+#[derive(Clone, PartialEq, Debug)]
+pub enum RigAddress {
+    /// Behind a serial port, e.g. `/dev/ttyACM0`.
+    Port(String),
+    /// Emulated: `farnear-sim` is started for it, and ends with it.
+    Emulated(Scenery),
+}
+
+impl RigAddress {
+    /// Whether the rig is the emulated one that is started for this.
+    pub fn is_emulated(&self) -> bool {
+        matches!(self, Self::Emulated(_))
+    }
+
+    /// The emulated rig before another scene.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`] for a real rig, whose world nobody can exchange.
+    pub fn with_scene(&self, scene: String) -> Result<Self> {
+        match self {
+            Self::Emulated(scenery) => Ok(Self::Emulated(scenery.with_scene(scene))),
+            Self::Port(port) => {
+                Err(WorkflowError::parameter("scene", scene, format!("{port} has a world of its own")))
+            }
+        }
+    }
+}
+
+/// A connected rig. The simulator, where there is one, ends after the client.
+pub struct Rig {
+    /// The way to the board.
+    pub client: Client,
+    /// The emulated rig that was started for this, and what it was asked to be.
+    pub emulation: Option<(Simulator, Scenery)>,
+}
+
+impl Rig {
+    /// Connects. Cancelling stops what moves. The emulated rig's lens is that of `optics`, where they are given.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+    pub fn connect(
+        address: &RigAddress,
+        optics: Option<(&Path, Psf)>,
+        context: &Context<'_>,
+    ) -> Result<Self> {
+        let (mut client, emulation) = match address {
+            RigAddress::Port(port) => (Client::open(port)?, None),
+            RigAddress::Emulated(scenery) => {
+                let simulator = Simulator::start(scenery, optics, context.progress)?;
+                (Client::open_emulated(simulator.port())?, Some((simulator, scenery.clone())))
+            }
+        };
+        client.interrupt_by(context.cancel.flag());
+        if let Some(note) = client.firmware_note() {
+            context.say(&note);
+        }
+        Ok(Self { client, emulation })
+    }
+}
