@@ -2,15 +2,16 @@
 //!
 //! Per left-out subject: the space (gallery, layout, RBF map, codebook) is learned from the other subjects' clips; its
 //! parameters, sharpness and the classifier's parameter are chosen by cross-validation over those subjects
-//! ([`super::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
+//! ([`crate::recognition::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
 //! left-out subject is ever seen before.
 
-use super::choice::{Views, choose, gathered, names, patterns_of, vectors_of};
 use super::confusion::Confusion;
-use super::experiment::Experiment;
 use crate::embedding::EmbeddingError;
+use crate::recognition::choice::{Views, choose, names};
 use crate::recognition::classifier::{Classifier, ClassifierKind};
 use crate::recognition::clip::Clip;
+use crate::recognition::experiment::Experiment;
+use crate::recognition::patterns::{gathered, patterns_of, vectors_of};
 use crate::recognition::space::SpaceSettings;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub struct Choice {
     pub views: Views,
     /// The space.
     pub space: SpaceSettings,
-    /// Sharpness of the codebook's shares.
+    /// Sharpness of the codebook's soft assignments.
     pub sharpness: f32,
     /// Classifier.
     pub classifier: ClassifierKind,

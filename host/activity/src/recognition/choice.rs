@@ -3,14 +3,13 @@
 //! Spaces are learned once from all training clips (that is unsupervised: no label is looked at), classifiers are trained and
 //! tested over folds of subjects on the patterns' Gram matrix. O(spaces x (clips^2 P + folds clips^2)) and mostly the spaces' training.
 
+use super::classifier::ClassifierKind;
+use super::classifier::method::Fold;
+use super::clip::Clip;
 use super::experiment::Experiment;
+use super::patterns::{gathered, patterns_of, vectors_of};
+use super::space::{Galleries, Map, Space, SpaceSettings};
 use crate::embedding::EmbeddingError;
-use crate::recognition::classifier::ClassifierKind;
-use crate::recognition::clip::Clip;
-use crate::recognition::knn;
-use crate::recognition::occupancy::rows;
-use crate::recognition::space::{Galleries, Map, Space, SpaceSettings};
-use crate::recognition::svc::DualSvc;
 use ndarray::{Array1, Array2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -53,7 +52,7 @@ impl Views {
 pub struct Chosen {
     /// The space, learned from all training clips.
     pub space: Space,
-    /// Sharpness of the codebook's shares.
+    /// Sharpness of the codebook's soft assignments.
     pub sharpness: f32,
     /// Classifier.
     pub classifier: ClassifierKind,
@@ -120,7 +119,7 @@ pub fn choose(
             }
         }
         let of = clips.len() * problem.arrangements.len();
-        best.chosen.inner_accuracy = Some(f64::from(best.right) / of.max(1) as f64);
+        best.chosen.inner_accuracy = Some(best.right as f64 / of.max(1) as f64);
     }
     Ok(best.chosen)
 }
@@ -136,7 +135,7 @@ struct Problem<'a> {
 }
 
 struct Candidate {
-    right: u32,
+    right: usize,
     chosen: Chosen,
 }
 
@@ -161,7 +160,7 @@ impl Problem<'_> {
                 if compare { self.arrangements.iter().map(product).collect() } else { Vec::new() };
             // The first of equals, so that nothing hangs on the order of the values.
             let scored = self.experiment.classifiers.iter().map(|&kind| {
-                let right: u32 = grams.iter().map(|gram| self.right(gram, kind)).sum();
+                let right: usize = grams.iter().map(|gram| self.right(gram, kind)).sum();
                 (right, kind)
             });
             let won = scored.reduce(|best, next| if next.0 > best.0 { next } else { best });
@@ -180,56 +179,15 @@ impl Problem<'_> {
     }
 
     /// Right answers of a classifier over the folds of training subjects, from the patterns' Gram matrix.
-    fn right(&self, gram: &Array2<f32>, kind: ClassifierKind) -> u32 {
-        let best = |values: &[f32]| {
-            values.iter().enumerate().fold(0, |best, (k, v)| if *v > values[best] { k } else { best })
-        };
+    fn right(&self, gram: &Array2<f32>, kind: ClassifierKind) -> usize {
         (0..self.folds)
             .into_par_iter()
             .map(|fold| {
-                let kept: Vec<usize> = (0..self.labels.len()).filter(|&i| self.group[i] != fold).collect();
-                let held = (0..self.labels.len()).filter(|&i| self.group[i] == fold);
-                let answer: Box<dyn Fn(usize) -> usize> = match kind {
-                    ClassifierKind::Svc(c) => {
-                        let svc = DualSvc::train(gram.view(), &kept, &self.labels, self.classes, c);
-                        Box::new(move |i| best(&svc.decide(gram.row(i)).to_vec()))
-                    }
-                    ClassifierKind::Knn(k) => Box::new(move |i| {
-                        let distances =
-                            kept.iter().map(|&j| (gram[[j, j]] - 2.0 * gram[[i, j]], self.labels[j]));
-                        best(&knn::vote(distances.collect(), self.classes, k))
-                    }),
-                };
-                held.filter(|&i| answer(i) == self.labels[i]).count() as u32
+                let all = 0..self.labels.len();
+                let (held, kept): (Vec<usize>, Vec<usize>) = all.partition(|&i| self.group[i] == fold);
+                let (gram, labels) = (gram.view(), self.labels.as_slice());
+                kind.right(&Fold { gram, kept: &kept, held: &held, labels, classes: self.classes })
             })
             .sum()
     }
-}
-
-/// Frame vectors of clips: `[clip][view]`.
-pub(super) fn vectors_of(space: &Space, clips: &[&Clip]) -> Result<Vec<Vec<Array2<f32>>>, EmbeddingError> {
-    clips.par_iter().map(|clip| clip.views.iter().map(|view| space.vectors(view)).collect()).collect()
-}
-
-/// Patterns of frame vectors: `[clip][view]`.
-pub(super) fn patterns_of(
-    space: &Space,
-    clips: &[Vec<Array2<f32>>],
-    sharpness: f32,
-) -> Vec<Vec<Array1<f32>>> {
-    let clip =
-        |views: &Vec<Array2<f32>>| views.iter().map(|v| space.pattern_of(v.view(), sharpness)).collect();
-    clips.par_iter().map(clip).collect()
-}
-
-/// The chosen views' patterns, one clip per row.
-pub(super) fn gathered(patterns: &[Vec<Array1<f32>>], chosen: &[usize]) -> Array2<f32> {
-    rows(&patterns.iter().map(|views| joined(views, chosen)).collect::<Vec<_>>())
-}
-
-/// The patterns of some views, one after the other, over the square root of their number: the product of two joined patterns is the mean
-/// of the views' products, so that a classifier's cost means the same for one view and for many.
-pub(crate) fn joined(views: &[Array1<f32>], chosen: &[usize]) -> Array1<f32> {
-    let scale = 1.0 / (chosen.len().max(1) as f32).sqrt();
-    chosen.iter().flat_map(|&view| views[view].iter().map(move |v| scale * v)).collect()
 }

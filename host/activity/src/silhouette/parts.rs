@@ -1,4 +1,4 @@
-//! Silhouettes from markers: every part's markers projected and filled (Li 2014, section 7.2.2).
+//! Silhouettes by parts: the markers of every part of the body, projected and filled (Li 2014, section 7.2.2).
 //!
 //! The thesis fills all triplets of a part's markers, so that a hidden marker leaves no hole. The union of all triangles over a set of
 //! points is the points' convex hull, so the hull gives the same picture in a fraction of the time. Both are here and are held against
@@ -9,7 +9,8 @@ use super::raster::{Point, convex_hull, fill_convex, fill_discs_hull};
 use super::template::Template;
 use super::view::{Canvas, View};
 use crate::mask::Mask;
-use rayon::prelude::*;
+use crate::mask::bits::BitMask;
+use ndarray::s;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -26,8 +27,8 @@ pub enum Fill {
 
 /// A drawn frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MarkerSilhouette {
-    /// The picture.
+pub struct PartsSilhouette {
+    /// All parts together.
     pub mask: Mask,
     /// Parts without a single visible marker: the picture lacks them.
     pub missing_parts: Vec<String>,
@@ -54,7 +55,7 @@ pub fn draw(
     view: &View,
     canvas: &Canvas,
     fill: Fill,
-) -> MarkerSilhouette {
+) -> PartsSilhouette {
     let mut mask = canvas.blank();
     let mut missing_parts = Vec::new();
     for part in &template.parts {
@@ -81,7 +82,7 @@ pub fn draw(
             }
         }
     }
-    MarkerSilhouette { mask, missing_parts }
+    PartsSilhouette { mask, missing_parts }
 }
 
 fn fill_triplets(mask: &mut Mask, points: &[Point]) {
@@ -97,83 +98,18 @@ fn fill_triplets(mask: &mut Mask, points: &[Point]) {
     }
 }
 
-/// Morphological closing by a square of `size` pixels (odd): gaps narrower than that are filled, the outline stays.
-pub fn close(mask: &Mask, size: usize) -> Mask {
-    let half = size / 2;
+/// Morphological closing by a square of `size_px` pixels (odd): gaps narrower than that are filled, the outline stays.
+pub fn close(mask: &Mask, size_px: usize) -> Mask {
+    let half = size_px / 2;
     if half == 0 {
         return mask.clone();
     }
     // A border of background keeps the picture's edge from being eaten or grown.
-    let (h, w) = mask.dim();
-    let mut wide = Mask::default((h + 2 * half, w + 2 * half));
-    wide.slice_mut(ndarray::s![half..half + h, half..half + w]).assign(mask);
-    let grown = window(&wide, half, true);
-    let closed = window(&grown, half, false);
-    closed.slice(ndarray::s![half..half + h, half..half + w]).to_owned()
-}
-
-/// Dilation (`any`) or erosion by a square, one axis after the other, by running counts.
-fn window(mask: &Mask, half: usize, any: bool) -> Mask {
-    let along_rows = |mask: &Mask| {
-        let (h, w) = mask.dim();
-        let mut out = Mask::default((h, w));
-        for (from, mut to) in mask.rows().into_iter().zip(out.rows_mut()) {
-            let mut count = from.iter().take(half).filter(|&&set| set).count();
-            for x in 0..w {
-                count += usize::from(x + half < w && from[x + half]);
-                let length = (x + half).min(w - 1) + 1 - x.saturating_sub(half);
-                to[x] = if any { count > 0 } else { count == length };
-                count -= usize::from(x >= half && from[x - half]);
-            }
-        }
-        out
-    };
-    let rows = along_rows(mask);
-    along_rows(&rows.t().as_standard_layout().to_owned()).t().as_standard_layout().to_owned()
-}
-
-/// Which of many similar silhouettes to keep (Li 2014, eq. 7.3 and 7.4): the two most alike are found, one of them goes (in turn
-/// the first and the second), until `keep` are left. The printed method only strikes the removed silhouette's row; its column is
-/// struck too, else a removed silhouette could be removed again. Gives the kept indices in rising order. O(N^2 P / 64).
-pub fn remove_redundant(masks: &[Mask], keep: usize) -> Vec<usize> {
-    let n = masks.len();
-    let packed: Vec<Vec<u64>> = masks
-        .par_iter()
-        .map(|mask| {
-            let pixels: Vec<bool> = mask.iter().copied().collect();
-            pixels
-                .chunks(64)
-                .map(|bits| bits.iter().enumerate().fold(0, |word, (i, &b)| word | (u64::from(b) << i)))
-                .collect()
-        })
-        .collect();
-    let difference = |a: usize, b: usize| -> u32 {
-        let common: u32 = packed[a].iter().zip(&packed[b]).map(|(p, q)| (p ^ q).count_ones()).sum();
-        let rest = packed[a].len().abs_diff(packed[b].len()) as u32 * 64;
-        common + rest
-    };
-    let matrix: Vec<Vec<u32>> =
-        (0..n).into_par_iter().map(|a| (0..a).map(|b| difference(a, b)).collect()).collect();
-    let mut alive = vec![true; n];
-    // The nearest lower-numbered living silhouette of each row; only rows that lose theirs are searched again.
-    let nearest = |alive: &[bool], a: usize| (0..a).filter(|&b| alive[b]).min_by_key(|&b| matrix[a][b]);
-    let mut best: Vec<Option<usize>> = (0..n).map(|a| nearest(&alive, a)).collect();
-    let mut left = n;
-    let mut first = true;
-    while left > keep.max(1) {
-        let pair = (0..n).filter(|&a| alive[a]).filter_map(|a| best[a].map(|b| (matrix[a][b], a, b))).min();
-        let Some((_, a, b)) = pair else { break };
-        let gone = if first { a } else { b };
-        first = !first;
-        alive[gone] = false;
-        left -= 1;
-        for other in gone + 1..n {
-            if alive[other] && best[other] == Some(gone) {
-                best[other] = nearest(&alive, other);
-            }
-        }
-    }
-    (0..n).filter(|&i| alive[i]).collect()
+    let (height, width) = mask.dim();
+    let inner = s![half..half + height, half..half + width];
+    let mut wide = Mask::default((height + 2 * half, width + 2 * half));
+    wide.slice_mut(inner).assign(mask);
+    BitMask::pack(wide.view()).closed(half).unpack().slice(inner).to_owned()
 }
 
 #[cfg(test)]
@@ -216,18 +152,5 @@ mod tests {
         assert!(closed[[20, 30]] && !closed[[5, 30]] && !closed[[20, 2]]);
         assert_eq!(area(closed.view()), 20 * 50);
         assert_eq!(close(&mask, 3), mask, "a gap of five stays with a window of three");
-    }
-
-    #[test]
-    fn the_most_alike_go_first_and_what_is_left_is_varied() {
-        let bar = |at: usize| Mask::from_shape_fn((10, 100), |(_, x)| (at..at + 10).contains(&x));
-        let masks: Vec<Mask> = [0, 1, 2, 40, 41, 80].map(bar).into();
-        let kept = remove_redundant(&masks, 3);
-        assert_eq!(kept.len(), 3);
-        assert!(
-            kept.iter().any(|&i| i <= 2) && kept.contains(&5) && kept.iter().any(|&i| i == 3 || i == 4),
-            "{kept:?}"
-        );
-        assert_eq!(remove_redundant(&masks, 10).len(), 6);
     }
 }

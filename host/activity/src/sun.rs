@@ -11,9 +11,16 @@
 //! but for SPA (a few microseconds).
 
 mod almanac;
+mod angles;
+mod clock;
+mod place;
 mod psa;
 mod spa;
 mod thesis;
+
+pub use angles::{Equatorial, SunPosition, to_horizon};
+pub use clock::parse_time;
+pub use place::{Place, SunError};
 
 use chrono::{DateTime, Utc};
 use serde::{Deserialize, Serialize};
@@ -50,84 +57,6 @@ impl FromStr for Model {
     }
 }
 
-/// Why a position could not be computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SunError {
-    /// Latitude outside -90 to 90 degrees or not a number.
-    #[error("latitude {0} deg is outside -90 to 90 deg")]
-    Latitude(f64),
-    /// Longitude outside -180 to 360 degrees or not a number.
-    #[error("longitude {0} deg is outside -180 to 360 deg (east is positive)")]
-    Longitude(f64),
-    /// No such model.
-    #[error("unknown sun model `{0}`: expected psa, almanac, thesis or spa")]
-    UnknownModel(String),
-    /// The text is not an RFC 3339 time.
-    #[error("`{text}` is not an RFC 3339 time such as 2014-06-23T11:30:00Z: {reason}")]
-    Time {
-        /// What was given.
-        text: String,
-        /// The parser's reason.
-        reason: String,
-    },
-    /// SPA refused.
-    #[error("SPA: {0}")]
-    Spa(String),
-}
-
-/// Declination and Greenwich hour angle, radians; the hour angle grows westwards and is not wrapped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Equatorial {
-    /// Angle above the celestial equator.
-    pub declination_rad: f64,
-    /// Hour angle at longitude zero.
-    pub greenwich_hour_angle_rad: f64,
-}
-
-/// Where the sun stands, seen from the ground, without refraction.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SunPosition {
-    /// Above the horizon, degrees.
-    pub elevation_deg: f64,
-    /// Clockwise from north, 0 to 360 degrees.
-    pub azimuth_deg: f64,
-}
-
-/// A place on the ground.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Place {
-    /// North positive, degrees.
-    pub latitude_deg: f64,
-    /// East positive, degrees.
-    pub longitude_deg: f64,
-}
-
-impl Place {
-    /// A checked place.
-    ///
-    /// # Errors
-    /// Latitude outside ±90 degrees, longitude outside -180 to 360 degrees.
-    pub fn new(latitude_deg: f64, longitude_deg: f64) -> Result<Self, SunError> {
-        if !(-90.0..=90.0).contains(&latitude_deg) {
-            return Err(SunError::Latitude(latitude_deg));
-        }
-        if !(-180.0..=360.0).contains(&longitude_deg) {
-            return Err(SunError::Longitude(longitude_deg));
-        }
-        Ok(Self { latitude_deg, longitude_deg })
-    }
-}
-
-/// Reads an RFC 3339 time, e.g. `2014-06-23T11:30:00Z` or `2014-06-23T12:30:00+01:00`.
-///
-/// # Errors
-/// Text that is not such a time.
-pub fn parse_time(text: &str) -> Result<DateTime<Utc>, SunError> {
-    DateTime::parse_from_rfc3339(text)
-        .map(|time| time.with_timezone(&Utc))
-        .map_err(|error| SunError::Time { text: text.to_owned(), reason: error.to_string() })
-}
-
 /// Elevation and azimuth of the sun (UT1 - UTC, below 0.9 s or 0.004 deg, is neglected).
 ///
 /// # Errors
@@ -155,32 +84,6 @@ pub fn equatorial(time: DateTime<Utc>, model: Model) -> Equatorial {
         Model::Almanac => almanac::equatorial(time),
         Model::Thesis => thesis::equatorial(time),
     }
-}
-
-/// From declination, local hour angle and latitude (radians) to elevation and azimuth.
-pub fn to_horizon(declination_rad: f64, hour_angle_rad: f64, latitude_rad: f64) -> SunPosition {
-    let (sin_d, cos_d) = declination_rad.sin_cos();
-    let (sin_h, cos_h) = hour_angle_rad.sin_cos();
-    let (sin_l, cos_l) = latitude_rad.sin_cos();
-    let up = sin_d * sin_l + cos_d * cos_l * cos_h;
-    let east = -cos_d * sin_h;
-    let north = sin_d * cos_l - cos_d * sin_l * cos_h;
-    SunPosition {
-        elevation_deg: up.atan2(east.hypot(north)).to_degrees(),
-        azimuth_deg: east.atan2(north).to_degrees().rem_euclid(360.0),
-    }
-}
-
-/// Seconds of a time since 2000-01-01 12:00 UTC, exact to the nanosecond's rounding in f64.
-fn seconds_since_j2000(time: DateTime<Utc>) -> f64 {
-    /// Unix time of 2000-01-01T12:00:00Z.
-    const J2000_UNIX_S: i64 = 946_728_000;
-    (time.timestamp() - J2000_UNIX_S) as f64 + f64::from(time.timestamp_subsec_nanos()) * 1e-9
-}
-
-/// Hours since midnight UTC.
-fn hours_of_day(time: DateTime<Utc>) -> f64 {
-    (time.timestamp().rem_euclid(86_400) as f64 + f64::from(time.timestamp_subsec_nanos()) * 1e-9) / 3600.0
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! World frame as in Li 2014, chapter 7: x and y span the ground, z points up, millimetres.
 
 pub mod capsule;
-pub mod markers;
-pub mod pixels;
+pub mod parts;
 pub mod raster;
+pub mod redundant;
 pub mod template;
 pub mod view;

@@ -4,9 +4,9 @@
 //! over the training subjects, so nothing is ever tuned on who is tested. Values were laid out by what they mean (factors of two or
 //! three about equal weight), not by what did best on any set.
 
-use crate::recognition::classifier::ClassifierKind;
-use crate::recognition::frames::{Mode, Weights};
-use crate::recognition::space::{Layout, PatternKind, SpaceSettings};
+use super::classifier::{ClassifierKind, Family};
+use super::frames::{Mode, Weights};
+use super::space::{Layout, PatternKind, SpaceSettings};
 
 /// One parameter of the space and the values it may take.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,7 +71,7 @@ pub struct Experiment {
     pub space: SpaceSettings,
     /// Parameters of the space, in the order in which they are chosen.
     pub sweeps: Vec<Sweep>,
-    /// Sharpness of the codebook's shares to choose from, with every space.
+    /// Sharpness of the codebook's soft assignments to choose from, with every space.
     pub sharpness: Vec<f32>,
     /// Classifiers to choose from, with every space.
     pub classifiers: Vec<ClassifierKind>,
@@ -88,7 +88,7 @@ impl Experiment {
             space,
             sweeps: Vec::new(),
             sharpness: vec![1.0, 2.0, 4.0],
-            classifiers: vec![ClassifierKind::Svc(1.0), ClassifierKind::Svc(5.0)],
+            classifiers: Family::Svc.tried(),
             mirror: true,
             inner_folds: 4,
         }
@@ -127,13 +127,10 @@ impl Experiment {
         }
     }
 
-    /// The same with k nearest neighbours in place of the SVC.
+    /// The same with another classifier, its parameter chosen from all that it tries.
     #[must_use]
-    pub fn with_neighbours(self) -> Self {
-        Self {
-            classifiers: vec![ClassifierKind::Knn(1), ClassifierKind::Knn(3), ClassifierKind::Knn(5)],
-            ..self
-        }
+    pub fn with_classifier(self, family: Family) -> Self {
+        Self { classifiers: family.tried(), ..self }
     }
 
     /// The same with nothing chosen: the first of everything.

@@ -4,7 +4,7 @@
 //! Sanderson and Lovell, "Shadow detection: a survey and comparative evaluation of recent methods", Pattern
 //! Recognition 45 (2012), 1684-1695. Each is built from its own paper, named in its module; thresholds are this
 //! project's. All need the picture of the empty scene ([`crate::background::BackgroundModel::background`]) and
-//! colour. [`made_scene`] scores them on pictures whose shadow is known.
+//! colour. [`crate::synthetic::pictures`] makes pictures whose shadow is known to score them on.
 //!
 //! The limits that the survey names hold here too: chromaticity fails on grey clothes, geometry on shadows that fall
 //! under the body's own columns, texture on smooth ground.
@@ -13,7 +13,6 @@ pub mod chromaticity;
 pub mod geometry;
 mod images;
 pub mod large_region;
-pub mod made_scene;
 pub mod physical;
 pub mod small_region;
 

@@ -9,6 +9,7 @@ mod recognition;
 mod robustness;
 mod sets;
 mod shadows;
+mod skeletons;
 mod strips;
 mod sun;
 

@@ -4,6 +4,7 @@
 //! Clips are few and patterns long, so the descent runs on the patterns' Gram matrix: a step costs as many operations as
 //! there are clips, whatever the patterns' length, and cross-validation folds share one Gram matrix.
 
+use super::method::{Fold, Method, largest};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use rand::{SeedableRng, seq::SliceRandom};
 use serde::{Deserialize, Serialize};
@@ -17,34 +18,33 @@ pub struct LinearSvc {
     pub offsets: Array1<f32>,
 }
 
-/// A classifier in terms of its training samples.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DualSvc {
-    /// Rows of the Gram matrix that were trained on.
-    pub rows: Vec<usize>,
-    /// Per class: multiplier times sign of each of those rows.
-    pub signed: Vec<Vec<f32>>,
-    /// Per class: offset.
-    pub offsets: Vec<f32>,
-}
-
 /// Passes over the samples at most.
 const PASSES: usize = 200;
 /// Largest projected gradient at which a class is settled.
 const TOLERANCE: f32 = 0.02;
 
-impl DualSvc {
+/// A classifier in terms of its training samples.
+struct DualSvc<'a> {
+    /// Rows of the Gram matrix that were trained on.
+    rows: &'a [usize],
+    /// Per class: multiplier times sign of each of those rows.
+    signed: Vec<Vec<f32>>,
+    /// Per class: offset.
+    offsets: Vec<f32>,
+}
+
+impl<'a> DualSvc<'a> {
     /// Trains on some rows of a Gram matrix (`labels` of all of its rows, below `classes`); `c` weighs errors against the margin.
-    pub fn train(gram: ArrayView2<f32>, rows: &[usize], labels: &[usize], classes: usize, c: f32) -> Self {
+    fn train(gram: ArrayView2<f32>, rows: &'a [usize], labels: &[usize], classes: usize, c: f32) -> Self {
         let part = Array2::from_shape_fn((rows.len(), rows.len()), |(i, j)| gram[[rows[i], rows[j]]]);
         let own: Vec<usize> = rows.iter().map(|&row| labels[row]).collect();
         let (signed, offsets) =
             (0..classes).map(|class| one_against_rest(&part, &own, class, classes, c)).unzip();
-        Self { rows: rows.to_vec(), signed, offsets }
+        Self { rows, signed, offsets }
     }
 
     /// Decision value of every class for a row of the Gram matrix.
-    pub fn decide(&self, gram_row: ArrayView1<f32>) -> Array1<f32> {
+    fn decide(&self, gram_row: ArrayView1<f32>) -> Vec<f32> {
         self.signed
             .iter()
             .zip(&self.offsets)
@@ -56,8 +56,23 @@ impl DualSvc {
 }
 
 impl LinearSvc {
-    /// Trains on patterns (N x P) with labels below `classes`; `c` weighs errors against the margin.
-    pub fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, c: f32) -> Self {
+    /// Decision value of every class: positive inside the class' half-space.
+    pub fn decide(&self, pattern: ArrayView1<f32>) -> Array1<f32> {
+        self.weights.dot(&pattern) + &self.offsets
+    }
+}
+
+impl Method for LinearSvc {
+    type Parameter = f32;
+    const NAME: &'static str = "svc";
+    const TRIED: &'static [f32] = &[1.0, 5.0];
+
+    fn described(c: f32) -> String {
+        format!("cost {c}")
+    }
+
+    /// `c` weighs errors against the margin.
+    fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, c: f32) -> Self {
         let gram = patterns.dot(&patterns.t());
         let rows: Vec<usize> = (0..patterns.nrows()).collect();
         let dual = DualSvc::train(gram.view(), &rows, labels, classes, c);
@@ -65,9 +80,24 @@ impl LinearSvc {
         Self { weights: signed.dot(&patterns), offsets: dual.offsets.into() }
     }
 
-    /// Decision value of every class: positive inside the class' half-space.
-    pub fn decide(&self, pattern: ArrayView1<f32>) -> Array1<f32> {
-        self.weights.dot(&pattern) + &self.offsets
+    /// The softmax of the decision values.
+    fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
+        /// Decision values lie about -1 to 1; this turns a margin of one into odds of twenty.
+        const SLOPE: f32 = 3.0;
+        let decision = self.decide(pattern);
+        let best = decision.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
+        let raised: Vec<f32> = decision.iter().map(|v| (SLOPE * (v - best)).exp()).collect();
+        let total: f32 = raised.iter().sum();
+        raised.into_iter().map(|v| v / total).collect()
+    }
+
+    fn answers(fold: &Fold, c: f32) -> Vec<usize> {
+        let dual = DualSvc::train(fold.gram, fold.kept, fold.labels, fold.classes, c);
+        fold.held.iter().map(|&i| largest(&dual.decide(fold.gram.row(i)))).collect()
+    }
+
+    fn fits(&self, width: usize, classes: usize) -> bool {
+        self.weights.dim() == (classes, width) && self.offsets.len() == classes
     }
 }
 
@@ -124,12 +154,13 @@ mod tests {
             Array2::from_shape_fn((90, 2), |(i, k)| centres[labels[i]][k] + rng.random_range(-1.0..1.0_f32));
         let svc = LinearSvc::train(patterns.view(), &labels, 3, 10.0);
         let gram = patterns.dot(&patterns.t());
-        let dual = DualSvc::train(gram.view(), &(0..90).collect::<Vec<_>>(), &labels, 3, 10.0);
+        let rows: Vec<usize> = (0..90).collect();
+        let dual = DualSvc::train(gram.view(), &rows, &labels, 3, 10.0);
         for (i, (row, &label)) in patterns.rows().into_iter().zip(&labels).enumerate() {
             let decision = svc.decide(row);
             let best = (0..3).max_by(|&a, &b| decision[a].total_cmp(&decision[b]));
             assert_eq!(best, Some(label));
-            assert!((&decision - &dual.decide(gram.row(i))).iter().all(|d| d.abs() < 1e-2));
+            assert!(decision.iter().zip(dual.decide(gram.row(i))).all(|(a, b)| (a - b).abs() < 1e-2));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Made colour pictures with known shadow, to score detectors where no labelled video is at hand.
 //!
-//! A scene's masks of body and shadow ([`crate::synthetic::scene`]) are coloured in: the ground is speckled paving lit
+//! A scene's masks of body and shadow ([`super::scene`]) are coloured in: the ground is speckled paving lit
 //! by a warm sun and a blue sky, the shadow keeps the sky's light only (with a soft edge), the body wears a
 //! patterned shirt and plain trousers under the same light, and the camera adds noise. Nothing of the detectors'
 //! models is used but the fact that light adds up.
@@ -9,11 +9,7 @@ use ndarray::{Array2, Array3, ArrayView2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Detector, Images, Method};
-use crate::{
-    shadow_score::{ShadowScore, Truth},
-    synthetic::scene::{Kind, scene},
-};
+use crate::shadow_score::Truth;
 
 /// A coloured scene.
 #[derive(Clone, Debug)]
@@ -70,30 +66,6 @@ pub fn colour_in(truth: ArrayView2<'_, Truth>, seed: u64) -> Pictures {
         }
     }
     Pictures { frame, background }
-}
-
-/// The score of one detector over made scenes of a kind, one per seed; the foreground given to it is body and shadow.
-/// Cost: about 0.1 s per scene, most of it for making the pictures.
-#[must_use]
-pub fn score(method: Method, kind: Kind, seeds: std::ops::Range<u64>) -> ShadowScore {
-    let mut total = ShadowScore::default();
-    let mut detector = Detector::new(method);
-    for seed in seeds {
-        let scene = scene(kind, seed);
-        let truth = scene.truth();
-        let pictures = colour_in(truth.view(), seed);
-        let images = Images {
-            frame: pictures.frame.view(),
-            background: pictures.background.view(),
-            foreground: scene.silhouette.view(),
-        };
-        let shadow = detector.detect(&images);
-        let left = Array2::from_shape_fn(truth.dim(), |at| scene.silhouette[at] && !shadow[at]);
-        // The shapes are the same by construction.
-        let added = total.add(Some(scene.silhouette.view()), left.view(), truth.view());
-        debug_assert!(added.is_ok());
-    }
-    total
 }
 
 /// How much of the sun reaches each pixel of the ground, 0 to 1: the shadow's edge is three pixels soft.

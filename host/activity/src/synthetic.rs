@@ -2,4 +2,5 @@
 
 pub mod activities;
 pub mod body;
+pub mod pictures;
 pub mod scene;
