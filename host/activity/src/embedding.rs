@@ -20,6 +20,9 @@ use ndarray::{Array2, ArrayView2};
 /// Why an embedding could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EmbeddingError {
+    /// Whoever watches the work stopped it.
+    #[error("stopped before the embedding was made")]
+    Stopped,
     /// Fewer samples than needed.
     #[error("{found} samples are too few: {needed} are needed")]
     TooFewSamples {

@@ -19,3 +19,4 @@ pub(crate) mod patterns;
 pub mod residuals;
 pub mod space;
 pub mod training;
+pub mod watch;

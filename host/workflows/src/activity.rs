@@ -8,3 +8,4 @@ pub mod recognition;
 pub mod samples;
 pub mod training;
 pub mod views;
+mod watched;

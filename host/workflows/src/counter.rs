@@ -4,32 +4,36 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::{context::Context, error::Result};
 
-/// Counts parts of a work over threads, so that whoever watches sees the count rise by one each time, and the last one last.
+/// Counts parts of a work over threads, so that whoever watches sees the count rise by one each time.
 pub(crate) struct Counter<'a> {
     context: &'a Context<'a>,
     unit: &'static str,
-    total: usize,
     done: Mutex<usize>,
 }
 
 impl<'a> Counter<'a> {
-    /// Nothing is done yet of `total` of what `unit` names.
-    pub fn new(context: &'a Context<'_>, unit: &'static str, total: usize) -> Self {
-        Self { context, unit, total, done: Mutex::new(0) }
+    /// Nothing is done yet of what `unit` names.
+    pub fn new(context: &'a Context<'_>, unit: &'static str) -> Self {
+        Self { context, unit, done: Mutex::new(0) }
     }
 
-    /// One part is done.
-    pub fn one(&self) {
+    /// One part is done, of so many where that is known.
+    pub fn one(&self, total: Option<usize>) {
         // Held while it is told, or another thread's higher count might be told first. A count cannot be half-changed.
         let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
         *done += 1;
-        self.context.progress.advance(self.unit, *done, Some(self.total));
+        self.context.progress.advance(self.unit, *done, total);
     }
 
     /// # Errors
     /// [`crate::WorkflowError::Cancelled`] where the work is to stop.
     pub fn check(&self, during: &str) -> Result<()> {
         self.context.cancel.check(during)
+    }
+
+    /// Whether the work is to stop.
+    pub fn is_cancelled(&self) -> bool {
+        self.context.cancel.is_cancelled()
     }
 }
 
@@ -53,8 +57,8 @@ mod tests {
     fn counts_rise_by_one_whoever_counts() {
         let heard = Heard::default();
         let context = Context { progress: &heard, questions: &Nobody, cancel: Cancel::default() };
-        let counter = Counter::new(&context, "clips", 100);
-        (0..100).into_par_iter().for_each(|_| counter.one());
+        let counter = Counter::new(&context, "clips");
+        (0..100).into_par_iter().for_each(|_| counter.one(Some(100)));
         let expected: Vec<_> = (1..=100).map(|done| (done, Some(100))).collect();
         assert_eq!(*heard.0.lock().unwrap_or_else(PoisonError::into_inner), expected);
     }

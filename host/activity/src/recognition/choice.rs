@@ -9,6 +9,7 @@ use super::clip::Clip;
 use super::experiment::Experiment;
 use super::patterns::{gathered, patterns_of, vectors_of};
 use super::space::{Galleries, Map, Space, SpaceSettings};
+use super::watch::Watch;
 use crate::embedding::EmbeddingError;
 use ndarray::{Array1, Array2};
 use rayon::prelude::*;
@@ -82,12 +83,13 @@ pub fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
 /// count together: one choice that serves them all rests on more trials than one for each.
 ///
 /// # Errors
-/// A space that cannot be learned.
+/// A space that cannot be learned; [`EmbeddingError::Stopped`].
 pub fn choose(
     clips: &[&Clip],
     classes: &[String],
     experiment: &Experiment,
     views: &[Views],
+    watch: &dyn Watch,
 ) -> Result<Chosen, EmbeddingError> {
     let subjects = names(clips.iter().map(|clip| &clip.subject));
     let folds = experiment.inner_folds.clamp(2, subjects.len().max(2));
@@ -103,6 +105,7 @@ pub fn choose(
             views.iter().flat_map(|views| views.arrangements(seen)).collect()
         },
         experiment,
+        watch,
     };
     let mut galleries = Galleries::default();
     let single =
@@ -132,6 +135,7 @@ struct Problem<'a> {
     folds: usize,
     arrangements: Vec<Vec<usize>>,
     experiment: &'a Experiment,
+    watch: &'a dyn Watch,
 }
 
 struct Candidate {
@@ -147,6 +151,9 @@ impl Problem<'_> {
         galleries: &mut Galleries,
         compare: bool,
     ) -> Result<Candidate, EmbeddingError> {
+        if self.watch.is_stopped() {
+            return Err(EmbeddingError::Stopped);
+        }
         let space = galleries.space(self.clips, settings)?;
         let vectors = vectors_of(&space, self.clips)?;
         let mut best: Option<Candidate> = None;
@@ -171,6 +178,7 @@ impl Problem<'_> {
                 best = Some(Candidate { right, chosen });
             }
         }
+        self.watch.space_tried();
         best.ok_or(EmbeddingError::Shape {
             what: "number of classifiers and sharpnesses to choose from",
             expected: 1,

@@ -7,6 +7,7 @@ use super::experiment::Experiment;
 use super::model::{ModelError, Recogniser, RecogniserSettings, nearest, pattern};
 use super::patterns::gathered;
 use super::space::Space;
+use super::watch::{Unwatched, Watch};
 use crate::embedding::descriptor::Scaling;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -25,18 +26,20 @@ impl Recogniser {
             mirror: settings.mirror,
             inner_folds: 2,
         };
-        Self::train_searched(clips, &experiment, settings.scaling).map(|(recogniser, _)| recogniser)
+        Self::train_searched(clips, &experiment, settings.scaling, &Unwatched)
+            .map(|(recogniser, _)| recogniser)
     }
 
     /// Trains with settings chosen by cross-validation over the clips' subjects; gives the accuracy over the folds beside it (0 to
     /// 1, of the chosen settings and so a little too good), `None` where nothing was compared: one subject, or one of everything.
     ///
     /// # Errors
-    /// As [`Self::train`].
+    /// As [`Self::train`], and where `watch` stops it.
     pub fn train_searched(
         clips: &[Clip],
         experiment: &Experiment,
         scaling: Scaling,
+        watch: &dyn Watch,
     ) -> Result<(Self, Option<f64>), ModelError> {
         let activities = names(clips.iter().map(|clip| &clip.activity));
         if activities.len() < 2 {
@@ -58,7 +61,7 @@ impl Recogniser {
             if experiment.mirror { clips.iter().map(Clip::mirrored).collect() } else { Vec::new() };
         let all: Vec<&Clip> = clips.iter().chain(&mirrors).collect();
         let Chosen { space, sharpness, classifier: kind, inner_accuracy, patterns } =
-            choose(&all, &activities, experiment, &[Views::Fused])?;
+            choose(&all, &activities, experiment, &[Views::Fused], watch)?;
         let order: Vec<usize> = (0..views).collect();
         let patterns = gathered(&patterns, &order);
         let labels: Vec<usize> =

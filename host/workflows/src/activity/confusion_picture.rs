@@ -63,8 +63,7 @@ mod tests {
         let mut confusion = Confusion::new(vec!["walk".into(), "dig".into()]);
         (0..4).for_each(|_| confusion.count(0, 0));
         confusion.count(1, 1);
-        let picture =
-            image::load_from_memory(&png(&confusion).expect("a picture")).expect("PNG").into_rgb8();
+        let picture = image::load_from_memory(&png(&confusion).expect("a picture")).expect("PNG").into_rgb8();
         // The lower right corner lies in the cell of the last class; the one above it is empty.
         let at = |up: u32| picture[(picture.width() - GAP_PX - 4, picture.height() - GAP_PX - 4 - up)];
         let dark = |pixel: Rgb<u8>| pixel.0.iter().map(|&v| u32::from(v)).sum::<u32>() < 300;

@@ -15,6 +15,7 @@ use farnear_activity::{
         choice::{Views, names},
         clip::{Clip, Track},
         model::Recogniser,
+        watch::Unwatched,
     },
 };
 use farnear_files::{masks, staging::Staging};
@@ -24,6 +25,7 @@ use super::{
     confusion_picture,
     method::Method,
     samples::{SCALING, Samples, SamplesError, are_full_frames},
+    watched,
 };
 use crate::{
     context::Context,
@@ -127,7 +129,9 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
     check_subjects(settings, &subjects, learned)?;
-    let outcome = train_on_others(learned, &test, &settings.method.experiment(), &[views])?;
+    let experiment = settings.method.experiment();
+    let outcome = train_on_others(learned, &test, &experiment, &[views], &watched::Folds::new(context));
+    let outcome = watched::outcome(outcome, context, "evaluating")?;
     let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
     let (low, high) = confusion.interval();
     let (right, answers) = confusion.right_of();
@@ -186,7 +190,9 @@ impl Clips {
 /// Refuses evaluations whose answers would mean nothing.
 fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &[Clip]) -> Result<()> {
     match &settings.learn_from {
-        LearnFrom::OtherSubjects if subjects.len() < 3 => Err(EvaluationError::Subjects(subjects.len()).into()),
+        LearnFrom::OtherSubjects if subjects.len() < 3 => {
+            Err(EvaluationError::Subjects(subjects.len()).into())
+        }
         LearnFrom::OtherSubjects | LearnFrom::SamplesOfOthers(_) => Ok(()),
         LearnFrom::Samples(train) => {
             let known = names(learned.iter().map(|clip| &clip.subject));
@@ -219,7 +225,7 @@ fn seconds_per_frame(
     context: &Context<'_>,
 ) -> Result<f64> {
     let views = clips.first().map_or(0, |clip| clip.views.len());
-    let (model, _) = Recogniser::train_searched(clips, &method.experiment().fixed(), SCALING)?;
+    let (model, _) = Recogniser::train_searched(clips, &method.experiment().fixed(), SCALING, &Unwatched)?;
     let sequences = folders
         .iter()
         .take(views)

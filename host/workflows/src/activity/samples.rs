@@ -160,13 +160,13 @@ impl Samples {
             return Err(SamplesError::None.into());
         }
         let folders: Vec<PathBuf> = samples.iter().map(|sample| base.join(&sample.masks)).collect();
-        let counter = Counter::new(context, "samples read", folders.len());
+        let counter = Counter::new(context, "samples read");
         let described: Result<Vec<(Track, bool)>> = folders
             .par_iter()
             .map(|folder| {
                 counter.check("reading samples")?;
                 let described = described(folder);
-                counter.one();
+                counter.one(Some(folders.len()));
                 described
             })
             .collect();

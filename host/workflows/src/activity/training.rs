@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::{
     method::Method,
     samples::{SCALING, Samples},
+    watched,
 };
 use crate::{
     context::Context,
@@ -90,8 +91,9 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
         None => clips,
     };
     let experiment = settings.method.experiment();
-    let (model, inner_accuracy) = Recogniser::train_searched(&clips, &experiment, SCALING)
-        .about(|| settings.samples.display().to_string())?;
+    let trained = Recogniser::train_searched(&clips, &experiment, SCALING, &watched::Training::new(context));
+    let (model, inner_accuracy) =
+        watched::outcome(trained, context, "training").about(|| settings.samples.display().to_string())?;
     staging::write_file(&settings.out, &model.to_bytes()?)?;
     context.say(&format!("wrote {}", settings.out.display()));
     let (gamma, condition_number) = match &model.space.map {

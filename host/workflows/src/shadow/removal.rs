@@ -143,14 +143,14 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     let (elevation_deg, azimuth_deg) = (rounded(sun.elevation_deg, 4), rounded(sun.azimuth_deg, 4));
     let sun = Sun { elevation_deg, azimuth_deg, in_view };
     let mut index = Index { sun, frame: Vec::with_capacity(all.len()) };
-    let counter = Counter::new(context, "masks", all.len());
+    let counter = Counter::new(context, "masks");
     for (number, named) in all.iter().enumerate() {
         counter.check("cutting shadow off")?;
         let file = format!("{}.png", named.name);
         let (mask, entry) = work.frame(number, &named.mask, file).about(|| named.name.clone())?;
         out.write(&entry.file, &masks::png(&mask)?)?;
         index.frame.push(entry);
-        counter.one();
+        counter.one(Some(all.len()));
     }
     out.write("shadow.toml", toml::to_string(&index)?.as_bytes())?;
     out.finish()?;

@@ -110,9 +110,7 @@ pub fn score(settings: &ScoreSettings, context: &Context<'_>) -> Result<ScoreFig
         let after = masks.mask(path)?;
         let before = before.as_ref().map(|before| before.mask(path)).transpose()?;
         let view = before.as_ref().map(|mask| mask.view());
-        labelled
-            .add(view, after.view(), truth.view())
-            .about(|| format!("scoring {}", path.display()))?;
+        labelled.add(view, after.view(), truth.view()).about(|| format!("scoring {}", path.display()))?;
         if let Some(before) = &before {
             let told_truth = Zip::from(&truth).and(before).map_collect(|&truth, &before| match truth {
                 Truth::Background if before => Truth::Shadow,

@@ -205,7 +205,7 @@ fn hidden_percent(recording: &Recording) -> f64 {
 fn template(name: &str) -> Result<Template> {
     let path = Path::new(name);
     let wrong = |source| SilhouettesError::Template { name: name.into(), source };
-    if Template::NAMES.contains(&name) || !path.is_file() {
+    if Template::names().any(|known| known == name) || !path.is_file() {
         return Ok(Template::named(name).map_err(wrong)?);
     }
     let text = fs::read_to_string(path).map_err(WorkflowError::read("the template", path))?;
@@ -225,11 +225,10 @@ fn recording(path: &Path, choices: Choices) -> Result<Recording> {
 
 /// Refuses a template with other names than the recording's, and says which built-in one fits.
 fn check_fit(template: &Template, recording: &Recording, path: &Path) -> Result<()> {
-    let fits = |name: &&str| {
+    let fits = |name: &&'static str| {
         Template::named(name).is_ok_and(|template| template.check(&recording.names).is_ok())
     };
     template.check(&recording.names).map_err(|source| {
-        let fits = Template::NAMES.iter().copied().find(|name| fits(name));
-        SilhouettesError::Unfit { path: path.into(), source, fits }.into()
+        SilhouettesError::Unfit { path: path.into(), source, fits: Template::names().find(fits) }.into()
     })
 }

@@ -79,7 +79,7 @@ pub(super) fn write(
     let out = Staging::new_folder(&drawing.out)?;
     let mut views = views_round(drawing.views, 0.0);
     views.iter_mut().for_each(|view| view.gamma_deg += first_view_deg);
-    let counter = Counter::new(context, "performances", performances.len());
+    let counter = Counter::new(context, "performances");
     let drawn: Result<Vec<usize>> = performances
         .par_iter()
         .zip(&names)
@@ -88,7 +88,7 @@ pub(super) fn write(
                 counter.check("drawing performances")?;
                 draw_view(performance, name, number, view, drawing.mm_per_px, &out)?;
             }
-            counter.one();
+            counter.one(Some(performances.len()));
             Ok(performance.bodies.len() * views.len())
         })
         .collect();
@@ -96,7 +96,8 @@ pub(super) fn write(
     out.write("samples.toml", samples(performances, &names, views.len()).as_bytes())?;
     out.finish()?;
     context.say(&format!("wrote {}", drawing.out.display()));
-    let distinct = |of: fn(&Performance) -> &String| performances.iter().map(of).collect::<BTreeSet<_>>().len();
+    let distinct =
+        |of: fn(&Performance) -> &String| performances.iter().map(of).collect::<BTreeSet<_>>().len();
     Ok(PerformancesFigures {
         performances: performances.len(),
         subjects: distinct(|performance| &performance.subject),

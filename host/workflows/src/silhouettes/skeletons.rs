@@ -57,7 +57,9 @@ pub fn draw(settings: &SkeletonsSettings, context: &Context<'_>) -> Result<Perfo
         .map_err(|source| SilhouettesError::Skeletons { path: path.clone(), source })?;
     let performances = clips.iter().map(|clip| Performance {
         subject: format!("s{:02}", clip.subject + 1),
-        activity: activities.get(clip.activity).map_or_else(|| clip.activity.to_string(), ToString::to_string),
+        activity: activities
+            .get(clip.activity)
+            .map_or_else(|| clip.activity.to_string(), ToString::to_string),
         bodies: clip.frames.iter().map(|joints| dress(joints, &layout)).collect(),
     });
     performances::write(&performances.collect::<Vec<_>>(), 0.0, &settings.drawing, context)

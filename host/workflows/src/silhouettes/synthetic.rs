@@ -48,6 +48,7 @@ pub fn draw(settings: &SyntheticSettings, context: &Context<'_>) -> Result<Perfo
 }
 
 fn number_of(name: &str) -> Result<usize> {
-    let unknown = || WorkflowError::parameter("activity", name, format!("expected {}", ACTIVITIES.join(", ")));
+    let unknown =
+        || WorkflowError::parameter("activity", name, format!("expected {}", ACTIVITIES.join(", ")));
     ACTIVITIES.iter().position(|known| *known == name).ok_or_else(unknown)
 }

@@ -149,9 +149,6 @@ pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoF
             context.progress.advance("frames", figures.frames, None);
         }
     }
-    if figures.frames >= PROGRESS_FRAMES {
-        context.progress.advance("frames", figures.frames, Some(figures.frames));
-    }
     let seconds = start.elapsed().as_secs_f64();
     figures.seconds = rounded(seconds, 3);
     figures.frames_per_second = rounded(figures.frames as f64 / seconds, 1);

@@ -53,7 +53,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
         (true, Some(train)) => LearnFrom::SamplesOfOthers(train),
         (false, Some(train)) => LearnFrom::Samples(train),
         (false, None) => bail!(report::Usage(
-            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both".into()
+            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both"
+                .into()
         )),
     };
     let settings = EvaluationSettings {

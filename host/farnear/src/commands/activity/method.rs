@@ -2,7 +2,10 @@
 
 use std::io::IsTerminal;
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args, ValueEnum,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use farnear_activity::recognition::{classifier::Family, frames::Mode};
 use farnear_workflows::activity::method::{Method, Pattern};
 
@@ -16,7 +19,7 @@ pub struct MethodArguments {
     #[arg(long, value_name = "PATTERN", conflicts_with_all = ["mode", "classifier"])]
     epl: Option<Epl>,
     /// svc (linear support vectors) or knn (nearest neighbours).
-    #[arg(long, default_value = "svc")]
+    #[arg(long, default_value = "svc", value_parser = classifiers())]
     classifier: Family,
     /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
     #[arg(long)]
@@ -43,4 +46,10 @@ impl MethodArguments {
         };
         Method { pattern, search }
     }
+}
+
+/// The names of all classifiers, so that help and completions list them.
+fn classifiers() -> impl TypedValueParser<Value = Family> {
+    PossibleValuesParser::new(Family::ALL.iter().map(|family| family.name()))
+        .try_map(|name| name.parse::<Family>())
 }

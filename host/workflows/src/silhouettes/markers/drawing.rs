@@ -29,6 +29,8 @@ const MARGIN_PX: usize = 2;
 /// Gaps that are closed in the thesis, and where parts have a thickness.
 const CLOSED_MM: f64 = 126.0;
 const CLOSED_BETWEEN_THICK_PARTS_MM: f64 = 40.0;
+/// What is counted.
+const UNIT: &str = "masks";
 /// What is under way where the work is cancelled.
 const DURING: &str = "drawing silhouettes";
 
@@ -49,7 +51,7 @@ pub struct Job<'a> {
 impl Job<'_> {
     /// All frames of every view, a folder of masks each; gives how many masks hold somebody.
     pub fn sequences(&self, views: &[View], out: &Staging) -> Result<usize> {
-        let counter = self.counter(views);
+        let counter = Counter::new(self.context, UNIT);
         let drawn: Result<Vec<usize>> = views
             .par_iter()
             .enumerate()
@@ -68,14 +70,14 @@ impl Job<'_> {
             silhouettes += usize::from(mask.iter().any(|&set| set));
             let mask = if self.settings.centred { cut_out(&mask) } else { mask };
             out.write(&format!("{folder}/{name}.png"), &masks::png(&mask)?)?;
-            counter.one();
+            counter.one(Some(self.settings.views * self.frames.len()));
         }
         Ok(silhouettes)
     }
 
     /// The `keep` least alike silhouettes of all views, in one folder; gives how many there are.
     pub fn gallery(&self, views: &[View], keep: usize, out: &Staging) -> Result<usize> {
-        let counter = self.counter(views);
+        let counter = Counter::new(self.context, UNIT);
         let all: Result<Vec<Vec<(String, Mask)>>> = views
             .par_iter()
             .enumerate()
@@ -98,13 +100,9 @@ impl Job<'_> {
             if let Some(mask) = centred(self.mask(frame, view, &canvas).view(), SIDE_PX) {
                 named.push((format!("{prefix}_{name}.png"), mask));
             }
-            counter.one();
+            counter.one(Some(self.settings.views * self.frames.len()));
         }
         Ok(named)
-    }
-
-    fn counter(&self, views: &[View]) -> Counter<'_> {
-        Counter::new(self.context, "masks", views.len() * self.frames.len())
     }
 
     /// Draws a frame of a view.
