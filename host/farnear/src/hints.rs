@@ -4,7 +4,10 @@ use farnear_capture::{
     ClientError, board_correction::BoardCorrectionError, expose::CaptureError, focus::FocusSearchError,
 };
 use farnear_protocol::RequestError;
-use farnear_workflows::{WorkflowError, simulator::SimulatorError};
+use farnear_workflows::{
+    WorkflowError, activity::samples::SamplesError, shadow::removal::CAMERA_FILE,
+    silhouettes::SilhouettesError, simulator::SimulatorError,
+};
 
 /// The commands that help with an error, where there are some.
 pub fn hint(error: &anyhow::Error) -> Option<String> {
@@ -31,6 +34,26 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         | WorkflowError::BoardCorrection(BoardCorrectionError::Board(error))
         | WorkflowError::Capture(CaptureError::Board(error))
         | WorkflowError::Focus(FocusSearchError::Capture(CaptureError::Board(error))) => of_client(error),
+        WorkflowError::Read { what: CAMERA_FILE, .. } => {
+            Some("`farnear shadow remove --help` shows what stands in it".into())
+        }
+        WorkflowError::Silhouettes(SilhouettesError::TooLarge { .. }) => {
+            Some("a larger --mm-per-px makes the picture smaller".into())
+        }
+        WorkflowError::Samples(error) => of_samples(error).map(Into::into),
+        _ => None,
+    }
+}
+
+fn of_samples(error: &SamplesError) -> Option<&'static str> {
+    match error {
+        SamplesError::Views { .. } => {
+            Some("`--any-view` (train) or `--views each` (evaluate) take every view by itself")
+        }
+        SamplesError::OtherViews { .. } => Some("`--views each` takes every view by itself"),
+        SamplesError::SamePerson { .. } => {
+            Some("add --leave-one-subject-out to leave them out of the training in turn")
+        }
         _ => None,
     }
 }

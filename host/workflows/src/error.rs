@@ -3,6 +3,15 @@
 
 use std::path::{Path, PathBuf};
 
+use farnear_activity::{
+    background::BackgroundError,
+    evaluation::leave_one_out::EvaluationError,
+    recognition::model::ModelError,
+    shadow::{ShadowError, camera::CameraError as CameraFileError, uncertainty::UncertaintyError},
+    shadow_detectors::ImagesError,
+    shadow_score::ShapeError,
+    sun::SunError,
+};
 use farnear_capture::{
     ClientError, board_correction::BoardCorrectionError, camera::CameraError, expose::CaptureError,
     focus::FocusSearchError, log_stream::LogEnded, plan::PlanError, record::RecordError,
@@ -197,6 +206,51 @@ pub enum WorkflowError {
     /// Results that cannot be put in place.
     #[error(transparent)]
     Staging(#[from] StagingError),
+    /// A thread that cannot be started.
+    #[error("cannot start a thread: {reason}")]
+    Thread {
+        /// What the system says.
+        reason: String,
+    },
+    /// Where the sun stands.
+    #[error(transparent)]
+    Sun(#[from] SunError),
+    /// Silhouettes.
+    #[error(transparent)]
+    Silhouettes(#[from] crate::silhouettes::SilhouettesError),
+    /// What moves in a video.
+    #[error(transparent)]
+    Background(#[from] BackgroundError),
+    /// Pictures that a shadow detector cannot take.
+    #[error(transparent)]
+    ShadowImages(#[from] ImagesError),
+    /// How a camera stands.
+    #[error(transparent)]
+    CameraFile(#[from] CameraFileError),
+    /// Where a shadow falls.
+    #[error(transparent)]
+    Shadow(#[from] ShadowError),
+    /// How sure a shadow is.
+    #[error(transparent)]
+    ShadowUncertainty(#[from] UncertaintyError),
+    /// Pictures that do not belong together.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// A score of shadow removal.
+    #[error(transparent)]
+    Score(#[from] crate::shadow::score::ScoreError),
+    /// Samples of activities.
+    #[error(transparent)]
+    Samples(#[from] crate::activity::samples::SamplesError),
+    /// A model of activities.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Other views than a model's.
+    #[error(transparent)]
+    Views(#[from] crate::activity::recognition::ViewsError),
+    /// An evaluation.
+    #[error(transparent)]
+    Evaluation(#[from] EvaluationError),
     /// A record that cannot be put into TOML.
     #[error("cannot write a record: {0}")]
     Toml(#[from] toml::ser::Error),

@@ -9,6 +9,8 @@
 //! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
 //! - [`calibrate`]: learning the point spread function and corrections.
+//! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
+//!   [`sun`] stands; [`activity`]: what the person does.
 //! - [`context`], [`error`]: the way to the face and back.
 //!
 //! A face that keeps what it is told, and a stage that is moved; a scripted board stands behind the port here.
@@ -50,12 +52,14 @@
 //! # Ok::<(), farnear_workflows::WorkflowError>(())
 //! ```
 
+pub mod activity;
 pub mod calibrate;
 pub mod clock;
 pub mod compare;
 pub mod context;
 pub mod correct;
 pub mod correction_file;
+mod counter;
 pub mod depth;
 pub mod error;
 pub mod figures;
@@ -63,8 +67,12 @@ mod operator_cache;
 pub mod operator_plot;
 pub mod operators;
 pub mod optics;
+mod parameters;
 pub mod rig;
+pub mod shadow;
+pub mod silhouettes;
 pub mod simulator;
+pub mod sun;
 
 pub use context::{Cancel, Context, Nobody, Progress, Questions};
 pub use error::{Result, WorkflowError};
