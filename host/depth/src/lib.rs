@@ -15,6 +15,6 @@ pub mod metrics;
 pub mod nir;
 pub mod operators;
 pub mod optics;
+pub mod pipeline;
 pub mod psf;
-pub mod run;
 pub mod uncertainty;

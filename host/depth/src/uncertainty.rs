@@ -24,9 +24,9 @@ use crate::filter::convolve;
 use crate::kernel::Kernel;
 use crate::operators::{Operators, linearise};
 use crate::optics::Optics;
-use crate::run::plain::reflect;
-use crate::run::simd::{Lag, lagged_products};
-use crate::run::{Backend, RunError, Settings, root};
+use crate::pipeline::plain::reflect;
+use crate::pipeline::simd::{Lag, lagged_products};
+use crate::pipeline::{Backend, RunError, Settings, root};
 
 /// The noise of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -69,7 +69,7 @@ pub fn median_gain(size: usize) -> f64 {
 /// Standard deviation of the depth of each pixel in mm, (height, width); NaN where nothing is known.
 ///
 /// # Errors
-/// As [`crate::run::depth_from_pair`] for images that cannot be processed.
+/// As [`crate::pipeline::depth_from_pair`] for images that cannot be processed.
 pub fn standard_deviation_mm(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -79,7 +79,7 @@ pub fn standard_deviation_mm(
     noise: Noise,
 ) -> Result<Array2<f32>, RunError> {
     // The run's own checks; its depth is of no use here, because alpha is needed before median and rim.
-    crate::run::Processor::new(operators, optics, settings)?.run(far, near)?;
+    crate::pipeline::Processor::new(operators, optics, settings)?.run(far, near)?;
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let filtered = |image: &Array2<f32>, kernel: &Kernel| {
         let mut output = Array2::zeros(image.dim());

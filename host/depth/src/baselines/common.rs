@@ -5,11 +5,11 @@ use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 use crate::fill::fill_low_texture;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
-use crate::psf::Psf;
-use crate::run::{
+use crate::pipeline::{
     Backend, DepthMap, MAX_ALPHA, RunError, Settings, SwapEvidence, Warning, check, check_windows,
     confidence, warnings_after,
 };
+use crate::psf::Psf;
 
 /// A checked pair, each image divided by its mean; pixels without a value hold the mean.
 pub(super) struct Pair {

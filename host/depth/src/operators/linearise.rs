@@ -17,8 +17,8 @@ use super::DesignError;
 use super::least_squares::solve;
 use crate::kernel::Kernel;
 use crate::nir::{GRID, GridPoint, sum_and_difference};
+use crate::pipeline::MAX_ALPHA;
 use crate::psf::Otf;
-use crate::run::MAX_ALPHA;
 
 /// Coefficients of alpha, alpha^3, alpha^5, alpha^7.
 pub type Polynomial = [f64; 4];

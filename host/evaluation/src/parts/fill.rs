@@ -4,7 +4,7 @@ use anyhow::Result;
 use farnear_depth::{
     metrics::{CompareSettings, compare},
     operators::Operators,
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
 };
 use farnear_scene::{Camera, Noise, Picture, Renderer, Scene, Texture};
 use ndarray::Array2;

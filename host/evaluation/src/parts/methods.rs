@@ -5,7 +5,7 @@ use farnear_depth::{
     baselines::{self, Favaro, FavaroSettings, Method},
     operators::Operators,
     optics::Optics,
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
 };
 use farnear_scene::Scene;
 use ndarray::Array2;

@@ -7,7 +7,7 @@ use farnear_capture::image_file::read_grey;
 use farnear_depth::{
     operators::Operators,
     optics::{Optics, OpticsFile},
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
 };
 use ndarray::{Array2, ArrayView2, s};
 

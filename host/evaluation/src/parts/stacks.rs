@@ -7,7 +7,7 @@ use farnear_activity::readers::matlab::{self, Array};
 use farnear_capture::image_file::read_grey;
 use farnear_depth::{
     operators::Operators,
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
 };
 use ndarray::{Array2, ShapeBuilder, Zip};
 use rayon::prelude::*;

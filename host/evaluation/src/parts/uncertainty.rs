@@ -3,7 +3,7 @@
 use anyhow::Result;
 use farnear_depth::{
     operators::Operators,
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
     uncertainty::{Noise, standard_deviation_mm},
 };
 use farnear_scene::{Camera, Noise as CameraNoise, Renderer};

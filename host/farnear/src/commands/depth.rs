@@ -17,7 +17,7 @@ use farnear_capture::{
 };
 use farnear_depth::{
     corrections::Correction,
-    run::{DepthMap, MAX_SMOOTHING_PX, Settings, Warning},
+    pipeline::{DepthMap, MAX_SMOOTHING_PX, Settings, Warning},
 };
 use ndarray::Array2;
 use serde::Serialize;

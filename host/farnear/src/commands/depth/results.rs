@@ -7,7 +7,7 @@ use farnear_capture::{aside::Aside, image_file::encode_png};
 use farnear_depth::{
     operators::Operators,
     optics::Optics,
-    run::{DepthMap, Settings},
+    pipeline::{DepthMap, Settings},
 };
 use ndarray::Array2;
 use serde::Serialize;

@@ -20,7 +20,7 @@ use farnear_capture::{
 use farnear_depth::{
     operators::Operators,
     optics::Optics,
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
 };
 use serde::{Deserialize, Serialize};
 

@@ -46,7 +46,7 @@ pub(crate) const READ_BEYOND: usize = 31;
 
 /// As [`convolve_rows`] for the first `rows` rows of `input`, to rows of `output` from `first` on.
 pub(crate) fn convolve(
-    backend: crate::run::Backend,
+    backend: crate::pipeline::Backend,
     taps: &mut Taps,
     input: &Plane,
     output: &mut Plane,
