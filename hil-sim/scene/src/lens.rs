@@ -8,12 +8,7 @@
 use thiserror::Error;
 
 use crate::optics::OpticsFile;
-
-/// Image distance of an object at `object_mm`, mm (thin lens).
-#[must_use]
-pub fn image_distance_mm(focal_length_mm: f64, object_mm: f64) -> f64 {
-    1.0 / (1.0 / focal_length_mm - 1.0 / object_mm)
-}
+pub use crate::thin_lens::image_distance_mm;
 
 /// A telecentric lens before a sensor, with its two focus settings.
 #[derive(Debug, Clone, PartialEq)]

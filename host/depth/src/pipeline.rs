@@ -5,41 +5,37 @@
 //! 1. `M = Q * (I2 - I1)`, `P = Q * (I2 + I1)`; `m = Gm1 * M`, `p1 = Gp1 * P`, `p2 = Gp2 * P` (Li 2014, eqs. 1.7 to
 //!    1.9), borders reflected without repeating the edge pixel.
 //! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
-//! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 (`cubic`), median, alpha to mm.
+//! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 (`crate::cubic`), median, alpha to mm.
 //! 4. The rim, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`rim`).
-//! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`confidence`]).
+//! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`crate::confidence`]).
 //!
 //! Images may have any common gain and offset: they are normalised first. `I1` is the far-focused image.
 
 mod check;
-pub mod confidence;
-mod cubic;
 mod fast;
-pub(crate) mod plain;
 mod processor;
+#[cfg(test)]
+mod reference;
+mod repair;
 mod rim;
-pub(crate) mod simd;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use crate::operators::Operators;
 use crate::optics::Optics;
 
-pub use check::{SwapEvidence, Warning};
+pub use crate::cubic::MAX_ALPHA;
+pub use crate::depth_map::{DepthMap, SwapEvidence, Warning};
+pub use crate::simd::Backend;
 pub(crate) use check::{after as warnings_after, check, check_windows};
-pub(crate) use cubic::root;
 pub use processor::Processor;
-pub use simd::Backend;
 
 /// Smallest width and height that can be processed: below, the operators see little but reflections.
 pub const MIN_SIDE_PX: usize = 16;
 
 /// Largest smoothing window.
 pub const MAX_SMOOTHING_PX: usize = 63;
-
-/// The largest |alpha| that is reported; a little beyond the working range, where the cubic still holds.
-pub const MAX_ALPHA: f32 = 1.2;
 
 /// Why no depth could be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -135,19 +131,6 @@ impl Settings {
     }
 }
 
-/// A depth map and what is known about it.
-#[derive(Debug, Clone)]
-pub struct DepthMap {
-    /// Object distance in mm, (height, width); NaN = no value.
-    pub depth_mm: Array2<f32>,
-    /// Confidence, 0 (none) to 1; 0 exactly where the depth is NaN.
-    pub confidence: Array2<f32>,
-    /// Part of the pixels whose texture energy is below [`confidence::LOW_TEXTURE`] times its median.
-    pub low_texture_fraction: f64,
-    /// What a user should know before trusting the map.
-    pub warnings: Vec<Warning>,
-}
-
 /// Depth of one pair; for many pairs of one size a [`Processor`] keeps its buffers and is faster. `far` and `near` are the far- and near-focused images, (height, width), of any common scale.
 ///
 /// # Errors
@@ -165,52 +148,12 @@ pub fn depth_from_pair(
     Ok(processor.into_map())
 }
 
-/// The cubic's alpha to mm in single precision without cancellation.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct DepthOfAlpha {
-    focal_length_mm: f32,
-    focal_length_squared: f32,
-    offset: f32,
-    slope: f32,
-    linearisation: [f32; 4],
-}
-
-impl DepthOfAlpha {
-    pub(crate) fn new(operators: &Operators, optics: &Optics) -> Self {
-        let [offset, slope] = optics.defocus_line_mm();
-        let f = optics.focal_length_mm();
-        Self {
-            focal_length_mm: f as f32,
-            focal_length_squared: (f * f) as f32,
-            offset: offset as f32,
-            slope: slope as f32,
-            linearisation: operators.linearisation().map(|c| c as f32),
-        }
-    }
-
-    /// Coefficients of the polynomial that alpha goes through first.
-    pub(crate) fn linearisation(self) -> [f32; 4] {
-        self.linearisation
-    }
-
-    /// `[F, F^2, offset, slope]` of `F + F^2 / (offset + slope alpha)`.
-    pub(crate) fn coefficients(self) -> [f32; 4] {
-        [self.focal_length_mm, self.focal_length_squared, self.offset, self.slope]
-    }
-
-    #[cfg(test)]
-    pub(crate) fn depth_mm(self, alpha: f32) -> f32 {
-        let square = alpha * alpha;
-        let alpha = alpha * self.linearisation.iter().rev().fold(0.0, |sum, c| sum * square + c);
-        self.focal_length_mm + self.focal_length_squared / (self.offset + self.slope * alpha)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use ndarray::CowArray;
+    use ndarray::{Array2, CowArray};
 
     use super::*;
+    use crate::depth_of_alpha::DepthOfAlpha;
     use crate::operators::{Request, design};
     use crate::optics::OpticsFile;
 
@@ -252,7 +195,7 @@ mod tests {
             let [far, near] = pair.each_ref().map(|i| CowArray::from(i.view()));
             let settings = Settings { smoothing_px, median_px, ..Settings::default() };
             let input = check::check(&far, &near, Backend::best(), 1).unwrap();
-            let plain = plain::maps(&input, &operators, &settings);
+            let plain = reference::maps(&input, &operators, &settings);
             for backend in Backend::available() {
                 for threads in [1, 2] {
                     let settings = Settings { threads, backend: Some(backend), ..settings };

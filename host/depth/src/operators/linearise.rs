@@ -15,9 +15,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 use super::least_squares::solve;
+use crate::cubic::MAX_ALPHA;
 use crate::kernel::Kernel;
 use crate::nir::{GRID, GridPoint, sum_and_difference};
-use crate::pipeline::MAX_ALPHA;
 use crate::psf::Otf;
 
 /// Coefficients of alpha, alpha^3, alpha^5, alpha^7.

@@ -1,97 +1,20 @@
 //! What is checked before and after a run: sizes, windows, operators that fit the optics, invalid, saturated and
 //! constant images, a pair that looks swapped.
 
-use std::fmt;
-
 use ndarray::{Array2, CowArray, Ix2};
 use rayon::prelude::*;
 
-use super::simd::{self, Extremes};
-use super::{Backend, DepthMap, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings};
+use super::{Backend, DepthMap, MAX_SMOOTHING_PX, MIN_SIDE_PX, RunError, Settings, SwapEvidence, Warning};
+use crate::confidence;
 use crate::operators::Operators;
 use crate::optics::Optics;
-use crate::psf::Psf;
+use crate::simd::{self, Extremes};
 
 /// Largest relative difference between the operators' and the optics' blur radius.
 const BLUR_TOLERANCE: f64 = 0.02;
 
 /// Part of saturated pixels in an image from which it is reported.
 const SATURATED: f64 = 0.002;
-
-/// What a user should know before trusting a map.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Warning {
-    /// Pixels are NaN or infinite.
-    NotFinite {
-        /// Number of pixels that are so in at least one image.
-        pixels: usize,
-    },
-    /// Pixels share the largest value of the pair in flat patches: they are saturated.
-    Saturated {
-        /// Part of the pixels that are so in at least one image.
-        fraction: f64,
-    },
-    /// The operators were designed for another PSF than the optics have.
-    PsfMismatch {
-        /// PSF of the operators.
-        operators: Psf,
-        /// PSF of the optics.
-        optics: Psf,
-    },
-    /// The far image seems to be the near one. Exchanging the images turns alpha into -alpha and nothing else, so only what
-    /// is known of scenes can tell; a scene that says nothing, as a plane, draws no warning.
-    LooksSwapped(SwapEvidence),
-}
-
-/// What speaks for a swapped pair.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SwapEvidence {
-    /// Much of the scene would lie before the near focus and almost nothing beyond the far focus; backgrounds do the
-    /// opposite.
-    BeyondNear {
-        /// Part of the confident pixels before the near focus.
-        fraction: f64,
-    },
-    /// The lower third of the image would lie farther away than the upper third; grounds and tables do the opposite.
-    LowerPartFarther {
-        /// Difference of the median depths, mm.
-        difference_mm: f64,
-    },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFinite { pixels } => {
-                write!(f, "{pixels} pixels are NaN or infinite: there is no depth around them")
-            }
-            Self::Saturated { fraction } => {
-                write!(
-                    f,
-                    "{:.1} % of the pixels are saturated: there is no depth around them",
-                    100.0 * fraction
-                )
-            }
-            Self::PsfMismatch { operators, optics } => write!(
-                f,
-                "the operators were designed for the PSF {operators}, the optics have {optics}: expect errors of millimetres"
-            ),
-            Self::LooksSwapped(evidence) => {
-                write!(f, "the pair looks swapped: ")?;
-                match evidence {
-                    SwapEvidence::BeyondNear { fraction } => {
-                        write!(f, "{:.0} % of the scene would lie before the near focus", 100.0 * fraction)?;
-                    }
-                    SwapEvidence::LowerPartFarther { difference_mm } => write!(
-                        f,
-                        "the lower part of the scene would lie {difference_mm:.0} mm farther away than the upper part"
-                    )?,
-                }
-                write!(f, "; is FAR really the far-focused image?")
-            }
-        }
-    }
-}
 
 /// A pair that can be processed: pixels in rows after each other.
 pub(crate) struct Input<'a> {
@@ -319,7 +242,7 @@ pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
     let [mut total, mut beyond_near, mut beyond_far] = [0_usize; 3];
     let mut thirds: [Vec<f32>; 3] = Default::default();
-    let sample = super::confidence::sample(map.depth_mm.dim());
+    let sample = confidence::sample(map.depth_mm.dim());
     let [depths, confidences] = [map.depth_mm.slice(sample), map.confidence.slice(sample)];
     let height = depths.nrows();
     for (y, (depths, confidences)) in depths.rows().into_iter().zip(confidences.rows()).enumerate() {

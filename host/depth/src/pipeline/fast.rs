@@ -8,15 +8,15 @@
 //!
 //! Bands are independent: threads share nothing but the input.
 
-use ndarray::{Array2, ArrayViewMut2, Axis, Zip, s};
+use ndarray::{ArrayViewMut2, Axis, s};
 use rayon::prelude::*;
 
 use super::check::Input;
-use super::plain::{median_at, reflect};
-use super::simd::{self, CubicRow, Plane, Taps, WindowRow};
-use super::{Backend, DepthMap, DepthOfAlpha, Settings};
-use crate::metrics::dilate_square;
+use super::{Backend, Settings};
+use crate::border::reflect;
+use crate::depth_of_alpha::DepthOfAlpha;
 use crate::operators::Operators;
+use crate::simd::{self, CubicRow, Plane, Taps, WindowRow};
 
 /// Rows that go through a stage at a time.
 const BLOCK: usize = simd::SEVEN_BLOCK;
@@ -71,33 +71,6 @@ impl Job<'_> {
             .for_each(|(i, (((tile, depth_mm), texture), misfit))| {
                 self.band(tile, i * rows, Maps { depth_mm, texture, misfit });
             });
-    }
-
-    /// Takes the pixels out that an invalid one takes part in, and takes the medians beside them over the rest.
-    pub fn repair(&self, map: &mut DepthMap, invalid: &Array2<bool>) {
-        let size = map.depth_mm.dim();
-        let settings = Settings { median_px: 1, ..*self.settings };
-        let plain = Job { settings: &settings, ..*self };
-        let [mut raw, mut texture, mut misfit] = [(); 3].map(|()| Array2::zeros(size));
-        plain.run(
-            &mut Vec::new(),
-            Maps { depth_mm: raw.view_mut(), texture: texture.view_mut(), misfit: misfit.view_mut() },
-        );
-        Zip::from(&mut raw).and(invalid).for_each(|raw, invalid| {
-            if *invalid {
-                *raw = f32::NAN;
-            }
-        });
-        let beside = dilate_square(invalid, self.settings.median_px / 2);
-        for (at, _) in beside.indexed_iter().filter(|(_, beside)| **beside) {
-            if invalid[at] {
-                map.depth_mm[at] = f32::NAN;
-                map.confidence[at] = 0.0;
-            } else if map.confidence[at] > 0.0 {
-                // Depth falls with alpha, so that the median of depths is the depth of the median.
-                map.depth_mm[at] = median_at(&raw, self.settings.median_px, at);
-            }
-        }
     }
 
     fn band(&self, tile: &mut Tile, top: usize, maps: Maps<'_>) {

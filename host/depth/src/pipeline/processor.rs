@@ -4,10 +4,13 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use super::fast::{Job, Maps, Tile};
-use super::{Backend, DepthMap, DepthOfAlpha, RunError, Settings, check, confidence, rim, simd};
+use super::{Backend, DepthMap, RunError, Settings, check, rim};
+use crate::confidence;
+use crate::depth_of_alpha::DepthOfAlpha;
 use crate::fill::fill_low_texture;
 use crate::operators::Operators;
 use crate::optics::Optics;
+use crate::simd;
 
 /// Depth of pair after pair with the same operators, optics and settings. Images may change their size; as long as
 /// they do not, nothing is allocated.

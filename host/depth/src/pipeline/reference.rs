@@ -1,16 +1,16 @@
-//! Plainly written parts: reflection and the median that knows missing values, which the fast run time uses around
-//! invalid pixels, and in tests the whole run time, stage by stage over whole images, as its reference.
+//! The whole run time written plainly, stage by stage over whole images: the reference of the fast one.
 
-use ndarray::Array2;
-#[cfg(test)]
-use ndarray::ArrayView2;
-#[cfg(test)]
-use {
-    super::Settings, super::check::Input, super::cubic, crate::kernel::Kernel, crate::operators::Operators,
-};
+use ndarray::{Array2, ArrayView2};
+
+use super::Settings;
+use super::check::Input;
+use super::repair::median_at;
+use crate::border::reflect;
+use crate::cubic;
+use crate::kernel::Kernel;
+use crate::operators::Operators;
 
 /// Maps before they become depth and confidence.
-#[cfg(test)]
 pub(crate) struct Maps {
     /// Normalised depth after the median.
     pub alpha: Array2<f32>,
@@ -20,14 +20,6 @@ pub(crate) struct Maps {
     pub misfit: Array2<f32>,
 }
 
-/// Index of a pixel beyond the border: reflected without repeating the edge pixel, as often as needed.
-pub(crate) fn reflect(i: isize, n: usize) -> usize {
-    let period = (2 * (n as isize - 1)).max(1);
-    let j = i.rem_euclid(period);
-    (if j < n as isize { j } else { period - j }) as usize
-}
-
-#[cfg(test)]
 /// Convolution (the kernels are symmetric) with reflected borders.
 pub(crate) fn convolve(image: ArrayView2<f32>, kernel: &Kernel) -> Array2<f32> {
     let (height, width) = image.dim();
@@ -45,7 +37,6 @@ pub(crate) fn convolve(image: ArrayView2<f32>, kernel: &Kernel) -> Array2<f32> {
     })
 }
 
-#[cfg(test)]
 /// Window sums with reflected borders, rows first.
 pub(crate) fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
     let (height, width) = image.dim();
@@ -58,24 +49,6 @@ pub(crate) fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
     })
 }
 
-/// Median of the values around (y, x) that are not NaN, with reflected borders; NaN if there is none.
-pub(crate) fn median_at(image: &Array2<f32>, size: usize, (y, x): (usize, usize)) -> f32 {
-    let (height, width) = image.dim();
-    let r = (size / 2) as isize;
-    let mut window = Vec::with_capacity(size * size);
-    for dy in -r..=r {
-        let row = reflect(y as isize + dy, height);
-        window
-            .extend((-r..=r).map(|dx| image[(row, reflect(x as isize + dx, width))]).filter(|v| !v.is_nan()));
-    }
-    if window.is_empty() {
-        return f32::NAN;
-    }
-    let middle = window.len() / 2;
-    *window.select_nth_unstable_by(middle, f32::total_cmp).1
-}
-
-#[cfg(test)]
 /// Alpha, texture and misfit of a checked pair.
 pub(crate) fn maps(input: &Input, operators: &Operators, settings: &Settings) -> Maps {
     let size = (input.height, input.width);

@@ -8,7 +8,8 @@
 //! steps of Newton from there reach 1e-6 for `|alpha| <= 1.1` and `-0.2 <= r <= 0.8`; near the turning point, where the
 //! slope vanishes, the slope is kept above 2 % of `c1`.
 
-use super::MAX_ALPHA;
+/// The largest |alpha| that is reported; a little beyond the working range, where the cubic still holds.
+pub const MAX_ALPHA: f32 = 1.2;
 
 /// Newton steps after the start.
 pub(crate) const STEPS: usize = 2;

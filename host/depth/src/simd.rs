@@ -32,24 +32,24 @@ pub(crate) use rows::{
 macro_rules! dispatch {
     ($(#[$attribute:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
         $(#[$attribute])*
-        pub(crate) fn $name(backend: crate::pipeline::Backend, $($argument: $type),*) $(-> $result)? {
+        pub(crate) fn $name(backend: crate::simd::Backend, $($argument: $type),*) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f")]
             fn avx512($($argument: $type),*) $(-> $result)? {
-                $generic::<crate::pipeline::simd::lanes::Avx512>($($argument),*)
+                $generic::<crate::simd::lanes::Avx512>($($argument),*)
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma")]
             fn avx2($($argument: $type),*) $(-> $result)? {
-                $generic::<crate::pipeline::simd::lanes::Avx2>($($argument),*)
+                $generic::<crate::simd::lanes::Avx2>($($argument),*)
             }
             match backend.checked() {
                 // SAFETY: `checked` falls back to portable code unless the processor has the instructions.
                 #[cfg(target_arch = "x86_64")]
-                crate::pipeline::Backend::Avx512 => unsafe { avx512($($argument),*) },
+                crate::simd::Backend::Avx512 => unsafe { avx512($($argument),*) },
                 #[cfg(target_arch = "x86_64")]
-                crate::pipeline::Backend::Avx2 => unsafe { avx2($($argument),*) },
-                _ => $generic::<crate::pipeline::simd::lanes::Portable>($($argument),*),
+                crate::simd::Backend::Avx2 => unsafe { avx2($($argument),*) },
+                _ => $generic::<crate::simd::lanes::Portable>($($argument),*),
             }
         }
     };

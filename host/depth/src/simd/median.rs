@@ -10,7 +10,7 @@
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
-use crate::pipeline::DepthOfAlpha;
+use crate::depth_of_alpha::DepthOfAlpha;
 
 dispatch! {
     /// Median over `rows` (as many as the window is wide) and as many columns, and its depth in mm, for `width` columns.

@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use super::dispatch;
 use super::lanes::Lanes;
-use crate::pipeline::Backend;
+use crate::simd::Backend;
 
 /// Sums that grow side by side: more than the latency of a multiply-add times the number of units on any processor known,
 /// and few enough for 16 registers.

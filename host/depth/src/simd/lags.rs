@@ -86,7 +86,7 @@ fn add_sums<const N: usize>(values: &[f32], [f0, f1, f2, f3]: [f32; 4], sums: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::Backend;
+    use crate::simd::Backend;
 
     #[test]
     fn pairs_within_the_window_are_counted() {

@@ -8,7 +8,7 @@
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, LARGEST_SIZE, free_coefficients, with_size};
 
 /// A kernel's free coefficients, ready for the loop, and the rows that wait for more input.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ pub(crate) const READ_BEYOND: usize = 31;
 
 /// As [`convolve_rows`] for the first `rows` rows of `input`, to rows of `output` from `first` on.
 pub(crate) fn convolve(
-    backend: crate::pipeline::Backend,
+    backend: crate::simd::Backend,
     taps: &mut Taps,
     input: &Plane,
     output: &mut Plane,
@@ -72,14 +72,7 @@ fn by_size<L: Lanes>(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]
     let vectors = width.next_multiple_of(L::N);
     assert!(input.iter().all(|row| width + READ_BEYOND <= row.len() && vectors - L::N + 32 <= row.len()));
     assert!(output.iter().all(|row| vectors <= row.len()) && vectors <= taps.pending.stride());
-    match taps.size {
-        5 => walk::<L, 5, 3>(taps, input, output, width),
-        7 => walk::<L, 7, 4>(taps, input, output, width),
-        9 => walk::<L, 9, 5>(taps, input, output, width),
-        11 => walk::<L, 11, 6>(taps, input, output, width),
-        // `Kernel` has no other size.
-        _ => unreachable!("kernel size {}", taps.size),
-    }
+    with_size!(taps.size, SIZE => walk::<L, SIZE, { SIZE / 2 + 1 }>(taps, input, output, width))
 }
 
 /// `SIZE` is the kernel's side, `FOLDED = SIZE / 2 + 1`.
@@ -93,7 +86,7 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
     let r = FOLDED - 1;
     assert!(taps.octant.len() == FOLDED * (FOLDED + 1) / 2);
     // Splatting from the octant lets equal coefficients share a register.
-    let mut octant = [L::splat(0.0); 21];
+    let mut octant = [L::splat(0.0); free_coefficients(LARGEST_SIZE)];
     for i in 0..FOLDED * (FOLDED + 1) / 2 {
         octant[i] = L::splat(taps.octant[i]);
     }

@@ -2,8 +2,8 @@
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
-use crate::pipeline::cubic::{LEAST_T, SLOPE_FLOOR, START, STEPS};
-use crate::pipeline::{MAX_ALPHA, confidence};
+use crate::confidence;
+use crate::cubic::{LEAST_T, MAX_ALPHA, SLOPE_FLOOR, START, STEPS};
 
 /// Texture energy that stands for none: keeps divisions finite, far below any real one (images are normalised).
 const TINY: f32 = 1e-30;
@@ -261,7 +261,7 @@ impl CubicRow<'_> {
     /// Sums the four rows `4 y ..` of `sums` over `window` columns and solves the cubic for `width` columns.
     pub fn solve(
         &mut self,
-        backend: crate::pipeline::Backend,
+        backend: crate::simd::Backend,
         sums: &Plane,
         y: usize,
         window: usize,
@@ -377,7 +377,7 @@ unsafe fn sum_of<L: Lanes>(p: *const f32, window: usize) -> L {
     }
 }
 
-/// The cubic's root ([`crate::pipeline::cubic`], in vectors) and the misfit ([`confidence`]).
+/// The cubic's root ([`crate::cubic`], in vectors) and the misfit ([`confidence`]).
 #[inline(always)]
 fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
     let [one, three] = [L::splat(1.0), L::splat(3.0)];
@@ -443,7 +443,7 @@ fn confidence_generic<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::Backend;
+    use crate::simd::Backend;
 
     #[test]
     fn rows_of_confidence_agree_with_the_formula() {
