@@ -1,0 +1,28 @@
+//! Real data for tests: photographs, motion capture, video, kept beside the repository and not in it.
+//!
+//! A test that needs them is counted as skipped where they are missing. Its crate's build script calls [`declare`],
+//! which sets the configuration `shared_data` where the data are; the test bears
+//! `#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]` and finds its files by [`path`].
+
+use std::path::{Path, PathBuf};
+
+/// The folder of the data, whether it is there or not.
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data")
+}
+
+/// For build scripts: the configuration `shared_data` is set where the data are.
+pub fn declare() {
+    println!("cargo::rustc-check-cfg=cfg(shared_data)");
+    println!("cargo::rerun-if-changed=build.rs");
+    // A path that is missing counts as changed, so that data that come later are found.
+    println!("cargo::rerun-if-changed={}", folder().display());
+    if folder().is_dir() {
+        println!("cargo::rustc-cfg=shared_data");
+    }
+}
+
+/// A file or folder of the data, e.g. `breakfast/far.png`.
+pub fn path(name: &str) -> PathBuf {
+    folder().join(name)
+}
