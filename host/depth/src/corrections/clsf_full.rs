@@ -3,26 +3,28 @@
 //! The ten terms of CLSF lack the cross terms (a bowl whose height changes with depth is `x^2 U`), which the regions
 //! only partly make up for. With them one set of coefficients does for the whole map, without seams.
 
-use farnear_maths::clsf::{self as board, Coefficient, DepthScale, FULL_TERMS};
-use ndarray::{Array2, ArrayView2, ArrayViewMut2};
+use farnear_maths::clsf::{Coefficient, DepthScale, FULL_TERMS};
+use ndarray::ArrayViewMut2;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    CorrectionError,
-    clsf::inside,
-    coordinate,
-    moments::{Moments, TWENTY},
-    pattern::{Series, normalise},
-};
+use super::board::BoardForm;
+use super::moments::{Moments, TWENTY};
+use super::pattern::{Series, coordinate, inside, normalise};
+use super::table::Learned;
+use super::{CdcSettings, CorrectionError};
 
 /// The coefficients in the order of [`FULL_TERMS`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Full {
+pub(super) struct ClsfFull {
     terms: [f64; FULL_TERMS],
 }
 
-impl Full {
-    pub(super) fn fit(series: &Series<'_>) -> Result<Self, CorrectionError> {
+impl Learned for ClsfFull {
+    // As for `clsf`.
+    const PATTERNS_NEEDED: usize = 4;
+    const BOARD_FORM: Option<BoardForm> = Some(BoardForm::Full);
+
+    fn learn(series: &Series<'_>, _: &CdcSettings) -> Result<Self, CorrectionError> {
         let scale = series.scale();
         let (height, width) = series.dim();
         let x: Vec<f64> = (0..width).map(|column| coordinate(column, width)).collect();
@@ -43,14 +45,14 @@ impl Full {
         Ok(Self { terms })
     }
 
-    pub(super) fn check(&self) -> Result<(), CorrectionError> {
+    fn prepare(&mut self, _: (usize, usize)) -> Result<(), CorrectionError> {
         if self.terms.iter().all(|c| c.is_finite()) {
             return Ok(());
         }
         Err(CorrectionError::Damaged("a coefficient of clsf-full is not finite".to_owned()))
     }
 
-    pub(super) fn apply(&self, mut depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
+    fn apply(&self, mut depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
         let (height, width) = depth_mm.dim();
         let span = f64::from(scale.half_span_mm());
         let x: Vec<f32> = (0..width).map(|column| coordinate(column, width) as f32).collect();
@@ -61,24 +63,8 @@ impl Full {
         }
     }
 
-    pub(super) fn apply_as_board(
-        &self,
-        depth_mm: ArrayView2<f32>,
-        scale: DepthScale,
-    ) -> Result<Array2<f32>, CorrectionError> {
-        let frame = super::board::frame(depth_mm.dim())?;
-        let mut table = vec![0; board::Full::table_words(frame.width())];
-        let mut full = board::Full::new(self.quantised()?, frame, &mut table)?;
-        super::board::apply(depth_mm, scale, |row, codes| full.correct_row(row, codes))
-    }
-
-    /// The coefficients as the board stores them.
-    pub(super) fn quantised(&self) -> Result<board::FullCoefficients, CorrectionError> {
-        let mut quantised = [Coefficient::default(); FULL_TERMS];
-        for (to, from) in quantised.iter_mut().zip(self.terms) {
-            *to = Coefficient::from_f64(from)?;
-        }
-        Ok(quantised)
+    fn quantised(&self) -> Result<Vec<i32>, CorrectionError> {
+        self.terms.iter().map(|term| Ok(Coefficient::from_f64(*term)?.to_bits())).collect()
     }
 }
 
