@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use farnear_capture::aside;
 use farnear_depth::{
+    kernel::sizes_in_words,
     operators::{self, Design, Family, Request},
     psf::Psf,
 };
@@ -31,8 +32,12 @@ pub struct Arguments {
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// Width and height of the kernels in pixels: 5, 7, 9 or 11.
-    #[arg(long, value_name = "PX", default_value_t = 7)]
+    #[arg(
+        long,
+        value_name = "PX",
+        default_value_t = 7,
+        help = format!("Width and height of the kernels in pixels: {}", sizes_in_words())
+    )]
     kernel_size: usize,
     /// Where to save the operators, as TOML.
     #[arg(long, value_name = "FILE")]

@@ -8,6 +8,7 @@ use farnear_capture::{
     aside,
     board_correction::{decode, encode},
 };
+use farnear_depth::corrections::Method;
 use ndarray::s;
 use serde::Serialize;
 
@@ -27,8 +28,11 @@ pub struct Arguments {
     depth: PathBuf,
     #[command(flatten)]
     target: Target,
-    /// The correction, as `farnear calibrate correction` saves it; clsf, clsf-blend or clsf-full.
-    #[arg(long, value_name = "FILE")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        help = format!("The correction, as `farnear calibrate correction` saves it: {}", Method::board_names())
+    )]
     correction: PathBuf,
     /// Where to write the corrected map: .npy or .tiff.
     #[arg(long, value_name = "DEPTH")]
