@@ -7,7 +7,7 @@
 //! `docs/activity.md`.
 //!
 //! Everything is seeded and no clock enters, so that two runs on one kind of processor write the same bytes.
-//! One part per file in [`depth`]; [`rig`] renders and compares, [`page`] writes Markdown, [`chart`] and [`panels`]
+//! One part per file in [`depth`]; [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes Markdown, [`chart`] and [`panels`]
 //! draw. It takes a few minutes on four cores; run it by `cargo xtask evaluate`.
 
 mod chart;
@@ -16,6 +16,7 @@ mod page;
 mod panels;
 mod people;
 mod rig;
+mod sweep;
 
 use std::{path::PathBuf, process::ExitCode};
 

@@ -1,10 +1,12 @@
 //! Corrections of the elliptical distortion, judged on depths that taught them nothing, like Li 2014, fig. 6.4 and table 5.2.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use farnear_depth::{
     corrections::{CdcSettings, Correction, Method, Pattern, fit},
     operators::Operators,
+    optics::Optics,
 };
+use farnear_scene::EllipticalDistortion;
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -28,6 +30,13 @@ struct Plane {
     depth_mm: Array2<f32>,
 }
 
+/// How a correction did on one plane.
+struct PlaneError {
+    true_mm: f64,
+    rmse_mm: f64,
+    bias_mm: f64,
+}
+
 pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("Corrections of the elliptical distortion");
     page.paragraph(&format!(
@@ -35,38 +44,31 @@ pub fn measure(page: &mut Page) -> Result<()> {
          image, semi-axes 0.75 and 0.6), Gaussian PSF, 8-bit. The corrections learn from {PATTERNS} planes from far to near focus and are judged on \
          {HELD_OUT} other planes with other textures and noise. *Step at seams* is the jump between the pixels on either side of the vertical borders of the 3x3 \
          regions, its mean along each border of each plane (160 px), so that noise counts little: root mean square and largest over all {HELD_OUT} planes. \
-         What no correction has is the noise of this figure."
+         What no correction has is the noise of this figure. *Formula undone* solves the formula above for alpha, which no rig could: what it leaves is the \
+         noise of the pairs, and no correction can do much better."
     ));
     let learn = planes(&rig::depths(PATTERNS, 0.0)?, SEED)?;
     let judge = planes(&rig::depths(HELD_OUT, 0.5)?, SEED + PATTERNS as u64)?;
-    let patterns: Vec<Pattern<'_>> =
-        learn.iter().map(|p| Pattern { depth_mm: p.depth_mm.view(), true_mm: p.true_mm }).collect();
-
-    let smoothed = CdcSettings::default();
-    let raw_patterns = CdcSettings { smoothing_px: 0.0, ..smoothed };
-    let mut rows = vec![Vec::new()];
-    let raw = errors(&judge, None)?;
-    rows[0] = row("none", &raw, steps(&judge, None)?);
-    let mut curves =
-        vec![Curve { name: "none".into(), points: raw.iter().map(|(d, e, _)| (*d, *e)).collect() }];
-    let named = [
-        ("two-step", Method::TwoStep, smoothed),
-        ("clsf", Method::Clsf, smoothed),
-        ("clsf-blend", Method::ClsfBlend, smoothed),
-        ("clsf-full", Method::ClsfFull, smoothed),
-        ("cdc, raw patterns", Method::Cdc, raw_patterns),
-        ("cdc", Method::Cdc, smoothed),
-    ];
-    let fitted = named
-        .par_iter()
-        .map(|(_, method, settings)| Ok(fit(*method, &patterns, settings)?))
-        .collect::<Result<Vec<_>>>()?;
-    for ((name, ..), correction) in named.iter().zip(&fitted) {
-        let errors = errors(&judge, Some(correction))?;
-        rows.push(row(name, &errors, steps(&judge, Some(correction))?));
-        curves
-            .push(Curve { name: (*name).into(), points: errors.iter().map(|(d, e, _)| (*d, *e)).collect() });
+    let corrections = learned(&learn)?;
+    let optics = rig::optics(PSF)?;
+    let mut rows = Vec::new();
+    let mut curves = Vec::new();
+    let mut judged = |name: &str, correct: &(dyn Fn(&Array2<f32>) -> Result<Array2<f32>> + Sync)| {
+        let corrected = judge
+            .par_iter()
+            .map(|plane| Ok(Plane { true_mm: plane.true_mm, depth_mm: correct(&plane.depth_mm)? }))
+            .collect::<Result<Vec<_>>>()?;
+        let errors = errors(&corrected)?;
+        rows.push(row(name, &errors, steps(&corrected)));
+        let points = errors.iter().map(|error| (error.true_mm, error.rmse_mm)).collect();
+        curves.push(Curve { name: name.into(), points });
+        anyhow::Ok(())
+    };
+    judged("none", &|map| Ok(map.clone()))?;
+    for (name, correction) in &corrections {
+        judged(name, &|map| Ok(correction.apply(map.view())?))?;
     }
+    judged("formula undone", &|map| Ok(undone(map, &optics)))?;
     page.table(
         1,
         &["correction", "RMSE", "largest of a plane", "largest bias", "step at seams, RMS", "largest step"],
@@ -75,18 +77,42 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let png =
         chart::lines("Held-out planes before and after correction", "depth in mm", "RMSE in mm", &curves)?;
     page.picture("accuracy-corrections.png", &png, "RMSE over depth of held-out planes for each correction")?;
+    errors_of_the_middle_plane(page, &judge[HELD_OUT / 2], &corrections)
+}
 
-    let middle = &judge[HELD_OUT / 2];
-    let panel = |title: &str, map: &Array2<f32>| (title.to_owned(), map.mapv(|d| d - middle.true_mm as f32));
-    let mut maps = vec![panel("no correction, -4 to +4 mm", &middle.depth_mm)];
-    for (index, title) in [(1, "clsf (3x3 regions)"), (3, "clsf-full")] {
-        maps.push(panel(title, &fitted[index].apply(middle.depth_mm.view())?));
+/// Every correction, and CDC also by patterns as measured.
+fn learned(planes: &[Plane]) -> Result<Vec<(String, Correction)>> {
+    let patterns: Vec<Pattern<'_>> =
+        planes.iter().map(|p| Pattern { depth_mm: p.depth_mm.view(), true_mm: p.true_mm }).collect();
+    let smoothed = CdcSettings::default();
+    let raw_patterns = CdcSettings { smoothing_px: 0.0, ..smoothed };
+    let mut wanted: Vec<_> =
+        Method::ALL.into_iter().map(|method| (method.name().to_owned(), method, smoothed)).collect();
+    wanted.push(("cdc, raw patterns".to_owned(), Method::Cdc, raw_patterns));
+    wanted
+        .into_par_iter()
+        .map(|(name, method, settings)| Ok((name, fit(method, &patterns, &settings)?)))
+        .collect()
+}
+
+/// Pictures of the errors before and after two of the corrections.
+fn errors_of_the_middle_plane(
+    page: &mut Page,
+    plane: &Plane,
+    corrections: &[(String, Correction)],
+) -> Result<()> {
+    let panel = |title: &str, map: &Array2<f32>| (title.to_owned(), map.mapv(|d| d - plane.true_mm as f32));
+    let mut maps = vec![panel("no correction, -4 to +4 mm", &plane.depth_mm)];
+    for (method, title) in [(Method::Clsf, "clsf (3x3 regions)"), (Method::ClsfFull, "clsf-full")] {
+        let (_, correction) =
+            corrections.iter().find(|(name, _)| name == method.name()).context("every method was learned")?;
+        maps.push(panel(title, &correction.apply(plane.depth_mm.view())?));
     }
     let panels: Vec<Panel<'_>> = maps
         .iter()
         .map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale: Scale::Error(4.0) })
         .collect();
-    let caption = format!("Error of the held-out plane at {:.2} mm: raw, clsf, clsf-full", middle.true_mm);
+    let caption = format!("Error of the held-out plane at {:.2} mm: raw, clsf, clsf-full", plane.true_mm);
     page.picture("accuracy-distortion.png", &panels::row(&panels)?, &caption)
 }
 
@@ -102,29 +128,32 @@ fn planes(depths: &[f64], seed: u64) -> Result<Vec<Plane>> {
     depths.par_iter().enumerate().map(one).collect()
 }
 
-fn corrected(plane: &Plane, correction: Option<&Correction>) -> Result<Array2<f32>> {
-    Ok(match correction {
-        Some(correction) => correction.apply(plane.depth_mm.view())?,
-        None => plane.depth_mm.clone(),
+/// The map with the rendered distortion taken back, pixel by pixel.
+fn undone(map: &Array2<f32>, optics: &Optics) -> Array2<f32> {
+    let lens = EllipticalDistortion::default();
+    let (height, width) = map.dim();
+    Array2::from_shape_fn((height, width), |(row, column)| {
+        let (x, y) = ((column as f64 + 0.5) / width as f64, (row as f64 + 0.5) / height as f64);
+        let seen = optics.alpha(f64::from(map[(row, column)]));
+        // The distortion is linear in alpha.
+        let at_zero = lens.apply(0.0, x, y);
+        optics.depth_mm((seen - at_zero) / (lens.apply(1.0, x, y) - at_zero)) as f32
     })
 }
 
-/// True depth, RMSE and bias of each plane.
-fn errors(planes: &[Plane], correction: Option<&Correction>) -> Result<Vec<(f64, f64, f64)>> {
+fn errors(planes: &[Plane]) -> Result<Vec<PlaneError>> {
     let one = |plane: &Plane| {
-        let map = corrected(plane, correction)?;
-        let truth = Array2::from_elem(map.dim(), plane.true_mm as f32);
-        let error = rig::error(&map, &truth, false)?;
-        Ok((plane.true_mm, error.rmse_mm, error.bias_mm))
+        let truth = Array2::from_elem(plane.depth_mm.dim(), plane.true_mm as f32);
+        let error = rig::error(&plane.depth_mm, &truth, false)?;
+        Ok(PlaneError { true_mm: plane.true_mm, rmse_mm: error.rmse_mm, bias_mm: error.bias_mm })
     };
     planes.iter().map(one).collect()
 }
 
 /// Root mean square and largest of the mean jumps across the vertical borders of the regions, mm.
-fn steps(planes: &[Plane], correction: Option<&Correction>) -> Result<[f64; 2]> {
+fn steps(planes: &[Plane]) -> [f64; 2] {
     let mut steps = Vec::new();
-    for plane in planes {
-        let map = corrected(plane, correction)?;
+    for Plane { depth_mm: map, .. } in planes {
         // Per third of the height: jumps of opposite sign in different regions must not cancel.
         for rows in 0..3 {
             for column in SEAMS {
@@ -137,12 +166,12 @@ fn steps(planes: &[Plane], correction: Option<&Correction>) -> Result<[f64; 2]> 
         }
     }
     let squares: f64 = steps.iter().map(|step| step * step).sum();
-    Ok([(squares / steps.len() as f64).sqrt(), steps.into_iter().fold(0.0, f64::max)])
+    [(squares / steps.len() as f64).sqrt(), steps.into_iter().fold(0.0, f64::max)]
 }
 
-fn row(name: &str, errors: &[(f64, f64, f64)], [rms_step, largest_step]: [f64; 2]) -> Vec<String> {
-    let rmse = (errors.iter().map(|(_, e, _)| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-    let largest = errors.iter().map(|(_, e, _)| *e).fold(0.0, f64::max);
-    let bias = errors.iter().map(|(.., b)| b.abs()).fold(0.0, f64::max);
+fn row(name: &str, errors: &[PlaneError], [rms_step, largest_step]: [f64; 2]) -> Vec<String> {
+    let rmse = (errors.iter().map(|e| e.rmse_mm * e.rmse_mm).sum::<f64>() / errors.len() as f64).sqrt();
+    let largest = errors.iter().map(|e| e.rmse_mm).fold(0.0, f64::max);
+    let bias = errors.iter().map(|e| e.bias_mm.abs()).fold(0.0, f64::max);
     vec![name.into(), mm(rmse), mm(largest), mm(bias), mm(rms_step), mm(largest_step)]
 }

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use farnear_depth::{
     baselines::{self, Favaro, FavaroSettings, Method},
+    metrics::Comparison,
     operators::Operators,
     optics::Optics,
     pipeline::{Settings, depth_from_pair},
@@ -58,7 +59,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
          2005). Clean / 8-bit, over {PLANES} planes, on the staircase (8 px around steps left out) and on the cone. *No value* is the part of the planes' \
          pixels, 8-bit, for which a method gives no depth; they are not counted."
     ));
-    let lens = rig::lens(false)?;
     let mut scenes: Vec<(Scene, u64, bool)> = Vec::new();
     for (index, depth_mm) in rig::depths(PLANES, 0.0)?.into_iter().enumerate() {
         scenes.push((rig::plane(depth_mm)?, SEED + index as u64, false));
@@ -69,26 +69,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let methods: Vec<Option<Method>> = std::iter::once(None).chain(Method::ALL.map(Some)).collect();
     let mut rows = Vec::new();
     for (name, psf) in PSFS {
-        let prepared = Prepared::new(psf)?;
-        // [exposure][scene][method]
-        let errors = EXPOSURES
-            .iter()
-            .map(|&exposure| {
-                scenes
-                    .par_iter()
-                    .map(|(scene, seed, away)| {
-                        let pair = rig::render(scene, &lens, psf, exposure, *seed)?;
-                        methods
-                            .iter()
-                            .map(|&method| {
-                                let map = prepared.depth(method, &pair, &Settings::default())?;
-                                rig::error(&map, &pair.truth, *away)
-                            })
-                            .collect::<Result<Vec<_>>>()
-                    })
-                    .collect::<Result<Vec<_>>>()
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let errors = errors(psf, &scenes, &methods)?;
         for (index, method) in methods.iter().enumerate() {
             let both = |places: std::ops::Range<usize>| {
                 let of = |errors: &Vec<Vec<_>>| {
@@ -110,6 +91,29 @@ pub fn measure(page: &mut Page) -> Result<()> {
     }
     page.table(2, &["PSF", "method", "planes", "staircase", "cone", "no value"], &rows);
     noise_against_support(page)
+}
+
+/// Errors `[exposure][scene][method]` of scenes with a seed each, 8 px around steps left out where asked for.
+fn errors(
+    psf: &str,
+    scenes: &[(Scene, u64, bool)],
+    methods: &[Option<Method>],
+) -> Result<[Vec<Vec<Comparison>>; 2]> {
+    let (prepared, lens) = (Prepared::new(psf)?, rig::lens(false)?);
+    let of_scene = |exposure: Exposure, (scene, seed, away): &(Scene, u64, bool)| {
+        let pair = rig::render(scene, &lens, psf, exposure, *seed)?;
+        methods
+            .iter()
+            .map(|&method| {
+                let map = prepared.depth(method, &pair, &Settings::default())?;
+                rig::error(&map, &pair.truth, *away)
+            })
+            .collect::<Result<Vec<_>>>()
+    };
+    let of_exposure =
+        |exposure| scenes.par_iter().map(|scene| of_scene(exposure, scene)).collect::<Result<Vec<_>>>();
+    let [clean, noisy] = EXPOSURES.map(of_exposure);
+    Ok([clean?, noisy?])
 }
 
 /// Rational operators and Favaro's method with the same windows: noise falls with support, whosever it is.
