@@ -19,7 +19,7 @@ use farnear_capture::{
 };
 use farnear_depth::{
     baselines::BaselineError, calibrate::CalibrationError, corrections::CorrectionError,
-    metrics::CompareError, operators::DesignError, optics::OpticsError, run::RunError,
+    metrics::CompareError, operators::DesignError, optics::OpticsError, pipeline::RunError,
 };
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,

@@ -22,7 +22,7 @@ pub struct FitSettings {
     pub rig: RigAddress,
     /// The list of depth maps; see [`correction::read`].
     pub patterns: PathBuf,
-    /// Which correction: clsf, clsf-blend or clsf-full.
+    /// Which correction; the board knows [`Method::board_names`].
     pub method: Method,
     /// Every so many pixels of every so many rows are taken.
     pub step: u16,
@@ -63,8 +63,8 @@ impl FitFigures {
 /// # Errors
 /// The method, the list and its maps, the rig.
 pub fn fit(settings: &FitSettings, context: &Context<'_>) -> Result<FitFigures> {
-    if matches!(settings.method, Method::Cdc | Method::TwoStep) {
-        let expected = "the board fits clsf, clsf-blend and clsf-full";
+    if settings.method.board_form().is_none() {
+        let expected = format!("the board fits {}", Method::board_names());
         return Err(WorkflowError::parameter("method", settings.method, expected));
     }
     let maps = correction::read(&settings.patterns)?;

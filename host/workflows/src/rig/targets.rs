@@ -10,7 +10,7 @@ use farnear_capture::record::{begin_folder, finish_folder};
 use farnear_depth::{
     operators::Operators,
     optics::Optics,
-    run::{Settings, depth_from_pair},
+    pipeline::{Settings, depth_from_pair},
 };
 use farnear_files::{map, staging};
 use ndarray::Array2;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use farnear_depth::corrections::Method;
 use farnear_workflows::rig::correct::{self, BoardCorrectSettings};
 
 use super::Target;
@@ -19,8 +20,11 @@ pub struct Arguments {
     depth: PathBuf,
     #[command(flatten)]
     target: Target,
-    /// The correction, as `farnear calibrate correction` saves it; clsf, clsf-blend or clsf-full.
-    #[arg(long, value_name = "FILE")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        help = format!("The correction, as `farnear calibrate correction` saves it: {}", Method::board_names())
+    )]
     correction: PathBuf,
     /// Where to write the corrected map: .npy or .tiff.
     #[arg(long, value_name = "DEPTH")]

@@ -22,8 +22,7 @@ pub struct Arguments {
     patterns: PathBuf,
     #[command(flatten)]
     target: Target,
-    /// clsf (3x3 regions), clsf-blend (without steps) or clsf-full (one polynomial).
-    #[arg(long)]
+    #[arg(long, help = Method::board_choices())]
     method: Method,
     /// Take every Nth pixel of every Nth row only.
     #[arg(long, value_name = "PX", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
