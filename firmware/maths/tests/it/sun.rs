@@ -1,6 +1,6 @@
 //! The sun against the same formulas in f64 and against NREL's SPA.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use farnear_maths::angle::BinaryAngle;
 use farnear_maths::sun::{Place, Sun};
