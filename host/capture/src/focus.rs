@@ -14,6 +14,7 @@ use std::time::Duration;
 use farnear_depth::focus_measure::{FocusError, FocusMeasure, peak};
 use farnear_depth::optics::Optics;
 use farnear_depth::psf::Psf;
+use farnear_protocol::Settle;
 use farnear_protocol::message::{Axis, Limits, Shot, ShotRecord, TriggerMode};
 use farnear_protocol::units::{Micros, Nanometres};
 use ndarray::{Array2, s};
@@ -34,12 +35,6 @@ const FINE_STEPS: i32 = 4;
 const FINE_STEP_NM: i32 = 14_000;
 /// The fine sweep may run out of the peak so often.
 const SWEEPS_MAX: usize = 3;
-/// Where the piezo stands for an image of the search.
-const SETTLE: (Nanometres, Micros) = (Nanometres(500), Micros(1_000));
-/// And in the sweep: 100 nm are a twentieth of the accuracy that is promised.
-const SETTLE_FINE: (Nanometres, Micros) = (Nanometres(100), Micros(1_000));
-/// And the stepper.
-const SETTLE_COARSE: (Nanometres, Micros) = (Nanometres(2_000), Micros(1_000));
 
 /// How focus is sought.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -217,7 +212,7 @@ impl Search<'_> {
         &self,
         axis: Axis,
         target: Nanometres,
-        (settle_window, settle_dwell): (Nanometres, Micros),
+        Settle { window: settle_window, dwell: settle_dwell }: Settle,
     ) -> Shot {
         let (exposure, mode) = (self.settings.exposure, TriggerMode::Hardware);
         Shot { axis, target, exposure, settle_window, settle_dwell, repeat: 1, mode }
@@ -249,11 +244,17 @@ impl Search<'_> {
             let from_below = self.fine.0 <= self.middle();
             let (first, last) = if from_below { (low, high) } else { (high, low) };
             match goal {
-                None => shots.push(self.shot(Axis::SensorFine, first, SETTLE)),
-                Some(goal) => shots.push(self.shot(Axis::SensorCoarse, goal, SETTLE_COARSE)),
+                None => shots.push(self.shot(Axis::SensorFine, first, Settle::of_search(Axis::SensorFine))),
+                Some(goal) => {
+                    shots.push(self.shot(Axis::SensorCoarse, goal, Settle::of_search(Axis::SensorCoarse)))
+                }
             }
-            shots.push(self.shot(Axis::SensorFine, Nanometres(self.middle()), SETTLE));
-            shots.push(self.shot(Axis::SensorFine, last, SETTLE));
+            shots.push(self.shot(
+                Axis::SensorFine,
+                Nanometres(self.middle()),
+                Settle::of_search(Axis::SensorFine),
+            ));
+            shots.push(self.shot(Axis::SensorFine, last, Settle::of_search(Axis::SensorFine)));
             let spectra: Vec<Spectrum> = self
                 .take(&shots)?
                 .iter()
@@ -317,7 +318,9 @@ impl Search<'_> {
             ));
             let shots: Vec<Shot> = targets
                 .iter()
-                .map(|target| self.shot(Axis::SensorFine, Nanometres(*target), SETTLE_FINE))
+                .map(|target| {
+                    self.shot(Axis::SensorFine, Nanometres(*target), Settle::of_sweep(Axis::SensorFine))
+                })
                 .collect();
             let mut samples = Vec::new();
             for (record, image) in self.take(&shots)? {

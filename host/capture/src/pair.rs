@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use farnear_protocol::Settle;
 use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
 use farnear_protocol::units::{Micros, Nanometres};
 
@@ -32,9 +33,8 @@ impl Default for Exposures {
     fn default() -> Self {
         Self {
             exposure: Micros(5_000),
-            // 50 nm of sensor travel are 0.0006 of the working range in alpha: 0.02 mm of depth at most.
-            settle_window: Nanometres(50),
-            settle_dwell: Micros(2_000),
+            settle_window: Settle::of_move(Axis::SensorFine).window,
+            settle_dwell: Settle::of_move(Axis::SensorFine).dwell,
             image_wait: Duration::from_secs(30),
         }
     }

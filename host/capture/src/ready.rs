@@ -1,6 +1,6 @@
 //! Making the rig ready: every axis homed, and where that leaves the sensor.
 
-use farnear_protocol::message::{Axis, AxisStatus, Capabilities, PositionState, Status};
+use farnear_protocol::message::{Axis, Capabilities, PositionState, Status, StepperKeys};
 
 use crate::client::Client;
 use crate::describe::{axis_name, state_name};
@@ -8,17 +8,8 @@ use crate::error::ClientError;
 
 /// The axes with a home switch that this rig has.
 pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {
-    let fitted = [(Axis::SensorCoarse, capabilities.sensor_coarse), (Axis::Lens, capabilities.lens)];
-    fitted.into_iter().filter_map(|(axis, fitted)| fitted.then_some(axis)).collect()
-}
-
-/// How an axis is.
-pub fn axis_status(status: &Status, axis: Axis) -> &AxisStatus {
-    match axis {
-        Axis::SensorCoarse => &status.coarse,
-        Axis::SensorFine => &status.fine,
-        Axis::Lens => &status.lens,
-    }
+    let steppers = Axis::ALL.into_iter().filter(|axis| StepperKeys::of(*axis).is_some());
+    steppers.filter(|axis| capabilities.has(*axis)).collect()
 }
 
 /// Homes what is not homed. One axis after the other: when a second request arrives while the first is under way
@@ -29,7 +20,7 @@ pub fn axis_status(status: &Status, axis: Axis) -> &AxisStatus {
 pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), ClientError> {
     let status = client.status()?;
     for axis in steppers(&client.hello().capabilities) {
-        let state = axis_status(&status, axis).state;
+        let state = status.axis(axis).state;
         if state != PositionState::Homed {
             say(&format!("homing the {} (its position is {})", axis_name(axis), state_name(state)));
             client.home(axis)?;

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use farnear_protocol::message::{Axis, Hello, SCHEMA_KEY, ShotRecord};
+use farnear_protocol::message::{Hello, SCHEMA_KEY, ShotRecord};
 use serde::{Deserialize, Serialize};
 
 use crate::aside::{Aside, AsideError};
@@ -220,19 +220,12 @@ pub fn record_of_sequence(
         coarse_measured_um: um(first.record.coarse),
         moving_us: None,
     };
-    let exposure = shots.iter().map(|shot| {
-        let axis = match shot.record.axis {
-            Axis::SensorCoarse => "coarse",
-            Axis::SensorFine => "fine",
-            Axis::Lens => "lens",
-        };
-        ExposureRecord {
-            axis: Some(axis.into()),
-            asked_um: Some(um(shot.record.asked)),
-            lens_measured_um: Some(um(shot.record.lens)),
-            triggered_by: Some(trigger_name(shot.mode).into()),
-            ..exposure_record(&shot.name, &shot.record, sensor_mm(&shot.record, limits))
-        }
+    let exposure = shots.iter().map(|shot| ExposureRecord {
+        axis: Some(shot.record.axis.name().into()),
+        asked_um: Some(um(shot.record.asked)),
+        lens_measured_um: Some(um(shot.record.lens)),
+        triggered_by: Some(trigger_name(shot.mode).into()),
+        ..exposure_record(&shot.name, &shot.record, sensor_mm(&shot.record, limits))
     });
     Some(record(client, circumstances, stage, exposure.collect(), &first.image))
 }

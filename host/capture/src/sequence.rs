@@ -17,6 +17,7 @@
 //! exposure_us = 2000
 //! ```
 
+use farnear_protocol::Settle;
 use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
 use farnear_protocol::units::{Micros, Nanometres};
 use serde::Deserialize;
@@ -43,7 +44,7 @@ impl Default for ShotDefaults {
         Self {
             exposure: Micros(5_000),
             settle_window: None,
-            settle_dwell: Micros(2_000),
+            settle_dwell: Settle::of_shot(Axis::SensorFine).dwell,
             repeat: 1,
             mode: TriggerMode::Hardware,
         }
@@ -53,13 +54,11 @@ impl Default for ShotDefaults {
 impl ShotDefaults {
     /// A shot at a position.
     pub fn shot(&self, axis: Axis, target: Nanometres) -> Shot {
-        // A stepper holds still to a count of its encoder, the piezo's loop to a few nanometres.
-        let usual = Nanometres(if axis == Axis::SensorFine { 100 } else { 1_000 });
         Shot {
             axis,
             target,
             exposure: self.exposure,
-            settle_window: self.settle_window.unwrap_or(usual),
+            settle_window: self.settle_window.unwrap_or(Settle::of_shot(axis).window),
             settle_dwell: self.settle_dwell,
             repeat: self.repeat,
             mode: self.mode,

@@ -6,6 +6,7 @@
 
 use std::time::Duration;
 
+use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Limits, Routine, Shot, Status, TriggerMode};
 
 /// The slowest coarse speed a healthy rig has; a third of its usual 6.25 mm/s.
@@ -76,17 +77,19 @@ pub fn move_time(distance_nm: u64) -> Duration {
     travel_time(distance_nm) + 2 * SETTLE
 }
 
+/// The way of a move in nanometres, as far as it takes time: the piezo's is over before anybody has looked.
+pub fn way(axis: Axis, from: Nanometres, to: Nanometres) -> u64 {
+    if axis == Axis::SensorFine { 0 } else { u64::from(from.0.abs_diff(to.0)) }
+}
+
 /// Longest time a healthy board takes for an exposure program.
 pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
-    let (mut coarse, mut lens) = (status.coarse.measured, status.lens.measured);
+    let mut at = Axis::ALL.map(|axis| status.axis(axis).measured);
     shots
         .iter()
         .map(|shot| {
-            let way = match shot.axis {
-                Axis::SensorCoarse => std::mem::replace(&mut coarse, shot.target).0.abs_diff(shot.target.0),
-                Axis::Lens => std::mem::replace(&mut lens, shot.target).0.abs_diff(shot.target.0),
-                Axis::SensorFine => 0,
-            };
+            let from = std::mem::replace(&mut at[shot.axis as usize], shot.target);
+            let way = way(shot.axis, from, shot.target);
             let exposure = Duration::from_micros(u64::from(shot.exposure.0));
             let trigger = match shot.mode {
                 TriggerMode::Hardware => Duration::ZERO,
@@ -95,7 +98,7 @@ pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
             };
             // The camera reads a picture out before it can take the next one.
             let once = exposure + Duration::from_millis(100) + trigger;
-            move_time(u64::from(way)) + once * u32::from(shot.repeat)
+            move_time(way) + once * u32::from(shot.repeat)
         })
         .sum()
 }
@@ -113,11 +116,7 @@ pub fn calibration_time(routine: Routine, limits: &Limits) -> Duration {
 }
 
 fn travel(axis: Axis, limits: &Limits) -> u64 {
-    let (min, max) = match axis {
-        Axis::SensorCoarse => (limits.coarse_min, limits.coarse_max),
-        Axis::SensorFine => (limits.fine_min, limits.fine_max),
-        Axis::Lens => (limits.lens_min, limits.lens_max),
-    };
+    let (min, max) = limits.of(axis);
     u64::from(max.0.abs_diff(min.0))
 }
 

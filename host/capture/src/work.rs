@@ -19,7 +19,7 @@ use crate::client::Client;
 use crate::describe::{axis_name, routine_name, um};
 use crate::error::ClientError;
 use crate::owner::{Listener, Note, nonsense};
-use crate::timing::{calibration_time, homing_time, move_time, program_time};
+use crate::timing::{calibration_time, homing_time, move_time, program_time, way};
 
 /// Longest single wait for an event, so that an interruption by the user is seen soon.
 const SLICE: Duration = Duration::from_millis(50);
@@ -266,12 +266,7 @@ impl Client {
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
         let during = format!("moving the {} to {:.3} um", axis_name(axis), um(target));
         let status = self.status()?;
-        let distance = match axis {
-            Axis::SensorCoarse => status.coarse.measured.0.abs_diff(target.0),
-            Axis::SensorFine => 0,
-            Axis::Lens => status.lens.measured.0.abs_diff(target.0),
-        };
-        let work = move_time(u64::from(distance));
+        let work = move_time(way(axis, status.axis(axis).measured, target));
         self.start_work(&Request::Move { axis, target, silence: self.silence() }, work, during)
     }
 

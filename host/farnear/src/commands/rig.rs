@@ -166,14 +166,6 @@ impl AxisName {
             Self::Lens => Axis::Lens,
         }
     }
-
-    fn of(axis: Axis) -> &'static str {
-        match axis {
-            Axis::SensorCoarse => "coarse",
-            Axis::SensorFine => "fine",
-            Axis::Lens => "lens",
-        }
-    }
 }
 
 /// A position in micrometres as the wire carries it.

@@ -106,11 +106,9 @@ fn measure(target: &Target, routine: Routine, json: bool) -> Result<()> {
         ensure_homed(&rig.client, &mut |what| eprintln!("{what}"))?;
     }
     let figures = match rig.client.calibrate(routine)? {
-        Calibration::Travel { axis, length } => {
-            Figures::Travel { axis: AxisName::of(axis), travel_um: um(length) }
-        }
+        Calibration::Travel { axis, length } => Figures::Travel { axis: axis.name(), travel_um: um(length) },
         Calibration::Backlash { axis, backlash, spread } => {
-            Figures::Backlash { axis: AxisName::of(axis), backlash_um: um(backlash), spread_um: um(spread) }
+            Figures::Backlash { axis: axis.name(), backlash_um: um(backlash), spread_um: um(spread) }
         }
         Calibration::Piezo { gain_pm_per_code, hysteresis_ppm, creep_ppm_per_decade } => Figures::Piezo {
             gain_pm_per_code,

@@ -116,7 +116,7 @@ pub fn go(arguments: MoveArguments) -> Result<()> {
     if let Some(twice) =
         axes.iter().enumerate().find_map(|(at, axis)| axes[..at].contains(axis).then_some(axis))
     {
-        bail!(Usage(format!("--axis {} is given twice", AxisName::of(twice.axis()))));
+        bail!(Usage(format!("--axis {} is given twice", twice.axis().name())));
     }
     let targets: Vec<_> = axes
         .iter()
@@ -134,11 +134,7 @@ pub fn go(arguments: MoveArguments) -> Result<()> {
     let mut moved = Vec::new();
     for (axis, work) in started {
         let end = work.moved()?;
-        moved.push(Moved {
-            axis: AxisName::of(axis),
-            asked_um: um(end.asked),
-            measured_um: um(end.measured),
-        });
+        moved.push(Moved { axis: axis.name(), asked_um: um(end.asked), measured_um: um(end.measured) });
     }
     match &moved[..] {
         [one] => report::print(one, arguments.json),

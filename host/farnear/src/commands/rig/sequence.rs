@@ -141,14 +141,7 @@ fn figures(shots: &[Shot], taken: &[SequenceShot]) -> Figures {
     let records = || taken.iter().map(|shot| &shot.record);
     let begin = records().map(|r| r.trigger.0.saturating_sub(u64::from(r.settle.0))).min().unwrap_or(0);
     let end = records().map(|r| r.strobe_end.0).max().unwrap_or(begin);
-    let error_nm = records().map(|r| {
-        let measured = match r.axis {
-            farnear_protocol::message::Axis::SensorCoarse => r.coarse,
-            farnear_protocol::message::Axis::SensorFine => r.fine,
-            farnear_protocol::message::Axis::Lens => r.lens,
-        };
-        measured.0.abs_diff(r.asked.0)
-    });
+    let error_nm = records().map(|r| r.measured(r.axis).0.abs_diff(r.asked.0));
     Figures {
         shots: shots.len(),
         exposures: taken.len(),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use farnear_capture::{
     describe::{axis_name, um},
-    ready::{axis_status, steppers},
+    ready::steppers,
 };
 use farnear_protocol::message::{Alarm, Axis, Status};
 
@@ -36,18 +36,11 @@ fn wait_for(checkup: &Checkup<'_>, what: impl Fn(&Status) -> bool) -> Result<Opt
     }
 }
 
-fn switches_of(status: &Status, axis: Axis) -> [bool; 2] {
-    match axis {
-        Axis::Lens => [status.lens_home_switch, status.lens_far_switch],
-        Axis::SensorCoarse | Axis::SensorFine => [status.home_switch, status.far_switch],
-    }
-}
-
 pub(super) fn switches(checkup: &mut Checkup<'_>) -> Found {
     let axes = steppers(&checkup.client().hello().capabilities);
     let status = checkup.client().status()?;
     for axis in &axes {
-        if switches_of(&status, *axis) == [true, true] {
+        if status.switches(*axis) == [true, true] {
             return failed(format!(
                 "both end switches of the {} read as reached: a plug or a wire is off (they are normally closed to ground)",
                 axis_name(*axis)
@@ -60,14 +53,14 @@ pub(super) fn switches(checkup: &mut Checkup<'_>) -> Found {
     for axis in &axes {
         for (which, name) in ["home", "far"].into_iter().enumerate() {
             eprintln!("   press the {name} switch of the {}", axis_name(*axis));
-            let Some(status) = wait_for(checkup, |status| switches_of(status, *axis)[which])? else {
+            let Some(status) = wait_for(checkup, |status| status.switches(*axis)[which])? else {
                 return failed(format!("the {name} switch of the {} was not seen", axis_name(*axis)));
             };
-            if switches_of(&status, *axis)[1 - which] {
+            if status.switches(*axis)[1 - which] {
                 return failed(format!("both switches of the {} closed at once", axis_name(*axis)));
             }
             eprintln!("   seen; release it");
-            if wait_for(checkup, |status| !switches_of(status, *axis)[which])?.is_none() {
+            if wait_for(checkup, |status| !status.switches(*axis)[which])?.is_none() {
                 return failed(format!("the {name} switch of the {} does not open again", axis_name(*axis)));
             }
         }
@@ -115,7 +108,7 @@ pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
     checkup.ask("disconnect the motors from their drivers (supply off), leave the encoders connected")?;
     let axes = steppers(&checkup.client().hello().capabilities);
     for axis in &axes {
-        let place = |status: &Status| um(axis_status(status, *axis).measured);
+        let place = |status: &Status| um(status.axis(*axis).measured);
         let before = place(&checkup.client().status()?);
         eprintln!(
             "   turn the motor of the {} by hand so that its stage moves AWAY from home",

@@ -13,7 +13,7 @@ use farnear_capture::{
 };
 use farnear_protocol::{
     Micros, Nanometres,
-    message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord},
+    message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord, StepperKeys},
 };
 
 use super::{Checkup, Found, failed, passed, passed_over};
@@ -31,18 +31,12 @@ const EXPOSURES: u16 = 5;
 const STROBE_US: u64 = 200;
 
 fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
-    match axis {
-        Axis::SensorCoarse => (limits.coarse_min.0, limits.coarse_max.0),
-        Axis::SensorFine => (limits.fine_min.0, limits.fine_max.0),
-        Axis::Lens => (limits.lens_min.0, limits.lens_max.0),
-    }
+    let (min, max) = limits.of(axis);
+    (min.0, max.0)
 }
 
 fn speed_key(axis: Axis) -> SettingKey {
-    match axis {
-        Axis::Lens => SettingKey::LensSpeedNmPerS,
-        Axis::SensorCoarse | Axis::SensorFine => SettingKey::CoarseSpeedNmPerS,
-    }
+    StepperKeys::of(axis).unwrap_or(StepperKeys::COARSE).speed
 }
 
 /// Homes at a twelfth of the speed, so that what is wired wrongly has time to be noticed.
