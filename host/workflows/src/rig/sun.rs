@@ -1,7 +1,5 @@
 //! The board's answer where the sun is and how a person's shadow lies, and the same calculation on this computer.
 
-mod on_host;
-
 use chrono::{DateTime, Utc};
 use farnear_protocol::message::{
     QueryDeviations, ShadowAnswer, ShadowQuery, ShadowReliability, SunAnswer, SunQuery,
@@ -99,7 +97,7 @@ pub fn sun(settings: &SunSettings, context: &Context<'_>) -> Result<BoardSunFigu
     let query = query(settings)?;
     let rig = Rig::connect(&settings.rig, None, context)?;
     let board = rig.client.sun(&query)?;
-    let host = on_host::answer(&query);
+    let host = farnear_rig::sun_query::answer(&query);
     let angle = match board.shadow {
         Some(ShadowAnswer::Angle { beta_deg, sigma_beta_deg, mirrored, length_m, .. }) => {
             Some((beta_deg, sigma_beta_deg, mirrored, length_m))

@@ -33,10 +33,7 @@ fn tolerance_um(axis: Axis) -> f64 {
 }
 
 fn speed_key(axis: Axis) -> SettingKey {
-    match axis {
-        Axis::Lens => SettingKey::LensSpeedNmPerS,
-        Axis::SensorCoarse | Axis::SensorFine => SettingKey::CoarseSpeedNmPerS,
-    }
+    StepperKeys::of(axis).unwrap_or(StepperKeys::COARSE).speed
 }
 
 /// Homes at a twelfth of the speed, so that what is wired wrongly has time to be noticed.

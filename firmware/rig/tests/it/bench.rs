@@ -2,17 +2,16 @@
 //!
 //! The hardware model is as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the
 //! emulated board's plant is the thorough one.
-#![allow(dead_code)] // each test file uses its part
 
 pub mod hardware;
 pub mod motor;
 
+use self::hardware::Hardware;
 use farnear_protocol::frame::{self, Decoder, Header, Kind, Packet};
 use farnear_protocol::message::{Alarm, Axis, Event, EventKind, Failure, Hello, ResetCause, Status};
 use farnear_protocol::{BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response};
 use farnear_rig::io::{MEMORY_BYTES, Outputs, TICK_US};
 use farnear_rig::{Identity, Rig};
-use hardware::Hardware;
 
 /// Boot number of the bench.
 pub const BOOT: u32 = 7;
@@ -265,7 +264,8 @@ impl Bench {
     }
 }
 
-fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
+/// Who the bench's board is.
+pub fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
     Identity {
         board: "bench",
         firmware: "0.1.0",

@@ -1,9 +1,7 @@
 //! The calibration routines through the rig's public face.
 
-mod bench;
-
-use bench::motor::{FAR_SWITCH_UM, PLAY, STEP_UM};
-use bench::{Bench, SILENCE, failure, go};
+use crate::bench::motor::{FAR_SWITCH_UM, PLAY, STEP_UM};
+use crate::bench::{self, Bench, SILENCE, failure, go};
 use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, PositionState, Routine, SettingKey};
 use farnear_protocol::{Nanometres, Request, RequestError, Response};
 

@@ -1,8 +1,6 @@
 //! What stops the rig: emergency stop, halt, the host's silence, supply, the link; and what survives the reset.
 
-mod bench;
-
-use bench::{Bench, failure, go, home};
+use crate::bench::{self, Bench, failure, go, home};
 use farnear_protocol::message::{
     Alarm, AlarmRecord, Axis, EventKind, Failure, PositionState, RecordName, ResetCause, SettingKey,
 };

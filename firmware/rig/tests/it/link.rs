@@ -1,8 +1,6 @@
 //! The link through the rig's public face: who may ask what, what acts twice (nothing), what is remembered.
 
-mod bench;
-
-use bench::{BOOT, Bench};
+use crate::bench::{self, BOOT, Bench};
 use farnear_protocol::frame::{self, Header, Kind};
 use farnear_protocol::message::{Axis, EventKind, Failure, ResetCause, SCHEMA_KEY};
 use farnear_protocol::{

@@ -2,13 +2,13 @@
 //!
 //! Counts control ticks; cost: a comparison and an addition a tick, a division once a dwell.
 
-use farnear_protocol::{Micros, Nanometres};
+use farnear_protocol::{Nanometres, Settle};
 
 use crate::io::TICK_US;
 
 /// Watches one position.
 #[derive(Clone, Debug)]
-pub(crate) struct Settle {
+pub(crate) struct Settling {
     window: Nanometres,
     dwell_ticks: u32,
     inside_ticks: u32,
@@ -19,12 +19,12 @@ pub(crate) struct Settle {
     settled: bool,
 }
 
-impl Settle {
-    /// Watches for `dwell`, at least one tick.
-    pub(crate) const fn new(window: Nanometres, dwell: Micros) -> Self {
-        let dwell_ticks = dwell.0.div_ceil(TICK_US);
+impl Settling {
+    /// Watches for the dwell, at least one tick.
+    pub(crate) const fn new(settle: Settle) -> Self {
+        let dwell_ticks = settle.dwell.0.div_ceil(TICK_US);
         Self {
-            window,
+            window: settle.window,
             dwell_ticks: if dwell_ticks == 0 { 1 } else { dwell_ticks },
             inside_ticks: 0,
             sum: 0,
@@ -69,19 +69,20 @@ impl Settle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use farnear_protocol::Micros;
 
     #[test]
     fn one_sample_outside_begins_the_dwell_again() {
-        let mut settle = Settle::new(Nanometres(50), Micros(2_000));
+        let mut settling = Settling::new(Settle { window: Nanometres(50), dwell: Micros(2_000) });
         let mut push = |error: i32| {
-            settle.push(Nanometres(error), Nanometres(1_000 + error));
-            settle.is_settled()
+            settling.push(Nanometres(error), Nanometres(1_000 + error));
+            settling.is_settled()
         };
         assert!((0..10).all(|_| !push(50)), "2 ms are ten ticks after the first sample");
         assert!(push(-50));
         assert!(!push(51));
         assert!((0..10).all(|_| !push(0)));
         assert!(push(0));
-        assert_eq!(settle.mean(), Nanometres(1_000));
+        assert_eq!(settling.mean(), Nanometres(1_000));
     }
 }

@@ -124,11 +124,8 @@ impl Motor {
                 segment.last = true;
             }
         }
-        if cut && !self.was_cut {
-            // The break input stops the timer, which looks like a queue that ran dry.
-            self.underrun |= !self.queue.is_empty() || self.running.is_some();
-            self.queue.clear();
-            self.running = None;
+        if cut {
+            self.cut();
         }
         self.was_cut = cut;
         for segment in &outputs.segments {
@@ -141,6 +138,16 @@ impl Motor {
         }
         if !self.faults.timer_dead {
             self.play(STEP_TIMER_HZ / 1_000_000 * TICK_US, now as f64, cut);
+        }
+    }
+
+    /// The break input stops the timer, which looks like a queue that ran dry.
+    pub fn cut(&mut self) {
+        if !self.was_cut {
+            self.underrun |= !self.queue.is_empty() || self.running.is_some();
+            self.queue.clear();
+            self.running = None;
+            self.was_cut = true;
         }
     }
 

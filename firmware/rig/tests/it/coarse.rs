@@ -1,9 +1,7 @@
 //! The stepper axes through the rig's public face: homing, moves, stops, and everything that can go wrong.
 
-mod bench;
-
-use bench::motor::MotorFaults as Faults;
-use bench::{Bench, SILENCE, failure};
+use crate::bench::motor::MotorFaults as Faults;
+use crate::bench::{self, Bench, SILENCE, failure};
 use farnear_protocol::message::{Alarm, Axis, EventKind, Failure, PositionState};
 use farnear_protocol::{Nanometres, Request, RequestError};
 use proptest::prelude::*;

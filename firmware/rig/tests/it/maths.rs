@@ -1,9 +1,7 @@
 //! Mathematics over the link: the same bits as `farnear_maths` gives on the host, each request acts once, and nothing of it
 //! while a stepper moves.
 
-mod bench;
-
-use bench::{Bench, go};
+use crate::bench::{self, Bench, go};
 use farnear_maths::clsf::{
     Blend, Coefficient, Columns, Frame, Full, FullFit, RegionCoefficients, RegionFit, Regions,
 };

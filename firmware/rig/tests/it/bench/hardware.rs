@@ -76,33 +76,40 @@ impl Hardware {
 
     /// What the board reads now.
     pub fn inputs(&mut self, now: BoardMicros) -> Inputs {
-        let gauge = (self.piezo_nm + self.noise() + f64::from(GAUGE_CODE_ZERO)).round();
-        let mut exposure = None;
-        if let Some((trigger, length)) = self.exposure {
-            let strobe_start = BoardMicros(trigger.0 + 20);
-            let strobe_end = BoardMicros(strobe_start.0 + u64::from(length.0));
-            if strobe_end < now {
-                self.exposure = None;
-                exposure = Some(ExposureEdges { trigger, strobe_start, strobe_end });
-            }
-        }
-        let strobe = self.strobe(now.0);
         Inputs {
             now,
+            gauge_code: self.gauge(),
             coarse: self.coarse.inputs(),
             lens: self.lens.inputs(),
-            gauge_code: self.faults.gauge.unwrap_or(Some(gauge as u32)),
             emergency_stop: self.faults.emergency_stop,
             supply_low: self.faults.supply_low,
             link_overflow: self.faults.link_overflow,
-            exposure: exposure.filter(|_| !self.faults.no_strobe),
-            strobe: strobe.filter(|_| !self.faults.no_strobe),
+            exposure: self.exposure(now),
+            strobe: self.strobe(now),
         }
     }
 
+    /// The gauge's code.
+    pub fn gauge(&mut self) -> Option<u32> {
+        let code = (self.piezo_nm + self.noise() + f64::from(GAUGE_CODE_ZERO)).round();
+        self.faults.gauge.unwrap_or(Some(code as u32))
+    }
+
+    /// The triggered exposure, once it is over.
+    pub fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
+        let (trigger, length) = self.exposure?;
+        let strobe_start = BoardMicros(trigger.0 + 20);
+        let strobe_end = BoardMicros(strobe_start.0 + u64::from(length.0));
+        if strobe_end >= now {
+            return None;
+        }
+        self.exposure = None;
+        (!self.faults.no_strobe).then_some(ExposureEdges { trigger, strobe_start, strobe_end })
+    }
+
     /// An exposure without a trigger that ended in the last tick and began while somebody listened.
-    fn strobe(&mut self, now: u64) -> Option<StrobeEdges> {
-        let since = self.listened_since?;
+    pub fn strobe(&self, BoardMicros(now): BoardMicros) -> Option<StrobeEdges> {
+        let since = self.listened_since.filter(|_| !self.faults.no_strobe)?;
         let last_of = |(period, length): (u64, u64)| {
             let start = now.saturating_sub(length + 1) / period * period;
             (start, start + length)
@@ -110,6 +117,13 @@ impl Hardware {
         let (start, end) = self.exposed_by_host.or(self.free_running.map(last_of))?;
         (start >= since && end < now && now - end <= 200)
             .then_some(StrobeEdges { start: BoardMicros(start), end: BoardMicros(end) })
+    }
+
+    /// The emergency stop's circuit opens.
+    pub fn open_circuit(&mut self) {
+        self.faults.emergency_stop = true;
+        self.coarse.cut();
+        self.lens.cut();
     }
 
     /// Carries the outputs out and lets a control tick pass.

@@ -1,8 +1,6 @@
 //! The fine axis and the exposure program through the rig's public face.
 
-mod bench;
-
-use bench::{Bench, SILENCE};
+use crate::bench::{self, Bench, SILENCE};
 use farnear_protocol::message::{
     Axis, EventKind, Failure, PositionState, ProgramState, Shot, ShotFault, ShotRecord, TriggerMode,
 };

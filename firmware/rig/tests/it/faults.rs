@@ -1,10 +1,8 @@
 //! Any sequence of requests on hardware that breaks at any moment, power included: nothing panics, everything ends
 //! once, and a repaired rig can always be brought back to work.
 
-mod bench;
-
-use bench::motor::MotorFaults;
-use bench::{Bench, SILENCE, ends, go, home};
+use crate::bench::motor::MotorFaults;
+use crate::bench::{self, Bench, SILENCE, ends, go, home};
 use farnear_protocol::message::{
     Alarm, Axis, EventKind, Failure, PositionState, ResetCause, Routine, SettingKey,
 };

@@ -1,8 +1,6 @@
 //! Any sequence of requests: nothing panics, nothing leaves the limits, everything ends once.
 
-mod bench;
-
-use bench::{Bench, SILENCE, ends};
+use crate::bench::{self, Bench, SILENCE, ends};
 use farnear_protocol::message::{
     Axis, CorrectionForm, CorrectionInfo, Routine, SettingKey, Shot, SunQuery, TriggerMode,
 };
