@@ -66,6 +66,43 @@ enum Work {
     Reset,
 }
 
+impl Work {
+    fn of(request: &Request) -> Self {
+        match request {
+            Request::Home { .. }
+            | Request::Move { .. }
+            | Request::RunProgram { .. }
+            | Request::Calibrate { .. } => Self::Long,
+            Request::ResumeProgram => Self::Resume,
+            Request::Reboot => Self::Reset,
+            Request::Hello
+            | Request::Status
+            | Request::Stop
+            | Request::LoadShot { .. }
+            | Request::ReadEvent { .. }
+            | Request::Halt
+            | Request::ArmProgram { .. }
+            | Request::PauseProgram
+            | Request::ReadAlarm { .. }
+            | Request::ClearAlarm { .. }
+            | Request::ReadSetting { .. }
+            | Request::WriteSetting { .. }
+            | Request::ReadCounters
+            | Request::Sun(_)
+            | Request::OpenCorrection(_)
+            | Request::LoadCorrection
+            | Request::StoreCorrection
+            | Request::PutCoefficients { .. }
+            | Request::GetCoefficients { .. }
+            | Request::FitSamples { .. }
+            | Request::SolveFit
+            | Request::PutRow { .. }
+            | Request::CorrectRow { .. }
+            | Request::GetRow { .. } => Self::Done,
+        }
+    }
+}
+
 impl Lockstep {
     /// A board that has just got power.
     pub fn new() -> Self {
@@ -78,17 +115,8 @@ impl Lockstep {
         for byte in bytes {
             let Some(Ok(packet)) = self.to_board.push(*byte) else { continue };
             if packet.header.kind == Kind::Request {
-                let work = match packet.message::<Request>() {
-                    Some(
-                        Request::Home { .. }
-                        | Request::Move { .. }
-                        | Request::RunProgram { .. }
-                        | Request::Calibrate { .. },
-                    ) => Work::Long,
-                    Some(Request::ResumeProgram) => Work::Resume,
-                    Some(Request::Reboot) => Work::Reset,
-                    _ => Work::Done,
-                };
+                // A malformed one is answered, too.
+                let work = packet.message::<Request>().map_or(Work::Done, |request| Work::of(&request));
                 let asked = Asked { work, until_ns: now_ns + ANSWER_NS, body: packet.body.to_vec() };
                 self.asked.insert(packet.header.id, asked);
             }

@@ -65,7 +65,7 @@ pub enum CameraError {
     },
     /// A number that makes no camera.
     #[error("camera: {name} = {value}, expected {expected}")]
-    Senseless {
+    Value {
         /// Which number.
         name: &'static str,
         /// Its value.
@@ -145,15 +145,15 @@ impl Camera {
                 max_px: Self::MAX_SIDE_PX,
             });
         }
-        let senseless = |name, value, expected| Err(CameraError::Senseless { name, value, expected });
+        let refused = |name, value, expected| Err(CameraError::Value { name, value, expected });
         if !(self.full_well_e >= 1.0 && self.full_well_e <= 1e9) {
-            return senseless("full_well_e", self.full_well_e, "1 to 1e9 electrons");
+            return refused("full_well_e", self.full_well_e, "1 to 1e9 electrons");
         }
         if !(self.exposure_level > 0.0 && self.exposure_level <= 100.0) {
-            return senseless("exposure_level", self.exposure_level, "a fraction of the full well above 0");
+            return refused("exposure_level", self.exposure_level, "a fraction of the full well above 0");
         }
         if !(self.read_noise_e >= 0.0 && self.read_noise_e <= 1e9) {
-            return senseless("read_noise_e", self.read_noise_e, "0 to 1e9 electrons");
+            return refused("read_noise_e", self.read_noise_e, "0 to 1e9 electrons");
         }
         Ok(())
     }
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_cameras_are_named() {
+    fn impossible_cameras_are_named() {
         let text = |camera: Camera| camera.check().unwrap_err().to_string();
         assert!(text(Camera::new(0, 480, Noise::None)).contains("0 x 480"));
         assert!(text(Camera { full_well_e: f64::NAN, ..Camera::default() }).contains("full_well_e = NaN"));
