@@ -20,18 +20,9 @@
 //! arguments and the seed: no clock, no thread count, no CPU feature enters.
 //!
 //! ```
-//! use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, render, truth};
+//! use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, render, standard, truth};
 //!
-//! let optics = OpticsFile::parse("
-//!     [lens]
-//!     focal_length_mm = 50.0
-//!     aperture_mm = 12.8
-//!     [sensor]
-//!     pixel_um = 7.4
-//!     [focus]
-//!     far_mm = 933.0
-//!     max_blur_px = 2.703
-//! ")?;
+//! let optics = OpticsFile::parse(standard::OPTICS)?;
 //! let lens = Lens::from_optics(&optics)?;
 //! let scene: Scene = "plane:900".parse()?;
 //! let psf: Psf = "gaussian:k=0.4578".parse()?;
@@ -57,6 +48,7 @@ pub mod scene;
 mod scene_error;
 mod scene_file;
 mod scene_text;
+pub mod standard;
 pub mod texture;
 mod thin_lens;
 

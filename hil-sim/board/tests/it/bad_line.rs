@@ -1,8 +1,6 @@
 //! A line that flips one bit in ten thousand: every request is answered rightly or fails, and none acts twice.
 
-mod common;
-
-use common::{Bench, SILENCE, fine_shot};
+use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{EventKind, Request, Response};
 use farnear_sim::{RigConfig, faults::Faults};
 

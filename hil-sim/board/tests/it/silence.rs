@@ -1,8 +1,6 @@
 //! A host that falls silent while something moves: the board asks, then stops.
 
-mod common;
-
-use common::{Bench, SILENCE};
+use crate::bench::{Bench, SILENCE};
 use farnear_protocol::{
     EventKind, Micros, Nanometres, Request, Response,
     message::{Alarm, Axis, Failure, PositionState},

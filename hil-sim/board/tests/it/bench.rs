@@ -1,12 +1,11 @@
 //! A host that speaks the protocol to the rig in this process.
-#![allow(dead_code)] // each test program uses its part
 
 use farnear_protocol::{
     Event, EventKind, Log, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
     frame::{Header, Kind, Packet, encode},
     message::{Alarm, AlarmRecord, Axis, Hello, Shot, Status, TriggerMode},
 };
-use farnear_sim::{EmulatedRig, Hands, Report, RigConfig};
+use farnear_sim::{EmulatedRig, Report, RigAccess, RigConfig};
 use object::{Object, ObjectSymbol, Symbol, SymbolKind};
 
 /// Long enough that no test's host is silent for so long, unless silence is what it tests.
@@ -142,17 +141,17 @@ impl Bench {
     }
 
     /// Does something to the rig.
-    pub fn hands(&mut self, work: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static) {
-        self.rig.reach_in(work).expect("the rig runs");
+    pub fn access(&mut self, work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static) {
+        self.rig.access(work).expect("the rig runs");
     }
 
     /// Looks at something in the rig.
     pub fn peek<T: Send + 'static>(
         &mut self,
-        look: impl FnOnce(&mut Hands<'_, '_>) -> T + Send + 'static,
+        look: impl FnOnce(&mut RigAccess<'_, '_>) -> T + Send + 'static,
     ) -> T {
         let (tell, told) = std::sync::mpsc::channel();
-        self.hands(move |hands| tell.send(look(hands)).expect("somebody waits"));
+        self.access(move |rig| tell.send(look(rig)).expect("somebody waits"));
         told.recv().expect("the rig runs")
     }
 
@@ -169,13 +168,13 @@ impl Bench {
     /// Cycles of the firmware's longest control tick since its reset.
     pub fn longest_tick(&mut self) -> u32 {
         let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
-        self.peek(move |hands| hands.read_word(at)).expect("RAM")
+        self.peek(move |rig| rig.read_word(at)).expect("RAM")
     }
 
     /// Counts the longest tick anew.
     pub fn forget_longest_tick(&mut self) {
         let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
-        self.hands(move |hands| hands.write_word(at, 0));
+        self.access(move |rig| rig.write_word(at, 0));
     }
 
     /// The alarm that is latched.

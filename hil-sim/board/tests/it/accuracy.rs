@@ -1,8 +1,6 @@
 //! Positions against the plant's truth: random moves of each axis, homing again and again, the longest tick.
 
-mod common;
-
-use common::{Bench, amount, go};
+use crate::bench::{Bench, amount, go};
 use farnear_protocol::{EventKind, message::Axis};
 use farnear_sim::{Report, plant::Noise};
 
@@ -68,12 +66,12 @@ fn random_moves_end_where_they_should() {
     println!("SensorFine: {moves} moves, RMS {:.4} um", rms(&errors));
     assert!(rms(&errors) <= 0.1, "{} um RMS", rms(&errors));
 
-    let (longest, depth) = (bench.longest_tick(), bench.peek(|hands| hands.stack_depth()));
+    let (longest, depth) = (bench.longest_tick(), bench.peek(|rig| rig.stack_depth()));
     println!(
         "the longest tick took {longest} of {TICK_CYCLES} instructions; the stack was {depth} bytes deep"
     );
     assert!(longest <= TICK_BUDGET, "a tick took {longest} instructions");
-    assert!(depth < farnear_sim::hands::STACK.1 / 2, "the stack was {depth} bytes deep");
+    assert!(depth < farnear_sim::access::STACK.1 / 2, "the stack was {depth} bytes deep");
 }
 
 #[test]

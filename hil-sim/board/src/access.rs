@@ -1,4 +1,5 @@
-//! What can be done to a running rig: press its buttons, break its parts, take its power away.
+//! Access to a running rig between two instructions: press its buttons, break its parts, take its power away, look into
+//! the chip's memory.
 
 use rigless::{
     device::Level,
@@ -7,10 +8,9 @@ use rigless::{
     session::Session,
     soc::Width,
 };
-use serde::Deserialize;
 
 use crate::{
-    board::{Chip, RAM, RigBoard, SUPPLY_MV, SpiChip, pins},
+    board::{Chip, RAM, RigBoard, SpiChip, pins},
     chips::{SharedPlant, with_plant},
     plant::{Noise, Plant, StageName},
     wiring::Wiring,
@@ -22,75 +22,9 @@ const STACK_PAINT: u64 = 0xcccc_cccc;
 pub const STACK: (u64, u64) = (0x2000_0000, 128 << 10);
 /// RAM that the firmware does not use: its variables end well before.
 const FREE_RAM: u64 = 0x2002_f000;
-/// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 2.93 V).
-const LOW_SUPPLY_MV: u32 = 2800;
 
-/// Something that may happen to a rig.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum What {
-    /// Somebody presses the emergency stop, or its wire breaks.
-    EmergencyStop,
-    /// The emergency stop is released.
-    EmergencyStopReleased,
-    /// The reset button is pressed.
-    ResetButton,
-    /// The power goes.
-    PowerLoss,
-    /// The power comes back.
-    PowerReturn,
-    /// The supply dips for so short a time that only the brown-out reset notices.
-    BrownOut,
-    /// The supply sinks to 2.8 V.
-    SupplyLow,
-    /// The supply is as it should be.
-    SupplyNormal,
-    /// The motor's driver reports a fault.
-    DriverFault,
-    /// The motor's driver takes it back.
-    DriverFine,
-    /// The motor is held fast.
-    MotorStalls,
-    /// The motor is free again.
-    MotorFree,
-    /// The home switch says for ever that it is open (not actuated).
-    HomeSwitchDead,
-    /// The piezo amplifier's chips no longer answer.
-    PiezoDead,
-    /// The program counter goes astray: the firmware's clock stands still.
-    FirmwareHangs,
-    /// A bit of the memory flips.
-    MemoryBitFlips,
-}
-
-/// Something that happens, and to what.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Happening {
-    /// When, in milliseconds of virtual time after power-on.
-    pub after_ms: u64,
-    /// What.
-    pub what: What,
-    /// The stage concerned, if one is.
-    #[serde(default = "sensor")]
-    pub stage: StageName,
-    /// The address of the memory concerned, if one is.
-    #[serde(default)]
-    pub address: u16,
-    /// The bit there.
-    #[serde(default)]
-    pub bit: u8,
-}
-
-fn sensor() -> StageName {
-    StageName::Sensor
-}
-
-/// TIM5, which keeps the firmware's time.
-const TIM5_CR1: u64 = 0x4000_0c00;
-
-/// The inside of the rig, for tests that break it.
-pub struct Hands<'a, 'h> {
+/// A rig that stands still between two instructions, for tests that break it or look into it.
+pub struct RigAccess<'a, 'h> {
     pub(crate) session: &'a mut Session<RigBoard>,
     pub(crate) host: &'a mut (dyn Host + 'h),
     pub(crate) stop: Stop,
@@ -98,7 +32,7 @@ pub struct Hands<'a, 'h> {
     pub(crate) wiring: &'a mut Wiring,
 }
 
-impl Hands<'_, '_> {
+impl RigAccess<'_, '_> {
     /// Works on the plant.
     pub fn plant<T>(&mut self, work: impl FnOnce(&mut Plant) -> T) -> T {
         with_plant(self.plant, work)
@@ -134,7 +68,7 @@ impl Hands<'_, '_> {
     }
 
     /// Sets the supply, millivolts. The emulator's chip knows its detector but no brown-out: for that, see
-    /// [`Hands::brown_out`].
+    /// [`RigAccess::brown_out`].
     pub fn set_supply_mv(&mut self, millivolts: u32) {
         self.chip().part().set_supply(millivolts);
     }
@@ -241,37 +175,6 @@ impl Hands<'_, '_> {
     /// The camera's host lets it run freely, or (period 0) stops that.
     pub fn run_camera_freely(&mut self, period_us: u64, exposure_us: u64) {
         self.wiring.camera_mut().run_freely(self.stop.at.0, period_us * 1000, exposure_us * 1000);
-    }
-
-    /// Lets something happen.
-    pub fn happen(&mut self, happening: &Happening) {
-        let stage = happening.stage;
-        match happening.what {
-            What::EmergencyStop => self.set_emergency_stop(true),
-            What::EmergencyStopReleased => self.set_emergency_stop(false),
-            What::ResetButton => self.press_reset(),
-            What::PowerLoss => self.set_power(false),
-            What::PowerReturn => self.set_power(true),
-            What::BrownOut => self.brown_out(),
-            What::SupplyLow => self.set_supply_mv(LOW_SUPPLY_MV),
-            What::SupplyNormal => self.set_supply_mv(SUPPLY_MV),
-            What::DriverFault => self.set_driver_fault(stage, true),
-            What::DriverFine => self.set_driver_fault(stage, false),
-            What::MotorStalls => self.plant(|plant| plant.stage_mut(stage).set_stalled(true)),
-            What::MotorFree => self.plant(|plant| plant.stage_mut(stage).set_stalled(false)),
-            What::HomeSwitchDead => self.plant(|plant| plant.stage_mut(stage).set_stuck_home(Some(false))),
-            What::PiezoDead => {
-                self.disconnect(SpiChip::Dac, true);
-                self.disconnect(SpiChip::Gauge, true);
-            }
-            What::FirmwareHangs => self.write_register(TIM5_CR1, 0),
-            What::MemoryBitFlips => self.change_memory(|contents| {
-                let address = usize::from(happening.address) % contents.len().max(1);
-                if let Some(byte) = contents.get_mut(address) {
-                    *byte ^= 1 << (happening.bit & 7);
-                }
-            }),
-        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the camera sees: renders each exposure at the place where the sensor really was, on a thread of its own,
+//! The camera's images: renders each exposure at the place where the sensor really was, on a thread of its own,
 //! so that the emulator never waits for a picture.
 
 use std::{
@@ -12,13 +12,13 @@ use farnear_scene::{Camera, Lens, Psf, Renderer, Scene};
 use crate::{error::SimError, wiring::Shot};
 
 /// Renders exposures.
-pub struct Eye {
+pub struct Imager {
     renderer: Renderer,
     camera: Camera,
     exposures: u32,
 }
 
-impl Eye {
+impl Imager {
     /// A camera before a scene; the seed makes its texture and noise.
     ///
     /// # Errors

@@ -1,8 +1,6 @@
 //! Hello, homing, moves, and what goes wrong with them.
 
-mod common;
-
-use common::{Bench, SILENCE, go};
+use crate::bench::{Bench, SILENCE, go};
 use farnear_protocol::{
     EventKind, Nanometres, Request, RequestError,
     message::{Alarm, Axis, Failure, PositionState, ResetCause, SCHEMA_KEY},
@@ -42,10 +40,7 @@ fn homing_finds_the_edge_and_moves_reach_their_target() {
 fn a_stall_is_seen_and_loses_the_position() {
     let mut bench = Bench::new(3);
     bench.home();
-    bench
-        .rig
-        .reach_in(|hands| hands.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true)))
-        .expect("runs");
+    bench.access(|rig| rig.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true)));
     let end = bench.move_to(Axis::SensorCoarse, Nanometres(2_000_000));
     assert!(
         matches!(end, EventKind::Failed { reason: Failure::Following { .. }, .. }),
@@ -57,10 +52,7 @@ fn a_stall_is_seen_and_loses_the_position() {
 #[test]
 fn a_home_switch_that_never_closes_ends_the_search() {
     let mut bench = Bench::new(4);
-    bench
-        .rig
-        .reach_in(|hands| hands.plant(|plant| plant.stage_mut(StageName::Sensor).set_stuck_home(Some(false))))
-        .expect("runs");
+    bench.access(|rig| rig.plant(|plant| plant.stage_mut(StageName::Sensor).set_stuck_home(Some(false))));
     let end = bench.carry_out(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE });
     // The carriage runs against its end stop, which the encoder notices first.
     assert!(
@@ -81,14 +73,14 @@ fn a_cut_gauge_and_a_dead_drive_end_a_fine_move() {
         let end = bench.carry_out(&go(target));
         assert!(matches!(end, EventKind::MoveDone { .. }), "{target} nm: {end:?}");
     }
-    bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Gauge, true)).expect("runs");
+    bench.access(|rig| rig.disconnect(SpiChip::Gauge, true));
     let end = bench.carry_out(&go(50_000));
     assert!(matches!(end, EventKind::Failed { reason: Failure::Gauge, .. }), "{end:?}");
-    bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Gauge, false)).expect("runs");
+    bench.access(|rig| rig.disconnect(SpiChip::Gauge, false));
     bench.clear(|alarm| *alarm == Alarm::Gauge);
     let end = bench.carry_out(&go(50_000));
     assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
-    bench.rig.reach_in(|hands| hands.disconnect(SpiChip::Dac, true)).expect("runs");
+    bench.access(|rig| rig.disconnect(SpiChip::Dac, true));
     let end = bench.carry_out(&go(150_000));
     assert!(matches!(end, EventKind::Failed { reason: Failure::NotSettled { .. }, .. }), "{end:?}");
 }

@@ -1,8 +1,6 @@
 //! What the board keeps without power: it survives, and where a copy is damaged the older one serves, and that is said.
 
-mod common;
-
-use common::{Bench, go};
+use crate::bench::{Bench, go};
 use farnear_protocol::{
     EventKind, Request, RequestError, Response,
     message::{Alarm, Axis, PositionState, RecordName, SettingKey},
@@ -25,13 +23,13 @@ fn write(bench: &mut Bench, value: i32) {
 }
 
 fn power_cycle(bench: &mut Bench) {
-    bench.hands(|hands| hands.set_power(false));
+    bench.access(|rig| rig.set_power(false));
     bench.rig.advance_us(50_000).expect("runs");
     power_return(bench);
 }
 
 fn power_return(bench: &mut Bench) {
-    bench.hands(|hands| hands.set_power(true));
+    bench.access(|rig| rig.set_power(true));
     bench.rig.settle().expect("runs");
     bench.events.clear();
     bench.answers();
@@ -67,9 +65,9 @@ fn a_setting_survives_the_loss_of_power_and_boots_count_on() {
 fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
     let mut bench = Bench::new(1);
     write(&mut bench, 3_000);
-    let before = bench.peek(|hands| hands.memory());
+    let before = bench.peek(|rig| rig.memory());
     write(&mut bench, 3_100);
-    let after = bench.peek(|hands| hands.memory());
+    let after = bench.peek(|rig| rig.memory());
     let places = changed(&before, &after);
     assert!(places.len() > 4, "a sequence number, a value and a checksum: {places:?}");
     // The first, the last and one in the middle; every byte is the campaign's.
@@ -78,12 +76,12 @@ fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
     for place in if all { places } else { some.to_vec() } {
         for bit in [0, 7] {
             let spoilt = after.clone();
-            bench.hands(move |hands| {
-                hands.change_memory(|contents| {
+            bench.access(move |rig| {
+                rig.change_memory(|contents| {
                     contents.copy_from_slice(&spoilt);
                     contents[place] ^= 1 << bit;
                 });
-                hands.press_reset();
+                rig.press_reset();
             });
             bench.rig.settle().expect("runs");
             bench.events.clear();
@@ -100,18 +98,18 @@ fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
 fn with_both_copies_bad_the_defaults_serve_and_an_alarm_says_so() {
     let mut bench = Bench::new(1);
     write(&mut bench, 3_000);
-    let before = bench.peek(|hands| hands.memory());
+    let before = bench.peek(|rig| rig.memory());
     write(&mut bench, 3_100);
-    let between = bench.peek(|hands| hands.memory());
+    let between = bench.peek(|rig| rig.memory());
     write(&mut bench, 3_200);
-    let after = bench.peek(|hands| hands.memory());
+    let after = bench.peek(|rig| rig.memory());
     let (one, other) = (changed(&before, &between)[0], changed(&between, &after)[0]);
-    bench.hands(move |hands| {
-        hands.change_memory(|contents| {
+    bench.access(move |rig| {
+        rig.change_memory(|contents| {
             contents[one] ^= 1;
             contents[other] ^= 1;
         });
-        hands.press_reset();
+        rig.press_reset();
     });
     bench.settle();
     bench.say_hello();
@@ -131,11 +129,11 @@ fn power_lost_in_the_middle_of_a_write_leaves_the_old_value_or_the_new() {
     let mut bench = Bench::new(1);
     let mut value = 3_000;
     write(&mut bench, value);
-    let before = bench.peek(|hands| hands.memory().len());
+    let before = bench.peek(|rig| rig.memory().len());
     assert_eq!(before, 32 * 1024);
     let (mut old, mut new) = (0, 0);
     for bytes in [1, 2, 5, 20, 40, 63, 64, 65, 80] {
-        bench.hands(move |hands| hands.fail_power_after_memory_bytes(bytes));
+        bench.access(move |rig| rig.fail_power_after_memory_bytes(bytes));
         let next = if value == 3_000 { 3_500 } else { 3_000 };
         bench.send(&Request::WriteSetting { key: KEY, value: next });
         bench.rig.advance_us(20_000).expect("runs");

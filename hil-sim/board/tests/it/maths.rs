@@ -1,8 +1,6 @@
 //! Mathematics on the board: the answers to the same requests on the emulated Cortex-M4F and on this machine, bit for bit.
 
-mod common;
-
-use common::{Bench, answer_in, request_frame};
+use crate::bench::{Bench, answer_in, request_frame};
 use farnear_protocol::{
     BoardMicros, Request, Response,
     frame::Decoder,
@@ -66,7 +64,7 @@ impl Here {
         });
     }
 
-    fn ask(&mut self, request: &Request) -> common::Answer {
+    fn ask(&mut self, request: &Request) -> crate::bench::Answer {
         self.id += 1;
         let boot = if *request == Request::Hello { 0 } else { self.rig.boot() };
         for byte in request_frame(self.id, boot, request) {

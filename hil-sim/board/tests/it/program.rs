@@ -1,8 +1,6 @@
 //! Exposure programs: how fast a pair is, and how still the sensor stands while it exposes.
 
-mod common;
-
-use common::{Bench, SILENCE, fine_shot};
+use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{
     EventKind, Micros, Nanometres, Request,
     message::{Shot, ShotRecord, TriggerMode},
@@ -107,7 +105,7 @@ fn the_cameras_host_triggers_it_and_the_strobe_ends_the_shot() {
             .collect();
         for id in ready.into_iter().skip(answered) {
             answered += 1;
-            bench.hands(move |hands| hands.expose(4_000, id));
+            bench.access(move |rig| rig.expose(4_000, id));
         }
     }
     let records = records(&bench);
@@ -124,7 +122,7 @@ fn the_cameras_host_triggers_it_and_the_strobe_ends_the_shot() {
 #[test]
 fn of_a_camera_that_runs_freely_the_first_exposure_after_settling_is_the_shot() {
     let mut bench = Bench::new(4);
-    bench.hands(|hands| hands.run_camera_freely(40_000, 5_000));
+    bench.access(|rig| rig.run_camera_freely(40_000, 5_000));
     bench.arm(
         &[20_000, 150_000]
             .map(|target| Shot { mode: TriggerMode::FreeRunning, ..fine_shot(target, 5_000, 100, 1_000) }),

@@ -1,8 +1,6 @@
 //! STEP pulses are counted exactly on both axes, come when they are due, and stop in time.
 
-mod common;
-
-use common::{Bench, amount, go};
+use crate::bench::{Bench, amount, go};
 use farnear_protocol::{
     EventKind, Request, Response,
     message::{Alarm, Axis, Failure, PositionState},
@@ -56,7 +54,7 @@ fn a_thousand_random_moves_lose_no_step() {
 /// Sends both axes to and fro at full speed; gives the longest time between two edges of a cruise.
 fn travels(bench: &mut Bench, edges_wanted: u64) -> u64 {
     bench.home();
-    bench.hands(|hands| hands.record_steps());
+    bench.access(|rig| rig.record_steps());
     let before = bench.report().step_edges();
     let mut worst_ns = 0;
     let mut far = true;
@@ -69,7 +67,7 @@ fn travels(bench: &mut Bench, edges_wanted: u64) -> u64 {
         bench.settle();
         let status = bench.status();
         assert_eq!([status.coarse.state, status.lens.state], [PositionState::Homed; 2], "{status:?}");
-        for (axis, edges) in bench.peek(|hands| hands.take_steps()).into_iter().enumerate() {
+        for (axis, edges) in bench.peek(|rig| rig.take_steps()).into_iter().enumerate() {
             let gaps: Vec<u64> = edges.windows(2).map(|pair| pair[1] - pair[0]).collect();
             // The ramps take less than a tenth of the way at either end.
             let cruise = &gaps[gaps.len() / 10..gaps.len() - gaps.len() / 10];
@@ -150,14 +148,14 @@ fn stops(
 fn the_emergency_stop_ends_the_steps_at_once() {
     let worst_us = stops(
         |bench| {
-            bench.hands(|hands| hands.set_emergency_stop(true));
+            bench.access(|rig| rig.set_emergency_stop(true));
             false
         },
         |bench| {
             let latched = bench.alarm().expect("latched");
             let refused = bench.ask(&Request::ClearAlarm { number: latched.number });
             assert!(refused.is_err(), "its circuit is open: {refused:?}");
-            bench.hands(|hands| hands.set_emergency_stop(false));
+            bench.access(|rig| rig.set_emergency_stop(false));
         },
         |alarm| *alarm == Alarm::EmergencyStop,
     );
@@ -184,10 +182,10 @@ fn a_halt_ends_the_steps_within_a_millisecond() {
 fn a_driver_fault_ends_the_steps_within_a_millisecond() {
     let worst_us = stops(
         |bench| {
-            bench.hands(|hands| hands.set_driver_fault(StageName::Lens, true));
+            bench.access(|rig| rig.set_driver_fault(StageName::Lens, true));
             true
         },
-        |bench| bench.hands(|hands| hands.set_driver_fault(StageName::Lens, false)),
+        |bench| bench.access(|rig| rig.set_driver_fault(StageName::Lens, false)),
         |alarm| *alarm == Alarm::DriverFault { axis: Axis::Lens },
     );
     println!("last STEP at most {worst_us} us after the driver's fault");

@@ -1,22 +1,9 @@
 //! The same seed gives the same bytes; another one others.
 
-mod common;
-
-use common::{Bench, fine_shot};
+use crate::bench::{Bench, fine_shot};
 use farnear_protocol::{Nanometres, message::Axis};
-use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene};
-use farnear_sim::{eye::Eye, rig::RigConfig};
-
-const OPTICS: &str = "
-[lens]
-focal_length_mm = 50.0
-aperture_mm = 12.8
-[sensor]
-pixel_um = 7.4
-[focus]
-far_mm = 933.0
-max_blur_px = 2.703
-";
+use farnear_scene::{Camera, Lens, Noise, OpticsFile, Scene, standard};
+use farnear_sim::{imager::Imager, rig::RigConfig};
 
 /// Homes, moves, exposes a pair; gives everything that came out: trace, events, pictures.
 fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
@@ -28,12 +15,11 @@ fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
     bench.move_to(Axis::SensorCoarse, Nanometres(5_821_300));
     bench.arm(&[10_000, 166_270].map(|target| fine_shot(target, 2_000, 50, 2_000)));
     bench.run();
-    let lens = Lens::from_optics(&OpticsFile::parse(OPTICS).expect("optics")).expect("a lens");
+    let lens = Lens::from_optics(&OpticsFile::parse(standard::OPTICS).expect("optics")).expect("a lens");
     let scene: Scene = "plane:900".parse().expect("a scene");
-    let psf: Psf = "gaussian:k=0.4578".parse().expect("a PSF");
     let camera = Camera::new(64, 48, Noise::EightBit);
-    let mut eye = Eye::new(&scene, &lens, &psf, camera, seed).expect("a picture");
-    let frames = bench.rig.take_shots().iter().map(|shot| eye.frame(shot).expect("a picture")).collect();
+    let mut imager = Imager::new(&scene, &lens, &standard::PSF, camera, seed).expect("a picture");
+    let frames = bench.rig.take_shots().iter().map(|shot| imager.frame(shot).expect("a picture")).collect();
     let events = format!("{:?}", bench.events);
     bench.rig.stop().expect("ends well");
     (std::fs::read_to_string(&trace).expect("a trace"), events, frames)

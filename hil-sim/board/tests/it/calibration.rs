@@ -1,8 +1,6 @@
 //! The board measures its own mechanics, and what it finds is what the plant is.
 
-mod common;
-
-use common::{Bench, SILENCE};
+use crate::bench::{Bench, SILENCE};
 use farnear_protocol::{
     EventKind, Nanometres, Request, Response,
     message::{Axis, Calibration, Routine, SettingKey},

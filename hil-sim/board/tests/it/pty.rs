@@ -1,7 +1,5 @@
 //! The program as a client sees it: its JSON line, the pty through `serialport`, the camera endpoint, its end.
 
-mod common;
-
 use std::{
     collections::VecDeque,
     io::{BufRead, BufReader, Read, Write},
@@ -11,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{Answer, SILENCE, answer_in, fine_shot, go, request_frame};
+use crate::bench::{Answer, SILENCE, answer_in, fine_shot, go, request_frame};
 use farnear_protocol::{
     Event, EventKind, Request, Response,
     camera::{Control, FRAME_HEADER, FrameHeader},

@@ -1,16 +1,14 @@
 //! Resets: each has its cause and the next boot number, nobody acts on requests of an earlier boot, and what was grave
 //! enough to reset the board is an alarm that stays until somebody has read and cleared it.
 
-mod common;
-
 use std::collections::HashSet;
 
-use common::{Bench, go, request_frame, symbols};
+use crate::bench::{Bench, go, request_frame, symbols};
 use farnear_protocol::{
     EventKind, Request, RequestError,
     message::{Alarm, Axis, PositionState, ResetCause},
 };
-use farnear_sim::Hands;
+use farnear_sim::RigAccess;
 use object::{ObjectSymbol, SymbolKind};
 
 /// TIM5, which keeps the firmware's time.
@@ -43,7 +41,7 @@ fn the_reset_button_is_told_from_a_request() {
     bench.home_axis(Axis::SensorCoarse);
     // The motor has come to rest, and the memory knows.
     bench.rig.advance_us(200_000).expect("runs");
-    bench.hands(|hands| hands.press_reset());
+    bench.access(|rig| rig.press_reset());
     bench.settle();
     check_boot(&mut bench, 2, ResetCause::Pin);
     assert_eq!(bench.status().coarse.state, PositionState::Unknown);
@@ -52,12 +50,12 @@ fn the_reset_button_is_told_from_a_request() {
 
 /// Something resets the board; the alarm that names it survives further resets and is cleared only by its number.
 fn leaves_an_alarm(
-    happen: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static,
+    happen: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
     cause: ResetCause,
     alarm: Alarm,
 ) {
     let mut bench = Bench::new(1);
-    bench.hands(happen);
+    bench.access(happen);
     // The watchdog bites within 0.19 s.
     bench.rig.advance_us(250_000).expect("runs");
     bench.settle();
@@ -67,14 +65,14 @@ fn leaves_an_alarm(
     let refused = RequestError::Alarm { number: latched.number, alarm };
     assert_eq!(bench.ask(&go(Axis::SensorFine, 50_000)), Err(refused));
 
-    bench.hands(|hands| hands.press_reset());
+    bench.access(|rig| rig.press_reset());
     bench.settle();
     check_boot(&mut bench, 3, ResetCause::Pin);
     assert_eq!(bench.alarm(), Some(latched), "it survives a reset");
-    bench.hands(|hands| hands.set_power(false));
+    bench.access(|rig| rig.set_power(false));
     bench.rig.advance_us(100_000).expect("runs");
     assert!(!bench.report().powered);
-    bench.hands(|hands| hands.set_power(true));
+    bench.access(|rig| rig.set_power(true));
     bench.settle();
     check_boot(&mut bench, 4, ResetCause::PowerOn);
     assert_eq!(bench.alarm(), Some(latched), "and a loss of power");
@@ -82,7 +80,7 @@ fn leaves_an_alarm(
     let wrong = bench.ask(&Request::ClearAlarm { number: latched.number + 1 });
     assert!(matches!(wrong, Err(RequestError::NoSuchAlarm { .. })), "{wrong:?}");
     bench.clear(|latched| *latched == alarm);
-    bench.hands(|hands| hands.press_reset());
+    bench.access(|rig| rig.press_reset());
     bench.settle();
     check_boot(&mut bench, 5, ResetCause::Pin);
     assert_eq!(bench.alarm(), None, "what was cleared stays so");
@@ -91,12 +89,12 @@ fn leaves_an_alarm(
 #[test]
 fn the_watchdog_resets_a_firmware_whose_clock_has_died() {
     // A stray write stops the timer that wakes the control loop.
-    leaves_an_alarm(|hands| hands.write_register(TIM5_CR1, 0), ResetCause::Watchdog, Alarm::Watchdog);
+    leaves_an_alarm(|rig| rig.write_register(TIM5_CR1, 0), ResetCause::Watchdog, Alarm::Watchdog);
 }
 
 #[test]
 fn a_brown_out_is_told() {
-    leaves_an_alarm(|hands| hands.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
+    leaves_an_alarm(|rig| rig.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
 }
 
 /// Lets the program's next step be this code, as a stray pointer in the right place would.
@@ -107,7 +105,7 @@ fn astray(code: &'static [u16], alarm: Alarm) {
     let functions: HashSet<u64> =
         symbols(|symbol| symbol.kind() == SymbolKind::Text).into_iter().map(|(at, _)| at & !1).collect();
     let is_function = move |word: u32| word & 1 == 1 && functions.contains(&u64::from(word & !1));
-    let replaced = bench.peek(move |hands| hands.lead_astray(task, is_function, code));
+    let replaced = bench.peek(move |rig| rig.lead_astray(task, is_function, code));
     assert!(replaced, "the task's function is found and replaced");
     for _ in 0..100 {
         bench.rig.advance_us(100).expect("runs");

@@ -1,10 +1,8 @@
 //! Anything may come over the link: the board answers what is a request, stays alive, and never leaves its limits.
 
-mod common;
-
 use std::time::{Duration, Instant};
 
-use common::{Bench, amount, fine_shot, request_frame};
+use crate::bench::{Bench, amount, fine_shot, request_frame};
 use farnear_protocol::{
     Micros, Nanometres, Request, Response,
     message::{
@@ -196,6 +194,6 @@ fn nothing_on_the_link_stops_the_board() {
         assert_eq!(bench.ask(&Request::ClearAlarm { number: latched.number }), Ok(Response::Accepted));
     }
     let longest = bench.longest_tick();
-    let depth = bench.peek(|hands| hands.stack_depth());
+    let depth = bench.peek(|rig| rig.stack_depth());
     println!("{sent} frames; the longest tick took {longest} instructions; the stack was {depth} bytes deep");
 }
