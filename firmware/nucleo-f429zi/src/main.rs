@@ -83,7 +83,6 @@ async fn main(spawner: Spawner) {
     let (boot, last) = retained::take();
     let p = clock::start();
     if let Some(mut core) = cortex_m::Peripherals::take() {
-        registers::guard_stack(&mut core.MPU);
         // The control loop counts its cycles.
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
