@@ -71,10 +71,9 @@ fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     RIG.init_with(|| Rig::new(identity, fitted.is_some().then_some(&records), clock::now()))
 }
 
-/// Guards the stack, and counts cycles, which the control loop wants to know.
-fn set_core_up() {
+/// Counts cycles, which the control loop wants to know.
+fn count_cycles() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
-        registers::guard_stack(&mut core.MPU);
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
     }
@@ -99,7 +98,7 @@ async fn main(spawner: Spawner) {
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
     let peripherals = clock::start();
-    set_core_up();
+    count_cycles();
     tell_of(last);
     let Parts { mut board, sender, led, emulated } = match Nucleo::new(peripherals) {
         Ok(parts) => parts,
