@@ -281,7 +281,7 @@ impl Board {
         self.put(Kind::Response, id, response);
     }
 
-    pub fn event(&mut self, kind: EventKind) {
+    fn event(&mut self, kind: EventKind) {
         self.time += 100;
         let event = Event { time: BoardMicros(self.time), kind };
         let number = self.events.len() as u32;

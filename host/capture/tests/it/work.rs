@@ -12,7 +12,7 @@ use farnear_protocol::{
 };
 use farnear_scripted_board::Faults;
 
-use crate::scripted::{SHOT, connect, run_shots};
+use crate::scripted::{SHORT, SHOT, connect, run_shots};
 
 #[test]
 fn homing_and_moving_end_with_their_events() {

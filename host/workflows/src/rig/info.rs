@@ -9,7 +9,7 @@ use crate::{context::Context, error::Result};
 
 /// What the board says of itself.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[allow(missing_docs)] // the names say it with their units; docs/protocol.md has each with its meaning
+#[allow(missing_docs)] // the names say what they are, with their units
 pub struct InfoFigures {
     pub board: String,
     pub firmware: String,
