@@ -252,7 +252,9 @@ mod tests {
         for text in ["NIR: optics (dots) and cubic fit", "Gp2", "frequency in rad/px"] {
             assert!(svg.contains(text), "{text}");
         }
-        let png = image::load_from_memory(&plot(&operators, Format::of(Path::new("a.PNG")).unwrap()).unwrap()).unwrap();
+        let png =
+            image::load_from_memory(&plot(&operators, Format::of(Path::new("a.PNG")).unwrap()).unwrap())
+                .unwrap();
         assert_eq!((png.width(), png.height()), SIZE);
         let error = Format::of(Path::new("a.pdf")).unwrap_err().to_string();
         assert!(error.contains(".svg or .png"), "{error}");

@@ -71,9 +71,11 @@ impl Prepared {
             (Method::RationalOperators, asked) => {
                 Ok(Self::RationalOperators(Box::new(operators::find(asked, optics)?)))
             }
-            (Method::Baseline(method), Some(asked)) => {
-                Err(WorkflowError::parameter("operators", asked.display(), format!("method {method} uses none")))
-            }
+            (Method::Baseline(method), Some(asked)) => Err(WorkflowError::parameter(
+                "operators",
+                asked.display(),
+                format!("method {method} uses none"),
+            )),
             (Method::Baseline(method), None) => Ok(Self::Baseline(method)),
         }
     }

@@ -190,7 +190,10 @@ mod tests {
         assert_eq!(files, ["depth.npy", "confidence.npy", "uncertainty.npy", "depth.exr"]);
         assert_eq!("npy,tiff,png,mesh,view".parse(), Ok(Outputs::default()));
         let unknown = "npy,jpg".parse::<Outputs>().unwrap_err();
-        assert_eq!(unknown.to_string(), "there is no output \"jpg\"; expected some of npy,tiff,png,mesh,view,exr");
+        assert_eq!(
+            unknown.to_string(),
+            "there is no output \"jpg\"; expected some of npy,tiff,png,mesh,view,exr"
+        );
         assert!("".parse::<Outputs>().is_err());
     }
 }

@@ -4,12 +4,7 @@ use farnear_depth::{operators::Operators, optics::Optics, run::Settings};
 use farnear_files::map::Scale;
 use serde::Serialize;
 
-use super::{
-    Computed, DepthSettings, Inputs,
-    noise::Uncertainty,
-    output::Outputs,
-    pair::name_of,
-};
+use super::{Computed, DepthSettings, Inputs, noise::Uncertainty, output::Outputs, pair::name_of};
 use crate::{MADE_BY, error::Result};
 
 /// Version of the record.
