@@ -5,7 +5,7 @@ use farnear_capture::{
 };
 use farnear_protocol::RequestError;
 use farnear_workflows::{
-    WorkflowError, activity::samples::SamplesError, shadow::removal::CAMERA_FILE,
+    WorkflowError, activity::samples::SamplesError, correction_file, operators, shadow::removal::CAMERA_FILE,
     silhouettes::SilhouettesError, simulator::SimulatorError,
 };
 
@@ -19,6 +19,15 @@ pub fn hint(error: &anyhow::Error) -> Option<String> {
 fn of_workflow(error: &WorkflowError) -> Option<String> {
     match error {
         WorkflowError::About { source, .. } => of_workflow(source),
+        WorkflowError::Read { what: operators::KIND, .. } => {
+            Some("operators have a name such as gro:linear, or `farnear operators --out` saves them".into())
+        }
+        WorkflowError::File { expected: operators::KIND, .. } => {
+            Some("`farnear operators --out` saves some".into())
+        }
+        WorkflowError::File { expected: correction_file::KIND, .. } => {
+            Some("`farnear calibrate correction --out` saves one".into())
+        }
         WorkflowError::NoOptics { .. } => Some("name a file with --optics".into()),
         WorkflowError::Simulator(SimulatorError::Missing) => {
             Some("`cargo xtask install` installs both, `cargo xtask demo` builds them".into())

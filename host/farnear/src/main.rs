@@ -83,7 +83,7 @@ fn main() -> ExitCode {
 /// An error and its causes in one line. A typed error often says its cause itself; that is not said twice.
 fn message(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message {
-        empty if empty.is_empty() => cause,
+        empty if empty.is_empty() => cause.trim_end().into(),
         message if message.contains(&cause) => message,
         message => format!("{message}: {}", cause.trim_end()),
     })

@@ -33,8 +33,10 @@ pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Re
     let (Ok(columns @ 1..), Ok(rows @ 1..)) = (i32::try_from(width), i32::try_from(height)) else {
         return Err(refused(format!("a picture of {width}x{height} px")));
     };
-    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).chain(texts.iter().map(|(name, _)| *name)).collect();
-    if let Some(name) = names.iter().find(|name| !(1..=NAME_MAX).contains(&name.len()) || name.contains('\0')) {
+    let names: Vec<&str> =
+        channels.iter().map(|(name, _)| *name).chain(texts.iter().map(|(name, _)| *name)).collect();
+    if let Some(name) = names.iter().find(|name| !(1..=NAME_MAX).contains(&name.len()) || name.contains('\0'))
+    {
         return Err(refused(format!("the name \"{name}\" does not have 1 to {NAME_MAX} bytes")));
     }
     // Readers expect the channels in the order of their names.
@@ -63,12 +65,7 @@ pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Re
 }
 
 /// Everything before the table of the rows' places.
-fn header(
-    channels: &[(&str, ArrayView2<f32>)],
-    texts: &[(&str, &str)],
-    columns: i32,
-    rows: i32,
-) -> Vec<u8> {
+fn header(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)], columns: i32, rows: i32) -> Vec<u8> {
     let integers = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
     let window = integers(&[0, 0, columns - 1, rows - 1]);
     let one = 1f32.to_le_bytes();
@@ -106,4 +103,67 @@ fn header(
     }
     bytes.push(0);
     bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, array};
+
+    #[test]
+    fn another_reader_finds_what_was_written() {
+        use exr::prelude::*;
+        let depth = array![[933.0f32, f32::NAN, -0.0], [887.5, 1e-30, f32::INFINITY]];
+        let confidence = array![[1.0f32, 0.0, 0.25], [0.5, 0.125, 0.75]];
+        // Not contiguous, and not in the order of the names.
+        let turned = confidence.t().as_standard_layout().into_owned();
+        let bytes = write(
+            &[("confidence", turned.t()), ("Z", depth.view())],
+            &[("farnear:units", "mm"), ("farnear:record", "far = \"Übung.png\"\n")],
+        )
+        .unwrap();
+        let picture = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .first_valid_layer()
+            .all_attributes()
+            .pedantic()
+            .non_parallel()
+            .from_buffered(std::io::Cursor::new(bytes))
+            .unwrap();
+        let layer = picture.layer_data;
+        assert_eq!(layer.size, Vec2(3, 2));
+        for (channel, (name, map)) in
+            layer.channel_data.list.iter().zip([("Z", &depth), ("confidence", &confidence)])
+        {
+            assert_eq!(channel.name.to_string(), name);
+            let FlatSamples::F32(values) = &channel.sample_data else { panic!("{name} is not float") };
+            assert!(values.iter().zip(map).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}: {values:?}");
+        }
+        let text = |name: &str| match &layer.attributes.other[&Text::from(name)] {
+            AttributeValue::Text(text) => String::from_utf8(text.bytes().to_vec()).unwrap(),
+            other => panic!("{name}: {other:?}"),
+        };
+        assert_eq!(text("farnear:units"), "mm");
+        assert_eq!(text("farnear:record"), "far = \"Übung.png\"\n");
+    }
+
+    #[test]
+    fn what_no_file_can_hold_is_refused() {
+        let (map, other) = (Array2::<f32>::zeros((2, 3)), Array2::<f32>::zeros((3, 2)));
+        let empty = Array2::<f32>::zeros((0, 3));
+        for (channels, texts, phrase) in [
+            (vec![], vec![], "0x0"),
+            (vec![("Z", &empty)], vec![], "3x0"),
+            (vec![("Z", &map), ("a", &other)], vec![], "channel a is 2x3, the first 3x2"),
+            (vec![("Z", &map), ("Z", &map)], vec![], "two channels are called Z"),
+            (vec![("", &map)], vec![], "1 to 31"),
+            (vec![("Z", &map)], vec![("a name of more than thirty-one bytes", "")], "1 to 31"),
+        ] {
+            let channels: Vec<_> = channels.iter().map(|(name, map)| (*name, map.view())).collect();
+            let error = write(&channels, &texts).unwrap_err();
+            assert!(error.reason.contains(phrase), "{phrase}: {error}");
+        }
+    }
 }

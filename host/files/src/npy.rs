@@ -125,8 +125,7 @@ fn numbers<const SIZE: usize>(values: &[u8], number: fn([u8; SIZE]) -> f32) -> O
 /// A map of (height, width) as the bytes of a file: version 1.0, little-endian f32, row by row.
 pub fn write(map: ArrayView2<f32>) -> Vec<u8> {
     let (height, width) = map.dim();
-    let header =
-        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width})}}");
+    let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width})}}");
     // At least one blank, then the line feed. Two numbers never make the header longer than 65,535 bytes.
     let values_from = (PREFIX + header.len() + 1) / BLOCK * BLOCK + BLOCK;
     let header_length = (values_from - PREFIX) as u16;

@@ -39,6 +39,8 @@ const LEFT_BEHIND_MAX: u32 = 100;
 pub struct Staging {
     folder: PathBuf,
     target: PathBuf,
+    /// Whether the folder that files go into was made for them.
+    made_target: bool,
 }
 
 impl Staging {
@@ -57,17 +59,18 @@ impl Staging {
         };
         fs::create_dir_all(&parent).map_err(StagingError::at(&parent))?;
         let name = target.file_name().unwrap_or_default().to_string_lossy();
-        Self::begin(parent.join(partial_name(&name)), target)
+        Self::begin(parent.join(partial_name(&name)), target, false)
     }
 
     /// Begins a set of files that go into a folder together, which is made where it is missing. Files of the
     /// same names are replaced, others stay.
     pub fn into_folder(target: &Path) -> Result<Self, StagingError> {
+        let made_target = !target.exists();
         fs::create_dir_all(target).map_err(StagingError::at(target))?;
-        Self::begin(target.join(partial_name("files")), target.into())
+        Self::begin(target.join(partial_name("files")), target.into(), made_target)
     }
 
-    fn begin(folder: PathBuf, target: PathBuf) -> Result<Self, StagingError> {
+    fn begin(folder: PathBuf, target: PathBuf, made_target: bool) -> Result<Self, StagingError> {
         // A program that was killed may have left the name behind, and a container gives its number out again.
         let mut free = folder.clone();
         for number in 1..LEFT_BEHIND_MAX {
@@ -77,7 +80,7 @@ impl Staging {
             free = folder.with_added_extension(number.to_string());
         }
         fs::create_dir(&free).map_err(StagingError::at(&target))?;
-        Ok(Self { folder: free, target })
+        Ok(Self { folder: free, target, made_target })
     }
 
     /// Where a file is to be written for the time being.
@@ -121,6 +124,10 @@ impl Drop for Staging {
     fn drop(&mut self) {
         // After `finish` of a new folder there is nothing left to remove, which is as good.
         let _ = fs::remove_dir_all(&self.folder);
+        if self.made_target {
+            // Not where anything is in it.
+            let _ = fs::remove_dir(&self.target);
+        }
     }
 }
 
@@ -210,5 +217,18 @@ mod tests {
         assert_eq!(fs::read(root.path().join("b")).unwrap(), b"1");
         write_file(&root.path().join("b"), b"2").unwrap();
         assert_eq!(names(root.path()), ["b", "old"]);
+    }
+
+    #[test]
+    fn a_folder_made_for_files_that_never_came_goes_again() {
+        let root = tempfile::tempdir().unwrap();
+        let (new, old) = (root.path().join("new"), root.path().join("old"));
+        fs::create_dir(&old).unwrap();
+        for target in [&new, &old] {
+            let staged = Staging::into_folder(target).unwrap();
+            staged.write("a", b"1").unwrap();
+        }
+        assert_eq!(names(root.path()), ["old"]);
+        assert_eq!(names(&old), Vec::<String>::new());
     }
 }

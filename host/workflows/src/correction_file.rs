@@ -6,11 +6,14 @@ use farnear_depth::corrections::Correction;
 
 use crate::error::{Result, WorkflowError};
 
+/// What the file holds, as [`WorkflowError::File`] names it.
+pub const KIND: &str = "a saved correction";
+
 /// Reads and checks a correction.
 ///
 /// # Errors
 /// [`WorkflowError::Read`], [`WorkflowError::File`].
 pub fn read(path: &Path) -> Result<Correction> {
-    let text = fs::read_to_string(path).map_err(WorkflowError::read("the correction", path))?;
-    toml::from_str(&text).map_err(WorkflowError::file(path, "a saved correction"))
+    let text = fs::read_to_string(path).map_err(WorkflowError::read(KIND, path))?;
+    toml::from_str(&text).map_err(WorkflowError::file(path, KIND))
 }

@@ -23,6 +23,9 @@ use crate::{
     optics,
 };
 
+/// What a file of operators holds, as [`WorkflowError::File`] names it.
+pub const KIND: &str = "saved operators";
+
 /// What is designed, and where it goes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct OperatorSettings {
@@ -126,13 +129,12 @@ fn named(asked: &Path) -> Option<Result<(Family, Design), operators::DesignError
 }
 
 fn read(path: &Path) -> Result<Operators> {
-    const EXPECTED: &str = "saved operators";
     // Neither a file nor a name such as gro:linear.
-    let text = fs::read_to_string(path).map_err(WorkflowError::read("the operators", path))?;
+    let text = fs::read_to_string(path).map_err(WorkflowError::read(KIND, path))?;
     if text.trim().is_empty() {
-        return Err(WorkflowError::file(path, EXPECTED)("it is empty"));
+        return Err(WorkflowError::file(path, KIND)("it is empty"));
     }
-    toml::from_str(&text).map_err(WorkflowError::file(path, EXPECTED))
+    toml::from_str(&text).map_err(WorkflowError::file(path, KIND))
 }
 
 #[cfg(test)]

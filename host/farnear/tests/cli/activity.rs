@@ -300,11 +300,10 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn skeletons_of_a_public_set_become_people_to_train_on() {
-    let file = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../shared/data/skeletons/Florence_3D_Action_Skeletons.mat"
-    );
+    let file = farnear_test_data::path("skeletons/Florence_3D_Action_Skeletons.mat");
+    let file = file.to_str().expect("a plain path");
     let folder = Folder::new();
     let out = folder.text("people");
     let wrong = folder.file("wrong.mat", "MATLAB 5.0 MAT-file, or so it says");
@@ -314,10 +313,6 @@ fn skeletons_of_a_public_set_become_people_to_train_on() {
         command
     };
     fails(&mut draw(&wrong, "florence"), 1, &["wrong.mat"]);
-    if !Path::new(file).is_file() {
-        println!("skipped: no shared data");
-        return;
-    }
     fails(&mut draw(file, "utkinect"), 1, &["Florence", "[3, 15, 27]", "[3, 20, frames]"]);
     let made = figures(&mut draw(file, "florence"));
     assert_eq!(

@@ -7,10 +7,10 @@ use std::{
 };
 
 use assert_cmd::Command as Assert;
-use farnear_capture::image_file::read_grey;
+use farnear_files::image_file::read_grey;
 use serde_json::Value;
 
-use crate::common::{Folder, SIM, beside, fails, farnear, has_emulated_rig, rig_optics, succeeds};
+use crate::common::{Folder, SIM, beside, fails, farnear, rig_optics, succeeds};
 
 /// A copy of the program alone in a folder, with nothing on its PATH.
 fn alone(folder: &Folder) -> Assert {
@@ -34,10 +34,8 @@ fn a_missing_simulator_is_named_with_what_to_do() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     fs::copy(beside(SIM), folder.path(SIM)).expect("a copy");
     let mut command = alone(&folder);
@@ -54,10 +52,8 @@ fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn what_the_simulator_refuses_is_passed_on() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     let typo = folder.file("faults.toml", "bit_eror_rate = 0.1");
     let said = ["bit_eror_rate", "farnear-sim ended at once"];
@@ -77,10 +73,8 @@ fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     // Homing takes some 4 s of the board's time, both exposures lie at 5.365 s and 5.385 s.
     for milliseconds in [300, 5_375] {
@@ -111,10 +105,8 @@ impl Drop for Reaped {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     let mut command = Command::new(beside(SIM));
     command.args(["run", "--optics", rig_optics()]).stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -140,10 +132,8 @@ fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_bad_line_changes_nothing_or_fails_cleanly() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     succeeds(&mut capture(&folder, None, "clean"));
     let images = |name: &str| {

@@ -1,7 +1,7 @@
 //! Running the program, and what is looked at afterwards.
 
 use std::{
-    env, fs,
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -111,22 +111,8 @@ pub fn render(folder: &Folder, scene: &str, name: &str) {
     succeeds(farnear(&["render", "--scene", scene, "--optics", rig_optics(), "--out", &out]).args(size));
 }
 
-/// Whether the emulated rig can be started; says so where not. With `FARNEAR_REQUIRE_SIM=1` it must be there.
-pub fn has_emulated_rig() -> bool {
-    let firmware = env::var_os("FARNEAR_FIRMWARE").map_or_else(|| beside(FIRMWARE), PathBuf::from);
-    for needed in [beside(SIM), firmware] {
-        if !needed.is_file() {
-            assert!(env::var_os("FARNEAR_REQUIRE_SIM").is_none(), "{} is missing", needed.display());
-            println!("skipped: farnear-sim not built ({} is missing)", needed.display());
-            return false;
-        }
-    }
-    true
-}
-
 /// Name of the emulated rig's program.
 pub const SIM: &str = "farnear-sim";
-const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
 
 /// A file in the folder in which the programs are built.
 pub fn beside(name: &str) -> PathBuf {

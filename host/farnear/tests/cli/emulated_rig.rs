@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::{Folder, fails, farnear, figures, has_emulated_rig, number, rig_optics, succeeds};
+use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
 fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
     let mut command = farnear(&["rig"]);
@@ -11,10 +11,8 @@ fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn info_says_who_is_there_and_that_it_is_emulated() {
-    if !has_emulated_rig() {
-        return;
-    }
     let mut command = on_the_rig(&["info", "--json"]);
     let info = figures(&mut command);
     assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &2.into(), &1.into()));
@@ -25,10 +23,8 @@ fn info_says_who_is_there_and_that_it_is_emulated() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
-    if !has_emulated_rig() {
-        return;
-    }
     let homed = figures(&mut on_the_rig(&["home", "--json"]));
     assert!(homed["shift_um"].is_number() && homed["lens_shift_um"].is_number(), "{homed}");
     let coarse = ["move", "--axis", "coarse", "--to-um", "123.5"];
@@ -63,10 +59,8 @@ fn content(folder: &Folder, name: &str) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     let mut maps = Vec::new();
     for (name, seed) in [("a", "1"), ("b", "1"), ("c", "2")] {

@@ -2,10 +2,10 @@
 
 use std::fs;
 
+use farnear_files::{map, npy};
 use ndarray::Array2;
-use ndarray_npy::{read_npy, write_npy};
 
-use crate::common::{Folder, fails, farnear, figures, has_emulated_rig, number, rig_optics, succeeds};
+use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
 fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
     let mut command = farnear(&["rig"]);
@@ -26,10 +26,8 @@ fn true_sensor_mm(trace: &str) -> f64 {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn focusing_from_a_millimetre_off_is_quick_and_lands_where_the_image_is_sharpest() {
-    if !has_emulated_rig() {
-        return;
-    }
     // The image of a plane at 900 mm before the 50 mm lens.
     let best_mm = 50.0 * 900.0 / 850.0;
     for start_mm in [best_mm - 0.99, best_mm + 0.6] {
@@ -51,10 +49,8 @@ fn focusing_from_a_millimetre_off_is_quick_and_lands_where_the_image_is_sharpest
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     // Near the focus: pictures from afar take the simulator long to draw.
     let out = folder.text("stack");
@@ -84,10 +80,8 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn flat_targets_are_captured_listed_and_not_captured_twice() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     let out = folder.text("series");
     let targets = |distances: &str| {
@@ -99,15 +93,13 @@ fn flat_targets_are_captured_listed_and_not_captured_twice() {
     let both = targets("900,920");
     assert_eq!((number(&both, "captured"), number(&both, "targets")), (1.0, 2.0));
     assert!(number(&both, "rmse_mm") < 2.0, "{both}");
-    let map: Array2<f32> = read_npy(folder.path("series/target-920.000/depth.npy")).expect("a map");
+    let map = map::read(&folder.path("series/target-920.000/depth.npy")).expect("a map");
     assert_eq!(map.dim(), (480, 640));
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_board_corrects_and_fits_with_the_hosts_bits() {
-    if !has_emulated_rig() {
-        return;
-    }
     let folder = Folder::new();
     let mut list = String::new();
     for (number, true_mm) in [890.0, 900.0, 910.0, 920.0, 930.0].into_iter().enumerate() {
@@ -116,7 +108,7 @@ fn the_board_corrects_and_fits_with_the_hosts_bits() {
             let (x, y) = (column as f32 / 11.5 - 1.0, row as f32 / 8.5 - 1.0);
             true_mm + (0.8 + 0.01 * (true_mm - 910.0)) * (x * x + y * y)
         });
-        write_npy(folder.path(&format!("{number}.npy")), &map).expect("a writable folder");
+        folder.file(&format!("{number}.npy"), npy::write(map.view()));
         list += &format!("[[pattern]]\ndepth = \"{number}.npy\"\ntrue_mm = {true_mm:.1}\n");
     }
     let (list, correction) = (folder.file("PATTERNS.toml", list), folder.text("correction.toml"));
@@ -136,10 +128,8 @@ fn the_board_corrects_and_fits_with_the_hosts_bits() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_checklist_passes_and_the_mechanics_are_measured() {
-    if !has_emulated_rig() {
-        return;
-    }
     let checked = figures(&mut on_the_rig(&["check", "--json"]));
     assert_eq!((number(&checked, "failed"), number(&checked, "passed")), (0.0, 12.0), "{checked}");
     // The plant's screw has 4 um of backlash.
@@ -149,10 +139,8 @@ fn the_checklist_passes_and_the_mechanics_are_measured() {
 }
 
 #[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_firmwares_log_is_decoded_with_its_elf() {
-    if !has_emulated_rig() {
-        return;
-    }
     let elf = std::env::var_os("FARNEAR_FIRMWARE")
         .map_or_else(|| crate::common::beside("farnear-nucleo-f429zi.elf"), Into::into);
     let elf = elf.to_str().expect("a plain path");

@@ -1,4 +1,6 @@
-//! The program as its users meet it: what it prints, what it writes, how it ends.
+//! The program as its users meet it: what it prints, what it writes, how it ends. One binary, because each costs a link.
+
+#![allow(clippy::unwrap_used)] // helpers of tests: what cannot be prepared must stop the test
 
 mod common;
 
@@ -7,13 +9,18 @@ mod bad_images;
 mod bad_optics;
 mod bad_ports;
 mod bad_rigs;
+mod calibration;
 mod emulated_rig;
 mod emulated_work;
 mod maps;
 mod markers;
+mod outputs;
 mod scene_files;
 mod scripted_board;
 mod shadow_remove;
+mod shadow_score;
+mod silhouettes;
 mod sun;
 mod uncertainty;
 mod usage;
+mod writers;

@@ -2,8 +2,8 @@
 
 use std::{fs, path::Path};
 
+use farnear_files::map;
 use ndarray::{Array2, s};
-use ndarray_npy::ReadNpyExt;
 
 use crate::common::{Folder, farnear, figures, number, render, rig_optics, succeeds};
 
@@ -151,7 +151,7 @@ fn names_that_are_no_text_are_fine() {
 }
 
 fn read(path: &Path) -> Array2<f32> {
-    Array2::read_npy(fs::File::open(path).expect("a map")).expect("f32 in .npy")
+    map::read(path).expect("a map")
 }
 
 fn median_and_sd(region: ndarray::ArrayView2<f32>) -> [f64; 2] {
@@ -164,12 +164,9 @@ fn median_and_sd(region: ndarray::ArrayView2<f32>) -> [f64; 2] {
 
 /// The pair that Watanabe and Nayar took, where it is at hand.
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn a_real_pair_gives_the_reference_depths() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/breakfast");
-    if !data.is_dir() {
-        println!("skipped: no shared data");
-        return;
-    }
+    let data = farnear_test_data::path("breakfast");
     let folder = Folder::new();
     succeeds(
         farnear(&["depth", "--smooth", "7", "--median", "5", "--out", &folder.text("out"), "--optics"])

@@ -119,12 +119,9 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn real_recordings_fit_built_in_templates() {
-    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/mocap");
-    if !data.is_dir() {
-        println!("skipped: no shared data");
-        return;
-    }
+    let data = farnear_test_data::path("mocap");
     let folder = Folder::new();
     for (name, template) in [
         ("cmu_02_05.c3d", "plug-in-gait"),

@@ -1,7 +1,7 @@
 //! Scenes from files: a height map and a picture of one's own.
 
+use farnear_files::npy;
 use ndarray::Array2;
-use ndarray_npy::WriteNpyExt;
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
@@ -13,9 +13,7 @@ fn bump(folder: &Folder) -> String {
         let [y, x] = [y as f32 - 30.0, x as f32 - 40.0].map(|d| d / 26.0);
         925.0 - 30.0 * (-x * x - y * y).exp()
     });
-    let mut bytes = Vec::new();
-    depth.write_npy(&mut bytes).expect("a vector takes all");
-    folder.file("bump.npy", bytes)
+    folder.file("bump.npy", npy::write(depth.view()))
 }
 
 /// A picture that is textured everywhere: two pixels of it for one of the camera's.

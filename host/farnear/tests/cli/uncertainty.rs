@@ -1,13 +1,12 @@
 //! The standard deviation that travels with a map.
 
+use farnear_files::map;
 use ndarray::Array2;
-use ndarray_npy::ReadNpyExt;
 
 use crate::common::{Folder, fails, farnear, figures, number, render, rig_optics, succeeds};
 
 fn read(folder: &Folder, name: &str) -> Array2<f32> {
-    let file = std::fs::File::open(folder.path(name)).expect("a map");
-    Array2::read_npy(file).expect("a map of f32")
+    map::read(&folder.path(name)).expect("a map")
 }
 
 /// The errors of a noisy plane are as large as they are said to be.

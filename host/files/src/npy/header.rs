@@ -86,7 +86,8 @@ impl<'a> Text<'a> {
     fn truth(&mut self) -> Result<bool, NpyError> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
-        let Some((word, truth)) = [(&b"True"[..], true), (b"False", false)].into_iter().find(|(word, _)| rest.starts_with(word))
+        let Some((word, truth)) =
+            [(&b"True"[..], true), (b"False", false)].into_iter().find(|(word, _)| rest.starts_with(word))
         else {
             return self.fail("True or False");
         };

@@ -1,7 +1,5 @@
 //! `farnear silhouettes video` as a user runs it, on small made videos.
 
-#![allow(clippy::unwrap_used)] // helpers of tests: what cannot be prepared must stop the test
-
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -15,7 +13,7 @@ const EMPTY_FRAMES: usize = 30;
 const FRAMES: usize = 40;
 
 fn farnear() -> Command {
-    Command::cargo_bin("farnear").unwrap()
+    crate::common::farnear(&[])
 }
 
 /// The left edge of the block that walks, in frames where it is there.

@@ -1,7 +1,5 @@
 //! `farnear shadow score` as a user runs it, on small masks counted by hand.
 
-#![allow(clippy::unwrap_used)] // helpers of tests: what cannot be prepared must stop the test
-
 use std::{fs, path::Path};
 
 use assert_cmd::Command;
@@ -14,7 +12,7 @@ fn picture(path: &Path, rows: &[&[u8]]) {
 }
 
 fn score(arguments: &[&Path]) -> Command {
-    let mut command = Command::cargo_bin("farnear").unwrap();
+    let mut command = crate::common::farnear(&[]);
     command.args(["shadow", "score", "--json"]).args(arguments);
     command
 }
