@@ -5,7 +5,7 @@ use std::{fs, path::Path, process::Command};
 use anyhow::{Context, Result};
 
 use crate::{
-    firmware, install,
+    firmware, host,
     run::{ROOT, output, step},
 };
 
@@ -17,8 +17,8 @@ const AWAY_FROM_EDGES_PX: &str = "8";
 
 /// Runs the demo; ends with its one line of figures.
 pub fn run() -> Result<()> {
-    firmware::build()?;
-    let programs = install::build_release()?;
+    firmware::build_emulated()?;
+    let programs = host::build()?;
     let farnear = |arguments: &[&str]| {
         let mut command = Command::new(programs.join("farnear"));
         command.args(arguments).current_dir(&*ROOT);

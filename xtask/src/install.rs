@@ -4,30 +4,12 @@ use std::{fs, path::PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::{
-    firmware,
-    run::{cargo, finish, step, target_folder},
-};
-
-/// Builds the host programs in the release profile; gives their folder.
-pub fn build_release() -> Result<PathBuf> {
-    step("host programs (the first build takes some minutes)");
-    finish(&mut cargo([
-        "build",
-        "--release",
-        "--locked",
-        "--package",
-        "farnear",
-        "--package",
-        "farnear-sim",
-    ]))?;
-    Ok(target_folder().join("release"))
-}
+use crate::{firmware, host};
 
 /// Copies `farnear`, `farnear-sim` and the firmware's ELF into cargo's bin folder.
 pub fn run() -> Result<()> {
     firmware::build()?;
-    let built = build_release()?;
+    let built = host::build_release()?;
     let home = std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)
         .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")))

@@ -1,13 +1,13 @@
 //! The table of instructions in `docs/instructions.md`: written from a count on the emulated board, and checked against
 //! one, so that a routine that has become slower is seen.
 
-use std::fmt::Write;
+use std::{fmt::Write, process::Command};
 
 use anyhow::{Context, Result, bail};
 
 use crate::{
-    firmware,
-    run::{ROOT, cargo, output, step},
+    firmware, host,
+    run::{ROOT, output, step},
 };
 
 /// Where the table lies.
@@ -59,10 +59,9 @@ impl Counted {
 }
 
 fn count() -> Result<Vec<Counted>> {
+    let programs = host::build()?;
     step("instructions of the on-board routines");
-    let elf = firmware::counter()?;
-    let mut program = cargo(["run", "--quiet", "--locked", "--package", "farnear-sim", "--", "count"]);
-    let text = output(program.arg(elf))?;
+    let text = output(Command::new(programs.join("farnear-sim")).arg("count").arg(firmware::counter()?))?;
     let lines: Option<Vec<Counted>> = text.lines().map(Counted::parse).collect();
     lines.filter(|lines| !lines.is_empty()).context("farnear-sim count printed no table")
 }

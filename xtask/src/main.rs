@@ -3,11 +3,13 @@
 //! One file per job. Every step says what it does before it does it, and every failure says what to type next.
 
 mod bench;
+mod boards;
 mod campaign;
 mod demo;
 mod evaluate;
 mod firmware;
 mod fuzz;
+mod host;
 mod install;
 mod instructions;
 mod run;

@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
     process::Command,
     sync::LazyLock,
+    time::Instant,
 };
 
 use anyhow::{Context, Result, bail};
@@ -48,9 +49,11 @@ fn host_rust_minor() -> Option<u32> {
     text.split_whitespace().nth(1)?.split('.').nth(1)?.parse().ok()
 }
 
-/// Says what is about to happen.
+/// Says what is about to happen, and how long everything before it has taken.
 pub fn step(what: &str) {
-    eprintln!("\n== {what}");
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    let seconds = START.elapsed().as_secs();
+    eprintln!("\n== {}:{:02} {what}", seconds / 60, seconds % 60);
 }
 
 /// Runs a program to its end; fails unless it succeeds.

@@ -6,12 +6,12 @@ use farnear_protocol::message::{Axis, EventKind, Failure, RecordName};
 use crate::calibrate::Step;
 use crate::program::Progress;
 use crate::rig::Rig;
-use crate::work::{AXES, AxisWork, WholeWork};
+use crate::work::{AxisWork, WholeWork};
 
 impl Rig {
     /// Takes all work one tick further.
     pub(crate) fn advance(&mut self, now: BoardMicros) {
-        for axis in AXES {
+        for axis in Axis::ALL {
             self.advance_axis(axis, now);
         }
         self.advance_whole(now);

@@ -1,6 +1,8 @@
 //! What to type next: the workflows' errors carry facts, the command line knows the commands that mend them.
 
-use farnear_capture::{ClientError, expose::CaptureError, focus::FocusSearchError};
+use farnear_capture::{
+    ClientError, board_correction::BoardCorrectionError, expose::CaptureError, focus::FocusSearchError,
+};
 use farnear_protocol::RequestError;
 use farnear_workflows::{
     WorkflowError, activity::samples::SamplesError, shadow::removal::CAMERA_FILE,
@@ -21,7 +23,15 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Simulator(SimulatorError::Missing) => {
             Some("`cargo xtask install` installs both, `cargo xtask demo` builds them".into())
         }
+        WorkflowError::Unanswered { .. } => {
+            Some("--no-prompt (targets) or --no-hands (check) asks nothing".into())
+        }
+        WorkflowError::InsideFocalLength { .. } => {
+            Some("`farnear rig settings get datum_nm` shows it".into())
+        }
+        WorkflowError::StepsFailed { alarm: Some(number), .. } => Some(clear(*number)),
         WorkflowError::Client(error)
+        | WorkflowError::BoardCorrection(BoardCorrectionError::Board(error))
         | WorkflowError::Capture(CaptureError::Board(error))
         | WorkflowError::Focus(FocusSearchError::Capture(CaptureError::Board(error))) => of_client(error),
         WorkflowError::Read { what: CAMERA_FILE, .. } => {
@@ -52,6 +62,9 @@ fn of_client(error: &ClientError) -> Option<String> {
     match error {
         ClientError::Refused { error, .. } => of_refusal(error),
         ClientError::Failed { alarm: Some(record), .. } => Some(clear(record.number)),
+        ClientError::Version { .. } | ClientError::Schema { .. } => {
+            Some("`cargo xtask firmware` builds the firmware of these sources".into())
+        }
         _ => None,
     }
 }

@@ -5,15 +5,16 @@
 //!
 //! - [`image_file`]: a grey image of any common kind; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes as
 //!   pictures; [`mesh`]: a surface as PLY; [`video`]: frames one by one.
+//! - [`npy`], [`exr`]: the formats themselves, where no crate is worth its compile time.
 //! - [`view`]: a depth map as a picture for people; [`text`]: words on a picture.
 //! - [`staging`]: written aside, then renamed.
 //!
 //! ```
-//! use farnear_files::{map, staging};
+//! use farnear_files::{map, npy, staging};
 //!
 //! let folder = std::env::temp_dir().join(format!("farnear-files-{}", std::process::id()));
 //! let staged = staging::Staging::new_folder(&folder)?;
-//! staged.write("depth.npy", &map::npy(ndarray::array![[933.0f32, f32::NAN]].view())?)?;
+//! staged.write("depth.npy", &npy::write(ndarray::array![[933.0f32, f32::NAN]].view()))?;
 //! assert!(!folder.exists()); // nothing half-written is ever seen
 //! staged.finish()?;
 //! assert_eq!(map::read(&folder.join("depth.npy"))?[[0, 0]], 933.0);
@@ -21,10 +22,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod exr;
 pub mod image_file;
 pub mod map;
 pub mod masks;
 pub mod mesh;
+pub mod npy;
 pub mod staging;
 pub mod text;
 pub mod video;

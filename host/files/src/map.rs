@@ -6,12 +6,12 @@ use std::{
 };
 
 use ndarray::{Array2, ArrayView2};
-use ndarray_npy::{ReadNpyError, ReadNpyExt, WriteNpyExt};
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
 
 use crate::{
     EncodeError,
     image_file::{self, ImageError},
+    npy::{self, NpyError},
 };
 
 /// A map could not be read.
@@ -32,12 +32,12 @@ pub enum MapError {
         path: PathBuf,
     },
     /// An array of another kind.
-    #[error("{} is not a map: a 2-D array of f32 or f64 in C order is needed: {reason}", path.display())]
+    #[error("{} is not a map, a 2-D array of f32 or f64: {reason}", path.display())]
     Npy {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        reason: String,
+        reason: NpyError,
     },
     /// Another file format.
     #[error("{} is neither .npy nor TIFF: {reason}", path.display())]
@@ -57,9 +57,6 @@ pub enum MapError {
     },
 }
 
-/// What the files begin with.
-const NPY_MAGIC: &[u8] = b"\x93NUMPY";
-
 /// Reads a map of numbers: `.npy` with f32 or f64, or a TIFF.
 ///
 /// # Errors
@@ -69,9 +66,8 @@ pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
     if bytes.is_empty() {
         return Err(MapError::Empty { path: path.into() });
     }
-    if bytes.starts_with(NPY_MAGIC) {
-        return read_npy(&bytes)
-            .map_err(|error| MapError::Npy { path: path.into(), reason: error.to_string() });
+    if bytes.starts_with(npy::MAGIC) {
+        return npy::read(&bytes).map_err(|reason| MapError::Npy { path: path.into(), reason });
     }
     let image =
         image_file::decode_grey(&bytes).map_err(|reason| MapError::Format { path: path.into(), reason })?;
@@ -79,16 +75,6 @@ pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
         return Err(MapError::Integers { path: path.into(), samples: image.samples });
     }
     Ok(image.pixels)
-}
-
-fn read_npy(bytes: &[u8]) -> Result<Array2<f32>, ReadNpyError> {
-    match Array2::<f32>::read_npy(Cursor::new(bytes)) {
-        Ok(map) => Ok(map),
-        Err(ReadNpyError::WrongDescriptor(_)) => {
-            Ok(Array2::<f64>::read_npy(Cursor::new(bytes))?.mapv(|value| value as f32))
-        }
-        Err(error) => Err(error),
-    }
 }
 
 /// Reads a mask: what is not black counts.
@@ -99,14 +85,35 @@ pub fn read_mask(path: &Path) -> Result<Array2<bool>, ImageError> {
     Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
 }
 
-/// A map as the bytes of an `.npy` file.
-///
-/// # Errors
-/// An encoder that refuses.
-pub fn npy(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
-    let mut bytes = Vec::new();
-    map.write_npy(&mut bytes).map_err(EncodeError::of(".npy"))?;
-    Ok(bytes)
+/// How a map is written, by the ending of its file's name.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Format {
+    /// `.npy`.
+    Npy,
+    /// `.tiff` or `.tif`, float.
+    Tiff,
+}
+
+impl Format {
+    /// `None` for a name with another ending.
+    pub fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_lowercase().as_str() {
+            "npy" => Some(Self::Npy),
+            "tif" | "tiff" => Some(Self::Tiff),
+            _ => None,
+        }
+    }
+
+    /// A map as the bytes of such a file.
+    ///
+    /// # Errors
+    /// An encoder that refuses.
+    pub fn encode(self, map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
+        match self {
+            Self::Npy => Ok(npy::write(map)),
+            Self::Tiff => tiff(map),
+        }
+    }
 }
 
 /// A map as the bytes of a float TIFF.
@@ -158,12 +165,13 @@ mod tests {
     fn maps_come_back_from_npy_and_tiff() {
         let map = array![[933.0f32, f32::NAN, 900.5], [887.0, 888.0, 889.0]];
         let folder = tempfile::tempdir().unwrap();
-        for (name, bytes) in [("a.npy", npy(map.view()).unwrap()), ("a.tiff", tiff(map.view()).unwrap())] {
+        for name in ["a.npy", "a.tiff", "b.TIF"] {
             let path = folder.path().join(name);
-            std::fs::write(&path, bytes).unwrap();
+            std::fs::write(&path, Format::of(&path).unwrap().encode(map.view()).unwrap()).unwrap();
             let back = read(&path).unwrap();
             assert!(back.iter().zip(&map).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}");
         }
+        assert_eq!(Format::of(Path::new("a.png")), None);
     }
 
     #[test]

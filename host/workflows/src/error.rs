@@ -14,9 +14,13 @@ use farnear_activity::{
 };
 use farnear_capture::{
     ClientError, board_correction::BoardCorrectionError, camera::CameraError, expose::CaptureError,
-    focus::FocusSearchError, plan::PlanError, record::RecordError,
+    focus::FocusSearchError, log_stream::LogEnded, plan::PlanError, record::RecordError,
+    sequence::ProgramError,
 };
-use farnear_depth::{operators::DesignError, optics::OpticsError};
+use farnear_depth::{
+    baselines::BaselineError, calibrate::CalibrationError, corrections::CorrectionError,
+    metrics::CompareError, operators::DesignError, optics::OpticsError, pipeline::RunError,
+};
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,
     video::VideoError,
@@ -64,6 +68,42 @@ pub enum WorkflowError {
         /// What was under way.
         during: String,
     },
+    /// The sharpest image would lie where no lens puts one.
+    #[error(
+        "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: is the \
+         rig's setting datum_nm right?"
+    )]
+    InsideFocalLength {
+        /// Sensor distance of the best focus.
+        sensor_mm: f64,
+        /// The lens' focal length.
+        focal_length_mm: f64,
+    },
+    /// The board calculates otherwise than this computer, which should give the same bits.
+    #[error("the board's answer differs from this computer's: {0}")]
+    Differs(String),
+    /// The bring-up checklist found something.
+    #[error("{failed} of the steps failed; put that right before anything moves further (docs/rig.md)")]
+    StepsFailed {
+        /// How many steps.
+        failed: usize,
+        /// Number of the alarm that is latched.
+        alarm: Option<u32>,
+    },
+    /// Lines that nobody takes any more.
+    #[error("the log cannot be handed on: {source}")]
+    Sink {
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A folder that cannot be made.
+    #[error("cannot make the folder {}: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// A question that nobody answered.
     #[error("nobody answers, the input has ended: {question}")]
     Unanswered {
@@ -75,6 +115,16 @@ pub enum WorkflowError {
     NoOptics {
         /// The pair's far-focused image.
         far: PathBuf,
+    },
+    /// Images that are not a pair.
+    #[error("{} and {}: {reason}", far.display(), near.display())]
+    Pair {
+        /// The image that was given as far-focused.
+        far: PathBuf,
+        /// The image that was given as near-focused.
+        near: PathBuf,
+        /// What is wrong.
+        reason: String,
     },
     /// The same, about something.
     #[error("{about}: {source}")]
@@ -90,6 +140,21 @@ pub enum WorkflowError {
     /// A design of operators that cannot be.
     #[error(transparent)]
     Design(#[from] DesignError),
+    /// A pair that gives no depth.
+    #[error(transparent)]
+    Depth(#[from] RunError),
+    /// The same with a method to compare with.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
+    /// A correction that cannot be learned or does not fit.
+    #[error(transparent)]
+    Correction(#[from] CorrectionError),
+    /// Images that give no point spread function.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// Maps that cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
     /// A text that is not TOML of the expected kind.
     #[error(transparent)]
     Parse(#[from] toml::de::Error),
@@ -111,6 +176,12 @@ pub enum WorkflowError {
     /// The search for the focus.
     #[error(transparent)]
     Focus(#[from] FocusSearchError),
+    /// An exposure program.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
+    /// The board's log.
+    #[error(transparent)]
+    Log(#[from] LogEnded),
     /// A capture's record.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -199,6 +270,21 @@ impl WorkflowError {
     /// For `map_err`: a file that cannot be read.
     pub fn read(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Read { what, path: path.into(), source }
+    }
+
+    /// Whether the work was given up because somebody wished so.
+    pub fn is_cancelled(&self) -> bool {
+        match self {
+            Self::Cancelled { .. }
+            | Self::Client(ClientError::Interrupted { .. })
+            | Self::Capture(CaptureError::Board(ClientError::Interrupted { .. }))
+            | Self::Focus(FocusSearchError::Capture(CaptureError::Board(ClientError::Interrupted {
+                ..
+            })))
+            | Self::BoardCorrection(BoardCorrectionError::Interrupted { .. }) => true,
+            Self::About { source, .. } => source.is_cancelled(),
+            _ => false,
+        }
     }
 
     /// Whether what was asked for was wrong, and not the world: nothing has been done.

@@ -24,23 +24,45 @@ const COLOURS: [RGBColor; 5] = [
     RGBColor(230, 159, 0),
 ];
 
-/// The plot of `operators` in the format that the name of `file` ends with.
+/// How a plot is kept.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Format {
+    /// Curves.
+    Svg,
+    /// Pixels.
+    Png,
+}
+
+impl Format {
+    /// By the ending of a file's name.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`] for an ending that is neither `.svg` nor `.png`.
+    pub fn of(file: &Path) -> Result<Self> {
+        match file.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
+            "svg" => Ok(Self::Svg),
+            "png" => Ok(Self::Png),
+            _ => Err(WorkflowError::parameter("plot", file.display(), "plots are written as .svg or .png")),
+        }
+    }
+}
+
+/// The plot of `operators` as the bytes of a file.
 ///
 /// # Errors
-/// For an ending that is neither `.svg` nor `.png`.
-pub fn plot(operators: &Operators, file: &Path) -> Result<Vec<u8>> {
+/// [`WorkflowError::Encode`].
+pub fn plot(operators: &Operators, format: Format) -> Result<Vec<u8>> {
     register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular())
         .map_err(|_| EncodeError::of("a plot")("the built-in font is damaged"))?;
     let failed = |error: &dyn std::fmt::Display| EncodeError::of("a plot")(error);
-    let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match ending.as_str() {
-        "svg" => {
+    match format {
+        Format::Svg => {
             let mut text = String::new();
             draw(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), operators)
                 .map_err(|error| failed(&error))?;
             Ok(text.into_bytes())
         }
-        "png" => {
+        Format::Png => {
             let mut pixels = vec![255; 3 * (SIZE.0 * SIZE.1) as usize];
             draw(&BitMapBackend::with_buffer(&mut pixels, SIZE).into_drawing_area(), operators)
                 .map_err(|error| failed(&error))?;
@@ -51,7 +73,6 @@ pub fn plot(operators: &Operators, file: &Path) -> Result<Vec<u8>> {
             picture.write_to(&mut png, image::ImageFormat::Png).map_err(EncodeError::of("a plot"))?;
             Ok(png.into_inner())
         }
-        _ => Err(WorkflowError::parameter("plot", file.display(), "plots are written as .svg or .png")),
     }
 }
 
@@ -227,13 +248,15 @@ mod tests {
             kernel_size: 7,
         };
         let operators = design(&request).unwrap();
-        let svg = String::from_utf8(plot(&operators, Path::new("a.svg")).unwrap()).unwrap();
+        let svg = String::from_utf8(plot(&operators, Format::Svg).unwrap()).unwrap();
         for text in ["NIR: optics (dots) and cubic fit", "Gp2", "frequency in rad/px"] {
             assert!(svg.contains(text), "{text}");
         }
-        let png = image::load_from_memory(&plot(&operators, Path::new("a.PNG")).unwrap()).unwrap();
+        let png =
+            image::load_from_memory(&plot(&operators, Format::of(Path::new("a.PNG")).unwrap()).unwrap())
+                .unwrap();
         assert_eq!((png.width(), png.height()), SIZE);
-        let error = plot(&operators, Path::new("a.pdf")).unwrap_err().to_string();
+        let error = Format::of(Path::new("a.pdf")).unwrap_err().to_string();
         assert!(error.contains(".svg or .png"), "{error}");
     }
 }

@@ -1,16 +1,98 @@
 //! Operators by name, from a file, or designed for the optics and kept in the user's cache.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use farnear_depth::{
     operators::{self, Design, Family, Operators, Request},
     optics::Optics,
+    psf::Psf,
 };
+use farnear_files::staging;
+use serde::Serialize;
 
 use crate::{
+    context::Context,
     error::{About, Result, WorkflowError},
+    figures::rounded,
     operator_cache as cache,
+    operator_plot::{self, Format},
+    optics,
 };
+
+/// What is designed, and where it goes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct OperatorSettings {
+    /// The optics file.
+    pub optics: PathBuf,
+    /// Point spread function; without it that of the optics.
+    pub psf: Option<Psf>,
+    /// Family; without it the one that belongs to the point spread function.
+    pub family: Option<Family>,
+    /// Design procedure.
+    pub design: Design,
+    /// Width and height of the kernels in pixels.
+    pub kernel_size: usize,
+    /// Where the operators are saved, as TOML.
+    pub out: Option<PathBuf>,
+    /// Where they are drawn: `.svg` or `.png`.
+    pub plot: Option<PathBuf>,
+}
+
+/// What there is to say of operators.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct OperatorFigures {
+    /// Family, design, point spread function and blur.
+    pub name: String,
+    /// How well the cubic fits the normalised image ratio.
+    pub nir_rms: f64,
+    /// How long the design took.
+    pub seconds: f64,
+}
+
+/// Designs operators, and saves and draws them where that is wanted.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for a drawing of another kind; optics; [`WorkflowError::Design`]; files.
+pub fn design(settings: &OperatorSettings, context: &Context<'_>) -> Result<OperatorFigures> {
+    let plot = match &settings.plot {
+        Some(file) => Some((file, Format::of(file)?)),
+        None => None,
+    };
+    let optics = optics::read(&settings.optics)?;
+    let psf = settings.psf.unwrap_or(optics.psf());
+    let request = Request {
+        family: settings.family.unwrap_or(Family::of(psf)),
+        design: settings.design,
+        psf,
+        max_blur_px: optics.max_blur_px(),
+        kernel_size: settings.kernel_size,
+    };
+    let start = Instant::now();
+    // Not from the cache: how long a design takes is one of the figures.
+    let operators = operators::design(&request)?;
+    let seconds = start.elapsed().as_secs_f64();
+    context.cancel.check("designing the operators")?;
+    let write = |file: &Path, bytes: &[u8]| -> Result<()> {
+        staging::write_file(file, bytes)?;
+        context.say(&format!("wrote {}", file.display()));
+        Ok(())
+    };
+    if let Some(out) = &settings.out {
+        write(out, toml::to_string(&operators)?.as_bytes())?;
+    }
+    if let Some((file, format)) = plot {
+        write(file, &operator_plot::plot(&operators, format)?)?;
+    }
+    Ok(OperatorFigures {
+        name: operators.name().into(),
+        nir_rms: operators.nir_rms(),
+        seconds: rounded(seconds, 6),
+    })
+}
 
 /// Operators for some optics: those that `asked` names (`family:design` or a family alone, e.g. `gro:linear` or
 /// `gro`, or a file saved by `farnear operators`), else the default ones.

@@ -1,4 +1,5 @@
-//! Real data for tests: photographs, motion capture, video, kept beside the repository and not in it.
+//! What some tests need and not every machine has: real data (photographs, motion capture, video), kept beside the
+//! repository and not in it, and the emulated rig.
 //!
 //! A test that needs them is counted as skipped where they are missing. Its crate's build script calls [`declare`],
 //! which sets the configuration `shared_data` where the data are; the test bears
@@ -19,6 +20,17 @@ pub fn declare() {
     println!("cargo::rerun-if-changed={}", folder().display());
     if folder().is_dir() {
         println!("cargo::rustc-cfg=shared_data");
+    }
+}
+
+/// For build scripts: the configuration `emulated_rig` is set where `FARNEAR_REQUIRE_SIM=1` says that `farnear-sim` and its
+/// firmware have been built, as `cargo xtask test` does. A test that starts them bears
+/// `#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]`.
+pub fn declare_emulated_rig() {
+    println!("cargo::rustc-check-cfg=cfg(emulated_rig)");
+    println!("cargo::rerun-if-env-changed=FARNEAR_REQUIRE_SIM");
+    if std::env::var_os("FARNEAR_REQUIRE_SIM").is_some_and(|value| value == "1") {
+        println!("cargo::rustc-cfg=emulated_rig");
     }
 }
 

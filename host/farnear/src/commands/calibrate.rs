@@ -1,6 +1,6 @@
 //! `farnear calibrate`: learns what the optics do from captured images and depth maps.
 
-pub mod correction;
+mod correction;
 mod psf;
 
 use anyhow::Result;

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_depth::metrics::{CompareSettings, compare};
+use farnear_depth::metrics::CompareSettings;
+use farnear_workflows::compare::{ComparisonSettings, compare};
 
-use crate::{files::map, report};
+use crate::report;
 
 /// Compare a depth map with the true one: root-mean-square, mean, 95th percentile and bias of the error.
 #[derive(Args)]
@@ -32,11 +33,7 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let depth = map::read(&arguments.depth)?;
-    let truth = map::read(&arguments.truth)?;
-    let mask = arguments.mask.as_deref().map(map::read_mask).transpose()?;
-    let settings =
-        CompareSettings { border_px: arguments.border, away_from_edges_px: arguments.away_from_edges };
-    let comparison = compare(depth.view(), truth.view(), mask.as_ref().map(|mask| mask.view()), &settings)?;
-    report::print(&comparison, arguments.json)
+    let Arguments { depth, truth, border, mask, away_from_edges, json } = arguments;
+    let pixels = CompareSettings { border_px: border, away_from_edges_px: away_from_edges };
+    report::print(&compare(&ComparisonSettings { depth, truth, mask, pixels })?, json)
 }

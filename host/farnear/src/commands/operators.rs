@@ -1,17 +1,17 @@
 //! `farnear operators`: designs the kernels for a point spread function and optics.
 
-use std::{path::PathBuf, time::Instant};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_capture::aside;
 use farnear_depth::{
-    operators::{self, Design, Family, Request},
+    kernel::sizes_in_words,
+    operators::{Design, Family},
     psf::Psf,
 };
-use serde::Serialize;
+use farnear_workflows::operators::{self, OperatorSettings};
 
-use crate::{files, plot, report};
+use crate::{report, terminal};
 
 /// Design rational operators and say how well they fit.
 #[derive(Args)]
@@ -31,8 +31,12 @@ pub struct Arguments {
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// Width and height of the kernels in pixels: 5, 7, 9 or 11.
-    #[arg(long, value_name = "PX", default_value_t = 7)]
+    #[arg(
+        long,
+        value_name = "PX",
+        default_value_t = 7,
+        help = format!("Width and height of the kernels in pixels: {}", sizes_in_words())
+    )]
     kernel_size: usize,
     /// Where to save the operators, as TOML.
     #[arg(long, value_name = "FILE")]
@@ -45,40 +49,9 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Figures {
-    name: String,
-    nir_rms: f64,
-    seconds: f64,
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let optics = files::optics::read(&arguments.optics)?;
-    let psf = arguments.psf.unwrap_or(optics.psf());
-    let request = Request {
-        family: arguments.family.unwrap_or(Family::of(psf)),
-        design: arguments.design,
-        psf,
-        max_blur_px: optics.max_blur_px(),
-        kernel_size: arguments.kernel_size,
-    };
-    let start = Instant::now();
-    // Not from the cache: how long a design takes is one of the figures.
-    let operators = operators::design(&request)?;
-    let seconds = start.elapsed().as_secs_f64();
-    if let Some(out) = &arguments.out {
-        aside::write_file(out, toml::to_string(&operators)?.as_bytes())?;
-        eprintln!("wrote {}", out.display());
-    }
-    if let Some(file) = &arguments.plot {
-        aside::write_file(file, &plot::plot(&operators, file)?)?;
-        eprintln!("wrote {}", file.display());
-    }
-    let figures = Figures {
-        name: operators.name().into(),
-        nir_rms: operators.nir_rms(),
-        seconds: report::rounded(seconds, 6),
-    };
-    report::print(&figures, arguments.json)
+    let Arguments { psf, family, design, optics, kernel_size, out, plot, json } = arguments;
+    let settings = OperatorSettings { optics, psf, family, design, kernel_size, out, plot };
+    report::print(&operators::design(&settings, &terminal::context()?)?, json)
 }

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use farnear_workflows::optics;
 
-use crate::{files, report};
+use crate::report;
 
 /// Print the working range: what far and near focus mean in mm, and how far the sensor moves.
 #[derive(Args)]
@@ -21,6 +22,5 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let optics = files::optics::read(&arguments.optics)?;
-    report::print(&optics.working_range(), arguments.json)
+    report::print(&optics::read(&arguments.optics)?.working_range(), arguments.json)
 }

@@ -2,16 +2,15 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
-use farnear_capture::{aside::Aside, image_file::encode_png};
-use farnear_depth::psf::Psf as OpticsPsf;
-use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Psf, Renderer, truth};
-use serde::Serialize;
+use farnear_scene::{Camera, Noise};
 
 use crate::{
-    files::{self, map, scene::SceneArgument},
+    render::{self, RenderSettings},
     report,
+    scene::SceneArgument,
+    terminal,
 };
 
 /// Render a far- and a near-focused image of a known scene, with its true depth.
@@ -61,49 +60,11 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Figures {
-    width: usize,
-    height: usize,
-    nearest_mm: f64,
-    farthest_mm: f64,
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let optics = files::optics::read(&arguments.optics)?;
-    let text = files::optics::text(&arguments.optics)?;
-    let psf = match &arguments.psf {
-        Some(name) => name.parse::<OpticsPsf>()?,
-        None => optics.psf(),
-    };
-    let spread: Psf =
-        psf.to_string().parse().context("the renderer does not know this point spread function")?;
-    let mut lens = Lens::from_optics(&OpticsFile::parse(&text)?)?;
-    if arguments.elliptical_distortion {
-        lens = lens.with_distortion(EllipticalDistortion::default());
-    }
-    let scene = arguments.scene.read()?;
-    let camera = Camera::new(arguments.width, arguments.height, arguments.noise);
-    let renderer = Renderer::new(&scene, &lens, &spread, &camera, arguments.seed)?;
-    let aside = Aside::into_folder(&arguments.out)?;
-    for (number, name, sensor_mm) in
-        [(0, "far.png", lens.sensor_far_mm), (1, "near.png", lens.sensor_near_mm)]
-    {
-        let pixels = renderer.expose(sensor_mm, number)?;
-        let png = encode_png(pixels.view(), arguments.noise.bits()).map_err(anyhow::Error::msg)?;
-        aside.write(name, &png)?;
-    }
-    let depth = truth(&scene, &lens, &camera);
-    aside.write("truth.npy", &map::npy(depth.view())?)?;
-    aside.write("optics.toml", toml::to_string(&optics.with_psf(psf))?.as_bytes())?;
-    aside.finish()?;
-    eprintln!("wrote {}", arguments.out.display());
-    let figures = Figures {
-        width: arguments.width,
-        height: arguments.height,
-        nearest_mm: f64::from(depth.iter().copied().fold(f32::INFINITY, f32::min)),
-        farthest_mm: f64::from(depth.iter().copied().fold(f32::NEG_INFINITY, f32::max)),
-    };
-    report::print(&figures, arguments.json)
+    let Arguments { scene, elliptical_distortion, psf, optics, noise, seed, width, height, out, json } =
+        arguments;
+    let camera = Camera::new(width, height, noise);
+    let settings = RenderSettings { scene, elliptical_distortion, psf, optics, camera, seed, out };
+    report::print(&render::render(settings, &terminal::context()?)?, json)
 }

@@ -1,0 +1,74 @@
+//! What a camera would see of a known scene, and the truth with it, into a folder.
+
+use std::{fs, path::PathBuf};
+
+use anyhow::{Context as _, Result};
+use farnear_depth::psf::Psf as OpticsPsf;
+use farnear_files::{image_file::encode_png, npy, staging::Staging};
+use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, Renderer, truth};
+use farnear_workflows::{Context, optics};
+use serde::Serialize;
+
+use crate::scene::SceneArgument;
+
+/// What is rendered, and where it goes.
+pub struct RenderSettings {
+    /// What stands before the camera.
+    pub scene: SceneArgument,
+    /// A lens whose focus varies over the field in ellipses.
+    pub elliptical_distortion: bool,
+    /// Point spread function by name; without it the one of the optics file.
+    pub psf: Option<String>,
+    /// The optics file.
+    pub optics: PathBuf,
+    /// Size and noise of the images.
+    pub camera: Camera,
+    /// Decides everything random.
+    pub seed: u64,
+    /// Folder for far.png, near.png, truth.npy and optics.toml.
+    pub out: PathBuf,
+}
+
+/// What there is to say of a rendered scene.
+#[derive(Serialize)]
+pub struct RenderFigures {
+    width: usize,
+    height: usize,
+    nearest_mm: f64,
+    farthest_mm: f64,
+}
+
+/// Renders a far- and a near-focused image; the folder gets all files or none.
+pub fn render(settings: RenderSettings, context: &Context<'_>) -> Result<RenderFigures> {
+    let RenderSettings { camera, optics: file, out, .. } = settings;
+    let optics = optics::read(&file)?;
+    let psf = settings.psf.map_or(Ok(optics.psf()), |name| name.parse::<OpticsPsf>())?;
+    let spread: Psf =
+        psf.to_string().parse().context("the renderer does not know this point spread function")?;
+    let mut lens = Lens::from_optics(&OpticsFile::parse(&fs::read_to_string(&file)?)?)?;
+    if settings.elliptical_distortion {
+        lens = lens.with_distortion(EllipticalDistortion::default());
+    }
+    let scene = settings.scene.read()?;
+    let renderer = Renderer::new(&scene, &lens, &spread, &camera, settings.seed)?;
+    let staged = Staging::into_folder(&out)?;
+    for (number, name, sensor_mm) in
+        [(0, "far.png", lens.sensor_far_mm), (1, "near.png", lens.sensor_near_mm)]
+    {
+        let pixels = renderer.expose(sensor_mm, number)?;
+        context.cancel.check("rendering")?;
+        staged.write(name, &encode_png(pixels.view(), camera.noise.bits())?)?;
+    }
+    let depth = truth(&scene, &lens, &camera);
+    staged.write("truth.npy", &npy::write(depth.view()))?;
+    staged.write("optics.toml", toml::to_string(&optics.with_psf(psf))?.as_bytes())?;
+    staged.finish()?;
+    context.say(&format!("wrote {}", out.display()));
+    let (height, width) = depth.dim();
+    Ok(RenderFigures {
+        width,
+        height,
+        nearest_mm: f64::from(depth.iter().copied().fold(f32::INFINITY, f32::min)),
+        farthest_mm: f64::from(depth.iter().copied().fold(f32::NEG_INFINITY, f32::max)),
+    })
+}

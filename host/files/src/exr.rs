@@ -1,0 +1,109 @@
+//! OpenEXR: maps as channels of one picture, in full precision, with texts in the header, as compositors and NumPy's
+//! neighbours read them.
+//!
+//! One part, scan lines from the top, 32-bit float, not compressed: measured depths have noise in their low bits, which no
+//! lossless method makes smaller by much. Layout: "OpenEXR File Layout", <https://openexr.com/en/latest/OpenEXRFileLayout.html>.
+//! Written by hand because the crate `exr` takes as long to compile as the rest of this one; tests read it back with that
+//! crate.
+
+use ndarray::ArrayView2;
+
+use crate::EncodeError;
+
+const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+/// Version 2: one part, scan lines, short names.
+const VERSION: i32 = 2;
+/// Longest name of a channel or an attribute, bytes.
+const NAME_MAX: usize = 31;
+/// Code of 32-bit float.
+const FLOAT: i32 = 2;
+
+/// A picture whose channels are maps of one size, NaN for no value, as the bytes of a file. `texts` are attributes of the
+/// header: name (with the namespace of whoever knows its meaning, `farnear:units`) and value.
+///
+/// # Errors
+/// Maps of different sizes or without pixels; names that are empty, longer than 31 bytes or given twice.
+pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Result<Vec<u8>, EncodeError> {
+    let refused = |reason: String| EncodeError { what: "an EXR", reason };
+    let (height, width) = channels.first().map_or((0, 0), |(_, map)| map.dim());
+    if let Some((name, map)) = channels.iter().find(|(_, map)| map.dim() != (height, width)) {
+        let (rows, columns) = map.dim();
+        return Err(refused(format!("channel {name} is {columns}x{rows}, the first {width}x{height}")));
+    }
+    let (Ok(columns @ 1..), Ok(rows @ 1..)) = (i32::try_from(width), i32::try_from(height)) else {
+        return Err(refused(format!("a picture of {width}x{height} px")));
+    };
+    let names: Vec<&str> = channels.iter().map(|(name, _)| *name).chain(texts.iter().map(|(name, _)| *name)).collect();
+    if let Some(name) = names.iter().find(|name| !(1..=NAME_MAX).contains(&name.len()) || name.contains('\0')) {
+        return Err(refused(format!("the name \"{name}\" does not have 1 to {NAME_MAX} bytes")));
+    }
+    // Readers expect the channels in the order of their names.
+    let mut channels = channels.to_vec();
+    channels.sort_by_key(|(name, _)| *name);
+    if let Some(pair) = channels.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        return Err(refused(format!("two channels are called {}", pair[0].0)));
+    }
+
+    let mut bytes = header(&channels, texts, columns, rows);
+    let row_bytes = channels.len() * width * size_of::<f32>();
+    let block_bytes = 2 * size_of::<i32>() + row_bytes;
+    let first_block = bytes.len() + height * size_of::<u64>();
+    bytes.reserve(height * (size_of::<u64>() + block_bytes));
+    for row in 0..height {
+        bytes.extend(((first_block + row * block_bytes) as u64).to_le_bytes());
+    }
+    for row in 0..height {
+        bytes.extend((row as i32).to_le_bytes());
+        bytes.extend((row_bytes as i32).to_le_bytes());
+        for (_, map) in &channels {
+            bytes.extend(map.row(row).iter().flat_map(|value| value.to_le_bytes()));
+        }
+    }
+    Ok(bytes)
+}
+
+/// Everything before the table of the rows' places.
+fn header(
+    channels: &[(&str, ArrayView2<f32>)],
+    texts: &[(&str, &str)],
+    columns: i32,
+    rows: i32,
+) -> Vec<u8> {
+    let integers = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
+    let window = integers(&[0, 0, columns - 1, rows - 1]);
+    let one = 1f32.to_le_bytes();
+    let mut list = Vec::new();
+    for (name, _) in channels {
+        list.extend(name.bytes());
+        list.push(0);
+        list.extend(integers(&[FLOAT]));
+        // Linear light is for half floats; three bytes are reserved.
+        list.extend([0; 4]);
+        // Every column and row is there.
+        list.extend(integers(&[1, 1]));
+    }
+    list.push(0);
+
+    let mut bytes = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
+    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+        for text in [name, kind] {
+            bytes.extend(text.bytes());
+            bytes.push(0);
+        }
+        bytes.extend((value.len() as i32).to_le_bytes());
+        bytes.extend(value);
+    };
+    attribute("channels", "chlist", &list);
+    attribute("compression", "compression", &[0]);
+    attribute("dataWindow", "box2i", &window);
+    attribute("displayWindow", "box2i", &window);
+    attribute("lineOrder", "lineOrder", &[0]);
+    attribute("pixelAspectRatio", "float", &one);
+    attribute("screenWindowCenter", "v2f", &[0; 8]);
+    attribute("screenWindowWidth", "float", &one);
+    for (name, text) in texts {
+        attribute(name, "string", text.as_bytes());
+    }
+    bytes.push(0);
+    bytes
+}

@@ -1,0 +1,255 @@
+//! `.npy`, NumPy's format for one array, as far as maps need it: two axes of f32 or f64.
+//!
+//! A file is `\x93NUMPY`, the version (two bytes), the length of the header (two bytes in version 1, four in 2 and 3,
+//! little-endian), the header (a Python dictionary, padded with blanks and ended by a line feed) and the values (NumPy
+//! Enhancement Proposal 1). Both byte orders and both orders of the axes are read; little-endian f32, row by row, is
+//! written. Why this is no crate's work: `docs/decisions/0011-npy.md`.
+
+mod header;
+
+use ndarray::{Array2, ArrayView2};
+
+use header::Header;
+
+/// What every file begins with.
+pub const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// All before the values fills whole blocks of this many bytes, so that the values can be mapped into memory.
+const BLOCK: usize = 64;
+/// Bytes before the header in version 1: the magic, the version and the header's length.
+const PREFIX: usize = MAGIC.len() + 2 + 2;
+
+/// Why bytes are no array that can be read.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum NpyError {
+    /// The first bytes are others.
+    #[error("it does not begin with \\x93NUMPY")]
+    Magic,
+    /// A version that nobody has written yet.
+    #[error("it has version {major}.{minor}; 1.0, 2.0 and 3.0 are known")]
+    Version {
+        /// First byte.
+        major: u8,
+        /// Second byte.
+        minor: u8,
+    },
+    /// The file ends before its header does.
+    #[error("it breaks off in the header")]
+    Cut,
+    /// The header is not the dictionary that it should be.
+    #[error("byte {at} of its header should be {expected}")]
+    Header {
+        /// How far into the header.
+        at: usize,
+        /// What should stand there.
+        expected: &'static str,
+    },
+    /// The header is silent about something.
+    #[error("its header has no '{key}'")]
+    Missing {
+        /// What is missing.
+        key: &'static str,
+    },
+    /// Values of another kind.
+    #[error("its values are '{descr}', and '<f4', '>f4', '<f8' and '>f8' are read")]
+    Kind {
+        /// NumPy's name of the kind.
+        descr: String,
+    },
+    /// Another number of axes.
+    #[error("its shape is {shape:?}, and a map has two axes (height, width)")]
+    Axes {
+        /// Lengths of the axes.
+        shape: Vec<usize>,
+    },
+    /// More or fewer bytes than the shape says.
+    #[error("its shape is {shape:?} of '{descr}', and {found} bytes follow the header")]
+    Size {
+        /// Lengths of the axes.
+        shape: [usize; 2],
+        /// NumPy's name of the kind of values.
+        descr: String,
+        /// Bytes there are.
+        found: usize,
+    },
+}
+
+/// Reads an array of (height, width); f64 is rounded to f32. Needs no more memory than the file is long.
+///
+/// # Errors
+/// [`NpyError`].
+pub fn read(bytes: &[u8]) -> Result<Array2<f32>, NpyError> {
+    let (header, values) = split(bytes)?;
+    let Header { descr, fortran_order, shape } = Header::parse(header)?;
+    let [height, width] = shape[..].try_into().map_err(|_| NpyError::Axes { shape: shape.clone() })?;
+    let size = || NpyError::Size { shape: [height, width], descr: descr.clone(), found: values.len() };
+    let numbers = match descr.as_str() {
+        "<f4" => numbers(values, f32::from_le_bytes),
+        ">f4" => numbers(values, f32::from_be_bytes),
+        "<f8" => numbers(values, |bytes| f64::from_le_bytes(bytes) as f32),
+        ">f8" => numbers(values, |bytes| f64::from_be_bytes(bytes) as f32),
+        _ => return Err(NpyError::Kind { descr }),
+    };
+    let numbers = numbers.ok_or_else(size)?;
+    if fortran_order {
+        let columns = Array2::from_shape_vec((width, height), numbers).map_err(|_| size())?;
+        return Ok(columns.t().as_standard_layout().into_owned());
+    }
+    Array2::from_shape_vec((height, width), numbers).map_err(|_| size())
+}
+
+/// Header and values.
+fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
+    let rest = bytes.strip_prefix(MAGIC).ok_or(NpyError::Magic)?;
+    let (&[major, minor], rest) = rest.split_first_chunk().ok_or(NpyError::Cut)?;
+    let (length, rest) = match (major, minor) {
+        (1, 0) => {
+            let (length, rest) = rest.split_first_chunk().ok_or(NpyError::Cut)?;
+            (usize::from(u16::from_le_bytes(*length)), rest)
+        }
+        (2 | 3, 0) => {
+            let (length, rest) = rest.split_first_chunk().ok_or(NpyError::Cut)?;
+            (usize::try_from(u32::from_le_bytes(*length)).map_err(|_| NpyError::Cut)?, rest)
+        }
+        _ => return Err(NpyError::Version { major, minor }),
+    };
+    rest.split_at_checked(length).ok_or(NpyError::Cut)
+}
+
+/// `None` where a number is cut off.
+fn numbers<const SIZE: usize>(values: &[u8], number: fn([u8; SIZE]) -> f32) -> Option<Vec<f32>> {
+    let (whole, cut) = values.as_chunks();
+    cut.is_empty().then(|| whole.iter().map(|bytes| number(*bytes)).collect())
+}
+
+/// A map of (height, width) as the bytes of a file: version 1.0, little-endian f32, row by row.
+pub fn write(map: ArrayView2<f32>) -> Vec<u8> {
+    let (height, width) = map.dim();
+    let header =
+        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width})}}");
+    // At least one blank, then the line feed. Two numbers never make the header longer than 65,535 bytes.
+    let values_from = (PREFIX + header.len() + 1) / BLOCK * BLOCK + BLOCK;
+    let header_length = (values_from - PREFIX) as u16;
+    let mut bytes = Vec::with_capacity(values_from + 4 * map.len());
+    bytes.extend(MAGIC);
+    bytes.extend([1, 0]);
+    bytes.extend(header_length.to_le_bytes());
+    bytes.extend(header.bytes());
+    bytes.resize(values_from - 1, b' ');
+    bytes.push(b'\n');
+    bytes.extend(map.iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+    use proptest::prelude::*;
+
+    /// A file of this version with this header, not padded.
+    fn file(version: u8, header: &str, values: &[u8]) -> Vec<u8> {
+        let mut bytes = [MAGIC, &[version, 0]].concat();
+        match version {
+            1 => bytes.extend((header.len() as u16).to_le_bytes()),
+            _ => bytes.extend((header.len() as u32).to_le_bytes()),
+        }
+        [&bytes, header.as_bytes(), values].concat()
+    }
+
+    fn of_kind(descr: &str, values: &[u8]) -> Result<Array2<f32>, NpyError> {
+        let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 2), }}\n");
+        read(&file(1, &header, values))
+    }
+
+    #[test]
+    fn what_is_written_is_known_to_the_byte() {
+        let bytes = write(array![[933.0f32, f32::NAN, -0.0]].view());
+        let head = b"\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': False, 'shape': (1, 3)}";
+        assert_eq!(bytes[..head.len()], head[..]);
+        assert!(bytes[head.len()..127].iter().all(|byte| *byte == b' '));
+        assert_eq!(bytes[127..], *b"\n\x00\x40\x69\x44\x00\x00\xc0\x7f\x00\x00\x00\x80");
+    }
+
+    #[test]
+    fn all_kinds_versions_and_orders_are_read() {
+        let expected = array![[933.5f32, -2.0]];
+        let little4 = [933.5f32, -2.0].map(f32::to_le_bytes).concat();
+        let big4 = [933.5f32, -2.0].map(f32::to_be_bytes).concat();
+        let little8 = [933.5f64, -2.0].map(f64::to_le_bytes).concat();
+        let big8 = [933.5f64, -2.0].map(f64::to_be_bytes).concat();
+        for (descr, values) in [("<f4", &little4), (">f4", &big4), ("<f8", &little8), (">f8", &big8)] {
+            assert_eq!(of_kind(descr, values).unwrap(), expected, "{descr}");
+        }
+        // As NumPy 1 on Python 2, NumPy 2 and ndarray-npy write it, and in a dictionary's other orders.
+        for header in [
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1L, 2L), }     \n",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }\n",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2)}\n",
+            "{\"shape\":(1,2,),\"fortran_order\":False,\"descr\":\"<f4\"}\n",
+        ] {
+            for version in 1..=3 {
+                assert_eq!(read(&file(version, header, &little4)).unwrap(), expected, "{version} {header}");
+            }
+        }
+        let columns = "{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }\n";
+        let values = [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].map(f32::to_le_bytes).concat();
+        assert_eq!(read(&file(1, columns, &values)).unwrap(), array![[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let eight = [0u8; 8];
+        let of_shape = |shape: &str| {
+            let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}\n");
+            read(&file(1, &header, &eight)).unwrap_err()
+        };
+        for (error, phrase) in [
+            (read(b"\x93NUMP").unwrap_err(), "\\x93NUMPY"),
+            (read(&file(4, "", &[])).unwrap_err(), "version 4.0"),
+            (read(b"\x93NUMPY\x01").unwrap_err(), "breaks off"),
+            (read(b"\x93NUMPY\x01\x00\xff\xff{").unwrap_err(), "breaks off"),
+            (read(b"\x93NUMPY\x03\x00\xff\xff\xff\xff{").unwrap_err(), "breaks off"),
+            (read(&file(1, "{'descr': '<f4', 'shape': (1, 2)}", &eight)).unwrap_err(), "'fortran_order'"),
+            (read(&file(1, "{'descr': '<f4'", &eight)).unwrap_err(), "byte 15"),
+            (read(&file(1, "{'descr': [('a', '<f4')]}", &eight)).unwrap_err(), "byte 10"),
+            (of_kind("<i4", &eight).unwrap_err(), "'<i4'"),
+            (of_kind("<f4", &eight[..7]).unwrap_err(), "7 bytes"),
+            (of_kind("<f8", &eight).unwrap_err(), "[1, 2] of '<f8', and 8 bytes"),
+            (of_shape("(2,)"), "[2]"),
+            (of_shape("(1, 2, 1)"), "two axes"),
+            (of_shape("()"), "two axes"),
+            (of_shape("(1, -2)"), "length of an axis"),
+            (of_shape("(18446744073709551615, 18446744073709551615)"), "8 bytes"),
+            (of_shape("(0, 18446744073709551615)"), "8 bytes"),
+            (of_shape("(1, 18446744073709551616)"), "length of an axis"),
+        ] {
+            assert!(error.to_string().contains(phrase), "{phrase}: {error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_map_comes_back(map in (0..9usize, 0..9usize).prop_flat_map(|size| {
+            proptest::collection::vec(any::<u32>(), size.0 * size.1)
+                .prop_map(move |bits| Array2::from_shape_vec(size, bits).expect("as many").mapv(f32::from_bits))
+        })) {
+            let back = read(&write(map.view())).unwrap();
+            prop_assert_eq!(back.mapv(f32::to_bits), map.mapv(f32::to_bits));
+        }
+
+        /// Whatever the bytes, reading ends with a map no larger than they are, or with an error.
+        #[test]
+        fn any_bytes_are_survived(
+            version in 0..4u8,
+            header in "\\{?('descr'|'shape'|'fortran_order'|[\\]\\[:,(){}'\"<>f480-9A-Za-zL ]){0,24}\\}?\\n?",
+            values in proptest::collection::vec(any::<u8>(), 0..64),
+        ) {
+            if let Ok(map) = read(&file(version, &header, &values)) {
+                prop_assert!(4 * map.len() <= values.len());
+            }
+            let _ = read(&values);
+            let _ = read(&[MAGIC, &values].concat());
+        }
+    }
+}

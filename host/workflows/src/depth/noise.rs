@@ -1,0 +1,227 @@
+//! The noise of the images and the standard deviation of depth that follows from it.
+
+use std::{fmt, str::FromStr};
+
+use farnear_depth::{
+    corrections::Correction,
+    fill::FILLED_CONFIDENCE,
+    operators::Operators,
+    optics::Optics,
+    pipeline::{DepthMap, Settings},
+    uncertainty::{Noise, standard_deviation_mm},
+};
+use farnear_files::image_file::Samples;
+use ndarray::{Array2, Zip};
+use serde::Serialize;
+
+use super::pair::Pair;
+use crate::{error::Result, figures::rounded};
+
+/// Step in mm over which a correction's slope is taken: far above rounding, far below what a correction bends over.
+const SLOPE_STEP_MM: f32 = 0.5;
+
+/// Where the noise of the images is known from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CameraNoise {
+    /// From what the pair itself leaves unexplained.
+    Estimated,
+    /// From the camera's data sheet.
+    Camera {
+        /// Electrons at the images' largest code (float images: at the value 1).
+        full_well_e: f64,
+        /// Read noise, electrons.
+        read_noise_e: f64,
+        /// Bits of the camera, where the file has more.
+        bits: Option<u8>,
+    },
+}
+
+/// A text that names no noise.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{reason}")]
+pub struct NoiseError {
+    /// The text.
+    pub text: String,
+    /// What is wrong with it, and what was expected.
+    pub reason: String,
+}
+
+impl FromStr for CameraNoise {
+    type Err = NoiseError;
+
+    fn from_str(text: &str) -> Result<Self, NoiseError> {
+        parse(text).map_err(|reason| NoiseError { text: text.into(), reason })
+    }
+}
+
+fn parse(text: &str) -> Result<CameraNoise, String> {
+    const EXPECTED: &str = "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12)";
+    if text == "estimated" {
+        return Ok(CameraNoise::Estimated);
+    }
+    let values = text.strip_prefix("camera:").ok_or(EXPECTED)?;
+    let [mut full_well, mut read_noise, mut bits] = [None; 3];
+    for part in values.split(',') {
+        let (name, value) = part.split_once('=').ok_or(EXPECTED)?;
+        let place = match name {
+            "full_well_e" => &mut full_well,
+            "read_noise_e" => &mut read_noise,
+            "bits" => &mut bits,
+            _ => return Err(format!("unknown {name}: {EXPECTED}")),
+        };
+        let number: f64 =
+            value.parse().map_err(|_| format!("{name} = {value} is not a number: {EXPECTED}"))?;
+        if place.replace(number).is_some() {
+            return Err(format!("{name} is given twice"));
+        }
+    }
+    let [Some(full_well_e), Some(read_noise_e)] = [full_well, read_noise] else {
+        return Err(format!("full_well_e and read_noise_e are both needed: {EXPECTED}"));
+    };
+    if !(full_well_e.is_finite() && full_well_e > 0.0 && read_noise_e.is_finite() && read_noise_e >= 0.0) {
+        return Err("full_well_e must be above 0 and read_noise_e 0 or more electrons".into());
+    }
+    let bits = match bits {
+        Some(bits) if bits.fract() == 0.0 && (4.0..=16.0).contains(&bits) => Some(bits as u8),
+        Some(bits) => return Err(format!("bits = {bits}: a camera has 4 to 16")),
+        None => None,
+    };
+    Ok(CameraNoise::Camera { full_well_e, read_noise_e, bits })
+}
+
+impl fmt::Display for CameraNoise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Estimated => write!(f, "estimated"),
+            Self::Camera { full_well_e, read_noise_e, bits } => {
+                write!(f, "camera:full_well_e={full_well_e},read_noise_e={read_noise_e}")?;
+                bits.map_or(Ok(()), |bits| write!(f, ",bits={bits}"))
+            }
+        }
+    }
+}
+
+impl CameraNoise {
+    /// The noise of images whose files have such samples and whose values are 1 at full scale.
+    fn of(self, samples: Samples) -> Noise {
+        let Self::Camera { full_well_e, read_noise_e, bits } = self else { return Noise::Estimated };
+        let bits = match samples {
+            Samples::Integer(of_file) => Some(bits.map_or(of_file, |bits| bits.min(of_file))),
+            Samples::Float => bits,
+        };
+        let rounding = bits.map_or(0.0, |bits| (2f64.powi(i32::from(bits)) - 1.0).powi(-2) / 12.0);
+        Noise::Camera {
+            constant: (read_noise_e / full_well_e).powi(2) + rounding,
+            per_unit: 1.0 / full_well_e,
+        }
+    }
+}
+
+/// What the standard deviations come to.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Uncertainty {
+    /// Where the noise is from.
+    pub noise: String,
+    /// Median over the pixels that have one.
+    pub median_sd_mm: f64,
+    /// 95 % of them have less.
+    pub p95_sd_mm: f64,
+}
+
+/// What the standard deviation follows from.
+pub struct Source<'a> {
+    /// Far- and near-focused image.
+    pub pair: &'a Pair,
+    /// What the depth was computed with.
+    pub operators: &'a Operators,
+    /// See there.
+    pub optics: &'a Optics,
+    /// See there.
+    pub settings: &'a Settings,
+}
+
+/// Standard deviation of `raw` (before `correction`), mm; NaN where there is no depth and where it was filled in from
+/// elsewhere.
+///
+/// # Errors
+/// [`crate::WorkflowError::Depth`], [`crate::WorkflowError::Correction`].
+pub fn deviation(
+    noise: CameraNoise,
+    source: &Source<'_>,
+    raw: &DepthMap,
+    correction: Option<&Correction>,
+) -> Result<(Array2<f32>, Uncertainty)> {
+    let pair = source.pair;
+    let mut deviation = standard_deviation_mm(
+        pair.far.view(),
+        pair.near.view(),
+        source.operators,
+        source.optics,
+        source.settings,
+        noise.of(pair.samples),
+    )?;
+    let filled = |confidence: f32| source.settings.fill && confidence == FILLED_CONFIDENCE;
+    Zip::from(&mut deviation).and(&raw.depth_mm).and(&raw.confidence).for_each(
+        |deviation, depth_mm, confidence| {
+            if depth_mm.is_nan() || filled(*confidence) {
+                *deviation = f32::NAN;
+            }
+        },
+    );
+    if let Some(correction) = correction {
+        let moved = |step: f32| correction.apply(raw.depth_mm.mapv(|depth_mm| depth_mm + step).view());
+        let (nearer, farther) = (moved(-0.5 * SLOPE_STEP_MM)?, moved(0.5 * SLOPE_STEP_MM)?);
+        Zip::from(&mut deviation).and(&nearer).and(&farther).for_each(|deviation, nearer, farther| {
+            *deviation *= (farther - nearer).abs() / SLOPE_STEP_MM;
+        });
+    }
+    let mut finite: Vec<f32> = deviation.iter().copied().filter(|value| value.is_finite()).collect();
+    finite.sort_unstable_by(f32::total_cmp);
+    let quantile = |part: f64| {
+        let last = finite.len().checked_sub(1).map_or(0, |last| (part * last as f64).round() as usize);
+        rounded(finite.get(last).map_or(f64::NAN, |value| f64::from(*value)), 4)
+    };
+    let found =
+        Uncertainty { noise: noise.to_string(), median_sd_mm: quantile(0.5), p95_sd_mm: quantile(0.95) };
+    Ok((deviation, found))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_named_like_everything_else() {
+        let camera = "camera:full_well_e=20000,read_noise_e=12,bits=12";
+        for text in ["estimated", camera, "camera:full_well_e=5e4,read_noise_e=0"] {
+            let noise: CameraNoise = text.parse().unwrap();
+            assert_eq!(noise.to_string().parse(), Ok(noise));
+        }
+        for (wrong, phrase) in [
+            ("far.png", "expected estimated"),
+            ("camera:full_well_e=20000", "both needed"),
+            ("camera:full_well_e=0,read_noise_e=1", "above 0"),
+            ("camera:full_well_e=1,read_noise_e=NaN", "0 or more"),
+            ("camera:full_well_e=1,read_noise_e=1,gain=2", "unknown gain"),
+            ("camera:full_well_e=1,full_well_e=1,read_noise_e=1", "twice"),
+            ("camera:full_well_e=1,read_noise_e=1,bits=17", "4 to 16"),
+        ] {
+            let error = wrong.parse::<CameraNoise>().unwrap_err();
+            assert!(error.reason.contains(phrase), "{wrong}: {error}");
+        }
+    }
+
+    /// The same noise as that of a camera in its codes, for images divided by the largest code.
+    #[test]
+    fn noise_follows_the_scale_of_the_images() {
+        let Noise::Camera { constant, per_unit } = Noise::camera(20_000.0, 12.0, 255.0) else {
+            unreachable!()
+        };
+        let noise = CameraNoise::Camera { full_well_e: 20_000.0, read_noise_e: 12.0, bits: None };
+        let Noise::Camera { constant: of_unit, per_unit: shot } = noise.of(Samples::Integer(8)) else {
+            unreachable!()
+        };
+        assert!((of_unit * 255.0 * 255.0 / constant - 1.0).abs() < 1e-12);
+        assert!((shot * 255.0 / per_unit - 1.0).abs() < 1e-12);
+    }
+}

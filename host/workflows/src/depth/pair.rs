@@ -1,0 +1,98 @@
+//! A far- and a near-focused image in files.
+
+use std::path::{Path, PathBuf};
+
+use farnear_capture::record::CAPTURE_FILE;
+use farnear_depth::pipeline::Warning;
+use farnear_files::image_file::{Samples, read_grey};
+use ndarray::Array2;
+
+use crate::error::{Result, WorkflowError};
+
+/// A pair as its files hold it.
+pub struct Pair {
+    /// The far-focused image, (height, width).
+    pub far: Array2<f32>,
+    /// The near-focused image.
+    pub near: Array2<f32>,
+    /// The coarser kind of samples.
+    pub samples: Samples,
+}
+
+impl Pair {
+    /// Reads both images. Their pixels must mean the same: integers of any depth share one scale, float files have their
+    /// own.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Image`]; [`WorkflowError::Pair`] for integers beside float and for one image given twice.
+    pub fn read(far: &Path, near: &Path) -> Result<Self> {
+        let (far_image, near_image) = (read_grey(far)?, read_grey(near)?);
+        let unfit = |reason| WorkflowError::Pair { far: far.into(), near: near.into(), reason };
+        let samples = match (far_image.samples, near_image.samples) {
+            (Samples::Integer(a), Samples::Integer(b)) => Samples::Integer(a.min(b)),
+            (Samples::Float, Samples::Float) => Samples::Float,
+            (far, near) => {
+                return Err(unfit(format!(
+                    "one has {far} pixels and the other {near} ones: give both as integers or both as float"
+                )));
+            }
+        };
+        if far_image.pixels == near_image.pixels {
+            let twice = "they hold the same image: depth needs one focused far and one focused near";
+            return Err(unfit(twice.into()));
+        }
+        Ok(Self { far: far_image.pixels, near: near_image.pixels, samples })
+    }
+}
+
+/// What there is to warn of: what the computation found, and names that contradict the order.
+///
+/// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near: only
+/// the names tell.
+pub fn warnings(found: &[Warning], far: &Path, near: &Path) -> Vec<String> {
+    let mut warnings: Vec<String> = found.iter().map(ToString::to_string).collect();
+    let seen_already = found.iter().any(|warning| matches!(warning, Warning::LooksSwapped { .. }));
+    if named_the_other_way_round(far, near) && !seen_already {
+        warnings.push(format!(
+            "the pair looks swapped by its names: {} was given as FAR and {} as NEAR",
+            name_of(far),
+            name_of(near)
+        ));
+    }
+    warnings
+}
+
+fn named_the_other_way_round(far: &Path, near: &Path) -> bool {
+    let says = |path: &Path, word: &str, other: &str| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+        stem.contains(word) && !stem.contains(other)
+    };
+    says(far, "near", "far") && says(near, "far", "near")
+}
+
+/// The name of a file without its folders, for records.
+pub fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Where results go that were given no place: a capture's own folder, or `depth` beside the far image.
+pub fn default_folder(far: &Path) -> PathBuf {
+    let folder = far.parent().unwrap_or(Path::new(""));
+    if folder.join(CAPTURE_FILE).exists() { folder.to_path_buf() } else { folder.join("depth") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_a_swapped_pair() {
+        let swapped = |far: &str, near: &str| named_the_other_way_round(far.as_ref(), near.as_ref());
+        assert!(swapped("a/near.png", "a/far.png"));
+        assert!(swapped("Breakfast_NEAR.tif", "breakfast_far.tif"));
+        assert!(!swapped("far.png", "near.png"));
+        assert!(!swapped("farnear_1.png", "farnear_2.png"));
+        assert!(!swapped("near/1.png", "far/2.png"), "folders are no names of images");
+        assert!(!swapped("near1.png", "near2.png"));
+    }
+}

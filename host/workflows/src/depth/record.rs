@@ -1,0 +1,64 @@
+//! `depth.toml`: what made a map.
+
+use farnear_depth::{operators::Operators, optics::Optics, pipeline::Settings};
+use farnear_files::map::Scale;
+use serde::Serialize;
+
+use super::{Computed, DepthSettings, Inputs, noise::Uncertainty, output::Outputs, pair::name_of};
+use crate::{MADE_BY, error::Result};
+
+/// Version of the record.
+const FORMAT: u32 = 1;
+
+#[derive(Serialize)]
+struct Record<'a> {
+    format: u32,
+    made_by: &'static str,
+    far: String,
+    near: String,
+    units: &'static str,
+    warnings: &'a [String],
+    /// Which outputs this record speaks of, where they are not the usual ones: others may lie there from before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    write: Option<String>,
+    /// How depth.png's codes stand for mm; code 0 = no value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    png: Option<Scale>,
+    method: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    correction: Option<String>,
+    settings: Settings,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uncertainty: Option<&'a Uncertainty>,
+    optics: Optics,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    operators: Option<&'a Operators>,
+}
+
+/// The record as TOML. `png` is the scale of depth.png, where that is written.
+pub fn record(
+    settings: &DepthSettings,
+    inputs: &Inputs,
+    computed: &Computed,
+    warnings: &[String],
+    png: Option<Scale>,
+) -> Result<String> {
+    let usual = settings.write == Outputs::default();
+    Ok(toml::to_string(&Record {
+        format: FORMAT,
+        made_by: MADE_BY,
+        far: name_of(&settings.far),
+        near: name_of(&settings.near),
+        units: "mm",
+        warnings,
+        write: (!usual).then(|| settings.write.to_string()),
+        png,
+        method: inputs.method.method().to_string(),
+        correction: settings.correction.as_deref().map(name_of),
+        // The number of threads changes nothing in the result.
+        settings: Settings { threads: Settings::default().threads, ..settings.computation },
+        uncertainty: computed.deviation.as_ref().map(|(_, found)| found),
+        optics: inputs.optics,
+        operators: inputs.method.operators(),
+    })?)
+}
