@@ -272,9 +272,7 @@ pub enum RecordingError {
         reason: String,
     },
     /// An unknown unit.
-    #[error(
-        "unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres"
-    )]
+    #[error("unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres")]
     Unit(String),
 }
 

@@ -144,12 +144,7 @@ impl Recogniser {
         }
         if views.iter().all(|view| view.frames() == 0) {
             let probabilities = self.activities.iter().map(|a| (a.clone(), 0.0)).collect();
-            return Ok(Answer {
-                activity: None,
-                confidence: 0.0,
-                probabilities,
-                outlier_score: f32::INFINITY,
-            });
+            return Ok(Answer { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY });
         }
         // A model of cut-out silhouettes looks at shapes only, also in full frames.
         let shapes: Vec<Track>;
