@@ -163,7 +163,7 @@ impl Series<'_> {
         for warning in &depth.warnings {
             self.context.progress.warn(&warning.to_string());
         }
-        folder.write("depth.npy", &map::npy(depth.depth_mm.view())?)?;
+        folder.write("depth.npy", &map::Format::Npy.encode(depth.depth_mm.view())?)?;
         finish_folder(folder, &pair, &record)?;
         Ok(depth.depth_mm)
     }
