@@ -17,7 +17,7 @@ const AWAY_FROM_EDGES_PX: &str = "8";
 
 /// Runs the demo; ends with its one line of figures.
 pub fn run() -> Result<()> {
-    firmware::build_program()?;
+    firmware::build_emulated()?;
     let programs = host::build()?;
     let farnear = |arguments: &[&str]| {
         let mut command = Command::new(programs.join("farnear"));

@@ -1,59 +1,83 @@
-//! Builds the firmware and lays its ELF beside the host programs, where `farnear-sim` looks for it.
+//! Builds the firmware of every board and lays the ELFs beside the host programs, where `farnear-sim` looks for the one
+//! that it emulates.
 
 use std::{fs, path::PathBuf};
 
 use anyhow::{Context, Result, bail};
 
 use crate::{
-    run::{ROOT, finish, step, target_folder},
+    boards::{BOARDS, Board, EMULATED},
+    run::{finish, step, target_folder},
+    sizes,
     thumb::{TARGET, Way},
 };
 
-/// Name of the firmware's package and program.
-const PROGRAM: &str = "farnear-nucleo-f429zi";
 /// The program that counts the instructions of the on-board routines, built alongside.
 const COUNTER: &str = "farnear-count";
 
-/// The firmware's own workspace.
-pub fn folder() -> PathBuf {
-    ROOT.join("firmware/nucleo-f429zi")
-}
-
-fn built(program: &str) -> Result<PathBuf> {
-    let elf = folder().join("target").join(TARGET).join("release").join(program);
+fn built(board: &Board, program: &str) -> Result<PathBuf> {
+    let elf = board.folder().join("target").join(TARGET).join("release").join(program);
     if !elf.exists() {
         bail!("the build ended well but left no {}", elf.display());
     }
     Ok(elf)
 }
 
-/// The counting program's ELF, after a build.
-pub fn counter() -> Result<PathBuf> {
-    built(COUNTER)
+/// What of a board's workspace is built.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Selection {
+    /// All programs.
+    All,
+    /// The firmware alone, which is quicker.
+    Firmware,
 }
 
-/// Builds the firmware and the program that counts instructions; gives the path of the firmware's ELF.
-pub fn build() -> Result<PathBuf> {
-    step("firmware for the NUCLEO-F429ZI");
-    build_with(Way::find()?, &[])
-}
-
-/// Builds the firmware alone, which is quicker.
-pub fn build_program() -> Result<PathBuf> {
-    step("firmware for the NUCLEO-F429ZI");
-    build_with(Way::find()?, &["--bin", PROGRAM])
-}
-
-/// Builds, in a way that was found before, what `selection` names (all, where that is nothing).
-pub fn build_with(way: Way, selection: &[&str]) -> Result<PathBuf> {
-    finish(way.cargo(&folder(), "build").args(["--release", "--locked"]).args(selection))?;
-    let elf = built(PROGRAM)?;
+fn build_board(board: &Board, way: Way, selection: Selection) -> Result<PathBuf> {
+    let program = board.program();
+    let mut cargo = way.cargo(&board.folder(), "build");
+    cargo.args(["--release", "--locked"]);
+    if selection == Selection::Firmware {
+        cargo.args(["--bin", &program]);
+    }
+    finish(&mut cargo)?;
+    let elf = built(board, &program)?;
     for profile in ["debug", "release"] {
         let beside = target_folder().join(profile);
-        let copy = beside.join(format!("{PROGRAM}.elf"));
+        let copy = beside.join(format!("{program}.elf"));
         fs::create_dir_all(&beside)
             .and_then(|()| fs::copy(&elf, &copy))
             .with_context(|| format!("cannot write {}", copy.display()))?;
+    }
+    Ok(elf)
+}
+
+/// The workspace of the board that is emulated.
+pub fn folder() -> PathBuf {
+    EMULATED.folder()
+}
+
+/// The counting program's ELF, after a build.
+pub fn counter() -> Result<PathBuf> {
+    built(EMULATED, COUNTER)
+}
+
+/// Builds the firmware of all boards; gives the path of the ELF that is emulated.
+pub fn build() -> Result<PathBuf> {
+    step("firmware");
+    build_with(Way::find()?)
+}
+
+/// Builds what the emulated board runs, and nothing else.
+pub fn build_emulated() -> Result<PathBuf> {
+    step("firmware");
+    build_board(EMULATED, Way::find()?, Selection::Firmware)
+}
+
+/// Builds the firmware in a way that was found before.
+pub fn build_with(way: Way) -> Result<PathBuf> {
+    let elf = build_board(EMULATED, way, Selection::All)?;
+    for board in BOARDS.iter().filter(|board| board.name != EMULATED.name) {
+        sizes::check(&build_board(board, way, Selection::All)?)?;
     }
     Ok(elf)
 }

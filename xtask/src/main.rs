@@ -3,6 +3,7 @@
 //! One file per job. Every step says what it does before it does it, and every failure says what to type next.
 
 mod bench;
+mod boards;
 mod campaign;
 mod demo;
 mod evaluate;

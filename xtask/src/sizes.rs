@@ -1,14 +1,11 @@
-//! The firmware's flash and static RAM against their budgets.
+//! The flash and static RAM of a board's firmware against the board's budgets.
 
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result, bail};
 use object::{Object, ObjectSection, SectionFlags, SectionKind, elf};
 
-/// Flash budget in bytes.
-pub const FLASH_BUDGET: u64 = 128 * 1024;
-/// Static RAM budget in bytes (the stack has the other 128 KiB of the 192).
-pub const RAM_BUDGET: u64 = 64 * 1024;
+use crate::boards::Board;
 
 /// Bytes an image takes on the chip.
 pub struct Sizes {
@@ -39,13 +36,16 @@ pub fn measure(elf: &Path) -> Result<Sizes> {
     Ok(sizes)
 }
 
-/// Prints the sizes; fails where a budget is exceeded.
+/// Prints the sizes of a board's ELF; fails where a budget is exceeded.
 pub fn check(elf: &Path) -> Result<()> {
+    let board =
+        Board::of(elf).with_context(|| format!("{} is not the program of any board", elf.display()))?;
     let Sizes { flash, ram } = measure(elf)?;
-    println!("flash {flash} of {FLASH_BUDGET} bytes, static RAM {ram} of {RAM_BUDGET} bytes");
-    if flash > FLASH_BUDGET || ram > RAM_BUDGET {
+    let Board { name, flash_budget, ram_budget } = board;
+    println!("{name}: flash {flash} of {flash_budget} bytes, static RAM {ram} of {ram_budget} bytes");
+    if flash > *flash_budget || ram > *ram_budget {
         bail!(
-            "the firmware is over its budget: flash {flash} of {FLASH_BUDGET}, RAM {ram} of {RAM_BUDGET} bytes"
+            "the firmware of {name} is over its budget: flash {flash} of {flash_budget}, RAM {ram} of {ram_budget} bytes"
         );
     }
     Ok(())

@@ -25,7 +25,7 @@ pub fn run() -> Result<()> {
 
     step("firmware for the NUCLEO-F429ZI");
     let way = Way::find()?;
-    let elf = firmware::build_with(way, &[])?;
+    let elf = firmware::build_with(way)?;
     sizes::check(&elf)?;
     instructions::run(false)?;
 

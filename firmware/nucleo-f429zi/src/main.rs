@@ -1,7 +1,7 @@
 //! # farnear-nucleo-f429zi
 //!
 //! The firmware on a NUCLEO-F429ZI. Thin on purpose: what the board does lives in `farnear-rig`; here are
-//! clocks, pins and registers. One file per driver; [`control`] joins them, 5000 times a second.
+//! clocks, pins and registers. One file per driver; [`board`] joins them, and [`control`] ticks 5000 times a second.
 //!
 //! | pin | function | signal |
 //! |---|---|---|
@@ -28,6 +28,7 @@
 #![no_main]
 
 mod axis;
+mod board;
 mod camera;
 mod clock;
 mod clock_tree;
@@ -43,7 +44,6 @@ mod supply;
 use defmt::{error, info};
 use embassy_executor::Spawner;
 use embassy_stm32::{
-    gpio::{Input, Pull},
     interrupt::{Interrupt, InterruptExt, Priority},
     uid,
 };
@@ -52,54 +52,37 @@ use farnear_rig::{Identity, Rig, io::MEMORY_BYTES};
 use static_cell::StaticCell;
 
 use crate::{
-    axis::{Axis, Switches},
-    camera::CameraPort,
-    control::Hardware,
-    encoder::Encoder,
+    board::{Nucleo, Parts},
     memory::Memory,
-    piezo::Piezo,
     registers::retained::{self, Last},
-    stepper::{DriverPins, Stepper},
-    supply::Supply,
 };
 
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);
 
-/// The rig with what its memory holds, and whether there is a memory. Not inside `main`, whose variables would have a
-/// place of their own for ever, and moved ones several.
+/// The rig with what its memory holds; a memory that does not answer is taken off the board. Not inside `main`, whose
+/// variables would have a place of their own for ever, and moved ones several.
 #[inline(never)]
-fn start(identity: Identity, memory: &mut Memory) -> (&'static mut Rig, bool) {
+fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     static RIG: StaticCell<Rig> = StaticCell::new();
     block_for(MEMORY_STARTS);
     let mut records = [0; MEMORY_BYTES];
-    let remembers = memory.is_there() && memory.read(&mut records);
-    (RIG.init_with(|| Rig::new(identity, remembers.then_some(&records), clock::now())), remembers)
+    fitted.take_if(|memory| !(memory.is_there() && memory.read(&mut records)));
+    RIG.init_with(|| Rig::new(identity, fitted.is_some().then_some(&records), clock::now()))
 }
 
-#[embassy_executor::main]
-async fn main(spawner: Spawner) {
-    let reset_cause = registers::take_reset_cause();
-    let (boot, last) = retained::take();
-    let p = clock::start();
+/// Counts cycles, which the control loop wants to know.
+fn count_cycles() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
-        registers::guard_stack(&mut core.MPU);
-        // The control loop counts its cycles.
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
     }
     Interrupt::USART3.set_priority(Priority::P2);
     Interrupt::TIM5.set_priority(Priority::P3);
+}
 
-    let identity = Identity {
-        board: "nucleo-f429zi",
-        firmware: env!("CARGO_PKG_VERSION"),
-        unique_id: uid::uid(),
-        boot,
-        reset_cause,
-        emulated: Input::new(p.PD15, Pull::Down).is_high(),
-        last_words: last.map(Last::words),
-    };
+/// Says why the boot before this ended itself.
+fn tell_of(last: Option<Last>) {
     match last {
         Some(Last::Panic { file, line }) => error!("panicked at {}:{}", file.unwrap_or("?"), line),
         Some(Last::Fault { program_counter, status }) => {
@@ -108,9 +91,17 @@ async fn main(spawner: Spawner) {
         Some(Last::StackOverflow) => error!("the stack overflowed"),
         None => {}
     }
+}
 
-    let (link, sender) = match link::open(p.USART3, p.PD8, p.PD9) {
-        Ok(ends) => ends,
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    let reset_cause = registers::take_reset_cause();
+    let (boot, last) = retained::take();
+    let peripherals = clock::start();
+    count_cycles();
+    tell_of(last);
+    let Parts { mut board, sender, led, emulated } = match Nucleo::new(peripherals) {
+        Ok(parts) => parts,
         Err(fault) => {
             // Nobody can be told; the log is all there is.
             error!("the serial port cannot be set up: {}", fault);
@@ -121,38 +112,16 @@ async fn main(spawner: Spawner) {
         Ok(task) => spawner.spawn(task),
         Err(fault) => error!("no place for the sending task: {}", defmt::Debug2Format(&fault)),
     }
-    let mut memory = Memory::new(p.SPI4, p.PE2, p.PE5, p.PE6, p.PE4);
-    let (rig, remembers) = start(identity, &mut memory);
-    info!("boot {}, emulated: {}, memory: {}", rig.boot(), identity.emulated, remembers);
-
-    let hardware = Hardware {
-        coarse: Axis {
-            stepper: Stepper::new(
-                p.TIM1,
-                DriverPins {
-                    step: p.PE9,
-                    direction: p.PF13,
-                    enable: p.PF14,
-                    diagnosis: p.PF15,
-                    stop: p.PE15,
-                },
-            ),
-            encoder: Encoder::new(p.TIM4, p.PD12, p.PD13),
-            switches: Switches::new(p.PG0, p.PG1),
-        },
-        lens: Axis {
-            stepper: Stepper::new(
-                p.TIM8,
-                DriverPins { step: p.PC6, direction: p.PF0, enable: p.PF1, diagnosis: p.PF2, stop: p.PA6 },
-            ),
-            encoder: Encoder::new(p.TIM3, p.PB4, p.PB5),
-            switches: Switches::new(p.PG2, p.PG3),
-        },
-        piezo: Piezo::new(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD0, p.PD1),
-        camera: CameraPort::new(p.TIM2, p.PB10, p.PB11),
-        memory: remembers.then_some(memory),
-        supply: Supply::new(),
-        link,
+    let identity = Identity {
+        board: "nucleo-f429zi",
+        firmware: env!("CARGO_PKG_VERSION"),
+        unique_id: uid::uid(),
+        boot,
+        reset_cause,
+        emulated,
+        last_words: last.map(Last::words),
     };
-    control::run(hardware, rig, p.IWDG, p.PB0).await
+    let rig = start(identity, &mut board.memory);
+    info!("boot {}, emulated: {}, memory: {}", rig.boot(), emulated, board.memory.is_some());
+    control::run(board, rig, led).await
 }

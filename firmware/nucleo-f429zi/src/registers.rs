@@ -15,7 +15,7 @@ use embassy_stm32::{
 };
 use farnear_protocol::message::ResetCause;
 
-pub use self::{faults::guard_stack, logger::take_log};
+pub use self::logger::take_log;
 
 /// Cycles of the longest control tick since the reset, interrupts included; a debugger (and the emulated board's
 /// tests) find it by its name.

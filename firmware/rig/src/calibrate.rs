@@ -11,8 +11,10 @@ use farnear_protocol::message::{Axis, Calibration, Failure, Routine, SettingKey}
 use self::backlash::Backlash;
 use self::sweep::Sweep;
 use self::travel::Travel;
+use crate::motion::axis::Stepper;
+use crate::motion::home::Homing;
 use crate::motion::stage::Stage;
-use crate::settings::Settings;
+use crate::settings::{Settings, StepperSettings};
 
 /// A routine under way.
 #[derive(Clone, Debug)]
@@ -62,5 +64,19 @@ impl Calibrating {
             Self::Backlash(backlash) => backlash.tick(stage, settings),
             Self::Piezo(sweep) => sweep.tick(&mut stage.fine),
         }
+    }
+}
+
+/// Homes the axis of a routine; until that is done, and where it fails, gives what the routine's tick brings.
+fn go_home(
+    homing: &mut Homing,
+    axis: Axis,
+    stepper: &mut Stepper,
+    settings: &StepperSettings,
+) -> Result<(), Step> {
+    match homing.tick(stepper, settings) {
+        None => Err(Step::On),
+        Some(Ok(_)) => Ok(()),
+        Some(Err(failure)) => Err(Step::Failed(axis, failure)),
     }
 }

@@ -14,15 +14,10 @@ use farnear_protocol::message::{
     CODES_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,
 };
 
-use crate::memory::contents;
-use crate::memory::record::Block;
-
 /// Widest row.
 pub const ROW_PIXELS_MAX: u16 = 1024;
 /// Coefficients of the largest form.
-const COEFFICIENTS: usize = REGIONS * REGIONS * REGION_TERMS;
-/// Blocks in which a correction is kept: its info, and eight coefficients each.
-pub(crate) const CORRECTION_BLOCKS: usize = 1 + COEFFICIENTS.div_ceil(8);
+pub(crate) const COEFFICIENTS: usize = REGIONS * REGIONS * REGION_TERMS;
 const TABLE_WORDS: usize = Full::table_words(ROW_PIXELS_MAX);
 
 /// A correction: what it is for, and its coefficients.
@@ -33,41 +28,20 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
-    /// For the memory.
-    pub(crate) fn block(&self, index: usize) -> Block {
-        match index.checked_sub(1) {
-            Some(index) => contents::values(&self.bits, index),
-            None => {
-                let form = match self.info.form {
-                    CorrectionForm::Regions => 1,
-                    CorrectionForm::Blend => 2,
-                    CorrectionForm::Full => 3,
-                };
-                let CorrectionInfo { width, height, centre_um, half_span_um, .. } = self.info;
-                contents::values(&[form, i32::from(width), i32::from(height), centre_um, half_span_um], 0)
-            }
-        }
+    /// A correction that the memory kept; `None` where it cannot be one.
+    pub(crate) fn restored(info: CorrectionInfo, bits: [i32; COEFFICIENTS]) -> Option<Self> {
+        frame(&info).ok()?;
+        Some(Self { info, bits })
     }
 
-    /// From the memory; `None` where none is kept.
-    pub(crate) fn from_blocks(block: impl Fn(usize) -> Block) -> Option<Self> {
-        let head = block(0);
-        let form = match contents::u32_at(&head, 0) {
-            1 => CorrectionForm::Regions,
-            2 => CorrectionForm::Blend,
-            3 => CorrectionForm::Full,
-            _ => return None,
-        };
-        let info = CorrectionInfo {
-            form,
-            width: contents::u32_at(&head, 4) as u16,
-            height: contents::u32_at(&head, 8) as u16,
-            centre_um: contents::u32_at(&head, 12) as i32,
-            half_span_um: contents::u32_at(&head, 16) as i32,
-        };
-        frame(&info).ok()?;
-        let bits = core::array::from_fn(|i| contents::u32_at(&block(1 + i / 8), i % 8 * 4) as i32);
-        Some(Self { info, bits })
+    /// What it is for.
+    pub(crate) const fn info(&self) -> &CorrectionInfo {
+        &self.info
+    }
+
+    /// Its coefficients, all that there may be.
+    pub(crate) const fn bits(&self) -> &[i32; COEFFICIENTS] {
+        &self.bits
     }
 
     fn coefficient(&self, index: usize) -> Coefficient {

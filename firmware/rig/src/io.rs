@@ -1,15 +1,12 @@
 //! The seam between behaviour and board: what the rig is told and what it orders, once per control tick.
 //!
-//! The board binary moves bytes and registers; everything with a decision in it is on this side. Each tick it
-//! 1. reads the hardware into [`Inputs`],
-//! 2. calls [`crate::Rig::tick`],
-//! 3. carries out [`Outputs`] at once, in the order of its fields.
+//! The board binary moves bytes and registers; everything with a decision in it is on this side. The loop that joins the
+//! two is [`crate::control`]: hardware into [`Inputs`], [`crate::Rig::tick`], [`Outputs`] to the hardware at once.
 //!
 //! The inputs of a tick already reflect the outputs of the tick before: segments handed over count as queued,
 //! so [`StepperState::idle`] is false, and an ordered abort has emptied the queue.
 //!
-//! The emergency stop is read after the step timers: a circuit that opens between the two readings must not look
-//! like a timer that ran dry. Ticks that make up for lost time (a long calculation) may follow each other at once;
+//! Ticks that make up for lost time (a long calculation) may follow each other at once;
 //! the piezo's loop leaves those out.
 //!
 //! # Step pulses
@@ -76,6 +73,11 @@ pub struct StepperState {
     pub room: u8,
 }
 
+impl StepperState {
+    /// A timer that has given no pulse and has room for everything.
+    pub const IDLE: Self = Self { pulses: 0, idle: true, underrun: false, room: u8::MAX };
+}
+
 /// The edges of one exposure, in board time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ExposureEdges {
@@ -112,6 +114,17 @@ pub struct MotorInputs {
     pub stepper: StepperState,
 }
 
+impl MotorInputs {
+    /// A motor at rest, in the middle of its travel, where the encoder began to count.
+    pub const IDLE: Self = Self {
+        encoder_counts: 0,
+        home_switch: false,
+        far_switch: false,
+        driver_fault: false,
+        stepper: StepperState::IDLE,
+    };
+}
+
 /// What the board saw; read at the start of a control tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Inputs {
@@ -134,6 +147,23 @@ pub struct Inputs {
     /// An exposure that began while [`Outputs::listen`] was set, given once, in the first tick after its end. The
     /// latest one where several ended since the tick before.
     pub strobe: Option<StrobeEdges>,
+}
+
+impl Inputs {
+    /// A board on which nothing moves and nothing is wrong: what benches and counts begin from.
+    pub const fn idle(now: BoardMicros) -> Self {
+        Self {
+            now,
+            coarse: MotorInputs::IDLE,
+            lens: MotorInputs::IDLE,
+            gauge_code: Some(GAUGE_CODE_ZERO),
+            emergency_stop: false,
+            supply_low: false,
+            link_overflow: false,
+            exposure: None,
+            strobe: None,
+        }
+    }
 }
 
 /// STEP pulses of equal spacing. `pulses * period_ticks` is at most [`SEGMENT_MAX_TICKS`].
@@ -183,11 +213,11 @@ pub struct Outputs {
     pub coarse: MotorOutputs,
     /// Stage B's stepper.
     pub lens: MotorOutputs,
-    /// Give a trigger pulse of this length now, and capture its edges.
-    pub trigger: Option<Micros>,
     /// Measure exposures that come without a trigger: report each that begins from now on as [`Inputs::strobe`]. Not
     /// set together with `trigger`, nor while a triggered exposure is awaited.
     pub listen: bool,
+    /// Give a trigger pulse of this length now, and capture its edges.
+    pub trigger: Option<Micros>,
     /// Write this to the memory now.
     pub memory: Option<MemoryWrite>,
     /// Reset the microcontroller now; the answers have left.

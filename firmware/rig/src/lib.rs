@@ -1,24 +1,25 @@
 //! # farnear-rig
 //!
 //! What the board does, without its hardware: `no_std`, no allocator, time as an argument, so that all of it is
-//! tested on the host. [`Rig`] is the whole; [`io`] is its seam to a board binary, which calls
-//! [`Rig::tick`] 5000 times a second and moves bytes through [`Rig::receive`] and [`Rig::transmit`].
+//! tested on the host. [`Rig`] is the whole; [`io`] is its seam to the hardware, [`control`] the loop that carries
+//! inputs, outputs and bytes across it 5000 times a second. A board implements [`control::Board`] and nothing else.
 //!
 //! ```text
+//! control    a board's loop: read, decide, carry out, speak, feed the watchdog
 //! rig        a tick: what stops everything, what is remembered      identity, settings: who, and with what numbers
 //! |- session    bytes <-> requests and answers; acts once
-//! |- requests   what each is checked for and starts                 report: hello and status
+//! |- requests   what each is checked for and starts, no one left out    report: hello and status
 //! |- progress   how long work goes on and ends                      work: what is under way, on each axis or on all
 //! |- events     numbered; kept for whoever saw a gap
 //! |- alarms     latched, numbered, cleared one by one               silence: the host must stay in touch
 //! |- memory     records in two copies: their form, the writing, what is in them
-//! |- correction, sky    depth correction and the sun over the link (farnear-maths)
+//! |- correction, sun_query    depth correction and the sun over the link (farnear-maths)
 //! |- program    up to 64 shots: move, settle, expose, strobe
 //! |  '- camera     when it may be exposed, by whom, and what it answers
 //! |- calibrate  travel, backlash, the piezo's figures
 //! '- motion     both stages
 //!    |- stage      two steppers and the piezo, sensed and driven together
-//!    |- home, positioning, settle    the switch, a position, on target for a dwell time
+//!    |- home, leg, positioning, settling    the switch, a way to it, a position, on target for a dwell time
 //!    |- axis       feeds a step timer, counts, watches encoder, switches and driver
 //!    |  '- ramp, steps    jerk-limited segments; nanometres <-> pulses
 //!    '- piezo      input shaping, observer, state feedback on the strain gauge, the calibrated model
@@ -44,6 +45,7 @@ extern crate std;
 mod alarms;
 mod calibrate;
 mod camera;
+pub mod control;
 mod correction;
 pub mod events;
 pub mod gains;
@@ -62,7 +64,7 @@ pub mod session;
 pub mod settings;
 mod shaper;
 mod silence;
-mod sky;
+pub mod sun_query;
 mod work;
 
 pub use identity::{Identity, LastWords};

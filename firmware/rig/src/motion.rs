@@ -2,9 +2,10 @@
 
 pub(crate) mod axis;
 pub(crate) mod home;
+pub(crate) mod leg;
 pub(crate) mod positioning;
 mod ramp;
-pub(crate) mod settle;
+pub(crate) mod settling;
 pub(crate) mod stage;
 pub(crate) mod steps;
 

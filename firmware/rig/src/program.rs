@@ -10,12 +10,12 @@
 use farnear_protocol::message::{
     Axis, Failure, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode,
 };
-use farnear_protocol::{BoardMicros, Micros, Nanometres};
+use farnear_protocol::{BoardMicros, Micros, Nanometres, Settle};
 
 use crate::camera::{Camera, NoAnswer};
 use crate::io::ExposureEdges;
 use crate::motion::positioning::Positioning;
-use crate::motion::stage::{Stage, limits};
+use crate::motion::stage::Stage;
 use crate::settings::{SETTLE_DWELL_MAX, SETTLE_WINDOW_MAX, Settings};
 
 /// Shots a program may have.
@@ -55,7 +55,7 @@ impl Shots {
 
     /// Puts a shot back that the memory kept; one that the settings no longer allow is dropped.
     pub(crate) fn restore(&mut self, index: usize, shot: Shot, settings: &Settings) {
-        let (min, max) = limits(settings, shot.axis);
+        let (min, max) = settings.limits(shot.axis);
         if (min..=max).contains(&shot.target) {
             let _ = self.load(index as u8, shot, settings); // an index is below SHOTS_MAX
         }
@@ -278,6 +278,6 @@ impl Run {
 }
 
 fn approach(shot: &Shot, stage: &mut Stage, settings: &Settings, now: BoardMicros) -> Positioning {
-    let settled = (shot.settle_window, shot.settle_dwell);
-    Positioning::start(stage, settings, (shot.axis, shot.target), settled, now)
+    let settle = Settle { window: shot.settle_window, dwell: shot.settle_dwell };
+    Positioning::start(stage, settings, (shot.axis, shot.target), settle, now)
 }

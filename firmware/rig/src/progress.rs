@@ -1,17 +1,17 @@
 //! How long work goes on, tick by tick, and ends.
 
 use farnear_protocol::BoardMicros;
-use farnear_protocol::message::{Axis, EventKind, Failure, RecordName};
+use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, RecordName};
 
 use crate::calibrate::Step;
 use crate::program::Progress;
 use crate::rig::Rig;
-use crate::work::{AXES, AxisWork, WholeWork};
+use crate::work::{AxisWork, WholeWork};
 
 impl Rig {
     /// Takes all work one tick further.
     pub(crate) fn advance(&mut self, now: BoardMicros) {
-        for axis in AXES {
+        for axis in Axis::ALL {
             self.advance_axis(axis, now);
         }
         self.advance_whole(now);
@@ -87,23 +87,16 @@ impl Rig {
                     }
                 }
             }
-            WholeWork::Calibration(routine) => match routine.tick(&mut self.stage, &self.settings) {
-                Step::On => None,
-                Step::Set(key, value) => {
-                    match self.values.set(key, value) {
-                        Ok(()) => self.apply_settings(),
-                        Err(_) => {
-                            active.work = WholeWork::Ending { axis: None, reason: Failure::Implausible };
-                        }
+            WholeWork::Calibration(routine) => {
+                let step = routine.tick(&mut self.stage, &self.settings);
+                match self.take_step(step) {
+                    Ok(result) => result.map(|result| EventKind::Calibrated { request, result }),
+                    Err((axis, reason)) => {
+                        active.work = WholeWork::Ending { axis, reason };
+                        None
                     }
-                    None
                 }
-                Step::Done(result) => Some(EventKind::Calibrated { request, result }),
-                Step::Failed(axis, reason) => {
-                    active.work = WholeWork::Ending { axis: Some(axis), reason };
-                    None
-                }
-            },
+            }
             WholeWork::Ending { axis, reason } if self.stage.steppers_still() => {
                 Some(EventKind::Failed { request, axis: *axis, reason: *reason })
             }
@@ -116,6 +109,20 @@ impl Rig {
                 self.camera.give_up();
                 self.store.mark(RecordName::Counters); // triggers
             }
+        }
+    }
+
+    /// Takes over what a tick of a calibration brought: its result at the end, or why it cannot be done.
+    fn take_step(&mut self, step: Step) -> Result<Option<Calibration>, (Option<Axis>, Failure)> {
+        match step {
+            Step::On => Ok(None),
+            Step::Set(key, value) => {
+                self.values.set(key, value).map_err(|_| (None, Failure::Implausible))?;
+                self.apply_settings();
+                Ok(None)
+            }
+            Step::Done(result) => Ok(Some(result)),
+            Step::Failed(axis, reason) => Err((Some(axis), reason)),
         }
     }
 }

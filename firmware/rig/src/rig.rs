@@ -19,7 +19,7 @@ use crate::program::Shots;
 use crate::session::Session;
 use crate::settings::{Settings, Values};
 use crate::silence::{Silence, Verdict};
-use crate::work::{AXES, Works};
+use crate::work::Works;
 
 /// A reboot that was asked for.
 #[derive(Clone, Copy, Debug)]
@@ -157,7 +157,7 @@ impl Rig {
         if let Some(alarm) = cause {
             self.alarm(alarm, now);
         }
-        for axis in AXES {
+        for axis in Axis::ALL {
             if in_motion & bit(axis) != 0
                 && let Some(stepper) = self.stage.stepper_mut(axis)
             {
@@ -217,8 +217,8 @@ impl Rig {
             piezo_dac: 0,
             coarse: MotorOutputs::default(),
             lens: MotorOutputs::default(),
-            trigger: self.camera.take_order(),
             listen: self.camera.is_listening(),
+            trigger: self.camera.take_order(),
             memory: None,
             reset: self.reset_is_due(now),
         };
@@ -243,7 +243,7 @@ impl Rig {
 
     /// Looks for what must stop the rig in what the axes and the host do.
     fn watch(&mut self, now: BoardMicros) {
-        for axis in AXES {
+        for axis in Axis::ALL {
             let fault = self.stage.stepper_mut(axis).and_then(|stepper| stepper.take_fault());
             if let Some(alarm) = fault.and_then(|fault| alarms::of_fault(axis, fault)) {
                 self.alarm(alarm, now);
@@ -270,7 +270,7 @@ impl Rig {
         self.camera.give_up();
         let number = record.number;
         let own = alarms::as_failure(&alarm);
-        for axis in AXES {
+        for axis in Axis::ALL {
             let reason = own.filter(|(of, _)| *of == axis).map(|(_, reason)| reason);
             self.works.end(axis, reason.unwrap_or(Failure::Alarm { number }));
         }
@@ -283,7 +283,7 @@ impl Rig {
     /// Has the memory know which axes may be moving before they do.
     fn remember_motion(&mut self) {
         let mut in_motion = 0;
-        for axis in [Axis::SensorCoarse, Axis::Lens] {
+        for axis in Axis::ALL {
             if self.works.is_on(axis) || !self.stage.is_still(axis) {
                 in_motion |= bit(axis);
             }
@@ -292,7 +292,7 @@ impl Rig {
             self.in_motion = in_motion;
             self.store.mark(RecordName::Counters);
         }
-        for axis in [Axis::SensorCoarse, Axis::Lens] {
+        for axis in Axis::ALL {
             let known = !self.store.is_fitted() || self.in_motion_stored & bit(axis) != 0;
             if let Some(stepper) = self.stage.stepper_mut(axis) {
                 stepper.permit(known);
@@ -347,7 +347,7 @@ impl Rig {
     }
 }
 
-/// An axis' bit in the memory.
+/// A stepper axis' bit in the memory; the piezo's gauge is absolute, so its motion need not be remembered.
 const fn bit(axis: Axis) -> u8 {
     match axis {
         Axis::SensorCoarse => 1,

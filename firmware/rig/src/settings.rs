@@ -6,7 +6,8 @@
 
 mod table;
 
-use farnear_protocol::{Micros, Nanometres};
+use farnear_protocol::message::Axis;
+use farnear_protocol::{Micros, Nanometres, Settle};
 
 use crate::gains::{Gains, PiezoModel, Poles};
 use crate::io::TICK_US;
@@ -76,10 +77,8 @@ pub struct StepperSettings {
     pub approach_margin: Nanometres,
     /// Largest difference between counted steps and encoder.
     pub following: Nanometres,
-    /// Settle window of a plain move.
-    pub settle_window: Nanometres,
-    /// Settle dwell of a plain move.
-    pub settle_dwell: Micros,
+    /// When a plain move has settled.
+    pub settle: Settle,
     /// Time to settle after the last pulse, dwell not included.
     pub settle_deadline: Micros,
     /// From switching the driver on to the first pulse.
@@ -97,10 +96,8 @@ pub struct FineSettings {
     pub max: Nanometres,
     /// Input shaper and control gains.
     pub gains: Gains,
-    /// Settle window of a plain move.
-    pub settle_window: Nanometres,
-    /// Settle dwell of a plain move.
-    pub settle_dwell: Micros,
+    /// When a plain move has settled.
+    pub settle: Settle,
     /// Time to settle from the start of the move, dwell not included.
     pub settle_deadline: Micros,
     /// Longest time without a believable gauge reading.
@@ -183,9 +180,7 @@ const STEPPER: StepperSettings = StepperSettings {
     home_hysteresis: Nanometres(2_000),
     // A micro-switch opens up to 0.2 mm behind where it closes.
     home_zone: Nanometres(300_000),
-    // Encoder count and microstep leave 0.2 um; 1 um is what the coarse axis promises.
-    settle_window: Nanometres(1_000),
-    settle_dwell: Micros(2_000),
+    settle: Settle::of_move(Axis::SensorCoarse),
     settle_deadline: Micros(500_000),
     // The driver's charge pump and current regulation are up after a few milliseconds.
     enable_delay: Micros(10_000),
@@ -196,6 +191,24 @@ const STEPPER: StepperSettings = StepperSettings {
 impl Settings {
     /// The rig of `docs/rig.md`.
     pub const DEFAULT: Self = PARTS.with(&Values::DEFAULT);
+
+    /// Smallest and largest position of an axis.
+    pub const fn limits(&self, axis: Axis) -> (Nanometres, Nanometres) {
+        match axis {
+            Axis::SensorCoarse => (self.coarse.min, self.coarse.max),
+            Axis::SensorFine => (self.fine.min, self.fine.max),
+            Axis::Lens => (self.lens.min, self.lens.max),
+        }
+    }
+
+    /// When a plain move of an axis has settled.
+    pub const fn settle(&self, axis: Axis) -> Settle {
+        match axis {
+            Axis::SensorCoarse => self.coarse.settle,
+            Axis::SensorFine => self.fine.settle,
+            Axis::Lens => self.lens.settle,
+        }
+    }
 }
 
 /// The parts of `docs/rig.md`; what is 0 here comes from the settings.
@@ -224,9 +237,7 @@ const PARTS: Settings = Settings {
             // turns 3 nm of gauge noise into less than 10 nm of motion. The tests hold all three together.
             observer: Poles { hz: 500.0, damping: 1.0 },
         }),
-        // A quarter of the depth of focus budget; 16 times the gauge's noise.
-        settle_window: Nanometres(50),
-        settle_dwell: Micros(2_000),
+        settle: Settle::of_move(Axis::SensorFine),
         // A full-stroke step settles within 15 ms; 20 times that is broken.
         settle_deadline: Micros(300_000),
         // Five samples: single lost conversions are bridged by the observer.

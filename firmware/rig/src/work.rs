@@ -11,9 +11,6 @@ use crate::motion::home::Homing;
 use crate::motion::positioning::Positioning;
 use crate::program::Run;
 
-/// All axes, in the order of their places here.
-pub(crate) const AXES: [Axis; 3] = [Axis::SensorCoarse, Axis::SensorFine, Axis::Lens];
-
 /// Work and the request that began it.
 #[derive(Clone, Debug)]
 pub(crate) struct Active<W> {
@@ -50,13 +47,13 @@ pub(crate) enum WholeWork {
 /// Everything that is under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Works {
-    axes: [Option<Active<AxisWork>>; AXES.len()],
+    axes: [Option<Active<AxisWork>>; Axis::ALL.len()],
     pub(crate) whole: Option<Active<WholeWork>>,
 }
 
 impl Works {
     pub(crate) const fn new() -> Self {
-        Self { axes: [const { None }; AXES.len()], whole: None }
+        Self { axes: [const { None }; Axis::ALL.len()], whole: None }
     }
 
     /// The work of an axis alone.
@@ -72,7 +69,7 @@ impl Works {
 
     /// A request that is under way, if one is.
     pub(crate) fn any(&self) -> Option<u32> {
-        AXES.into_iter().find_map(|axis| self.request_on(axis))
+        Axis::ALL.into_iter().find_map(|axis| self.request_on(axis))
     }
 
     /// Whether an axis has work of its own.

@@ -1,25 +1,140 @@
-//! Faults of line, port and rig, from a TOML file.
+//! What goes wrong with line, port and rig, from a TOML file.
 //!
 //! ```toml
 //! bit_error_rate = 1e-4      # of each bit, in both directions
 //! garbage = [1, 255, 0, 66]  # the host hears this before anything else
 //! unplug_after_ms = 500      # virtual time after power-on; the port goes away
 //!
-//! [[happens]]                # in any number
+//! [[happens]]                # in any number and order
 //! after_ms = 1500            # virtual time after power-on
-//! what = "motor-stalls"      # see below
-//! stage = "lens"             # or "sensor", which is the default; where a stage is concerned
+//! what = "motor-stalls"      # a name of the table below
+//! stage = "lens"             # or "sensor", which is the default
 //! ```
 //!
-//! `what` is one of emergency-stop, emergency-stop-released, reset-button, power-loss, power-return, brown-out,
-//! supply-low, supply-normal, driver-fault, driver-fine, motor-stalls, motor-free, home-switch-dead, piezo-dead,
-//! firmware-hangs, and memory-bit-flips (with `address` and `bit`). See [`crate::hands::What`].
+//! | `what` | then | with |
+//! |---|---|---|
+//! | `emergency-stop` | somebody presses the emergency stop, or its wire breaks | |
+//! | `emergency-stop-released` | it is released | |
+//! | `reset-button` | somebody presses the reset button | |
+//! | `power-loss` | the power goes; the volatile memory forgets | |
+//! | `power-return` | the power comes back | |
+//! | `brown-out` | the supply dips so shortly that only the brown-out reset notices | |
+//! | `supply-low` | the supply sinks to 2.8 V, which the chip's detector sees | |
+//! | `supply-normal` | the supply is 3.3 V again | |
+//! | `driver-fault` | the motor's driver reports a fault on DIAG | `stage` |
+//! | `driver-fine` | it takes that back | `stage` |
+//! | `motor-stalls` | the motor is held fast | `stage` |
+//! | `motor-free` | it is free again | `stage` |
+//! | `home-switch-dead` | the home switch says for ever that it is open | `stage` |
+//! | `piezo-dead` | the chips of the piezo's amplifier no longer answer | |
+//! | `firmware-hangs` | a stray write stops the firmware's clock | |
+//! | `memory-bit-flips` | a bit of the FRAM flips | `address` (0 to 32767), `bit` (0 to 7) |
+//!
+//! A new kind is a constant in one of the files of this module (or in a new one), a line in [`KINDS`], and a row above.
 
-use std::path::Path;
+pub mod chips;
+mod line;
+pub mod motion;
+pub mod power;
 
-use serde::Deserialize;
+use std::{fmt, path::Path};
 
-use crate::{error::SimError, hands::Happening, plant::Noise};
+use rigless::chip::fram;
+use serde::{Deserialize, Deserializer, de};
+
+pub use self::line::NoisyLine;
+use crate::{access::RigAccess, error::SimError, plant::StageName};
+
+/// A kind of thing that may happen to a rig.
+#[derive(Clone, Copy)]
+pub struct Kind {
+    /// Its name in files.
+    pub name: &'static str,
+    /// Lets it happen.
+    pub happen: fn(&mut RigAccess<'_, '_>, &Happening),
+}
+
+/// All kinds.
+pub const KINDS: [Kind; 16] = [
+    motion::EMERGENCY_STOP,
+    motion::EMERGENCY_STOP_RELEASED,
+    power::RESET_BUTTON,
+    power::POWER_LOSS,
+    power::POWER_RETURN,
+    power::BROWN_OUT,
+    power::SUPPLY_LOW,
+    power::SUPPLY_NORMAL,
+    motion::DRIVER_FAULT,
+    motion::DRIVER_FINE,
+    motion::MOTOR_STALLS,
+    motion::MOTOR_FREE,
+    motion::HOME_SWITCH_DEAD,
+    chips::PIEZO_DEAD,
+    power::FIRMWARE_HANGS,
+    chips::MEMORY_BIT_FLIPS,
+];
+
+impl PartialEq for Kind {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl<'de> Deserialize<'de> for Kind {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(from)?;
+        KINDS.into_iter().find(|kind| kind.name == name).ok_or_else(|| {
+            let names = KINDS.map(|kind| kind.name).join(", ");
+            de::Error::custom(format!("what = {name:?} is unknown, expected one of {names}"))
+        })
+    }
+}
+
+/// Something that happens, and to what.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Happening {
+    /// When, in milliseconds of virtual time after power-on.
+    pub after_ms: u64,
+    /// What.
+    pub what: Kind,
+    /// The stage concerned, if one is.
+    #[serde(default = "sensor")]
+    pub stage: StageName,
+    /// The address of the memory concerned, if one is.
+    #[serde(default)]
+    pub address: u16,
+    /// The bit there, 0 to 7.
+    #[serde(default)]
+    pub bit: u8,
+}
+
+fn sensor() -> StageName {
+    StageName::Sensor
+}
+
+impl Happening {
+    /// Lets it happen.
+    pub fn happen(&self, rig: &mut RigAccess<'_, '_>) {
+        (self.what.happen)(rig, self);
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if usize::from(self.address) >= fram::SIZE {
+            return Err(format!("address = {} is not in the memory, 0 to {}", self.address, fram::SIZE - 1));
+        }
+        if self.bit > 7 {
+            return Err(format!("bit = {} is not a bit of a byte, 0 to 7", self.bit));
+        }
+        Ok(())
+    }
+}
 
 /// What goes wrong.
 #[derive(Clone, PartialEq, Debug, Default, Deserialize)]
@@ -39,100 +154,55 @@ impl Faults {
     /// Reads the file.
     ///
     /// # Errors
-    /// [`SimError::Faults`] where it cannot be read, is no such TOML, or a rate is no probability.
+    /// [`SimError::Faults`] where it cannot be read, is not such TOML, or a value is out of its range.
     pub fn read(path: &Path) -> Result<Self, SimError> {
         let wrong = |reason: String| SimError::Faults { path: path.into(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
-        let faults: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        Self::parse(&text).map_err(wrong)
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let faults: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         if !(0.0..=1.0).contains(&faults.bit_error_rate) {
-            return Err(wrong(format!("bit_error_rate = {} is not in 0..1", faults.bit_error_rate)));
+            return Err(format!("bit_error_rate = {} is not in 0..1", faults.bit_error_rate));
         }
+        faults.happens.iter().try_for_each(Happening::check)?;
         Ok(faults)
-    }
-}
-
-/// One direction of a line that flips bits.
-#[derive(Clone, Debug)]
-pub struct NoisyLine {
-    rate: f64,
-    noise: Noise,
-    /// Bits until the next one that is flipped.
-    gap: u64,
-    flipped: u64,
-}
-
-impl NoisyLine {
-    /// A line with this rate; `direction` names its stream of random numbers.
-    pub fn new(rate: f64, seed: u64, direction: &str) -> Self {
-        let mut line = Self { rate, noise: Noise::new(seed, direction), gap: 0, flipped: 0 };
-        line.gap = line.draw();
-        line
-    }
-
-    /// Length of the run of good bits: geometric.
-    fn draw(&mut self) -> u64 {
-        if self.rate <= 0.0 {
-            return u64::MAX;
-        }
-        let good = libm::log(1.0 - self.noise.uniform()) / libm::log1p(-self.rate);
-        // A float too large for the integer saturates, which is what is meant.
-        if good.is_finite() { good as u64 } else { 0 }
-    }
-
-    /// Carries bytes over the line.
-    pub fn carry(&mut self, bytes: &mut [u8]) {
-        for byte in bytes {
-            for bit in 0..8 {
-                if self.gap == 0 {
-                    *byte ^= 1 << bit;
-                    self.flipped += 1;
-                    self.gap = self.draw();
-                } else {
-                    self.gap -= 1;
-                }
-            }
-        }
-    }
-
-    /// Bits flipped so far.
-    pub fn flipped(&self) -> u64 {
-        self.flipped
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{hands::What, plant::StageName};
 
-    #[test]
-    fn flips_its_share_of_bits() {
-        let mut line = NoisyLine::new(1e-3, 1, "test");
-        let mut bytes = vec![0u8; 1_000_000];
-        line.carry(&mut bytes);
-        let ones: u32 = bytes.iter().map(|byte| byte.count_ones()).sum();
-        assert_eq!(u64::from(ones), line.flipped());
-        // Poisson with mean 8000: five standard deviations.
-        assert!((f64::from(ones) - 8000.0).abs() < 450.0, "{ones}");
-        let mut clean = NoisyLine::new(0.0, 1, "test");
-        let mut bytes = *b"unchanged";
-        clean.carry(&mut bytes);
-        assert_eq!(&bytes, b"unchanged");
+    fn refused(text: &str, expected: &str) {
+        let reason = Faults::parse(text).expect_err(text);
+        assert!(reason.contains(expected), "{reason}");
     }
 
     #[test]
-    fn refuses_a_rate_that_is_none() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("faults.toml");
-        std::fs::write(&path, "bit_error_rate = 2.0").expect("can write");
-        let error = Faults::read(&path).expect_err("2 is no probability");
-        assert!(error.to_string().contains("bit_error_rate = 2"), "{error}");
-        std::fs::write(&path, "[[happens]]\nafter_ms = 7\nwhat = \"motor-stalls\"\nstage = \"lens\"")
-            .expect("can write");
-        let happens = Faults::read(&path).expect("a good file").happens;
-        assert_eq!((happens[0].after_ms, happens[0].what), (7, What::MotorStalls));
+    fn a_file_is_read_and_mistakes_are_named() {
+        let text = "[[happens]]\nafter_ms = 7\nwhat = \"motor-stalls\"\nstage = \"lens\"";
+        let happens = Faults::parse(text).expect("a good file").happens;
+        assert_eq!((happens[0].after_ms, happens[0].what), (7, motion::MOTOR_STALLS));
         assert_eq!(happens[0].stage, StageName::Lens);
-        std::fs::write(&path, "bit_eror_rate = 0.1").expect("can write");
-        assert!(Faults::read(&path).expect_err("misspelt").to_string().contains("bit_eror_rate"));
+        refused("bit_error_rate = 2.0", "bit_error_rate = 2");
+        refused("bit_eror_rate = 0.1", "bit_eror_rate");
+        let happens = |rest| format!("[[happens]]\nafter_ms = 7\nwhat = {rest}");
+        refused(
+            &happens("\"motor-stals\""),
+            "what = \"motor-stals\" is unknown, expected one of emergency-stop, ",
+        );
+        refused(&happens("\"memory-bit-flips\"\nbit = 99"), "bit = 99");
+        refused(&happens("\"memory-bit-flips\"\naddress = 32768"), "address = 32768");
+    }
+
+    #[test]
+    fn the_table_above_has_every_kind_once() {
+        let rows = include_str!("faults.rs")
+            .lines()
+            .filter_map(|line| line.strip_prefix("//! | `")?.split('`').next());
+        let told: Vec<&str> = rows.skip(1).collect();
+        assert_eq!(told, KINDS.map(|kind| kind.name));
     }
 }

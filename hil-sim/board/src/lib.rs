@@ -4,41 +4,47 @@
 //! two motorised stages, a piezo, encoders, end switches and a camera. What the firmware measures, it measures through the
 //! registers it uses on the real board; what is really there is in [`plant`], and only tests may look.
 //!
-//! - [`rig`]: the emulated rig in this process, for tests.
-//! - [`run`](mod@run): the program: a pty and a camera endpoint for any client.
+//! - [`rig`]: the emulated rig in this process, for tests; [`config`], [`command`], [`report`]: what it is made of, what
+//!   it can be asked and what it answers.
+//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client.
 //! - [`board`], [`chips`], [`memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
-//! - [`camera`], [`eye`]: when the camera exposes, and what it sees.
-//! - [`driver`], [`lockstep`]: when virtual time passes.
+//! - [`camera`], [`imager`]: when the camera exposes, and its images.
+//! - [`driver`]: what happens whenever the emulator stops; [`pacing`], [`lockstep`]: when virtual time passes.
 //! - [`mod@count`]: instructions of the on-board routines.
-//! - [`hands`], [`faults`], [`trace`]: what can be done to a rig, what can be broken, and what can be watched.
+//! - [`faults`]: what can be broken, from a file; [`access`]: the same from a test; [`trace`]: what can be watched.
 //!
 //! # Time
 //! Virtual time is counted in nanoseconds and has nothing to do with the clock on the wall. In lockstep it
 //! passes only while the board owes the host something, so the same requests give the same bytes on any
 //! machine, as long as the host asks while time stands (a request sent during a move arrives when it arrives).
 
+pub mod access;
 pub mod board;
 pub mod camera;
 pub mod chips;
+pub mod command;
+pub mod config;
 pub mod count;
 pub mod driver;
 pub mod endpoint;
 pub mod error;
-pub mod eye;
 pub mod faults;
 pub mod firmware;
-pub mod hands;
+pub mod imager;
 pub mod lockstep;
 pub mod memory;
+pub mod pacing;
 pub mod plant;
 pub mod port;
+pub mod report;
 pub mod rig;
 pub mod run;
 pub mod serial;
 pub mod trace;
 pub mod wiring;
 
-pub use driver::{Pace, Report, StageReport};
+pub use access::RigAccess;
+pub use config::{Pace, RigConfig};
 pub use error::SimError;
-pub use hands::Hands;
-pub use rig::{EmulatedRig, RigConfig};
+pub use report::{Report, StageReport};
+pub use rig::EmulatedRig;

@@ -66,6 +66,44 @@ enum Work {
     Reset,
 }
 
+impl Work {
+    /// Each request by its name and none in passing: time would stand still for a new one that begins long work.
+    fn of(request: &Request) -> Self {
+        match request {
+            Request::Home { .. }
+            | Request::Move { .. }
+            | Request::RunProgram { .. }
+            | Request::Calibrate { .. } => Self::Long,
+            Request::ResumeProgram => Self::Resume,
+            Request::Reboot => Self::Reset,
+            Request::Hello
+            | Request::Status
+            | Request::Stop
+            | Request::Halt
+            | Request::LoadShot { .. }
+            | Request::ArmProgram { .. }
+            | Request::PauseProgram
+            | Request::ReadEvent { .. }
+            | Request::ReadAlarm { .. }
+            | Request::ClearAlarm { .. }
+            | Request::ReadSetting { .. }
+            | Request::WriteSetting { .. }
+            | Request::ReadCounters
+            | Request::Sun(_)
+            | Request::OpenCorrection(_)
+            | Request::LoadCorrection
+            | Request::StoreCorrection
+            | Request::PutCoefficients { .. }
+            | Request::GetCoefficients { .. }
+            | Request::FitSamples { .. }
+            | Request::SolveFit
+            | Request::PutRow { .. }
+            | Request::CorrectRow { .. }
+            | Request::GetRow { .. } => Self::Done,
+        }
+    }
+}
+
 impl Lockstep {
     /// A board that has just got power.
     pub fn new() -> Self {
@@ -78,17 +116,8 @@ impl Lockstep {
         for byte in bytes {
             let Some(Ok(packet)) = self.to_board.push(*byte) else { continue };
             if packet.header.kind == Kind::Request {
-                let work = match packet.message::<Request>() {
-                    Some(
-                        Request::Home { .. }
-                        | Request::Move { .. }
-                        | Request::RunProgram { .. }
-                        | Request::Calibrate { .. },
-                    ) => Work::Long,
-                    Some(Request::ResumeProgram) => Work::Resume,
-                    Some(Request::Reboot) => Work::Reset,
-                    _ => Work::Done,
-                };
+                // What is not a request of this version is only refused.
+                let work = packet.message().map_or(Work::Done, |request| Work::of(&request));
                 let asked = Asked { work, until_ns: now_ns + ANSWER_NS, body: packet.body.to_vec() };
                 self.asked.insert(packet.header.id, asked);
             }

@@ -10,22 +10,8 @@ use std::{
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
-use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene};
-use farnear_sim::{Pace, RigConfig, eye::Eye, faults::Faults, run::ServedRig};
-
-/// The lens of Li 2014, chapter 4: 933 to 887 mm through 50 mm at f/3.9.
-const OPTICS: &str = "
-[lens]
-focal_length_mm = 50.0
-aperture_mm = 12.8
-[sensor]
-pixel_um = 7.4
-[focus]
-far_mm = 933.0
-max_blur_px = 2.703
-";
-/// Size of the camera's image.
-const SIZE_PX: (usize, usize) = (640, 480);
+use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, standard};
+use farnear_sim::{Pace, RigConfig, faults::Faults, imager::Imager, run::ServedRig};
 
 /// The farnear rig without hardware: the real firmware on an emulated board.
 #[derive(Parser)]
@@ -54,25 +40,25 @@ enum Job {
 #[derive(Args)]
 struct Run {
     /// What stands before the camera: plane:MM, staircase, slant, cone or sphere.
-    #[arg(long, default_value = "staircase")]
+    #[arg(long, default_value = standard::SCENE)]
     scene: Scene,
     /// The lens' blur: pillbox, gaussian:k=K or generalised:p=P,k=K.
-    #[arg(long, default_value = "gaussian:k=0.4578")]
+    #[arg(long, default_value_t = standard::PSF)]
     psf: Psf,
     /// optics.toml of the rig; without it a 50 mm lens with its far focus at 933 mm.
     #[arg(long, value_name = "FILE")]
     optics: Option<PathBuf>,
     /// The camera's noise and bits: none, 8bit or 12bit.
-    #[arg(long, default_value = "8bit")]
+    #[arg(long, default_value_t = standard::NOISE)]
     noise: Noise,
     /// Decides everything random.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = standard::SEED)]
     seed: u64,
     /// The firmware; without it the one that lies beside this program.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
     /// TOML file with faults: bit_error_rate, garbage, unplug_after_ms, and [[happens]] tables (after_ms, what, stage), e.g.
-    /// what = "emergency-stop", "power-loss" or "motor-stalls".
+    /// what = "emergency-stop", "power-loss" or "motor-stalls"; a wrong one is answered with all of them.
     #[arg(long, value_name = "FILE")]
     faults: Option<PathBuf>,
     /// Let the board's time follow the wall clock, for a person who watches; without it time passes only while
@@ -114,11 +100,11 @@ fn serve(run: &Run) -> Result<()> {
                 std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
             OpticsFile::parse(&text).with_context(|| path.display().to_string())?
         }
-        None => OpticsFile::parse(OPTICS)?,
+        None => OpticsFile::parse(standard::OPTICS)?,
     };
     let lens = Lens::from_optics(&optics)?;
-    let camera = Camera::new(SIZE_PX.0, SIZE_PX.1, run.noise);
-    let eye = Eye::new(&run.scene, &lens, &run.psf, camera, run.seed)?;
+    let camera = Camera::new(standard::SIZE_PX.0, standard::SIZE_PX.1, run.noise);
+    let imager = Imager::new(&run.scene, &lens, &run.psf, camera, run.seed)?;
     let config = RigConfig {
         firmware: run.firmware.clone(),
         seed: run.seed,
@@ -126,7 +112,7 @@ fn serve(run: &Run) -> Result<()> {
         pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
         trace: run.trace.clone(),
     };
-    let rig = ServedRig::start(&config, eye)?;
+    let rig = ServedRig::start(&config, imager)?;
     ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
     let stop = rig.stopper();
     if stdin_is_a_pipe() {

@@ -1,11 +1,10 @@
 //! The emulated rig in this process: the firmware on its board, the plant around it, and the time they run in.
 //!
 //! The emulator runs on a thread of its own and is asked through a channel; what a call asks for has happened
-//! when it returns. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] let time pass; in [`Pace::Lockstep`]
-//! and [`Pace::Realtime`] it also passes by itself.
+//! when it returns. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] let time pass; in [`crate::Pace::Lockstep`]
+//! and [`crate::Pace::Realtime`] it also passes by itself.
 
 use std::{
-    path::PathBuf,
     sync::mpsc::{self, Receiver, Sender},
     thread::JoinHandle,
 };
@@ -19,50 +18,22 @@ use rigless::{
 };
 
 use crate::{
+    access::RigAccess,
     board::RigBoard,
     camera::Camera,
     chips::SharedPlant,
-    driver::{Command, Driver, Pace, Report},
+    command::{Command, Outlets},
+    config::RigConfig,
+    driver::Driver,
     error::SimError,
-    faults::Faults,
     firmware,
-    hands::Hands,
     lockstep::BOOT_NS,
     plant::Plant,
+    report::Report,
     serial::Line,
     trace::Trace,
     wiring::{Shot, Wiring},
 };
-
-/// What an emulated rig is made of.
-#[derive(Clone, Debug)]
-pub struct RigConfig {
-    /// The firmware's ELF; `None` looks beside the program and the tests ([`firmware::find`]).
-    pub firmware: Option<PathBuf>,
-    /// Decides everything random: the mechanics' errors, noise, jitter, the unique id, the line's faults.
-    pub seed: u64,
-    /// Faults of the line.
-    pub faults: Faults,
-    /// How time passes.
-    pub pace: Pace,
-    /// Where to write what the plant really did, as CSV.
-    pub trace: Option<PathBuf>,
-}
-
-impl Default for RigConfig {
-    /// Seed 1, no faults, time only when told.
-    fn default() -> Self {
-        Self { firmware: None, seed: 1, faults: Faults::default(), pace: Pace::Told, trace: None }
-    }
-}
-
-/// Where bytes and exposures go that come out of the rig.
-pub struct Outlets {
-    /// Bytes for the host, as the line delivers them; dropped when the port goes away.
-    pub bytes: Option<Sender<Vec<u8>>>,
-    /// Exposures, when they end.
-    pub shots: Sender<Shot>,
-}
 
 /// A running emulated rig; ends when dropped.
 pub struct EmulatedRig {
@@ -117,15 +88,15 @@ impl EmulatedRig {
         self.advance_us(0)
     }
 
-    /// Reaches into the rig: breaks something, presses the reset button.
+    /// Does something with the rig between two instructions: breaks something, presses the reset button.
     ///
     /// # Errors
     /// [`SimError::Stopped`].
-    pub fn reach_in(
+    pub fn access(
         &mut self,
-        work: impl FnOnce(&mut Hands<'_, '_>) + Send + 'static,
+        work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
     ) -> Result<(), SimError> {
-        self.commands.send(Command::ReachIn(Box::new(work))).map_err(|_| SimError::Stopped)
+        self.commands.send(Command::Access(Box::new(work))).map_err(|_| SimError::Stopped)
     }
 
     fn ask(&mut self, command: impl FnOnce(Sender<Report>) -> Command) -> Result<Report, SimError> {

@@ -9,12 +9,13 @@ use std::{
 use farnear_protocol::camera::Control;
 
 use crate::{
-    driver::Command,
+    command::{Command, Outlets},
+    config::RigConfig,
     endpoint,
     error::SimError,
-    eye::Eye,
+    imager::Imager,
     port,
-    rig::{Outlets, RigConfig, launch},
+    rig::launch,
 };
 
 /// A rig that clients can open.
@@ -32,12 +33,12 @@ impl ServedRig {
     ///
     /// # Errors
     /// [`SimError`].
-    pub fn start(config: &RigConfig, eye: Eye) -> Result<Self, SimError> {
+    pub fn start(config: &RigConfig, imager: Imager) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
         let (commands, thread) = launch(config, Outlets { bytes: Some(bytes_out), shots: shots_out })?;
         let (frames_out, frames) = mpsc::channel();
-        eye.watch(shots, frames_out)?;
+        imager.watch(shots, frames_out)?;
         let control = commands.clone();
         let camera = endpoint::open(frames, move |asked| {
             let command = match asked {
@@ -45,11 +46,11 @@ impl ServedRig {
                 Control::AdvanceMicros(micros) => {
                     Command::Advance { nanos: micros.saturating_mul(1000), done: mpsc::channel().0 }
                 }
-                Control::Expose { shot_id, exposure } => Command::Camera(Box::new(move |hands| {
-                    hands.expose(u64::from(exposure.0), shot_id);
+                Control::Expose { shot_id, exposure } => Command::Camera(Box::new(move |rig| {
+                    rig.expose(u64::from(exposure.0), shot_id);
                 })),
-                Control::FreeRun { period, exposure } => Command::Camera(Box::new(move |hands| {
-                    hands.run_camera_freely(u64::from(period.0), u64::from(exposure.0));
+                Control::FreeRun { period, exposure } => Command::Camera(Box::new(move |rig| {
+                    rig.run_camera_freely(u64::from(period.0), u64::from(exposure.0));
                 })),
             };
             let _ = control.send(command); // the rig may have ended

@@ -65,7 +65,7 @@ pub enum CameraError {
     },
     /// A number that makes no camera.
     #[error("camera: {name} = {value}, expected {expected}")]
-    Senseless {
+    Unusable {
         /// Which number.
         name: &'static str,
         /// Its value.
@@ -145,15 +145,15 @@ impl Camera {
                 max_px: Self::MAX_SIDE_PX,
             });
         }
-        let senseless = |name, value, expected| Err(CameraError::Senseless { name, value, expected });
+        let unusable = |name, value, expected| Err(CameraError::Unusable { name, value, expected });
         if !(self.full_well_e >= 1.0 && self.full_well_e <= 1e9) {
-            return senseless("full_well_e", self.full_well_e, "1 to 1e9 electrons");
+            return unusable("full_well_e", self.full_well_e, "1 to 1e9 electrons");
         }
         if !(self.exposure_level > 0.0 && self.exposure_level <= 100.0) {
-            return senseless("exposure_level", self.exposure_level, "a fraction of the full well above 0");
+            return unusable("exposure_level", self.exposure_level, "a fraction of the full well above 0");
         }
         if !(self.read_noise_e >= 0.0 && self.read_noise_e <= 1e9) {
-            return senseless("read_noise_e", self.read_noise_e, "0 to 1e9 electrons");
+            return unusable("read_noise_e", self.read_noise_e, "0 to 1e9 electrons");
         }
         Ok(())
     }

@@ -8,12 +8,7 @@
 use thiserror::Error;
 
 use crate::optics::OpticsFile;
-
-/// Image distance of an object at `object_mm`, mm (thin lens).
-#[must_use]
-pub fn image_distance_mm(focal_length_mm: f64, object_mm: f64) -> f64 {
-    1.0 / (1.0 / focal_length_mm - 1.0 / object_mm)
-}
+pub use crate::thin_lens::image_distance_mm;
 
 /// A telecentric lens before a sensor, with its two focus settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +47,7 @@ pub enum LensError {
     },
     /// A number of the lens is not finite and above zero, or near is not nearer than far.
     #[error("lens: {what} = {value}, expected {expected}")]
-    Senseless {
+    Unusable {
         /// Which number.
         what: &'static str,
         /// Its value.
@@ -66,7 +61,7 @@ impl Lens {
     /// The lens that an `optics.toml` describes, without distortion.
     ///
     /// # Errors
-    /// [`LensError::Senseless`] for numbers that [`OpticsFile::parse`] would have refused.
+    /// [`LensError::Unusable`] for numbers that [`OpticsFile::parse`] would have refused.
     pub fn from_optics(optics: &OpticsFile) -> Result<Self, LensError> {
         let positive = [
             ("focal_length_mm", optics.focal_length_mm),
@@ -75,13 +70,13 @@ impl Lens {
         ];
         for (what, value) in positive {
             if !(value.is_finite() && value > 0.0) {
-                return Err(LensError::Senseless { what, value, expected: "a finite number above 0" });
+                return Err(LensError::Unusable { what, value, expected: "a finite number above 0" });
             }
         }
         let focal_length_mm = optics.focal_length_mm;
         if !(optics.near_mm > focal_length_mm && optics.near_mm < optics.far_mm && optics.far_mm.is_finite())
         {
-            return Err(LensError::Senseless {
+            return Err(LensError::Unusable {
                 what: "near_mm",
                 value: optics.near_mm,
                 expected: "a distance between the focal length and far_mm",

@@ -20,18 +20,9 @@
 //! arguments and the seed: no clock, no thread count, no CPU feature enters.
 //!
 //! ```
-//! use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, render, truth};
+//! use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, render, standard, truth};
 //!
-//! let optics = OpticsFile::parse("
-//!     [lens]
-//!     focal_length_mm = 50.0
-//!     aperture_mm = 12.8
-//!     [sensor]
-//!     pixel_um = 7.4
-//!     [focus]
-//!     far_mm = 933.0
-//!     max_blur_px = 2.703
-//! ")?;
+//! let optics = OpticsFile::parse(standard::OPTICS)?;
 //! let lens = Lens::from_optics(&optics)?;
 //! let scene: Scene = "plane:900".parse()?;
 //! let psf: Psf = "gaussian:k=0.4578".parse()?;
@@ -54,9 +45,12 @@ pub mod psf;
 mod quadrature;
 mod render;
 pub mod scene;
+mod scene_error;
 mod scene_file;
 mod scene_text;
+pub mod standard;
 pub mod texture;
+mod thin_lens;
 
 pub use camera::{Camera, CameraError, Noise};
 pub use lens::{EllipticalDistortion, Lens, LensError};
@@ -64,6 +58,7 @@ pub use maps::{HeightMap, Picture};
 pub use optics::{OpticsError, OpticsFile};
 pub use psf::{Psf, PsfError};
 pub use render::{RenderError, Renderer, render, render_f32, truth};
-pub use scene::{Scene, SceneError, Shape};
+pub use scene::{Scene, Shape};
+pub use scene_error::SceneError;
 pub use scene_file::SceneFile;
 pub use texture::Texture;

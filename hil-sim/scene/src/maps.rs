@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::scene::SceneError;
+use crate::scene_error::SceneError;
 
 /// A height field: depths in mm, rows from the top, of any size.
 #[derive(Debug, Clone, PartialEq)]

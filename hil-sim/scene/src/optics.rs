@@ -7,8 +7,8 @@
 use serde::Deserialize;
 use thiserror::Error;
 
-use crate::lens::image_distance_mm;
 use crate::psf::{Psf, PsfError};
+use crate::thin_lens::image_distance_mm;
 
 /// Largest relative disagreement of two values that follow from each other.
 const AGREEMENT: f64 = 0.02;
@@ -33,28 +33,37 @@ pub struct OpticsFile {
 }
 
 /// Why an `optics.toml` was refused.
+///
+/// The messages are word for word those of the depth estimation's own reader, which a test of that crate holds them to:
+/// two readers, so that a wrong formula in one shows against the other, but one language for the user.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum OpticsError {
     /// Not TOML, or a key is missing, unknown or of the wrong type.
-    #[error("optics: {0}")]
+    #[error("{0}")]
     Syntax(String),
     /// A length that must be a finite number above zero is not.
-    #[error("optics: {key} = {value}, expected a finite number above 0")]
+    #[error("[{section}] {name} = {value}: must be a positive, finite number{unit}")]
     NotPositive {
-        /// Key in the file.
-        key: &'static str,
+        /// Section of the file.
+        section: &'static str,
+        /// Key in the section.
+        name: &'static str,
         /// What the file says.
         value: f64,
+        /// Its unit as the message ends, such as ` of mm`.
+        unit: &'static str,
     },
     /// Neither `aperture_mm` nor `f_number`.
-    #[error("optics: [lens] needs aperture_mm or f_number")]
+    #[error("[lens] needs aperture_mm or f_number")]
     NoAperture,
     /// `aperture_mm` and `f_number` contradict each other.
     #[error(
-        "optics: aperture_mm = {aperture_mm} and f_number = {f_number} disagree by more than 2 %: that aperture \
-         has f_number = {implied}"
+        "[lens] aperture_mm = {aperture_mm} and f_number = {f_number} disagree: with focal_length_mm = \
+         {focal_length_mm} that aperture is f_number = {implied:.5}; give one of them"
     )]
     ApertureDisagreement {
+        /// `focal_length_mm` in the file.
+        focal_length_mm: f64,
         /// `aperture_mm` in the file.
         aperture_mm: f64,
         /// `f_number` in the file.
@@ -64,19 +73,20 @@ pub enum OpticsError {
     },
     /// An object inside the focal length has no image.
     #[error(
-        "optics: {key} = {distance_mm} mm is not beyond the focal length of {focal_length_mm} mm, so it has no \
-         image; give the distance from the lens"
+        "[focus] {name} = {distance_mm} is not beyond the focal length of {focal_length_mm} mm: no real image forms"
     )]
     InsideFocalLength {
-        /// Key in the file.
-        key: &'static str,
+        /// Key in `[focus]`.
+        name: &'static str,
         /// The object distance, mm.
         distance_mm: f64,
         /// The focal length, mm.
         focal_length_mm: f64,
     },
     /// Near focus is not nearer than far focus.
-    #[error("optics: near_mm = {near_mm} is not below far_mm = {far_mm}; are the two swapped?")]
+    #[error(
+        "[focus] near_mm = {near_mm} is not nearer than far_mm = {far_mm}: the near focus must be the smaller distance"
+    )]
     NearBeyondFar {
         /// Near focus, mm.
         near_mm: f64,
@@ -84,25 +94,27 @@ pub enum OpticsError {
         far_mm: f64,
     },
     /// Neither `max_blur_px` nor `near_mm`.
-    #[error("optics: [focus] needs max_blur_px or near_mm beside far_mm")]
+    #[error("[focus] needs max_blur_px or near_mm")]
     NoRange,
     /// `max_blur_px` and `near_mm` contradict each other.
     #[error(
-        "optics: max_blur_px = {given_px} and near_mm = {near_mm} disagree by more than 2 %: that near focus gives \
-         max_blur_px = {implied_px:.4}, that blur gives near_mm = {implied_near_mm:.3}"
+        "[focus] max_blur_px = {given_px} and near_mm = {near_mm} disagree by {percent:.1} % (2 % allowed): \
+         near_mm = {implied_near_mm:.2} would agree with that blur, max_blur_px = {implied_px:.4} with that distance"
     )]
     Disagreement {
         /// `max_blur_px` in the file.
         given_px: f64,
         /// `near_mm` in the file.
         near_mm: f64,
+        /// Relative difference of the blur radii in percent.
+        percent: f64,
         /// The blur that `near_mm` implies, px.
         implied_px: f64,
         /// The near focus that `max_blur_px` implies, mm.
         implied_near_mm: f64,
     },
     /// `[psf]` is not a PSF.
-    #[error("optics: [psf]: {0}")]
+    #[error("[psf] {0}")]
     Psf(#[from] PsfError),
 }
 
@@ -116,76 +128,120 @@ impl OpticsFile {
     pub fn parse(text: &str) -> Result<Self, OpticsError> {
         let raw: RawFile =
             toml::from_str(text).map_err(|error| OpticsError::Syntax(error.to_string().trim_end().into()))?;
-        let focal_length_mm = positive("lens.focal_length_mm", raw.lens.focal_length_mm)?;
-        let aperture_mm = match (raw.lens.aperture_mm, raw.lens.f_number) {
-            (Some(aperture_mm), None) => positive("lens.aperture_mm", aperture_mm)?,
-            (None, Some(f_number)) => focal_length_mm / positive("lens.f_number", f_number)?,
-            (None, None) => return Err(OpticsError::NoAperture),
-            (Some(aperture_mm), Some(f_number)) => {
-                positive("lens.f_number", f_number)?;
-                let implied = focal_length_mm / positive("lens.aperture_mm", aperture_mm)?;
-                if (f_number - implied).abs() > AGREEMENT * implied {
-                    return Err(OpticsError::ApertureDisagreement { aperture_mm, f_number, implied });
-                }
-                focal_length_mm / f_number
-            }
-        };
-        let pixel_um = positive("sensor.pixel_um", raw.sensor.pixel_um)?;
-        let far_mm = positive("focus.far_mm", raw.focus.far_mm)?;
-        beyond_focal_length("focus.far_mm", far_mm, focal_length_mm)?;
-
-        let sensor_far_mm = image_distance_mm(focal_length_mm, far_mm);
-        let travel_per_blur_mm = 2.0 * (focal_length_mm / aperture_mm) * pixel_um * 1e-3;
-        let near_of = |blur_px: f64| {
-            let sensor_near_mm = sensor_far_mm + travel_per_blur_mm * blur_px;
-            1.0 / (1.0 / focal_length_mm - 1.0 / sensor_near_mm)
-        };
-        let (near_mm, max_blur_px) = match (raw.focus.near_mm, raw.focus.max_blur_px) {
-            (None, None) => return Err(OpticsError::NoRange),
-            (None, Some(blur_px)) => {
-                let blur_px = positive("focus.max_blur_px", blur_px)?;
-                (near_of(blur_px), blur_px)
-            }
-            (Some(near_mm), given_px) => {
-                positive("focus.near_mm", near_mm)?;
-                beyond_focal_length("focus.near_mm", near_mm, focal_length_mm)?;
-                if near_mm >= far_mm {
-                    return Err(OpticsError::NearBeyondFar { near_mm, far_mm });
-                }
-                let implied_px =
-                    (image_distance_mm(focal_length_mm, near_mm) - sensor_far_mm) / travel_per_blur_mm;
-                match given_px {
-                    None => (near_mm, implied_px),
-                    Some(given_px) => {
-                        positive("focus.max_blur_px", given_px)?;
-                        let implied_near_mm = near_of(given_px);
-                        if (given_px - implied_px).abs() > AGREEMENT * implied_px {
-                            return Err(OpticsError::Disagreement {
-                                given_px,
-                                near_mm,
-                                implied_px,
-                                implied_near_mm,
-                            });
-                        }
-                        (implied_near_mm, given_px)
-                    }
-                }
-            }
-        };
+        let focal_length_mm = positive("lens", "focal_length_mm", raw.lens.focal_length_mm, " of mm")?;
+        let aperture_mm = raw.lens.aperture(focal_length_mm)?;
+        let pixel_um = positive("sensor", "pixel_um", raw.sensor.pixel_um, " of um")?;
+        let far_mm = positive("focus", "far_mm", raw.focus.far_mm, " of mm")?;
+        beyond_focal_length("far_mm", far_mm, focal_length_mm)?;
         let psf = raw.psf.map(|psf| Psf::from_parts(&psf.model, psf.p, psf.k)).transpose()?;
+        let f_number = focal_length_mm / aperture_mm;
+        let travel = Travel {
+            focal_length_mm,
+            sensor_far_mm: image_distance_mm(focal_length_mm, far_mm),
+            per_blur_mm: 2.0 * f_number * pixel_um * 1e-3,
+        };
+        let (near_mm, max_blur_px) = raw.focus.range(&travel)?;
         Ok(Self { focal_length_mm, aperture_mm, pixel_um, far_mm, near_mm, max_blur_px, psf })
     }
 }
 
-fn positive(key: &'static str, value: f64) -> Result<f64, OpticsError> {
-    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(OpticsError::NotPositive { key, value }) }
+/// How the sensor travels from far to near focus.
+struct Travel {
+    focal_length_mm: f64,
+    sensor_far_mm: f64,
+    /// Travel for each px of the largest blur.
+    per_blur_mm: f64,
 }
 
-fn beyond_focal_length(key: &'static str, distance_mm: f64, focal_length_mm: f64) -> Result<(), OpticsError> {
+impl Travel {
+    fn near_mm(&self, blur_px: f64) -> f64 {
+        let sensor_near_mm = self.sensor_far_mm + self.per_blur_mm * blur_px;
+        1.0 / (1.0 / self.focal_length_mm - 1.0 / sensor_near_mm)
+    }
+
+    fn blur_px(&self, near_mm: f64) -> f64 {
+        (image_distance_mm(self.focal_length_mm, near_mm) - self.sensor_far_mm) / self.per_blur_mm
+    }
+}
+
+impl RawLens {
+    /// Diameter of the aperture, mm.
+    fn aperture(&self, focal_length_mm: f64) -> Result<f64, OpticsError> {
+        let given = self.aperture_mm.map(|a| positive("lens", "aperture_mm", a, " of mm")).transpose()?;
+        let f_number = self.f_number.map(|f| positive("lens", "f_number", f, "")).transpose()?;
+        match (given, f_number) {
+            (None, None) => Err(OpticsError::NoAperture),
+            (Some(aperture_mm), None) => Ok(aperture_mm),
+            (None, Some(f_number)) => Ok(focal_length_mm / f_number),
+            (Some(aperture_mm), Some(f_number)) => {
+                let implied = focal_length_mm / aperture_mm;
+                if (f_number - implied).abs() > AGREEMENT * implied {
+                    return Err(OpticsError::ApertureDisagreement {
+                        focal_length_mm,
+                        aperture_mm,
+                        f_number,
+                        implied,
+                    });
+                }
+                Ok(focal_length_mm / f_number)
+            }
+        }
+    }
+}
+
+impl RawFocus {
+    /// Near focus in mm and largest blur in px.
+    fn range(&self, travel: &Travel) -> Result<(f64, f64), OpticsError> {
+        let given_px = self.max_blur_px.map(|r| positive("focus", "max_blur_px", r, " of px")).transpose()?;
+        let near_mm = self.near_mm.map(|u| positive("focus", "near_mm", u, " of mm")).transpose()?;
+        let Some(near_mm) = near_mm else {
+            let blur_px = given_px.ok_or(OpticsError::NoRange)?;
+            return Ok((travel.near_mm(blur_px), blur_px));
+        };
+        beyond_focal_length("near_mm", near_mm, travel.focal_length_mm)?;
+        if near_mm >= self.far_mm {
+            return Err(OpticsError::NearBeyondFar { near_mm, far_mm: self.far_mm });
+        }
+        let implied_px = travel.blur_px(near_mm);
+        let Some(given_px) = given_px else { return Ok((near_mm, implied_px)) };
+        let implied_near_mm = travel.near_mm(given_px);
+        let difference = (given_px - implied_px).abs() / implied_px;
+        if difference > AGREEMENT {
+            let percent = 100.0 * difference;
+            return Err(OpticsError::Disagreement {
+                given_px,
+                near_mm,
+                percent,
+                implied_px,
+                implied_near_mm,
+            });
+        }
+        Ok((implied_near_mm, given_px))
+    }
+}
+
+fn positive(
+    section: &'static str,
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+) -> Result<f64, OpticsError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(OpticsError::NotPositive { section, name, value, unit })
+    }
+}
+
+fn beyond_focal_length(
+    name: &'static str,
+    distance_mm: f64,
+    focal_length_mm: f64,
+) -> Result<(), OpticsError> {
     if distance_mm > focal_length_mm {
         Ok(())
     } else {
-        Err(OpticsError::InsideFocalLength { key, distance_mm, focal_length_mm })
+        Err(OpticsError::InsideFocalLength { name, distance_mm, focal_length_mm })
     }
 }
 
@@ -280,12 +336,12 @@ mod tests {
     #[test]
     fn senseless_optics_are_refused_by_name() {
         let cases = [
-            ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 940.0", "swapped"),
-            ("f_number = 0.0", "far_mm = 933.0\nmax_blur_px = 2.7", "lens.f_number = 0"),
-            ("aperture_mm = -1.0", "far_mm = 933.0\nmax_blur_px = 2.7", "lens.aperture_mm = -1"),
+            ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 940.0", "not nearer than far_mm = 933"),
+            ("f_number = 0.0", "far_mm = 933.0\nmax_blur_px = 2.7", "f_number = 0"),
+            ("aperture_mm = -1.0", "far_mm = 933.0\nmax_blur_px = 2.7", "aperture_mm = -1"),
             ("aperture_mm = 12.8", "far_mm = 50.0\nmax_blur_px = 2.7", "focal length of 50"),
-            ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 12.0", "focus.near_mm = 12"),
-            ("aperture_mm = 12.8", "far_mm = nan\nmax_blur_px = 2.7", "focus.far_mm = NaN"),
+            ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 12.0", "near_mm = 12"),
+            ("aperture_mm = 12.8", "far_mm = nan\nmax_blur_px = 2.7", "far_mm = NaN"),
             ("aperture_mm = 12.8", "far_mm = 933.0", "max_blur_px or near_mm"),
             ("", "far_mm = 933.0\nmax_blur_px = 2.7", "aperture_mm or f_number"),
             ("aperture_mm = 12.8\nf_number = 4.0", "far_mm = 933.0\nmax_blur_px = 2.7", "f_number = 3.90625"),

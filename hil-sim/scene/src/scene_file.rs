@@ -11,7 +11,8 @@ use ndarray::Array2;
 use serde::Deserialize;
 
 use crate::maps::{HeightMap, Picture};
-use crate::scene::{Scene, SceneError, Shape};
+use crate::scene::{Scene, Shape};
+use crate::scene_error::SceneError;
 use crate::texture::Texture;
 
 /// A parsed scene file.

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::scene::{Scene, SceneError, Shape};
+use crate::scene::{Scene, Shape};
+use crate::scene_error::SceneError;
 use crate::texture::Texture;
 
 /// Levels of a staircase that does not say how many.

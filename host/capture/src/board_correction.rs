@@ -3,17 +3,15 @@
 //!
 //! Rows travel in pieces of [`CODES_MAX`] codes. A row of 640 pixels takes 19 requests, some 25 ms on the serial line.
 
-use farnear_depth::corrections::{BoardCorrection, CorrectionError, Method};
+use farnear_depth::corrections::{BoardCorrection, BoardForm, CorrectionError, Method};
 use farnear_maths::clsf::{DepthScale, Frame};
-use farnear_protocol::message::{
-    CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionForm, CorrectionInfo,
+use farnear_protocol::{
+    Request, Response,
+    message::{CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionForm, CorrectionInfo},
 };
-use farnear_protocol::{Request, Response};
 use ndarray::{Array2, ArrayView2};
 
-use crate::client::Client;
-use crate::error::ClientError;
-use crate::owner::nonsense;
+use crate::{client::Client, error::ClientError, owner::nonsense};
 
 /// The board could not correct.
 #[derive(Debug, thiserror::Error)]
@@ -64,11 +62,10 @@ pub struct CodedTarget {
 }
 
 fn info(method: Method, frame: Frame, scale: DepthScale) -> Result<CorrectionInfo, CorrectionError> {
-    let form = match method {
-        Method::Clsf => CorrectionForm::Regions,
-        Method::ClsfBlend => CorrectionForm::Blend,
-        Method::ClsfFull => CorrectionForm::Full,
-        Method::Cdc | Method::TwoStep => return Err(CorrectionError::NotOnBoard(method)),
+    let form = match method.board_form().ok_or(CorrectionError::NotOnBoard(method))? {
+        BoardForm::Regions => CorrectionForm::Regions,
+        BoardForm::Blend => CorrectionForm::Blend,
+        BoardForm::Full => CorrectionForm::Full,
     };
     let micrometres = |mm: f32| (f64::from(mm) * 1e3).round() as i32;
     Ok(CorrectionInfo {
@@ -96,7 +93,7 @@ impl Client {
     /// # Errors
     /// [`BoardCorrectionError`].
     pub fn send_correction(&self, correction: &BoardCorrection) -> Result<(), BoardCorrectionError> {
-        let BoardCorrection { method, frame, scale, coefficients } = correction;
+        let BoardCorrection { method, frame, scale, coefficients, .. } = correction;
         let during = "sending a depth correction";
         let open = Request::OpenCorrection(info(*method, *frame, *scale)?);
         self.expect_accepted(&open, during)?;

@@ -1,10 +1,11 @@
 //! Cameras: what gives an image for a trigger of the board. One file per kind.
 
-use std::path::PathBuf;
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 
-use farnear_protocol::message::{ShotRecord, TriggerMode};
-use farnear_protocol::units::Micros;
+use farnear_protocol::{
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
 use ndarray::Array2;
 
 pub mod folder;
@@ -43,7 +44,7 @@ pub trait Camera {
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
     /// No camera answers at the address.
-    #[error("no camera at {address}: {reason}; is `farnear-sim` running, and is this its `camera` address?")]
+    #[error("no camera at {address}: {reason}; does a simulator run, and is this its camera's address?")]
     Connect {
         /// The address.
         address: String,

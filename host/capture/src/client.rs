@@ -6,20 +6,28 @@
 //! request gives [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`] says that this is understood,
 //! for the rig may have lost its position. See `docs/protocol.md`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::{
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{Sender, channel, sync_channel},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::message::{Hello, Status};
-use farnear_protocol::{Request, Response};
+use farnear_protocol::{
+    Request, Response,
+    message::{Hello, Status},
+};
 
-use crate::error::ClientError;
-use crate::owner::{Command, Connect, Listener, Owner, Session, nonsense};
-use crate::stream::{LogPart, News, Stream};
-use crate::timing::Timing;
-use crate::transport::{SerialTransport, Transport};
+use crate::{
+    error::ClientError,
+    log_stream::LogStream,
+    owner::{Command, Connect, Listener, Owner, Session, nonsense},
+    timing::Timing,
+    transport::{SerialTransport, Transport},
+};
 
 /// From one attempt to reach a board that restarts to the next.
 const NEXT_ATTEMPT: Duration = Duration::from_millis(50);
@@ -51,28 +59,27 @@ impl Drop for Port {
 
 impl Client {
     /// Opens a serial port and says hello. Once the board was there, the port is opened again whenever it comes back.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
     pub fn open(port: &str) -> Result<Self, ClientError> {
-        Self::start(serial(port), port, false)
+        Self::connect(serial(port), port)
     }
 
     /// As [`Client::open`], where the board is known to be emulated: hello is asked as patiently as all else, so
     /// that a slow computer does not ask it twice, which would make the run another one.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
         Self::start(serial(port), port, true)
     }
 
-    /// Says hello over any transport, which is not opened again. `port` is its name in messages.
-    pub fn connect(transport: Box<dyn Transport>, port: &str) -> Result<Self, ClientError> {
-        let mut only = Some(transport);
-        let name = port.to_owned();
-        let connect = move || {
-            only.take().ok_or_else(|| crate::PortError::Absent { port: name.clone(), present: Vec::new() })
-        };
-        Self::start(Box::new(connect), port, false)
-    }
-
-    /// Says hello over what `connect` opens, the first time and whenever the line broke.
-    pub fn connect_by(connect: Connect, port: &str) -> Result<Self, ClientError> {
+    /// Says hello over what `connect` opens, the first time and whenever the line broke. `port` is its name in messages.
+    ///
+    /// # Errors
+    /// [`ClientError`] where nothing can be opened, nobody answers, or no protocol version is shared.
+    pub fn connect(connect: Connect, port: &str) -> Result<Self, ClientError> {
         Self::start(connect, port, false)
     }
 
@@ -136,7 +143,7 @@ impl Client {
         (theirs != ours).then(|| {
             format!(
                 "the board's firmware is version {theirs}, this program {ours}; they speak the same protocol, but consider \
-                 flashing the firmware that belongs to it (`cargo xtask firmware`)"
+                 flashing the firmware that belongs to it"
             )
         })
     }
@@ -214,22 +221,12 @@ impl Client {
         }
     }
 
-    /// The board's events from now on, those after a reset or an unplugging too.
-    ///
-    /// # Errors
-    /// [`ClientError::Gone`] where the port's owner has ended.
-    pub fn events(&self) -> Result<Stream<News>, ClientError> {
-        let (sender, stream) = Stream::new();
-        self.command(Command::Events(sender), "listening")?;
-        Ok(stream)
-    }
-
     /// The board's log from now on: pieces of its defmt stream, to be decoded with the firmware's ELF file.
     ///
     /// # Errors
     /// [`ClientError::Gone`] where the port's owner has ended.
-    pub fn logs(&self) -> Result<Stream<LogPart>, ClientError> {
-        let (sender, stream) = Stream::new();
+    pub fn logs(&self) -> Result<LogStream, ClientError> {
+        let (sender, stream) = LogStream::new();
         self.command(Command::Logs(sender), "listening")?;
         Ok(stream)
     }

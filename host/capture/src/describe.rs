@@ -3,10 +3,10 @@
 mod alarm;
 mod refusal;
 
-use farnear_protocol::message::{
-    Axis, PositionState, ProgramState, RecordName, ResetCause, Routine, TriggerMode,
+use farnear_protocol::{
+    message::{Axis, PositionState, ProgramState, RecordName, ResetCause, Routine, TriggerMode},
+    units::Nanometres,
 };
-use farnear_protocol::units::Nanometres;
 
 pub use alarm::{alarm_text, failure_text};
 pub use refusal::refusal_text;

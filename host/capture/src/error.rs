@@ -1,10 +1,11 @@
 //! What can go wrong between this program and the rig, each with what was seen and what to do.
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-use farnear_protocol::RequestError;
-use farnear_protocol::message::{AlarmRecord, Axis, Failure, ResetCause};
+use farnear_protocol::{
+    RequestError,
+    message::{AlarmRecord, Axis, Failure, ResetCause},
+};
 
 use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
 
@@ -67,7 +68,7 @@ pub enum ClientError {
     /// The port broke off: unplugged, or the program behind it ended.
     #[error(
         "port {port} went away while {during}; plug the board in again and check its cable ({source}); what was moving is \
-         stopped by the board's own deadline for this program's silence"
+         stopped by the board's keep-alive timeout"
     )]
     Gone {
         /// The port.
@@ -80,7 +81,7 @@ pub enum ClientError {
     /// No answer came in time, however often it was asked.
     #[error(
         "no answer from {port} while {during}: asked {attempts} times within {waited:?}{}",
-        silence_hint(*bad_frames, *bytes)
+        what_came(*bad_frames, *bytes)
     )]
     Silent {
         /// The port.
@@ -99,7 +100,7 @@ pub enum ClientError {
     /// Board and host share no protocol version.
     #[error(
         "the board speaks protocol {board_min} to {board_current}, this program {host_min} to {host_current}; {}",
-        if board_min > host_current { "use a newer farnear" } else { "flash the firmware that belongs to this farnear (`cargo xtask firmware`)" }
+        if board_min > host_current { "use a newer farnear" } else { "flash the firmware that belongs to this farnear" }
     )]
     Version {
         /// Oldest version of the board.
@@ -215,7 +216,7 @@ pub enum ClientError {
     },
 }
 
-fn silence_hint(bad_frames: u64, bytes: u64) -> String {
+fn what_came(bad_frames: u64, bytes: u64) -> String {
     match (bad_frames, bytes) {
         (_, 0) => "; nothing at all came: is it the right port, and is the board powered?".into(),
         (0, bytes) => format!("; {bytes} bytes came, but no frame: is it the right port?"),

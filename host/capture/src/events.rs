@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use farnear_protocol::Event;
-use farnear_protocol::frame::Packet;
-use farnear_protocol::message::{EventKind, Status};
+use farnear_protocol::{
+    Event,
+    frame::Packet,
+    message::{EventKind, Status},
+};
 
 use crate::error::ClientError;
 
@@ -43,10 +45,10 @@ impl Events {
         Ok(())
     }
 
-    pub(crate) fn pop(&mut self) -> Option<(u32, Event)> {
+    pub(crate) fn pop(&mut self) -> Option<Event> {
         let event = self.arrived.remove(&self.due)?;
         self.due += 1;
-        Some((self.due - 1, event))
+        Some(event)
     }
 }
 

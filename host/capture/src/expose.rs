@@ -2,13 +2,17 @@
 
 use std::time::{Duration, Instant};
 
-use farnear_protocol::message::{EventKind, Limits, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::Micros;
+use farnear_protocol::{
+    message::{EventKind, Limits, Shot, ShotRecord, TriggerMode, sensor_distance_nm},
+    units::Micros,
+};
 
-use crate::camera::{Camera, CameraError, Image};
-use crate::client::Client;
-use crate::error::ClientError;
-use crate::plan::PlanError;
+use crate::{
+    camera::{Camera, CameraError, Image},
+    client::Client,
+    error::ClientError,
+    plan::PlanError,
+};
 
 /// Longest single wait for an image, so that an interruption by the user is seen soon.
 const SLICE: Duration = Duration::from_millis(200);
@@ -123,8 +127,7 @@ fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), CaptureError> {
 
 /// Sensor distance from the lens' principal plane at an exposure, by encoders and gauge, in mm.
 pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
-    let parts = [limits.datum, record.coarse, record.fine, record.lens];
-    parts.iter().map(|part| f64::from(part.0)).sum::<f64>() / 1e6
+    sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
 }
 
 fn wait_for_image(

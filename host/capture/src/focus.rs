@@ -11,18 +11,26 @@ mod model;
 
 use std::time::Duration;
 
-use farnear_depth::focus_measure::{FocusError, FocusMeasure, peak};
-use farnear_depth::optics::Optics;
-use farnear_depth::psf::Psf;
-use farnear_protocol::message::{Axis, Limits, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::{Micros, Nanometres};
+use farnear_depth::{
+    focus_measure::{FocusError, FocusMeasure, peak},
+    optics::Optics,
+    psf::Psf,
+};
+use farnear_protocol::{
+    Settle,
+    message::{Axis, Limits, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
 use ndarray::{Array2, s};
 
-use crate::camera::{Camera, Image};
-use crate::client::Client;
-use crate::describe::um;
-use crate::error::ClientError;
-use crate::expose::{CaptureError, expose};
+use crate::{
+    camera::{Camera, Image},
+    client::Client,
+    describe::um,
+    error::ClientError,
+    expose::{CaptureError, expose},
+    ready::base_nm,
+};
 use model::{Spectrum, estimate};
 
 /// Places of the stepper before the search is given up.
@@ -34,12 +42,6 @@ const FINE_STEPS: i32 = 4;
 const FINE_STEP_NM: i32 = 14_000;
 /// The fine sweep may run out of the peak so often.
 const SWEEPS_MAX: usize = 3;
-/// Where the piezo stands for an image of the search.
-const SETTLE: (Nanometres, Micros) = (Nanometres(500), Micros(1_000));
-/// And in the sweep: 100 nm are a twentieth of the accuracy that is promised.
-const SETTLE_FINE: (Nanometres, Micros) = (Nanometres(100), Micros(1_000));
-/// And the stepper.
-const SETTLE_COARSE: (Nanometres, Micros) = (Nanometres(2_000), Micros(1_000));
 
 /// How focus is sought.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -155,7 +157,7 @@ pub fn find_focus(
         optics,
         settings,
         limits,
-        base_nm: i64::from(limits.datum.0) + i64::from(status.lens.measured.0),
+        base_nm: base_nm(client, &status),
         coarse: status.coarse.measured,
         fine: status.fine.measured,
         exposures: 0,
@@ -213,14 +215,21 @@ impl Search<'_> {
         FocusSearchError::NotFound { range_mm, start_mm: self.mm(start), last_mm: self.mm(last) }
     }
 
-    fn shot(
-        &self,
-        axis: Axis,
-        target: Nanometres,
-        (settle_window, settle_dwell): (Nanometres, Micros),
-    ) -> Shot {
-        let (exposure, mode) = (self.settings.exposure, TriggerMode::Hardware);
-        Shot { axis, target, exposure, settle_window, settle_dwell, repeat: 1, mode }
+    fn shot(&self, axis: Axis, target: i32, settle: Settle) -> Shot {
+        Shot {
+            axis,
+            target: Nanometres(target),
+            exposure: self.settings.exposure,
+            settle_window: settle.window,
+            settle_dwell: settle.dwell,
+            repeat: 1,
+            mode: TriggerMode::Hardware,
+        }
+    }
+
+    /// A shot of the search: roughly where it was sent is enough.
+    fn look(&self, axis: Axis, target: i32) -> Shot {
+        self.shot(axis, target, Settle::of_search(axis))
     }
 
     /// Takes the shots and gives each with the part of its image that counts.
@@ -245,15 +254,15 @@ impl Search<'_> {
         let mut goal = None;
         for place in 1..=PLACES_MAX {
             let mut shots = Vec::new();
-            let (low, high) = (self.limits.fine_min, self.limits.fine_max);
+            let (low, high) = (self.limits.fine_min.0, self.limits.fine_max.0);
             let from_below = self.fine.0 <= self.middle();
             let (first, last) = if from_below { (low, high) } else { (high, low) };
             match goal {
-                None => shots.push(self.shot(Axis::SensorFine, first, SETTLE)),
-                Some(goal) => shots.push(self.shot(Axis::SensorCoarse, goal, SETTLE_COARSE)),
+                None => shots.push(self.look(Axis::SensorFine, first)),
+                Some(goal) => shots.push(self.look(Axis::SensorCoarse, goal)),
             }
-            shots.push(self.shot(Axis::SensorFine, Nanometres(self.middle()), SETTLE));
-            shots.push(self.shot(Axis::SensorFine, last, SETTLE));
+            shots.push(self.look(Axis::SensorFine, self.middle()));
+            shots.push(self.look(Axis::SensorFine, last));
             let spectra: Vec<Spectrum> = self
                 .take(&shots)?
                 .iter()
@@ -274,7 +283,7 @@ impl Search<'_> {
             }
             let wanted = around - f64::from(self.middle());
             let (min, max) = (f64::from(self.limits.coarse_min.0), f64::from(self.limits.coarse_max.0));
-            let next = Nanometres(wanted.clamp(min, max) as i32);
+            let next = wanted.clamp(min, max) as i32;
             if goal == Some(next) {
                 return Err(self.not_found(start));
             }
@@ -315,10 +324,8 @@ impl Search<'_> {
                 um(Nanometres(middle - reach)),
                 um(Nanometres(middle + reach))
             ));
-            let shots: Vec<Shot> = targets
-                .iter()
-                .map(|target| self.shot(Axis::SensorFine, Nanometres(*target), SETTLE_FINE))
-                .collect();
+            let (axis, settle) = (Axis::SensorFine, Settle::of_sweep(Axis::SensorFine));
+            let shots: Vec<Shot> = targets.iter().map(|target| self.shot(axis, *target, settle)).collect();
             let mut samples = Vec::new();
             for (record, image) in self.take(&shots)? {
                 let place = f64::from(record.coarse.0) + f64::from(record.fine.0);

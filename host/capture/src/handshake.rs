@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use farnear_protocol::frame::{Kind, Packet};
-use farnear_protocol::message::{Hello, SCHEMA_KEY};
-use farnear_protocol::{PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response};
+use farnear_protocol::{
+    PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response,
+    frame::{Kind, Packet},
+    message::{Hello, SCHEMA_KEY},
+};
 
-use crate::error::ClientError;
-use crate::link::Link;
-use crate::timing::Timing;
+use crate::{error::ClientError, link::Link, timing::Timing};
 
 /// How often hello is asked, the wait doubling each time from [`Timing::REAL`]'s: 3 s altogether. The board
 /// may still be starting, and whether it is an emulated one is not known yet.

@@ -2,8 +2,8 @@
 //!
 //! Talks to the rig and takes pictures with it; blocking, no async runtime.
 //!
-//! - [`transport`], [`client`], [`work`], [`stream`]: the serial port, handles of the board behind it, long work with its
-//!   end, and the board's events and log.
+//! - [`transport`], [`client`], [`work`], [`log_stream`]: the serial port, handles of the board behind it, long work with
+//!   its end, and the board's log.
 //! - [`camera`]: where images come from.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, where the axes go for a pair, taking it, and the folder it is kept in.
 //! - [`expose`], [`focus`], [`sequence`]: programs with a camera: finding the focus, focus stacks, programs from a file.
@@ -11,13 +11,26 @@
 //! - [`timing`]: how long the host waits, and why.
 //! - [`error`], [`describe`]: what can go wrong, in words.
 //!
-//! ```no_run
-//! use farnear_capture::Client;
-//! use farnear_protocol::message::Axis;
+//! A handle of a board behind a serial port comes from [`Client::open`]; here a scripted board stands at the other end of
+//! the line.
 //!
-//! let rig = Client::open("/dev/ttyACM0")?;
+//! ```
+//! use farnear_capture::{Client, ClientError};
+//! use farnear_protocol::{Nanometres, message::Axis};
+//! use farnear_scripted_board::{Faults, Peer};
+//!
+//! let board = Peer::new(Faults::default());
+//! let rig = Client::connect(board.connect(), "scripted")?;
+//!
+//! // Nothing but the piezo moves before homing, and the refusal says why.
+//! let refused = rig.move_to(Axis::SensorCoarse, Nanometres(5_800_000));
+//! assert!(matches!(refused, Err(ClientError::Refused { .. })));
+//!
 //! rig.home(Axis::SensorCoarse)?;
-//! # Ok::<(), farnear_capture::ClientError>(())
+//! let moved = rig.move_to(Axis::SensorCoarse, Nanometres(5_800_000))?;
+//! // The encoder says where the screw has come to; the piezo makes up for the rest.
+//! assert_eq!(moved.measured, Nanometres(5_800_375));
+//! # Ok::<(), ClientError>(())
 //! ```
 
 pub mod board_correction;
@@ -30,6 +43,7 @@ pub mod expose;
 pub mod focus;
 mod handshake;
 mod link;
+pub mod log_stream;
 mod owner;
 pub mod pair;
 pub mod plan;
@@ -37,15 +51,14 @@ pub mod ready;
 pub mod record;
 mod requests;
 pub mod sequence;
-pub mod stream;
 pub mod timing;
 pub mod transport;
 pub mod work;
 
 pub use client::Client;
 pub use error::{ClientError, PortError};
+pub use log_stream::{LogPart, LogStream};
 pub use owner::Connect;
-pub use stream::{LogPart, News, Stream};
 pub use timing::Timing;
 pub use transport::{SerialTransport, Transport};
 pub use work::{Step, Work};

@@ -2,19 +2,22 @@
 //!
 //! Knows no session: which boot and version a request carries, and what an event means, is the caller's.
 
-use std::io::{self, ErrorKind};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::{
+    io::{self, ErrorKind},
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::Request;
-use farnear_protocol::frame::{Decoder, Header, Kind, Packet, encode};
+use farnear_protocol::{
+    Request,
+    frame::{Decoder, Header, Kind, Packet, encode},
+};
 
-use crate::error::ClientError;
-use crate::transport::Transport;
+use crate::{error::ClientError, transport::Transport};
 
-/// Silence on the line that tells that nothing older is still under way.
+/// Quiet on the line that tells that nothing older is still under way.
 const QUIET: Duration = Duration::from_millis(5);
-/// Longest time to wait for that silence.
+/// Longest time to wait for that quiet.
 const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 /// Shortest time allowed for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
@@ -126,7 +129,7 @@ impl Link {
         }
     }
 
-    /// Reads until the line is silent, so that no answer meant for an earlier program is taken for ours.
+    /// Reads until the line is quiet, so that no answer meant for an earlier program is taken for ours.
     pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
         self.transport.discard_input().map_err(|source| self.gone(source, during))?;
         let until = Instant::now() + QUIET_AT_MOST;

@@ -5,23 +5,31 @@
 //! after a reset or an unplugging. A new hello begins a new *session*: what belongs to the old one, a handle or running
 //! work, gets an error and has to decide for itself, because the rig may have lost its position.
 
-use std::collections::BTreeMap;
-use std::io;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::{
+    collections::BTreeMap,
+    io,
+    sync::{
+        Arc, Mutex, PoisonError, Weak,
+        mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender},
+    },
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::frame::{Kind, Packet};
-use farnear_protocol::message::{EventKind, Hello, ResetCause, Status};
-use farnear_protocol::{Event, Log, Request, RequestError, Response};
+use farnear_protocol::{
+    Log, Request, RequestError, Response,
+    frame::{Kind, Packet},
+    message::{EventKind, Hello, ResetCause, Status},
+};
 
-use crate::error::{ClientError, PortError};
-use crate::events::{Events, is_under_way, request_of};
-use crate::handshake::shake_hands;
-use crate::link::Link;
-use crate::stream::{Audience, LogPart, News};
-use crate::timing::Timing;
-use crate::transport::Transport;
+use crate::{
+    error::{ClientError, PortError},
+    events::{Events, is_under_way, request_of},
+    handshake::shake_hands,
+    link::Link,
+    log_stream::{LogPart, Readers},
+    timing::Timing,
+    transport::Transport,
+};
 
 /// Opens the line to the board, the first time and after it broke.
 pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Send>;
@@ -93,7 +101,6 @@ pub(crate) enum Command {
         known: u32,
         answer: SyncSender<Result<Session, ClientError>>,
     },
-    Events(SyncSender<News>),
     Logs(SyncSender<LogPart>),
 }
 
@@ -110,8 +117,7 @@ pub(crate) struct Owner {
     next_attempt: Instant,
     events: Events,
     works: BTreeMap<u32, Listener>,
-    news: Audience<News>,
-    logs: Audience<LogPart>,
+    logs: Readers,
     next_log: Option<u32>,
     still_there: bool,
     last_heard: Instant,
@@ -143,8 +149,7 @@ impl Owner {
             next_attempt: now,
             events,
             works: BTreeMap::new(),
-            news: Audience::default(),
-            logs: Audience::default(),
+            logs: Readers::default(),
             next_log: None,
             still_there: false,
             last_heard: now,
@@ -160,7 +165,7 @@ impl Owner {
     /// Works until the last handle has gone.
     pub(crate) fn run(mut self) {
         loop {
-            let awaited = !self.works.is_empty() || !self.news.is_empty() || !self.logs.is_empty();
+            let awaited = !self.works.is_empty() || !self.logs.is_empty();
             match self.inbox.recv_timeout(if awaited { ALERT } else { IDLE }) {
                 Ok(command) => self.obey(command),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -190,7 +195,6 @@ impl Owner {
                 let result = self.join(known);
                 let _ = answer.send(result);
             }
-            Command::Events(sender) => self.news.add(sender),
             Command::Logs(sender) => self.logs.add(sender),
         }
     }
@@ -276,7 +280,6 @@ impl Owner {
         for (_, work) in std::mem::take(&mut self.works) {
             let _ = work.notes.send(Note::Broken(broken.clone()));
         }
-        self.news.tell(&News::Broken(error.clone()));
         self.events.arrived.clear();
         self.still_there = false;
         // A board that was reset is there; one that was unplugged takes a while.
@@ -334,9 +337,7 @@ impl Owner {
         self.events = Events { boot: hello.boot, ..Events::default() };
         self.next_log = None;
         self.session.hello = Arc::new(hello);
-        self.join_events()?;
-        self.news.tell(&News::Joined(Arc::clone(&self.session.hello)));
-        Ok(())
+        self.join_events()
     }
 
     /// Events count from now on.
@@ -384,8 +385,8 @@ impl Owner {
     /// Gives the events out that are due, fetches those that got lost, and answers the board's question.
     fn give_out(&mut self) {
         while self.broken.is_none() {
-            if let Some((number, event)) = self.events.pop() {
-                self.deliver(number, event);
+            if let Some(event) = self.events.pop() {
+                self.deliver(&event.kind);
             } else if !self.events.arrived.is_empty() {
                 self.fetch_due_event();
             } else if std::mem::take(&mut self.still_there) {
@@ -397,8 +398,7 @@ impl Owner {
         }
     }
 
-    fn deliver(&mut self, number: u32, event: Event) {
-        let kind = &event.kind;
+    fn deliver(&mut self, kind: &EventKind) {
         match request_of(kind) {
             Some((request, ends)) => {
                 if let Some(work) = self.works.get(&request) {
@@ -420,7 +420,6 @@ impl Owner {
             }
             None => {}
         }
-        self.news.tell(&News::Event { number, event });
     }
 
     /// Asks the board for the due event, which did not arrive by itself.
@@ -436,8 +435,6 @@ impl Owner {
                 for (_, work) in std::mem::take(&mut self.works) {
                     let _ = work.notes.send(Note::EventsLost { from: number, to });
                 }
-                let during = "listening".into();
-                self.news.tell(&News::Broken(ClientError::EventsLost { during, from: number, to }));
             }
             // Nobody answers: pass over the event, so that the rest is given out. The session's end is known already.
             Ok(_) | Err(_) => self.events.due += 1,

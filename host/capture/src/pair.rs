@@ -2,16 +2,21 @@
 
 use std::time::Duration;
 
-use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::{Micros, Nanometres};
+use farnear_protocol::{
+    Settle,
+    message::{Axis, Shot, ShotRecord, TriggerMode},
+    units::Micros,
+};
 
-use crate::camera::{Camera, Image};
-use crate::client::Client;
-use crate::describe::um;
-use crate::expose::{expose, sensor_mm};
-use crate::plan::{SensorPair, coarse_for, fine_for};
-use crate::ready::{base_nm, base_when_homed_nm, ensure_homed};
-use crate::work::Moved;
+use crate::{
+    camera::{Camera, Image},
+    client::Client,
+    describe::um,
+    expose::{expose, sensor_mm},
+    plan::{SensorPair, coarse_for, fine_for},
+    ready::{base_nm, base_when_homed_nm, ensure_homed},
+    work::Moved,
+};
 
 pub use crate::expose::CaptureError;
 
@@ -20,10 +25,8 @@ pub use crate::expose::CaptureError;
 pub struct Exposures {
     /// Length of each.
     pub exposure: Micros,
-    /// How near to its target the piezo has to be...
-    pub settle_window: Nanometres,
-    /// ...and for how long, before the trigger.
-    pub settle_dwell: Micros,
+    /// When the piezo counts as settled, before the trigger.
+    pub settle: Settle,
     /// Longest wait for an image once the board has told of its exposure.
     pub image_wait: Duration,
 }
@@ -32,9 +35,7 @@ impl Default for Exposures {
     fn default() -> Self {
         Self {
             exposure: Micros(5_000),
-            // 50 nm of sensor travel are 0.0006 of the working range in alpha: 0.02 mm of depth at most.
-            settle_window: Nanometres(50),
-            settle_dwell: Micros(2_000),
+            settle: Settle::of_move(Axis::SensorFine),
             image_wait: Duration::from_secs(30),
         }
     }
@@ -96,8 +97,8 @@ pub fn capture_pair(
         axis: Axis::SensorFine,
         target,
         exposure: exposures.exposure,
-        settle_window: exposures.settle_window,
-        settle_dwell: exposures.settle_dwell,
+        settle_window: exposures.settle.window,
+        settle_dwell: exposures.settle.dwell,
         repeat: 1,
         mode: TriggerMode::Hardware,
     };
@@ -116,18 +117,16 @@ pub fn capture_pair(
     let Ok([far, near]) = <[Taken; 2]>::try_from(taken) else {
         return Err(CaptureError::Count { told, asked: 2 });
     };
-    if far.image.pixels.dim() != near.image.pixels.dim() || far.image.bits != near.image.bits {
-        let ((far_height, far_width), (near_height, near_width)) =
-            (far.image.pixels.dim(), near.image.pixels.dim());
-        let (far_bits, near_bits) = (far.image.bits, near.image.bits);
-        return Err(CaptureError::Unlike {
-            far_width,
-            far_height,
-            far_bits,
-            near_width,
-            near_height,
-            near_bits,
-        });
-    }
+    alike(&far.image, &near.image)?;
     Ok(Pair { far, near, coarse })
+}
+
+/// Refuses two images of different size or depth of bits.
+fn alike(far: &Image, near: &Image) -> Result<(), CaptureError> {
+    let ((far_height, far_width), (near_height, near_width)) = (far.pixels.dim(), near.pixels.dim());
+    let (far_bits, near_bits) = (far.bits, near.bits);
+    if (far_width, far_height, far_bits) == (near_width, near_height, near_bits) {
+        return Ok(());
+    }
+    Err(CaptureError::Unlike { far_width, far_height, far_bits, near_width, near_height, near_bits })
 }

@@ -5,8 +5,7 @@
 //! piezo's range, in its middle; the piezo then makes up for what the coarse stage is off, and toggles between
 //! the two in milliseconds. Lengths in nanometres unless a name says otherwise.
 
-use farnear_protocol::message::Limits;
-use farnear_protocol::units::Nanometres;
+use farnear_protocol::{message::Limits, units::Nanometres};
 
 /// Sensor distances of a pair from the lens' principal plane, in millimetres.
 #[derive(Clone, Copy, PartialEq, Debug)]

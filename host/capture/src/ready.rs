@@ -1,24 +1,19 @@
 //! Making the rig ready: every axis homed, and where that leaves the sensor.
 
-use farnear_protocol::message::{Axis, AxisStatus, Capabilities, PositionState, Status};
+use farnear_protocol::{
+    Nanometres,
+    message::{Axis, Capabilities, PositionState, Status, sensor_distance_nm},
+};
 
-use crate::client::Client;
-use crate::describe::{axis_name, state_name};
-use crate::error::ClientError;
+use crate::{
+    client::Client,
+    describe::{axis_name, state_name},
+    error::ClientError,
+};
 
 /// The axes with a home switch that this rig has.
 pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {
-    let fitted = [(Axis::SensorCoarse, capabilities.sensor_coarse), (Axis::Lens, capabilities.lens)];
-    fitted.into_iter().filter_map(|(axis, fitted)| fitted.then_some(axis)).collect()
-}
-
-/// How an axis is.
-pub fn axis_status(status: &Status, axis: Axis) -> &AxisStatus {
-    match axis {
-        Axis::SensorCoarse => &status.coarse,
-        Axis::SensorFine => &status.fine,
-        Axis::Lens => &status.lens,
-    }
+    [Axis::SensorCoarse, Axis::Lens].into_iter().filter(|axis| capabilities.has(*axis)).collect()
 }
 
 /// Homes what is not homed. One axis after the other: when a second request arrives while the first is under way
@@ -29,7 +24,7 @@ pub fn axis_status(status: &Status, axis: Axis) -> &AxisStatus {
 pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), ClientError> {
     let status = client.status()?;
     for axis in steppers(&client.hello().capabilities) {
-        let state = axis_status(&status, axis).state;
+        let state = status.axis(axis).state;
         if state != PositionState::Homed {
             say(&format!("homing the {} (its position is {})", axis_name(axis), state_name(state)));
             client.home(axis)?;
@@ -40,13 +35,20 @@ pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), Cl
 
 /// Sensor distance with both axes of stage A at 0, in nanometres: the datum and where the lens stage stands.
 pub fn base_nm(client: &Client, status: &Status) -> i64 {
-    i64::from(client.hello().limits.datum.0) + i64::from(status.lens.measured.0)
+    base(client, |axis| status.axis(axis).measured)
 }
 
 /// As [`base_nm`] after [`ensure_homed`], which brings a lens stage to 0 that was not homed.
 pub fn base_when_homed_nm(client: &Client, status: &Status) -> i64 {
-    match status.lens.state {
-        PositionState::Homed => base_nm(client, status),
-        PositionState::Unknown | PositionState::Lost => i64::from(client.hello().limits.datum.0),
-    }
+    base(client, |axis| match status.axis(axis).state {
+        PositionState::Homed => status.axis(axis).measured,
+        PositionState::Unknown | PositionState::Lost => Nanometres(0),
+    })
+}
+
+fn base(client: &Client, position: impl Fn(Axis) -> Nanometres) -> i64 {
+    sensor_distance_nm(client.hello().limits.datum, |axis| match axis {
+        Axis::SensorCoarse | Axis::SensorFine => Nanometres(0),
+        Axis::Lens => position(axis),
+    })
 }

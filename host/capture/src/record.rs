@@ -5,19 +5,21 @@
 
 use std::path::Path;
 
-use farnear_protocol::message::{Axis, Hello, SCHEMA_KEY, ShotRecord};
-use serde::{Deserialize, Serialize};
-
-use crate::camera::Image;
-use crate::client::Client;
-use crate::describe::{cause_name, trigger_name, um};
-use crate::expose::sensor_mm;
-use crate::pair::{Pair, Taken};
-use crate::sequence::SequenceShot;
 use farnear_files::{
     EncodeError,
     image_file::encode_png,
     staging::{Staging, StagingError},
+};
+use farnear_protocol::message::{Hello, SCHEMA_KEY, ShotRecord};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    camera::Image,
+    client::Client,
+    describe::{cause_name, trigger_name, um},
+    expose::sensor_mm,
+    pair::{Pair, Taken},
+    sequence::SequenceShot,
 };
 
 /// Name of the record in a capture folder.
@@ -223,19 +225,12 @@ pub fn record_of_sequence(
         coarse_measured_um: um(first.record.coarse),
         moving_us: None,
     };
-    let exposure = shots.iter().map(|shot| {
-        let axis = match shot.record.axis {
-            Axis::SensorCoarse => "coarse",
-            Axis::SensorFine => "fine",
-            Axis::Lens => "lens",
-        };
-        ExposureRecord {
-            axis: Some(axis.into()),
-            asked_um: Some(um(shot.record.asked)),
-            lens_measured_um: Some(um(shot.record.lens)),
-            triggered_by: Some(trigger_name(shot.mode).into()),
-            ..exposure_record(&shot.name, &shot.record, sensor_mm(&shot.record, limits))
-        }
+    let exposure = shots.iter().map(|shot| ExposureRecord {
+        axis: Some(shot.record.axis.name().into()),
+        asked_um: Some(um(shot.record.asked)),
+        lens_measured_um: Some(um(shot.record.lens)),
+        triggered_by: Some(trigger_name(shot.mode).into()),
+        ..exposure_record(&shot.name, &shot.record, sensor_mm(&shot.record, limits))
     });
     Some(record(client, circumstances, stage, exposure.collect(), &first.image))
 }

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use farnear_protocol::message::{AlarmRecord, Counters, Setting, SettingKey, SunAnswer, SunQuery};
-use farnear_protocol::{Request, RequestError, Response};
+use farnear_protocol::{
+    Request, RequestError, Response,
+    message::{AlarmRecord, Counters, Setting, SettingKey, SunAnswer, SunQuery},
+};
 
-use crate::client::Client;
-use crate::error::ClientError;
-use crate::owner::nonsense;
+use crate::{client::Client, error::ClientError, owner::nonsense};
 
 /// Longest wait for a reset board to answer again.
 const RESTART: Duration = Duration::from_secs(5);
@@ -28,22 +28,6 @@ impl Client {
     /// [`ClientError`].
     pub fn halt(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Halt, "halting")
-    }
-
-    /// Stands still after the exposure that is under way.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub fn pause_program(&self) -> Result<(), ClientError> {
-        self.expect_accepted(&Request::PauseProgram, "pausing the exposure program")
-    }
-
-    /// Goes on after a pause.
-    ///
-    /// # Errors
-    /// [`ClientError`].
-    pub fn resume_program(&self) -> Result<(), ClientError> {
-        self.expect_accepted(&Request::ResumeProgram, "resuming the exposure program")
     }
 
     /// Resets the board and says hello to it again.

@@ -17,9 +17,12 @@
 //! exposure_us = 2000
 //! ```
 
-use farnear_protocol::message::{Axis, Shot, ShotRecord, TriggerMode};
-use farnear_protocol::units::{Micros, Nanometres};
-use serde::Deserialize;
+use farnear_protocol::{
+    Settle,
+    message::{Axis, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
+use serde::{Deserialize, Deserializer, de::Error};
 
 use crate::camera::Image;
 
@@ -28,10 +31,10 @@ use crate::camera::Image;
 pub struct ShotDefaults {
     /// Length of the exposure.
     pub exposure: Micros,
-    /// Settle window; where none is given it depends on the axis.
+    /// Settle window; where none is given that of [`Settle::of_shot`].
     pub settle_window: Option<Nanometres>,
-    /// Settle dwell.
-    pub settle_dwell: Micros,
+    /// Settle dwell; likewise.
+    pub settle_dwell: Option<Micros>,
     /// Exposures at a position.
     pub repeat: u16,
     /// How exposures come about.
@@ -43,7 +46,7 @@ impl Default for ShotDefaults {
         Self {
             exposure: Micros(5_000),
             settle_window: None,
-            settle_dwell: Micros(2_000),
+            settle_dwell: None,
             repeat: 1,
             mode: TriggerMode::Hardware,
         }
@@ -53,14 +56,13 @@ impl Default for ShotDefaults {
 impl ShotDefaults {
     /// A shot at a position.
     pub fn shot(&self, axis: Axis, target: Nanometres) -> Shot {
-        // A stepper holds still to a count of its encoder, the piezo's loop to a few nanometres.
-        let usual = Nanometres(if axis == Axis::SensorFine { 100 } else { 1_000 });
+        let usual = Settle::of_shot(axis);
         Shot {
             axis,
             target,
             exposure: self.exposure,
-            settle_window: self.settle_window.unwrap_or(usual),
-            settle_dwell: self.settle_dwell,
+            settle_window: self.settle_window.unwrap_or(usual.window),
+            settle_dwell: self.settle_dwell.unwrap_or(usual.dwell),
             repeat: self.repeat,
             mode: self.mode,
         }
@@ -114,7 +116,8 @@ struct ProgramFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ShotEntry {
-    axis: AxisEntry,
+    #[serde(deserialize_with = "axis_by_name")]
+    axis: Axis,
     to_um: f64,
     exposure_us: Option<u32>,
     settle_window_nm: Option<i32>,
@@ -140,12 +143,12 @@ enum Trigger {
     FreeRunning,
 }
 
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum AxisEntry {
-    Coarse,
-    Fine,
-    Lens,
+fn axis_by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Axis, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    Axis::ALL.into_iter().find(|axis| axis.name() == name).ok_or_else(|| {
+        let names = Axis::ALL.map(Axis::name).join(", ");
+        D::Error::custom(format!("unknown axis `{name}`, expected one of {names}"))
+    })
 }
 
 impl Options {
@@ -153,7 +156,7 @@ impl Options {
         ShotDefaults {
             exposure: self.exposure_us.map_or(defaults.exposure, Micros),
             settle_window: self.settle_window_nm.map(Nanometres).or(defaults.settle_window),
-            settle_dwell: self.settle_dwell_us.map_or(defaults.settle_dwell, Micros),
+            settle_dwell: self.settle_dwell_us.map(Micros).or(defaults.settle_dwell),
             repeat: self.repeat.unwrap_or(defaults.repeat),
             mode: self.trigger.map_or(defaults.mode, |trigger| match trigger {
                 Trigger::Hardware => TriggerMode::Hardware,
@@ -186,11 +189,6 @@ pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
         let ShotEntry { axis, to_um, exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger } =
             entry;
         let options = Options { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger };
-        let axis = match axis {
-            AxisEntry::Coarse => Axis::SensorCoarse,
-            AxisEntry::Fine => Axis::SensorFine,
-            AxisEntry::Lens => Axis::Lens,
-        };
         let target = nanometres(to_um).ok_or(ProgramError::Position { index, to_um })?;
         Ok(options.over(&defaults).shot(axis, target))
     });
@@ -244,7 +242,7 @@ mod tests {
     fn what_is_wrong_with_a_program_is_said() {
         for (text, phrase) in [
             ("exposure_us = 3", "no [[shot]]"),
-            ("[[shot]]\naxis = \"z\"\nto_um = 1.0", "unknown variant `z`"),
+            ("[[shot]]\naxis = \"z\"\nto_um = 1.0", "unknown axis `z`"),
             ("[[shot]]\naxis = \"fine\"", "to_um"),
             ("[[shot]]\naxis = \"fine\"\nto_um = 1e12", "shot 0: 1000000000000 um is no position"),
             ("exposre_us = 3\n[[shot]]\naxis = \"fine\"\nto_um = 1.0", "exposre_us"),

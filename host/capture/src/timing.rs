@@ -6,7 +6,10 @@
 
 use std::time::Duration;
 
-use farnear_protocol::message::{Axis, Limits, Routine, Shot, Status, TriggerMode};
+use farnear_protocol::{
+    Nanometres,
+    message::{Axis, Limits, Routine, Shot, Status, TriggerMode},
+};
 
 /// The slowest coarse speed a healthy rig has; a third of its usual 6.25 mm/s.
 const SLOWEST_COARSE_NM_PER_S: u64 = 2_000_000;
@@ -25,26 +28,26 @@ pub struct Timing {
     pub reply: Duration,
     /// How often a request is sent again.
     pub retries: u32,
-    /// Silence after which the board is asked whether an event got lost.
+    /// Time without a word after which the board is asked whether an event got lost.
     pub poll: Duration,
     /// What the board's own time is multiplied by to become a wait of the host.
     pub work_factor: u32,
     /// What is added to every wait for work.
     pub work_slack: Duration,
-    /// How long the board goes on with work of which the host has died, in the board's time. It asks after half of it,
-    /// and the host answers as long as somebody holds the work.
-    pub silence: Duration,
+    /// Keep-alive timeout: how long the board goes on with work of which the host has died, in the board's time. It asks
+    /// after half of it, and the host answers as long as somebody holds the work.
+    pub keep_alive: Duration,
 }
 
 impl Timing {
-    /// For a board of flesh and blood.
+    /// For a real board.
     pub const REAL: Self = Self {
         reply: Duration::from_millis(50),
         retries: 3,
         poll: Duration::from_millis(500),
         work_factor: 1,
         work_slack: Duration::from_secs(1),
-        silence: Duration::from_secs(2),
+        keep_alive: Duration::from_secs(2),
     };
 
     /// For the emulated board, also on a crowded machine.
@@ -55,7 +58,7 @@ impl Timing {
         work_factor: 10,
         work_slack: Duration::from_secs(20),
         // Longer: its time may run faster than this computer's, which may be slow to answer.
-        silence: Duration::from_secs(10),
+        keep_alive: Duration::from_secs(10),
     };
 
     /// The host's wait for work that takes the board `work`.
@@ -69,24 +72,25 @@ pub fn homing_time(axis: Axis, limits: &Limits) -> Duration {
     travel_time(travel(axis, limits)) + SLOW_APPROACH
 }
 
-/// Longest time a healthy board takes for a move over this many nanometres on a stepper's axis; the piezo is
-/// faster.
-pub fn move_time(distance_nm: u64) -> Duration {
+/// Longest time a healthy board takes for a move from one position to another. The piezo's travel takes no time to speak
+/// of.
+pub fn move_time(axis: Axis, from: Nanometres, to: Nanometres) -> Duration {
+    let distance_nm = match axis {
+        Axis::SensorCoarse | Axis::Lens => from.0.abs_diff(to.0),
+        Axis::SensorFine => 0,
+    };
     // Twice for a backlash that is taken out: beyond the target and back.
-    travel_time(distance_nm) + 2 * SETTLE
+    travel_time(u64::from(distance_nm)) + 2 * SETTLE
 }
 
 /// Longest time a healthy board takes for an exposure program.
 pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
-    let (mut coarse, mut lens) = (status.coarse.measured, status.lens.measured);
+    let mut stands = Axis::ALL.map(|axis| (axis, status.axis(axis).measured));
     shots
         .iter()
         .map(|shot| {
-            let way = match shot.axis {
-                Axis::SensorCoarse => std::mem::replace(&mut coarse, shot.target).0.abs_diff(shot.target.0),
-                Axis::Lens => std::mem::replace(&mut lens, shot.target).0.abs_diff(shot.target.0),
-                Axis::SensorFine => 0,
-            };
+            let place = stands.iter_mut().find(|(axis, _)| *axis == shot.axis);
+            let from = place.map_or(shot.target, |(_, at)| std::mem::replace(at, shot.target));
             let exposure = Duration::from_micros(u64::from(shot.exposure.0));
             let trigger = match shot.mode {
                 TriggerMode::Hardware => Duration::ZERO,
@@ -95,7 +99,7 @@ pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
             };
             // The camera reads a picture out before it can take the next one.
             let once = exposure + Duration::from_millis(100) + trigger;
-            move_time(u64::from(way)) + once * u32::from(shot.repeat)
+            move_time(shot.axis, from, shot.target) + once * u32::from(shot.repeat)
         })
         .sum()
 }
@@ -113,11 +117,7 @@ pub fn calibration_time(routine: Routine, limits: &Limits) -> Duration {
 }
 
 fn travel(axis: Axis, limits: &Limits) -> u64 {
-    let (min, max) = match axis {
-        Axis::SensorCoarse => (limits.coarse_min, limits.coarse_max),
-        Axis::SensorFine => (limits.fine_min, limits.fine_max),
-        Axis::Lens => (limits.lens_min, limits.lens_max),
-    };
+    let (min, max) = limits.of(axis);
     u64::from(max.0.abs_diff(min.0))
 }
 
@@ -131,8 +131,10 @@ mod tests {
 
     #[test]
     fn the_wait_grows_with_the_way() {
-        assert_eq!(move_time(0), 2 * SETTLE);
-        assert_eq!(move_time(13_000_000), 2 * SETTLE + Duration::from_millis(6_500));
+        let (near, far) = (Nanometres(0), Nanometres(13_000_000));
+        assert_eq!(move_time(Axis::Lens, near, near), 2 * SETTLE);
+        assert_eq!(move_time(Axis::SensorCoarse, far, near), 2 * SETTLE + Duration::from_millis(6_500));
+        assert_eq!(move_time(Axis::SensorFine, near, far), 2 * SETTLE);
         assert!(Timing::EMULATED.allowance(SETTLE) > Timing::REAL.allowance(SETTLE));
     }
 }

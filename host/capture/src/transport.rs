@@ -2,8 +2,10 @@
 //!
 //! Every operation takes the longest time it may wait; none blocks for ever.
 
-use std::io::{self, Read, Write};
-use std::time::{Duration, Instant};
+use std::{
+    io::{self, Read, Write},
+    time::{Duration, Instant},
+};
 
 use serialport::{ClearBuffer, SerialPort};
 

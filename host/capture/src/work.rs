@@ -2,24 +2,30 @@
 //!
 //! A [`Work`] is held by whoever wants it done: as long as it lives, the board's question whether anybody is still there
 //! is answered; dropped before its end it stops the rig, and a program that dies leaves the board to its own deadline
-//! ([`crate::Timing::silence`]). Every wait has a deadline computed from the work ([`crate::timing`]); at the deadline,
+//! ([`crate::Timing::keep_alive`]). Every wait has a deadline computed from the work ([`crate::timing`]); at the deadline,
 //! and when the user interrupts, the board is told to stop before the error is returned.
 
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
-
-use farnear_protocol::message::{
-    AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotRecord,
+use std::{
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvTimeoutError, channel},
+    },
+    time::{Duration, Instant},
 };
-use farnear_protocol::units::{Micros, Nanometres};
-use farnear_protocol::{Request, Response};
 
-use crate::client::Client;
-use crate::describe::{axis_name, routine_name, um};
-use crate::error::ClientError;
-use crate::owner::{Listener, Note, nonsense};
-use crate::timing::{calibration_time, homing_time, move_time, program_time};
+use farnear_protocol::{
+    Request, Response,
+    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot},
+    units::{Micros, Nanometres},
+};
+
+use crate::{
+    client::Client,
+    describe::{axis_name, routine_name, um},
+    error::ClientError,
+    owner::{Listener, Note, nonsense},
+    timing::{calibration_time, homing_time, move_time, program_time},
+};
 
 /// Longest single wait for an event, so that an interruption by the user is seen soon.
 const SLICE: Duration = Duration::from_millis(50);
@@ -235,9 +241,10 @@ impl Client {
         })
     }
 
-    fn silence(&self) -> Micros {
+    /// The keep-alive timeout that goes with work, within what the board allows.
+    fn keep_alive(&self) -> Micros {
         let limits = &self.hello().limits;
-        let asked = Micros(u32::try_from(self.timing().silence.as_micros()).unwrap_or(u32::MAX));
+        let asked = Micros(u32::try_from(self.timing().keep_alive.as_micros()).unwrap_or(u32::MAX));
         asked.max(limits.silence_min).min(limits.silence_max)
     }
 
@@ -248,7 +255,7 @@ impl Client {
     pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
         let during = format!("homing the {}", axis_name(axis));
         let work = homing_time(axis, &self.hello().limits);
-        self.start_work(&Request::Home { axis, silence: self.silence() }, work, during)
+        self.start_work(&Request::Home { axis, silence: self.keep_alive() }, work, during)
     }
 
     /// Homes an axis. Gives how far the encoder's old zero was from the new one.
@@ -266,13 +273,8 @@ impl Client {
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
         let during = format!("moving the {} to {:.3} um", axis_name(axis), um(target));
         let status = self.status()?;
-        let distance = match axis {
-            Axis::SensorCoarse => status.coarse.measured.0.abs_diff(target.0),
-            Axis::SensorFine => 0,
-            Axis::Lens => status.lens.measured.0.abs_diff(target.0),
-        };
-        let work = move_time(u64::from(distance));
-        self.start_work(&Request::Move { axis, target, silence: self.silence() }, work, during)
+        let work = move_time(axis, status.axis(axis).measured, target);
+        self.start_work(&Request::Move { axis, target, silence: self.keep_alive() }, work, during)
     }
 
     /// Moves an axis to an absolute position.
@@ -290,7 +292,7 @@ impl Client {
     pub fn calibrate(&self, routine: Routine) -> Result<Calibration, ClientError> {
         let during = format!("measuring the {}", routine_name(routine));
         let work = calibration_time(routine, &self.hello().limits);
-        let request = Request::Calibrate { routine, silence: self.silence() };
+        let request = Request::Calibrate { routine, silence: self.keep_alive() };
         match self.start_work(&request, work, during.clone())?.wait()? {
             EventKind::Calibrated { result, .. } => Ok(result),
             other => Err(wrong_end(&during, &other)),
@@ -325,7 +327,7 @@ impl Client {
         }
         let work = program_time(shots, &status);
         let during = "running the exposure program".to_string();
-        self.start_work(&Request::RunProgram { silence: self.silence() }, work, during)
+        self.start_work(&Request::RunProgram { silence: self.keep_alive() }, work, during)
     }
 
     /// Arms and runs an exposure program. `on_event` is told of each exposure
@@ -348,21 +350,6 @@ impl Client {
                 Step::Done(other) => return Err(wrong_end("running the exposure program", &other).into()),
             }
         }
-    }
-
-    /// As [`Client::run_program`], told of the exposures only.
-    ///
-    /// # Errors
-    /// [`ClientError`], and what `on_shot` returns.
-    pub fn run_shots<E: From<ClientError>>(
-        &self,
-        shots: &[Shot],
-        mut on_shot: impl FnMut(&ShotRecord) -> Result<(), E>,
-    ) -> Result<u16, E> {
-        self.run_program(shots, |kind| match kind {
-            EventKind::ShotDone { shot, .. } => on_shot(shot),
-            _ => Ok(()),
-        })
     }
 }
 

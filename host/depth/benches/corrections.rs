@@ -13,7 +13,7 @@ use farnear_depth::calibrate::{CapturedPair, Model, fit_psf};
 use farnear_depth::corrections::{CdcSettings, Method, Pattern, fit};
 use farnear_depth::focus_measure::FocusMeasure;
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
-use farnear_depth::run::Settings;
+use farnear_depth::pipeline::Settings;
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -15,7 +15,7 @@ use farnear_depth::filter::convolve;
 use farnear_depth::kernel::Kernel;
 use farnear_depth::operators::{Design, Family, Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
-use farnear_depth::run::{Backend, Processor, Settings};
+use farnear_depth::pipeline::{Backend, Processor, Settings};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
@@ -180,7 +180,7 @@ fn main() {
             let inside = (y % 120).abs_diff(60).pow(2) + (x % 128).abs_diff(64).pow(2) < 900;
             if inside { 0.0 } else { 1.0 }
         });
-        let map = farnear_depth::run::depth_from_pair(
+        let map = farnear_depth::pipeline::depth_from_pair(
             vga[0].view(),
             vga[1].view(),
             &operators,

@@ -8,7 +8,7 @@
 //!
 //! (Watanabe & Nayar and Raj & Staunton differ from this project's method by their operators only: see
 //! [`crate::operators::Family`].) Each gives a [`DepthMap`] with the same meaning of depth, confidence and holes as
-//! [`crate::run::depth_from_pair`]; [`Settings::smoothing_px`] is the window over which evidence is summed.
+//! [`crate::pipeline::depth_from_pair`]; [`Settings::smoothing_px`] is the window over which evidence is summed.
 //!
 //! The first two know of the PSF only its second moment, `sigma^2 = 2 k^2 R^2` for a Gaussian. With the blur radii of a
 //! telecentric pair the difference of the two images' moments is linear in the normalised depth:
@@ -26,7 +26,7 @@ use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
 use crate::optics::Optics;
-use crate::run::{DepthMap, RunError, Settings};
+use crate::pipeline::{DepthMap, RunError, Settings};
 
 pub use favaro::{Favaro, FavaroSettings};
 

@@ -25,8 +25,8 @@ use serde::{Deserialize, Serialize};
 use crate::corrections::Pattern;
 use crate::operators::Operators;
 use crate::optics::Optics;
+use crate::pipeline::{RunError, Settings, depth_from_pair};
 use crate::psf::Psf;
-use crate::run::{RunError, Settings, depth_from_pair};
 
 pub(crate) use spectra::{SpectrumError, transform};
 

@@ -1,7 +1,7 @@
 //! Corrections of the depth-variant elliptical distortion, learned from depth maps of flat targets.
 //!
 //! A flat target comes out as a bowl whose height depends on the depth itself (Li 2014, sections 5.3 and 6.2). A
-//! series of such targets at known depths, [`Pattern`]s, teaches one of five corrections:
+//! series of such targets at known depths, [`Pattern`]s, teaches one of these corrections:
 //!
 //! | method | what | reference |
 //! |---|---|---|
@@ -10,10 +10,13 @@
 //! | [`Method::ClsfFull`] | one polynomial with all 20 terms of third order; seamless | |
 //! | [`Method::Cdc`] | cancellation by the stored pattern nearest in depth, interpolated twice | eqs. 6.2 to 6.10 |
 //! | [`Method::TwoStep`] | offset by a first polynomial, its distortion by a second | eqs. 5.21, 5.22 |
+//! | [`Method::Spline`] | smooth surface over field and depth: tensor-product cubic B-spline, penalised; seamless | Eilers & Marx 1996 |
 //!
 //! Depths are mm, maps (height, width), NaN = no value. `x` and `y` run from -1 to 1 over the map and depth is
 //! normalised over 1.3 times half the range of the patterns ([`farnear_maths::clsf::DepthScale`]). Beyond that scale a
 //! correction would extrapolate, so there the corrected depth is NaN.
+//!
+//! Another correction is a file of this folder that provides the trait `Learned`, and its line in the table below.
 //!
 //! Cost of [`Correction::apply_in_place`] on 640x480, one thread: 0.2 ms (`clsf`) to 0.4 ms (`two-step`), CDC (24
 //! patterns, window 1) about 12 ms. Cost of [`fit`] from 24 patterns: 0.1 s (`clsf`) to 1.2 s (`cdc`).
@@ -21,22 +24,26 @@
 mod board;
 mod cdc;
 mod clsf;
+mod clsf_blend;
+mod clsf_full;
 mod error;
-mod full;
 mod moments;
+mod names;
 mod pattern;
+mod regions;
+mod spline;
+mod table;
 mod two_step;
-
-use std::fmt;
-use std::str::FromStr;
 
 use farnear_maths::clsf::DepthScale;
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 use serde::{Deserialize, Serialize};
 
+use self::pattern::Series;
+use self::table::{Learned, corrections};
 use crate::optics::WorkingRange;
 
-pub use board::BoardCorrection;
+pub use board::{BoardCorrection, BoardForm};
 pub use cdc::CdcSettings;
 pub use error::CorrectionError;
 pub use pattern::Pattern;
@@ -47,61 +54,20 @@ pub const FORMAT: u32 = 1;
 /// A working range may reach beyond the patterns' range by this part of it.
 const RANGE_TOLERANCE: f64 = 0.05;
 
-/// Which correction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// 10 terms in each of 3x3 regions.
-    Clsf,
-    /// The same, blended bilinearly.
-    ClsfBlend,
-    /// 20 terms for the whole map.
-    ClsfFull,
-    /// Cancellation by stored patterns.
-    Cdc,
-    /// Two polynomials in turn.
-    TwoStep,
-}
-
-impl Method {
-    /// All methods.
-    pub const ALL: [Self; 5] = [Self::Clsf, Self::ClsfBlend, Self::ClsfFull, Self::Cdc, Self::TwoStep];
-
-    /// The name as the command line writes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Clsf => "clsf",
-            Self::ClsfBlend => "clsf-blend",
-            Self::ClsfFull => "clsf-full",
-            Self::Cdc => "cdc",
-            Self::TwoStep => "two-step",
-        }
-    }
-
-    /// The least number of patterns, at different depths, that can teach it.
-    pub fn patterns_needed(self) -> usize {
-        match self {
-            // 1, U, U^2 and U^3 cannot be told apart by fewer.
-            Self::Clsf | Self::ClsfBlend | Self::ClsfFull | Self::TwoStep => 4,
-            // One pattern and a neighbour on either side.
-            Self::Cdc => 3,
-        }
-    }
-}
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Method {
-    type Err = CorrectionError;
-
-    fn from_str(text: &str) -> Result<Self, CorrectionError> {
-        let known = Self::ALL.into_iter().find(|method| method.name() == text.trim());
-        known.ok_or_else(|| CorrectionError::UnknownMethod(text.to_owned()))
-    }
+// All corrections: what it is in a few words; variant, name, and what learns it.
+corrections! {
+    /// 3x3 regions
+    Clsf = "clsf": clsf::Clsf,
+    /// 3x3 regions without steps
+    ClsfBlend = "clsf-blend": clsf_blend::ClsfBlend,
+    /// one polynomial
+    ClsfFull = "clsf-full": clsf_full::ClsfFull,
+    /// stored patterns
+    Cdc = "cdc": cdc::Cdc,
+    /// two polynomials in turn
+    TwoStep = "two-step": two_step::TwoStep,
+    /// smooth surface over field and depth
+    Spline = "spline": spline::Spline,
 }
 
 /// A correction, learned or loaded; serde saves it whole.
@@ -114,17 +80,6 @@ pub struct Correction {
     near_mm: f64,
     scale: DepthScale,
     map: Map,
-}
-
-/// The part that differs from method to method.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "method", rename_all = "kebab-case")]
-enum Map {
-    Clsf(clsf::Regions),
-    ClsfBlend(clsf::Regions),
-    ClsfFull(full::Full),
-    Cdc(cdc::Cdc),
-    TwoStep(two_step::TwoStep),
 }
 
 /// The stored form of a [`Correction`].
@@ -154,12 +109,7 @@ impl TryFrom<Stored> for Correction {
         }
         let Stored { width, height, far_mm, near_mm, mut map, .. } = stored;
         let scale = pattern::scale(far_mm, near_mm)?;
-        match &mut map {
-            Map::Clsf(regions) | Map::ClsfBlend(regions) => regions.check()?,
-            Map::ClsfFull(full) => full.check()?,
-            Map::Cdc(cdc) => cdc.expand(width, height)?,
-            Map::TwoStep(two_step) => two_step.check()?,
-        }
+        map.prepare((height, width))?;
         Ok(Self { width, height, far_mm, near_mm, scale, map })
     }
 }
@@ -174,14 +124,8 @@ pub fn fit(
     patterns: &[Pattern<'_>],
     cdc: &CdcSettings,
 ) -> Result<Correction, CorrectionError> {
-    let series = pattern::Series::new(method, patterns)?;
-    let map = match method {
-        Method::Clsf => Map::Clsf(clsf::Regions::fit(&series)?),
-        Method::ClsfBlend => Map::ClsfBlend(clsf::Regions::fit_blended(&series)?),
-        Method::ClsfFull => Map::ClsfFull(full::Full::fit(&series)?),
-        Method::Cdc => Map::Cdc(cdc::Cdc::fit(&series, cdc)?),
-        Method::TwoStep => Map::TwoStep(two_step::TwoStep::fit(&series)?),
-    };
+    let series = Series::new(method, patterns)?;
+    let map = Map::learn(method, &series, cdc)?;
     let (height, width) = series.dim();
     let (far_mm, near_mm) = series.range_mm();
     Ok(Correction { width, height, far_mm, near_mm, scale: series.scale(), map })
@@ -190,13 +134,7 @@ pub fn fit(
 impl Correction {
     /// Which correction this is.
     pub fn method(&self) -> Method {
-        match self.map {
-            Map::Clsf(_) => Method::Clsf,
-            Map::ClsfBlend(_) => Method::ClsfBlend,
-            Map::ClsfFull(_) => Method::ClsfFull,
-            Map::Cdc(_) => Method::Cdc,
-            Map::TwoStep(_) => Method::TwoStep,
-        }
+        self.map.method()
     }
 
     /// (height, width) of the maps it corrects.
@@ -249,13 +187,7 @@ impl Correction {
             depth_mm.assign(&corrected);
             return Ok(());
         }
-        match &self.map {
-            Map::Clsf(regions) => regions.apply(depth_mm.view_mut(), self.scale),
-            Map::ClsfBlend(regions) => regions.apply_blended(depth_mm.view_mut(), self.scale),
-            Map::ClsfFull(full) => full.apply(depth_mm.view_mut(), self.scale),
-            Map::Cdc(cdc) => cdc.apply(depth_mm.view_mut(), self.scale),
-            Map::TwoStep(two_step) => two_step.apply(depth_mm.view_mut(), self.scale),
-        }
+        self.map.apply(depth_mm, self.scale);
         Ok(())
     }
 
@@ -267,12 +199,7 @@ impl Correction {
     /// coefficient or the size does not fit its number formats, [`CorrectionError::SizeMismatch`].
     pub fn apply_as_board(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         self.check_size(depth_mm.dim())?;
-        match &self.map {
-            Map::Clsf(regions) => regions.apply_as_board(depth_mm, self.scale),
-            Map::ClsfBlend(regions) => regions.apply_blended_as_board(depth_mm, self.scale),
-            Map::ClsfFull(full) => full.apply_as_board(depth_mm, self.scale),
-            Map::Cdc(_) | Map::TwoStep(_) => Err(CorrectionError::NotOnBoard(self.method())),
-        }
+        self.for_board()?.apply(depth_mm)
     }
 
     /// This correction in the board's number formats.
@@ -280,15 +207,10 @@ impl Correction {
     /// # Errors
     /// [`CorrectionError::NotOnBoard`], [`CorrectionError::Board`] as for [`Self::apply_as_board`].
     pub fn for_board(&self) -> Result<BoardCorrection, CorrectionError> {
-        let coefficients = match &self.map {
-            Map::Clsf(regions) | Map::ClsfBlend(regions) => {
-                regions.quantised()?.as_flattened().as_flattened().iter().map(|c| c.to_bits()).collect()
-            }
-            Map::ClsfFull(full) => full.quantised()?.iter().map(|c| c.to_bits()).collect(),
-            Map::Cdc(_) | Map::TwoStep(_) => return Err(CorrectionError::NotOnBoard(self.method())),
-        };
+        let method = self.method();
+        let form = method.board_form().ok_or(CorrectionError::NotOnBoard(method))?;
         let frame = board::frame((self.height, self.width))?;
-        Ok(BoardCorrection { method: self.method(), frame, scale: self.scale, coefficients })
+        Ok(BoardCorrection { method, form, frame, scale: self.scale, coefficients: self.map.quantised()? })
     }
 
     fn check_size(&self, (height, width): (usize, usize)) -> Result<(), CorrectionError> {
@@ -298,9 +220,4 @@ impl Correction {
         let (made_for_width, made_for_height) = (self.width, self.height);
         Err(CorrectionError::SizeMismatch { width, height, made_for_width, made_for_height })
     }
-}
-
-/// Normalised coordinate of a pixel: -1 at the first, +1 at the last.
-fn coordinate(index: usize, length: usize) -> f64 {
-    2.0 * index as f64 / (length as f64 - 1.0) - 1.0
 }

@@ -1,7 +1,7 @@
 //! Fills regions of low texture from what surrounds them.
 //!
 //! Depth from defocus says nothing where the surface has no texture. A region begins with connected (8-neighbours) pixels
-//! whose texture energy is below [`LOW_TEXTURE`](crate::run::confidence::LOW_TEXTURE) times its median, and grows over the
+//! whose texture energy is below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median, and grows over the
 //! pixels around them that have less than [`GROWN_TEXTURE`] times the median, as far as kernels and windows reach: these see
 //! the region's texture on one side only, and noise, which adds to the energy but not to the depth's evidence, draws their
 //! depth towards the middle of the range. A cubic surface (Li 2014, eq. 6.16, with the mixed terms that it lacks: without
@@ -24,7 +24,7 @@ use ndarray::ArrayView2;
 
 pub use boundary::trace_boundary;
 
-use crate::run::DepthMap;
+use crate::depth_map::DepthMap;
 use region::Regions;
 use surface::Surface;
 

@@ -3,17 +3,16 @@
 //! Borders are reflected without repeating the edge pixel. The middle of the image is read and written in place; only
 //! columns near the left and right border go through a copy that has the reflected ones beside it.
 //!
-//! Cost for 7x7: 16 multiply-adds and 10 additions per pixel (see `run::simd::convolve`), about 0.13 ms for 640x480 on one
+//! Cost for 7x7: 16 multiply-adds and 10 additions per pixel (see `simd::convolve`), about 0.13 ms for 640x480 on one
 //! core with AVX-512.
 
 use std::ops::Range;
 
 use ndarray::{ArrayView2, ArrayViewMut2};
 
+use crate::border::reflect;
 use crate::kernel::Kernel;
-use crate::run::Backend;
-use crate::run::plain::reflect;
-use crate::run::simd::{self, Plane, Taps};
+use crate::simd::{self, Backend, Plane, Taps};
 
 /// Rows that are convolved at a time.
 const BLOCK: usize = simd::MAX_ROWS;

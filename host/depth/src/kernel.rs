@@ -9,14 +9,46 @@
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Sizes that the operators may have.
-pub const SIZES: [usize; 4] = [5, 7, 9, 11];
+/// Declares the sizes that operators may have, the only list of them: [`SIZES`], and `with_size!`, which runs code with the
+/// size as a constant. (`$` is handed in because a macro in a macro cannot write its own.)
+macro_rules! sizes {
+    ($dollar:tt: $($size:literal)+) => {
+        /// Sizes that the operators may have.
+        pub const SIZES: [usize; [$($size),+].len()] = [$($size),+];
+
+        /// `with_size!(value, SIZE => expression)`: the expression with the constant `SIZE` equal to `value`, which must be
+        /// one of [`SIZES`].
+        macro_rules! with_size {
+            ($dollar value:expr, $dollar constant:ident => $dollar expression:expr) => {
+                match $dollar value {
+                    $($size => {
+                        const $dollar constant: usize = $size;
+                        $dollar expression
+                    })+
+                    // `Kernel` has no other size.
+                    other => unreachable!("kernel size {other}"),
+                }
+            };
+        }
+    };
+}
+sizes!($: 5 7 9 11 13);
+pub(crate) use with_size;
+
+/// The largest of [`SIZES`].
+pub const LARGEST_SIZE: usize = SIZES[SIZES.len() - 1];
+
+/// [`SIZES`] in words, such as "5, 7 or 9".
+pub fn sizes_in_words() -> String {
+    let [rest @ .., last] = SIZES.map(|size| size.to_string());
+    format!("{} or {last}", rest.join(", "))
+}
 
 /// What is wrong with a kernel.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum KernelError {
     /// The size is none of [`SIZES`].
-    #[error("kernel size {0}: must be 5, 7, 9 or 11")]
+    #[error("kernel size {0}: must be {sizes}", sizes = sizes_in_words())]
     Size(usize),
     /// The number of coefficients does not fit the size.
     #[error("a {size}x{size} kernel of eight-fold symmetry has {expected} coefficients, not {found}")]
@@ -34,7 +66,7 @@ pub enum KernelError {
 }
 
 /// Number of free coefficients of a kernel of `size`.
-pub fn free_coefficients(size: usize) -> usize {
+pub const fn free_coefficients(size: usize) -> usize {
     let side = size / 2 + 1;
     side * (side + 1) / 2
 }
@@ -61,6 +93,11 @@ pub fn basis_response((dx, dy): (usize, usize), u: f64, v: f64) -> f64 {
     let both = if dx == dy { one(dx_f, dy_f) } else { one(dx_f, dy_f) + one(dy_f, dx_f) };
     let mirrored = |d: usize| if d == 0 { 1.0 } else { 2.0 };
     both * mirrored(dx) * mirrored(dy)
+}
+
+/// [`basis_response`] of every free coefficient of a kernel of `size`, in their order.
+pub fn basis_responses(size: usize, u: f64, v: f64) -> Vec<f64> {
+    offsets(size).map(|offset| basis_response(offset, u, v)).collect()
 }
 
 /// An eight-fold symmetric kernel.
@@ -109,6 +146,20 @@ impl Kernel {
             Some(i) => Err(KernelError::NotFinite(i)),
             None => Ok(Self { size, octant }),
         }
+    }
+
+    /// `N` kernels of `size` from their free coefficients, one kernel after the other.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn several<const N: usize>(size: usize, octants: &[f64]) -> Result<[Self; N], KernelError> {
+        let (n, found) = (free_coefficients(size), octants.len());
+        if found != N * n {
+            return Err(KernelError::Coefficients { size, expected: N * n, found });
+        }
+        let kernels = octants.chunks_exact(n).map(|octant| Self::new(size, octant.to_vec()));
+        let kernels: Vec<Self> = kernels.collect::<Result<_, _>>()?;
+        kernels.try_into().map_err(|_| KernelError::Coefficients { size, expected: N * n, found })
     }
 
     /// Width and height.
@@ -177,5 +228,7 @@ mod tests {
         );
         assert_eq!(Kernel::new(5, vec![0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0]), Err(KernelError::NotFinite(1)));
         assert!(toml::from_str::<Kernel>("size = 7\noctant = [1.0]").is_err());
+        let too_large = Kernel::new(15, vec![0.0; 36]).unwrap_err().to_string();
+        assert_eq!(too_large, "kernel size 15: must be 5, 7, 9, 11 or 13");
     }
 }

@@ -4,8 +4,13 @@
 //! operators (Watanabe & Nayar 1998; Li, PhD thesis, University of Warwick, 2014).
 //! Images and maps are `ndarray::Array2<f32>` of (height, width); depth is in mm, NaN where there is no value.
 pub mod baselines;
+mod border;
 pub mod calibrate;
+pub mod confidence;
 pub mod corrections;
+mod cubic;
+mod depth_map;
+mod depth_of_alpha;
 pub mod fill;
 pub mod filter;
 pub mod focus_measure;
@@ -15,6 +20,7 @@ pub mod metrics;
 pub mod nir;
 pub mod operators;
 pub mod optics;
+pub mod pipeline;
 pub mod psf;
-pub mod run;
+mod simd;
 pub mod uncertainty;

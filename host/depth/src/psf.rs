@@ -16,27 +16,54 @@ use serde::{Deserialize, Serialize};
 
 use crate::hankel::HankelTable;
 
-/// Smallest and largest exponent of the generalised Gaussian: below, the tails reach over hundreds of pixels; above,
-/// it is a pill-box to three digits.
-const EXPONENTS: [f64; 2] = [0.5, 64.0];
+/// Exponents of the generalised Gaussian: below, the tails reach over hundreds of pixels; above, it is a pill-box to three
+/// digits.
+const P_RANGE: [f64; 2] = [0.5, 64.0];
+
+/// Blur constants: usual are 0.3 to 1.
+const K_RANGE: [f64; 2] = [0.01, 10.0];
 
 /// What is wrong with a point-spread function's text or parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PsfError {
-    /// The text is none of the known forms.
-    #[error("`{0}` is no PSF: write pillbox, gaussian:k=0.4578 or generalised:p=1.8,k=0.4802")]
-    Syntax(String),
-    /// `k` is not a positive number.
-    #[error("k = {0}: the blur constant must be a positive number, usually 0.3 to 1")]
-    BlurConstant(f64),
-    /// `p` is outside what can be computed.
-    #[error("p = {0}: the exponent must lie between 0.5 and 64 (2 is a Gaussian)")]
-    Exponent(f64),
+    /// The name is that of no model.
+    #[error("unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578 or generalised:p=1.8,k=0.4802")]
+    Unknown(String),
+    /// A parameter that the model needs is missing.
+    #[error("PSF {model} needs {name}=NUMBER, for instance {example}")]
+    Missing {
+        /// The model.
+        model: &'static str,
+        /// The missing parameter.
+        name: &'static str,
+        /// A complete PSF.
+        example: &'static str,
+    },
+    /// A parameter that the model does not have, or has twice.
+    #[error("PSF {model} takes no {name:?} here")]
+    Unexpected {
+        /// The model.
+        model: String,
+        /// The parameter.
+        name: String,
+    },
+    /// A parameter that is not a number or out of range.
+    #[error("PSF parameter {name} = {value}, expected a number from {low} to {high}")]
+    Range {
+        /// The parameter.
+        name: &'static str,
+        /// What was given.
+        value: String,
+        /// Smallest.
+        low: f64,
+        /// Largest.
+        high: f64,
+    },
 }
 
 /// A model of the point-spread function.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(tag = "model", rename_all = "lowercase")]
+#[serde(try_from = "Parts", into = "Parts")]
 pub enum Psf {
     /// Uniform disc of the geometric blur radius.
     #[default]
@@ -55,23 +82,76 @@ pub enum Psf {
     },
 }
 
+/// A PSF as stored.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parts {
+    model: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    p: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    k: Option<f64>,
+}
+
+impl TryFrom<Parts> for Psf {
+    type Error = PsfError;
+
+    fn try_from(Parts { model, p, k }: Parts) -> Result<Self, PsfError> {
+        Self::from_parts(&model, p, k)
+    }
+}
+
+impl From<Psf> for Parts {
+    fn from(psf: Psf) -> Self {
+        let (model, p, k) = match psf {
+            Psf::PillBox => ("pillbox", None, None),
+            Psf::Gaussian { k } => ("gaussian", None, Some(k)),
+            Psf::Generalised { p, k } => ("generalised", Some(p), Some(k)),
+        };
+        Self { model: model.to_owned(), p, k }
+    }
+}
+
 impl Psf {
+    /// A PSF from the name of its model and its parameters.
+    ///
+    /// # Errors
+    /// [`PsfError`] for an unknown model, missing, surplus or unusable parameters.
+    pub fn from_parts(model: &str, p: Option<f64>, k: Option<f64>) -> Result<Self, PsfError> {
+        let surplus = |name: &str| PsfError::Unexpected { model: model.to_owned(), name: name.to_owned() };
+        match (model, p, k) {
+            ("pillbox", None, None) => Ok(Self::PillBox),
+            ("pillbox", Some(_), _) => Err(surplus("p")),
+            ("pillbox", None, Some(_)) => Err(surplus("k")),
+            ("gaussian", None, Some(k)) => Self::Gaussian { k }.checked(),
+            ("gaussian", Some(_), _) => Err(surplus("p")),
+            ("gaussian", None, None) => {
+                Err(PsfError::Missing { model: "gaussian", name: "k", example: "gaussian:k=0.4578" })
+            }
+            ("generalised", Some(p), Some(k)) => Self::Generalised { p, k }.checked(),
+            ("generalised", p, _) => Err(PsfError::Missing {
+                model: "generalised",
+                name: if p.is_none() { "p" } else { "k" },
+                example: "generalised:p=1.8,k=0.4802",
+            }),
+            _ => Err(PsfError::Unknown(model.to_owned())),
+        }
+    }
+
     /// The PSF itself if its parameters are usable.
     ///
     /// # Errors
-    /// [`PsfError::BlurConstant`] or [`PsfError::Exponent`].
+    /// [`PsfError::Range`].
     pub fn checked(self) -> Result<Self, PsfError> {
-        let k = match self {
-            Self::PillBox => 1.0,
-            Self::Gaussian { k } => k,
+        match self {
+            Self::PillBox => {}
+            Self::Gaussian { k } => check_range("k", k, K_RANGE)?,
             Self::Generalised { p, k } => {
-                if !(EXPONENTS[0]..=EXPONENTS[1]).contains(&p) {
-                    return Err(PsfError::Exponent(p));
-                }
-                k
+                check_range("p", p, P_RANGE)?;
+                check_range("k", k, K_RANGE)?;
             }
-        };
-        if k.is_finite() && k > 0.0 { Ok(self) } else { Err(PsfError::BlurConstant(k)) }
+        }
+        Ok(self)
     }
 
     /// The OTF for blur radii up to `max_radius_px` and every frequency a pixel grid carries (up to `sqrt(2) pi`).
@@ -92,6 +172,14 @@ impl Psf {
     }
 }
 
+fn check_range(name: &'static str, value: f64, [low, high]: [f64; 2]) -> Result<(), PsfError> {
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(PsfError::Range { name, value: value.to_string(), low, high })
+    }
+}
+
 impl fmt::Display for Psf {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -105,28 +193,30 @@ impl fmt::Display for Psf {
 impl FromStr for Psf {
     type Err = PsfError;
 
+    /// `pillbox`, `gaussian:k=0.4578` or `generalised:p=1.8,k=0.4802`.
     fn from_str(text: &str) -> Result<Self, PsfError> {
-        let syntax = || PsfError::Syntax(text.to_owned());
         let (model, parameters) = text.trim().split_once(':').unwrap_or((text.trim(), ""));
+        let model = model.trim();
         let [mut p, mut k] = [None; 2];
-        for parameter in parameters.split(',').filter(|s| !s.trim().is_empty()) {
-            let (name, value) = parameter.split_once('=').ok_or_else(syntax)?;
-            let slot = match name.trim() {
-                "p" => &mut p,
-                "k" => &mut k,
-                _ => return Err(syntax()),
+        for parameter in parameters.split(',').filter(|parameter| !parameter.trim().is_empty()) {
+            let (name, value) = parameter.split_once('=').unwrap_or((parameter, ""));
+            let (name, value) = (name.trim(), value.trim());
+            let (slot, name, [low, high]) = match name {
+                "p" => (&mut p, "p", P_RANGE),
+                "k" => (&mut k, "k", K_RANGE),
+                _ => return Err(PsfError::Unexpected { model: model.to_owned(), name: name.to_owned() }),
             };
-            let value: f64 = value.trim().parse().map_err(|_| syntax())?;
-            if slot.replace(value).is_some() {
-                return Err(syntax());
+            let number = value.parse::<f64>().map_err(|_| PsfError::Range {
+                name,
+                value: value.to_owned(),
+                low,
+                high,
+            })?;
+            if slot.replace(number).is_some() {
+                return Err(PsfError::Unexpected { model: model.to_owned(), name: name.to_owned() });
             }
         }
-        match (model, p, k) {
-            ("pillbox", None, None) => Ok(Self::PillBox),
-            ("gaussian", None, Some(k)) => Self::Gaussian { k }.checked(),
-            ("generalised", Some(p), Some(k)) => Self::Generalised { p, k }.checked(),
-            _ => Err(syntax()),
-        }
+        Self::from_parts(model, p, k)
     }
 }
 
@@ -177,19 +267,24 @@ mod tests {
             assert_eq!(text.parse::<Psf>().unwrap().to_string(), text);
         }
         assert_eq!("generalised:k=0.5,p=4".parse::<Psf>().unwrap(), Psf::Generalised { p: 4.0, k: 0.5 });
-        for bad in [
-            "",
-            "pillbox:k=1",
-            "gaussian",
-            "gaussian:k",
-            "gaussian:k=a",
-            "gaussian:k=1,k=2",
-            "generalised:p=2",
+        for (bad, expected) in [
+            ("", "unknown PSF \"\""),
+            ("airy", "unknown PSF \"airy\""),
+            ("pillbox:k=1", "takes no \"k\""),
+            ("gaussian", "needs k=NUMBER"),
+            ("gaussian:k", "k = , expected a number"),
+            ("gaussian:k=a", "k = a"),
+            ("gaussian:k=1,k=2", "takes no \"k\""),
+            ("gaussian:k=-1", "k = -1, expected a number from 0.01"),
+            ("generalised:p=2", "needs k=NUMBER"),
+            ("generalised:p=0.1,k=1", "p = 0.1"),
         ] {
-            assert!(matches!(bad.parse::<Psf>(), Err(PsfError::Syntax(_))), "{bad}");
+            let error = bad.parse::<Psf>().unwrap_err().to_string();
+            assert!(error.contains(expected), "{error:?} should contain {expected:?}");
         }
-        assert_eq!("gaussian:k=-1".parse::<Psf>(), Err(PsfError::BlurConstant(-1.0)));
-        assert_eq!("generalised:p=0.1,k=1".parse::<Psf>(), Err(PsfError::Exponent(0.1)));
+        assert_eq!(toml::from_str::<Psf>("model = \"gaussian\"\nk = 0.5").unwrap(), Psf::Gaussian { k: 0.5 });
+        let surplus = toml::from_str::<Psf>("model = \"pillbox\"\nk = 0.5").unwrap_err().to_string();
+        assert!(surplus.contains("PSF pillbox takes no \"k\""), "{surplus}");
     }
 
     #[test]

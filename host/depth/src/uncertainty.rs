@@ -20,13 +20,14 @@
 use ndarray::{Array2, ArrayView2, Zip, s};
 use serde::{Deserialize, Serialize};
 
+use crate::border::reflect;
+use crate::cubic::root;
 use crate::filter::convolve;
 use crate::kernel::Kernel;
 use crate::operators::{Operators, linearise};
 use crate::optics::Optics;
-use crate::run::plain::reflect;
-use crate::run::simd::{Lag, lagged_products};
-use crate::run::{Backend, RunError, Settings, root};
+use crate::pipeline::{Processor, RunError, Settings};
+use crate::simd::{Backend, Lag, lagged_products};
 
 /// The noise of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -69,7 +70,7 @@ pub fn median_gain(size: usize) -> f64 {
 /// Standard deviation of the depth of each pixel in mm, (height, width); NaN where nothing is known.
 ///
 /// # Errors
-/// As [`crate::run::depth_from_pair`] for images that cannot be processed.
+/// As [`crate::pipeline::depth_from_pair`] for images that cannot be processed.
 pub fn standard_deviation_mm(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -79,7 +80,7 @@ pub fn standard_deviation_mm(
     noise: Noise,
 ) -> Result<Array2<f32>, RunError> {
     // The run's own checks; its depth is of no use here, because alpha is needed before median and rim.
-    crate::run::Processor::new(operators, optics, settings)?.run(far, near)?;
+    Processor::new(operators, optics, settings)?.run(far, near)?;
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let filtered = |image: &Array2<f32>, kernel: &Kernel| {
         let mut output = Array2::zeros(image.dim());

@@ -7,7 +7,7 @@ use common::{Texture, eight_bit, rig};
 use farnear_depth::baselines::{BaselineError, Favaro, FavaroSettings, Method, depth_from_pair};
 use farnear_depth::fill::FILLED_CONFIDENCE;
 use farnear_depth::optics::Optics;
-use farnear_depth::run::{RunError, Settings, Warning};
+use farnear_depth::pipeline::{RunError, Settings, Warning};
 use ndarray::{Array2, Axis, concatenate, s};
 
 const SIDE: usize = 128;
@@ -101,7 +101,7 @@ fn holes_and_blank_regions_are_marked() {
     }
 }
 
-/// What `run::depth_from_pair` tells about a pair the baselines tell too, and they fill as it does.
+/// What `pipeline::depth_from_pair` tells about a pair the baselines tell too, and they fill as it does.
 #[test]
 fn checks_and_filling_are_those_of_the_rational_operators() {
     let optics = rig("gaussian:k=0.4578");

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use farnear_depth::operators::Operators;
 use farnear_depth::optics::OpticsFile;
-use farnear_depth::run::{Settings, Warning, depth_from_pair};
+use farnear_depth::pipeline::{Settings, Warning, depth_from_pair};
 use ndarray::{Array2, s};
 
 fn grey(path: &Path) -> Array2<f32> {

@@ -10,8 +10,8 @@ use farnear_depth::calibrate::{
 use farnear_depth::corrections::{CdcSettings, Method, fit};
 use farnear_depth::focus_measure::{FocusMeasure, peak};
 use farnear_depth::operators::Operators;
+use farnear_depth::pipeline::Settings;
 use farnear_depth::psf::Psf;
-use farnear_depth::run::Settings;
 use farnear_scene as scene;
 use ndarray::Array2;
 

@@ -7,8 +7,8 @@ use common::{Texture, rig};
 use farnear_depth::metrics::{CompareSettings, compare};
 use farnear_depth::operators::{Design, DesignError, Family, Operators, Request, design};
 use farnear_depth::optics::{Optics, OpticsFile};
+use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::psf::Psf;
-use farnear_depth::run::{Settings, depth_from_pair};
 use ndarray::Array2;
 
 /// RMSE relative to half the working range over planes through it, without noise.

@@ -7,7 +7,7 @@ mod common;
 use common::{Texture, eight_bit, rig};
 use farnear_depth::operators::{Operators, Request, design};
 use farnear_depth::optics::Optics;
-use farnear_depth::run::{DepthMap, RunError, Settings, Warning, depth_from_pair};
+use farnear_depth::pipeline::{DepthMap, RunError, Settings, Warning, depth_from_pair};
 use ndarray::{Array2, s};
 
 const ALPHA: f64 = 0.4;

@@ -7,7 +7,7 @@ mod common;
 use common::{Texture, eight_bit, rig};
 use farnear_depth::metrics::{CompareSettings, compare};
 use farnear_depth::operators::Operators;
-use farnear_depth::run::{Settings, depth_from_pair};
+use farnear_depth::pipeline::{Settings, depth_from_pair};
 use ndarray::Array2;
 
 /// RMSE in mm over planes through the working range, a texture each, border 16 px dropped.

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Texture, eight_bit, rig};
 use farnear_depth::operators::Operators;
-use farnear_depth::run::{Settings, depth_from_pair};
+use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
 use ndarray::{Array2, s};
 

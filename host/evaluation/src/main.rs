@@ -7,15 +7,16 @@
 //! `docs/activity.md`.
 //!
 //! Everything is seeded and no clock enters, so that two runs on one kind of processor write the same bytes.
-//! One part per file in [`parts`]; [`rig`] renders and compares, [`page`] writes Markdown, [`chart`] and [`panels`]
+//! One part per file in [`depth`]; [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes Markdown, [`chart`] and [`panels`]
 //! draw. It takes a few minutes on four cores; run it by `cargo xtask evaluate`.
 
 mod chart;
+mod depth;
 mod page;
 mod panels;
-mod parts;
 mod people;
 mod rig;
+mod sweep;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -55,15 +56,15 @@ fn run(arguments: &Arguments) -> Result<()> {
     std::fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
     let of_people = people::PARTS.iter().map(|(name, _)| *name);
     let known =
-        parts::RENDERED.iter().map(|(name, _)| *name).chain(["real"]).chain(of_people).collect::<Vec<_>>();
+        depth::RENDERED.iter().map(|(name, _)| *name).chain(["real"]).chain(of_people).collect::<Vec<_>>();
     if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
         bail!("no part is called {unknown:?}, there are {}", known.join(", "));
     }
     let wanted = |name: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
 
-    if parts::RENDERED.iter().any(|(name, _)| wanted(name)) {
-        let mut page = Page::new(&images, parts::INTRODUCTION);
-        for (name, measure) in parts::RENDERED {
+    if depth::RENDERED.iter().any(|(name, _)| wanted(name)) {
+        let mut page = Page::new(&images, depth::INTRODUCTION);
+        for (name, measure) in depth::RENDERED {
             if wanted(name) {
                 eprintln!("{name}");
                 measure(&mut page).with_context(|| format!("measuring {name}"))?;
@@ -96,8 +97,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     eprintln!("real");
-    let mut page = Page::new(&images, parts::real::INTRODUCTION);
-    parts::real::measure(&mut page, &data).context("measuring real scenes")?;
+    let mut page = Page::new(&images, depth::real::INTRODUCTION);
+    depth::real::measure(&mut page, &data).context("measuring real scenes")?;
     finish(page, arguments, "accuracy-real.md")
 }
 

@@ -5,8 +5,8 @@ use farnear_depth::{
     metrics::{CompareSettings, Comparison, compare},
     operators::Operators,
     optics::{Optics, OpticsFile},
+    pipeline::{Settings, depth_from_pair},
     psf::Psf,
-    run::{Settings, depth_from_pair},
 };
 use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, Renderer, Scene, truth};
 use ndarray::Array2;

@@ -1,8 +1,13 @@
 //! What to type next: the workflows' errors carry facts, the command line knows the commands that mend them.
 
-use farnear_capture::{ClientError, expose::CaptureError, focus::FocusSearchError};
+use farnear_capture::{
+    ClientError, board_correction::BoardCorrectionError, expose::CaptureError, focus::FocusSearchError,
+};
 use farnear_protocol::RequestError;
-use farnear_workflows::{WorkflowError, correction_file, operators, simulator::SimulatorError};
+use farnear_workflows::{
+    WorkflowError, activity::samples::SamplesError, correction_file, operators, shadow::removal::CAMERA_FILE,
+    silhouettes::SilhouettesError, simulator::SimulatorError,
+};
 
 /// The commands that help with an error, where there are some.
 pub fn hint(error: &anyhow::Error) -> Option<String> {
@@ -27,9 +32,37 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::Simulator(SimulatorError::Missing) => {
             Some("`cargo xtask install` installs both, `cargo xtask demo` builds them".into())
         }
+        WorkflowError::Unanswered { .. } => {
+            Some("--no-prompt (targets) or --no-hands (check) asks nothing".into())
+        }
+        WorkflowError::InsideFocalLength { .. } => {
+            Some("`farnear rig settings get datum_nm` shows it".into())
+        }
+        WorkflowError::StepsFailed { alarm: Some(number), .. } => Some(clear(*number)),
         WorkflowError::Client(error)
+        | WorkflowError::BoardCorrection(BoardCorrectionError::Board(error))
         | WorkflowError::Capture(CaptureError::Board(error))
         | WorkflowError::Focus(FocusSearchError::Capture(CaptureError::Board(error))) => of_client(error),
+        WorkflowError::Read { what: CAMERA_FILE, .. } => {
+            Some("`farnear shadow remove --help` shows what stands in it".into())
+        }
+        WorkflowError::Silhouettes(SilhouettesError::TooLarge { .. }) => {
+            Some("a larger --mm-per-px makes the picture smaller".into())
+        }
+        WorkflowError::Samples(error) => of_samples(error).map(Into::into),
+        _ => None,
+    }
+}
+
+fn of_samples(error: &SamplesError) -> Option<&'static str> {
+    match error {
+        SamplesError::Views { .. } => {
+            Some("`--any-view` (train) or `--views each` (evaluate) take every view by itself")
+        }
+        SamplesError::OtherViews { .. } => Some("`--views each` takes every view by itself"),
+        SamplesError::SamePerson { .. } => {
+            Some("add --leave-one-subject-out to leave them out of the training in turn")
+        }
         _ => None,
     }
 }
@@ -38,6 +71,9 @@ fn of_client(error: &ClientError) -> Option<String> {
     match error {
         ClientError::Refused { error, .. } => of_refusal(error),
         ClientError::Failed { alarm: Some(record), .. } => Some(clear(record.number)),
+        ClientError::Version { .. } | ClientError::Schema { .. } => {
+            Some("`cargo xtask firmware` builds the firmware of these sources".into())
+        }
         _ => None,
     }
 }

@@ -70,6 +70,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
         Err(error) => {
+            terminal::end_count();
             let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
             eprintln!("farnear: {}{hint}", message(&error));
             let usage =

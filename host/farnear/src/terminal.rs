@@ -5,6 +5,7 @@ use std::{
     io::{BufRead, IsTerminal, Write},
     sync::{
         OnceLock,
+        atomic::{AtomicBool, Ordering},
         mpsc::{RecvTimeoutError, channel},
     },
     time::Duration,
@@ -20,6 +21,16 @@ const LOOK: Duration = Duration::from_millis(50);
 pub struct Terminal {
     /// Whether counts are shown while they rise.
     counts: bool,
+}
+
+/// Whether the cursor stands behind a count that may still rise.
+static COUNTING_LINE: AtomicBool = AtomicBool::new(false);
+
+/// Ends the line of a count, so that what follows has one of its own.
+pub fn end_count() {
+    if COUNTING_LINE.swap(false, Ordering::Relaxed) {
+        eprintln!();
+    }
 }
 
 static PLAIN: Terminal = Terminal { counts: false };
@@ -54,6 +65,7 @@ pub fn counting(json: bool) -> Result<Context<'static>> {
 
 impl Progress for Terminal {
     fn say(&self, what: &str) {
+        end_count();
         eprintln!("{what}");
     }
 
@@ -65,8 +77,9 @@ impl Progress for Terminal {
             Some(total) => eprint!("\r{done} of {total} {unit}"),
             None => eprint!("\r{done} {unit}"),
         }
+        COUNTING_LINE.store(true, Ordering::Relaxed);
         if total == Some(done) {
-            eprintln!();
+            end_count();
         }
     }
 }

@@ -88,6 +88,11 @@ impl Staging {
         self.folder.join(name)
     }
 
+    /// Makes a folder in it, with its parents; `name` may be a path.
+    pub fn make_folder(&self, name: &str) -> Result<(), StagingError> {
+        fs::create_dir_all(self.path(name)).map_err(StagingError::at(&self.target.join(name)))
+    }
+
     /// Writes a file.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StagingError> {
         let path = self.path(name);

@@ -11,7 +11,7 @@ use std::{path::PathBuf, time::Instant};
 use farnear_depth::{
     corrections::Correction,
     optics::Optics,
-    run::{DepthMap, Settings},
+    pipeline::{DepthMap, Settings},
 };
 use ndarray::Array2;
 use serde::Serialize;

@@ -3,13 +3,23 @@
 
 use std::path::{Path, PathBuf};
 
+use farnear_activity::{
+    background::BackgroundError,
+    evaluation::leave_one_out::EvaluationError,
+    recognition::model::ModelError,
+    shadow::{ShadowError, camera::CameraError as CameraFileError, uncertainty::UncertaintyError},
+    shadow_detectors::ImagesError,
+    shadow_score::ShapeError,
+    sun::SunError,
+};
 use farnear_capture::{
     ClientError, board_correction::BoardCorrectionError, camera::CameraError, expose::CaptureError,
-    focus::FocusSearchError, plan::PlanError, record::RecordError,
+    focus::FocusSearchError, log_stream::LogEnded, plan::PlanError, record::RecordError,
+    sequence::ProgramError,
 };
 use farnear_depth::{
     baselines::BaselineError, calibrate::CalibrationError, corrections::CorrectionError,
-    metrics::CompareError, operators::DesignError, optics::OpticsError, run::RunError,
+    metrics::CompareError, operators::DesignError, optics::OpticsError, pipeline::RunError,
 };
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,
@@ -57,6 +67,42 @@ pub enum WorkflowError {
     Cancelled {
         /// What was under way.
         during: String,
+    },
+    /// The sharpest image would lie where no lens puts one.
+    #[error(
+        "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: is the \
+         rig's setting datum_nm right?"
+    )]
+    InsideFocalLength {
+        /// Sensor distance of the best focus.
+        sensor_mm: f64,
+        /// The lens' focal length.
+        focal_length_mm: f64,
+    },
+    /// The board calculates otherwise than this computer, which should give the same bits.
+    #[error("the board's answer differs from this computer's: {0}")]
+    Differs(String),
+    /// The bring-up checklist found something.
+    #[error("{failed} of the steps failed; put that right before anything moves further (docs/rig.md)")]
+    StepsFailed {
+        /// How many steps.
+        failed: usize,
+        /// Number of the alarm that is latched.
+        alarm: Option<u32>,
+    },
+    /// Lines that nobody takes any more.
+    #[error("the log cannot be handed on: {source}")]
+    Sink {
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A folder that cannot be made.
+    #[error("cannot make the folder {}: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
     },
     /// A question that nobody answered.
     #[error("nobody answers, the input has ended: {question}")]
@@ -130,6 +176,12 @@ pub enum WorkflowError {
     /// The search for the focus.
     #[error(transparent)]
     Focus(#[from] FocusSearchError),
+    /// An exposure program.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
+    /// The board's log.
+    #[error(transparent)]
+    Log(#[from] LogEnded),
     /// A capture's record.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -154,6 +206,51 @@ pub enum WorkflowError {
     /// Results that cannot be put in place.
     #[error(transparent)]
     Staging(#[from] StagingError),
+    /// A thread that cannot be started.
+    #[error("cannot start a thread: {reason}")]
+    Thread {
+        /// What the system says.
+        reason: String,
+    },
+    /// Where the sun stands.
+    #[error(transparent)]
+    Sun(#[from] SunError),
+    /// Silhouettes.
+    #[error(transparent)]
+    Silhouettes(#[from] crate::silhouettes::SilhouettesError),
+    /// What moves in a video.
+    #[error(transparent)]
+    Background(#[from] BackgroundError),
+    /// Pictures that a shadow detector cannot take.
+    #[error(transparent)]
+    ShadowImages(#[from] ImagesError),
+    /// How a camera stands.
+    #[error(transparent)]
+    CameraFile(#[from] CameraFileError),
+    /// Where a shadow falls.
+    #[error(transparent)]
+    Shadow(#[from] ShadowError),
+    /// How sure a shadow is.
+    #[error(transparent)]
+    ShadowUncertainty(#[from] UncertaintyError),
+    /// Pictures that do not belong together.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// A score of shadow removal.
+    #[error(transparent)]
+    Score(#[from] crate::shadow::score::ScoreError),
+    /// Samples of activities.
+    #[error(transparent)]
+    Samples(#[from] crate::activity::samples::SamplesError),
+    /// A model of activities.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Other views than a model's.
+    #[error(transparent)]
+    Views(#[from] crate::activity::recognition::ViewsError),
+    /// An evaluation.
+    #[error(transparent)]
+    Evaluation(#[from] EvaluationError),
     /// A record that cannot be put into TOML.
     #[error("cannot write a record: {0}")]
     Toml(#[from] toml::ser::Error),
@@ -173,6 +270,21 @@ impl WorkflowError {
     /// For `map_err`: a file that cannot be read.
     pub fn read(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Read { what, path: path.into(), source }
+    }
+
+    /// Whether the work was given up because somebody wished so.
+    pub fn is_cancelled(&self) -> bool {
+        match self {
+            Self::Cancelled { .. }
+            | Self::Client(ClientError::Interrupted { .. })
+            | Self::Capture(CaptureError::Board(ClientError::Interrupted { .. }))
+            | Self::Focus(FocusSearchError::Capture(CaptureError::Board(ClientError::Interrupted {
+                ..
+            })))
+            | Self::BoardCorrection(BoardCorrectionError::Interrupted { .. }) => true,
+            Self::About { source, .. } => source.is_cancelled(),
+            _ => false,
+        }
     }
 
     /// Whether what was asked for was wrong, and not the world: nothing has been done.

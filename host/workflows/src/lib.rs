@@ -9,14 +9,57 @@
 //! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
 //! - [`calibrate`]: learning the point spread function and corrections.
+//! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
+//!   [`sun`] stands; [`activity`]: what the person does.
 //! - [`context`], [`error`]: the way to the face and back.
+//!
+//! A face that keeps what it is told, and a stage that is moved; a scripted board stands behind the port here.
+//!
+//! ```
+//! # #[cfg(target_os = "linux")] { // where a pseudo-terminal holds the board
+//! # use std::sync::Mutex;
+//! # use farnear_protocol::message::Axis;
+//! # use farnear_scripted_board::{Faults, plug_in};
+//! use farnear_workflows::{Cancel, Context, Nobody, Progress, rig};
+//!
+//! #[derive(Default)]
+//! struct Face(Mutex<Vec<String>>);
+//!
+//! impl Progress for Face {
+//!     fn say(&self, what: &str) {
+//!         self.0.lock().expect("one thread").push(what.into());
+//!     }
+//! }
+//!
+//! let (port, _board) = plug_in(Faults::default());
+//! let settings = rig::motion::MoveSettings {
+//!     rig: rig::RigAddress::Port(port),
+//!     targets: vec![(Axis::Lens, 1_000.0)],
+//!     home: true,
+//! };
+//! let face = Face::default();
+//! // Whoever holds a clone of `cancel` can stop the rig, from any thread.
+//! let cancel = Cancel::default();
+//! let context = Context { progress: &face, questions: &Nobody, cancel: cancel.clone() };
+//! let moved = rig::motion::move_to(&settings, &context)?;
+//! assert!(matches!(moved, rig::motion::MoveFigures::One(lens) if lens.measured_um == 1_000.125));
+//! assert!(face.0.lock().expect("one thread").iter().any(|said| said.starts_with("homing the lens stage")));
+//!
+//! cancel.cancel();
+//! let error = rig::motion::move_to(&settings, &context).expect_err("nothing moves any more");
+//! assert!(error.is_cancelled());
+//! # }
+//! # Ok::<(), farnear_workflows::WorkflowError>(())
+//! ```
 
+pub mod activity;
 pub mod calibrate;
 pub mod clock;
 pub mod compare;
 pub mod context;
 pub mod correct;
 pub mod correction_file;
+mod counter;
 pub mod depth;
 pub mod error;
 pub mod figures;
@@ -24,8 +67,12 @@ mod operator_cache;
 pub mod operator_plot;
 pub mod operators;
 pub mod optics;
+mod parameters;
 pub mod rig;
+pub mod shadow;
+pub mod silhouettes;
 pub mod simulator;
+pub mod sun;
 
 pub use context::{Cancel, Context, Nobody, Progress, Questions};
 pub use error::{Result, WorkflowError};

@@ -1,7 +1,26 @@
 //! A rig, real or emulated: connecting to it, and what it can be made to do. One file per job.
+//!
+//! - [`info`], [`motion`], [`alarms`], [`settings`], [`board`], [`log`]: what the board is asked and told.
+//! - [`camera`]: a rig with its camera; [`pair`], [`sequence`], [`focus`], [`targets`]: what is done with both.
+//! - [`mechanics`], [`correction_fit`], [`correct`], [`sun`]: what the board measures and calculates.
+//! - [`check`]: the bring-up checklist.
 
+pub mod alarms;
+pub mod board;
 pub mod camera;
+pub mod check;
+pub mod correct;
+pub mod correction_fit;
+pub mod focus;
+pub mod info;
+pub mod log;
+pub mod mechanics;
+pub mod motion;
 pub mod pair;
+pub mod sequence;
+pub mod settings;
+pub mod sun;
+pub mod targets;
 
 use std::path::Path;
 
@@ -55,7 +74,7 @@ impl Rig {
     /// Connects. Cancelling stops what moves. The emulated rig's lens is that of `optics`, where they are given.
     ///
     /// # Errors
-    /// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+    /// [`WorkflowError::Simulator`], [`WorkflowError::Client`], [`WorkflowError::Cancelled`] while the emulated rig starts.
     pub fn connect(
         address: &RigAddress,
         optics: Option<(&Path, Psf)>,
@@ -64,7 +83,7 @@ impl Rig {
         let (mut client, emulation) = match address {
             RigAddress::Port(port) => (Client::open(port)?, None),
             RigAddress::Emulated(scenery) => {
-                let simulator = Simulator::start(scenery, optics, context.progress)?;
+                let simulator = Simulator::start(scenery, optics, context)?;
                 (Client::open_emulated(simulator.port())?, Some((simulator, scenery.clone())))
             }
         };

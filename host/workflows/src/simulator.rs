@@ -12,7 +12,10 @@ use farnear_capture::record::SimulationRecord;
 use farnear_depth::psf::Psf;
 use serde::Deserialize;
 
-use crate::context::Progress;
+use crate::{
+    context::{Cancel, Context},
+    error::Result,
+};
 
 /// Name of the program.
 const PROGRAM: &str = "farnear-sim";
@@ -21,6 +24,11 @@ const FAREWELL: Duration = Duration::from_secs(3);
 
 /// Longest wait for the simulator to say where it listens; it takes about a second.
 const START: Duration = Duration::from_secs(60);
+/// From one look at the wish to stop to the next.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// The lens that the emulated rig has without optics: that of the thesis' 50 mm lens.
+pub const USUAL_PSF: Psf = Psf::Gaussian { k: 0.4578 };
 
 /// What the emulated rig is made of; what is left open has the simulator's own defaults. The texts are checked by the
 /// simulator.
@@ -119,16 +127,12 @@ impl Simulator {
     /// Starts the simulator and says so. Without optics it has those of a 50 mm lens.
     ///
     /// # Errors
-    /// [`SimulatorError`].
-    pub fn start(
-        scenery: &Scenery,
-        optics: Option<(&Path, Psf)>,
-        progress: &dyn Progress,
-    ) -> Result<Self, SimulatorError> {
+    /// [`SimulatorError`], [`crate::WorkflowError::Cancelled`].
+    pub fn start(scenery: &Scenery, optics: Option<(&Path, Psf)>, context: &Context<'_>) -> Result<Self> {
         let program = find()?;
-        progress.say(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
+        context.say(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
         let mut command = Command::new(&program);
-        let record = scenery.decided(optics.map_or(Psf::Gaussian { k: 0.4578 }, |(_, psf)| psf));
+        let record = scenery.decided(optics.map_or(USUAL_PSF, |(_, psf)| psf));
         command.args(["run", "--scene", &record.scene, "--psf", &record.psf, "--noise", &record.noise]);
         command.args(["--seed", &record.seed.to_string()]);
         for (flag, file) in [
@@ -156,10 +160,10 @@ impl Simulator {
         let stdout = child.stdout.take();
         let mut simulator = Self { child, stdin, address: Address::default() };
         let lost = |reason: String| SimulatorError::Lost { reason };
-        let line = first_line(stdout.ok_or_else(|| lost("it has none".into()))?)?;
+        let line = first_line(stdout.ok_or_else(|| lost("it has none".into()))?, &context.cancel)?;
         if line.is_empty() {
             let status = simulator.child.wait().map_err(|error| lost(error.to_string()))?;
-            return Err(SimulatorError::Ended { status: status.to_string() });
+            return Err(SimulatorError::Ended { status: status.to_string() }.into());
         }
         simulator.address = serde_json::from_str(&line)
             .map_err(|error| SimulatorError::Address { line, reason: error.to_string() })?;
@@ -194,18 +198,23 @@ impl Drop for Simulator {
 }
 
 /// The first line of the simulator's output; empty where there is none.
-fn first_line(output: impl Read + Send + 'static) -> Result<String, SimulatorError> {
+fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<String> {
     let (sender, line) = channel();
     std::thread::spawn(move || {
         let mut line = String::new();
         let read = BufReader::new(output).read_line(&mut line);
         let _ = sender.send(read.map(|_| line)); // nobody listens after the deadline
     });
-    match line.recv_timeout(START) {
-        Ok(line) => line.map_err(|error| SimulatorError::Lost { reason: error.to_string() }),
-        Err(RecvTimeoutError::Timeout) => Err(SimulatorError::Silent),
-        Err(RecvTimeoutError::Disconnected) => {
-            Err(SimulatorError::Lost { reason: "its reader ended".into() })
+    let until = Instant::now() + START;
+    loop {
+        let lost = |reason: String| SimulatorError::Lost { reason };
+        match line.recv_timeout(LOOK) {
+            Ok(line) => return Ok(line.map_err(|error| lost(error.to_string()))?),
+            Err(RecvTimeoutError::Disconnected) => return Err(lost("its reader ended".into()).into()),
+            Err(RecvTimeoutError::Timeout) if Instant::now() >= until => {
+                return Err(SimulatorError::Silent.into());
+            }
+            Err(RecvTimeoutError::Timeout) => cancel.check("starting the emulated rig")?,
         }
     }
 }

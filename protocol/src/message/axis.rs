@@ -16,6 +16,35 @@ pub enum Axis {
     Lens,
 }
 
+impl Axis {
+    /// All, in the order of their numbers on the wire.
+    pub const ALL: [Self; 3] = [Self::SensorCoarse, Self::SensorFine, Self::Lens];
+
+    /// Its name in commands, in files and among the settings.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SensorCoarse => "coarse",
+            Self::SensorFine => "fine",
+            Self::Lens => "lens",
+        }
+    }
+
+    /// Whether its position is part of the distance between sensor and lens. Not every movable part is: a filter wheel
+    /// would turn and leave the distance as it is.
+    pub const fn is_in_distance(self) -> bool {
+        match self {
+            Self::SensorCoarse | Self::SensorFine | Self::Lens => true,
+        }
+    }
+}
+
+/// Sensor distance from the lens' principal plane, nanometres: the datum and the positions of those axes that are part
+/// of it ([`Axis::is_in_distance`]). The one sum of this kind: whoever adds an axis says there whether it joins.
+pub fn sensor_distance_nm(datum: Nanometres, mut position: impl FnMut(Axis) -> Nanometres) -> i64 {
+    let parts = Axis::ALL.into_iter().filter(|axis| axis.is_in_distance());
+    i64::from(datum.0) + parts.map(|axis| i64::from(position(axis).0)).sum::<i64>()
+}
+
 /// What is known of an axis' position.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PositionState {

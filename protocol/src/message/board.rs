@@ -4,7 +4,7 @@ use heapless::String;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{AlarmRecord, AxisStatus, ProgramStatus};
+use super::{AlarmRecord, Axis, AxisStatus, ProgramStatus};
 use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// Who the board is and what it can do.
@@ -51,6 +51,17 @@ pub struct Capabilities {
     pub emergency_stop: bool,
 }
 
+impl Capabilities {
+    /// Whether the board has an axis.
+    pub const fn has(&self, axis: Axis) -> bool {
+        match axis {
+            Axis::SensorCoarse => self.sensor_coarse,
+            Axis::SensorFine => self.sensor_fine,
+            Axis::Lens => self.lens,
+        }
+    }
+}
+
 /// How far the axes go and how much fits.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
@@ -86,6 +97,17 @@ pub struct Limits {
     pub silence_max: Micros,
     /// Pixels of the row buffer for depth correction.
     pub row_pixels_max: u16,
+}
+
+impl Limits {
+    /// Smallest and largest position of an axis.
+    pub const fn of(&self, axis: Axis) -> (Nanometres, Nanometres) {
+        match axis {
+            Axis::SensorCoarse => (self.coarse_min, self.coarse_max),
+            Axis::SensorFine => (self.fine_min, self.fine_max),
+            Axis::Lens => (self.lens_min, self.lens_max),
+        }
+    }
 }
 
 /// Why the board was reset.
@@ -142,6 +164,26 @@ pub struct Status {
     pub steps: u64,
     /// What the link has seen.
     pub link: LinkCounters,
+}
+
+impl Status {
+    /// How an axis is.
+    pub const fn axis(&self, axis: Axis) -> &AxisStatus {
+        match axis {
+            Axis::SensorCoarse => &self.coarse,
+            Axis::SensorFine => &self.fine,
+            Axis::Lens => &self.lens,
+        }
+    }
+
+    /// Whether an axis' home switch and its far switch are closed; an axis without switches has both open.
+    pub const fn switches(&self, axis: Axis) -> [bool; 2] {
+        match axis {
+            Axis::SensorCoarse => [self.home_switch, self.far_switch],
+            Axis::SensorFine => [false; 2],
+            Axis::Lens => [self.lens_home_switch, self.lens_far_switch],
+        }
+    }
 }
 
 /// What the board's link has seen since the reset.

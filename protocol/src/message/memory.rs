@@ -3,6 +3,8 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use super::Axis;
+
 /// A record in the board's memory. Each has a version, a CRC and two copies.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RecordName {
@@ -123,6 +125,57 @@ impl SettingKey {
             Self::PiezoCreepPpmPerDecade => "piezo_creep_ppm_per_decade",
             Self::CameraReadoutUs => "camera_readout_us",
             Self::StrobeDeadlineUs => "strobe_deadline_us",
+        }
+    }
+}
+
+/// The settings that every stepper axis has.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct StepperKeys {
+    /// Smallest position.
+    pub min: SettingKey,
+    /// Largest position.
+    pub max: SettingKey,
+    /// Speed of a move.
+    pub speed: SettingKey,
+    /// Acceleration of a move.
+    pub acceleration: SettingKey,
+    /// Jerk of a move.
+    pub jerk: SettingKey,
+    /// Backlash of the screw.
+    pub backlash: SettingKey,
+    /// Largest difference between steps and encoder.
+    pub following: SettingKey,
+}
+
+impl StepperKeys {
+    /// Of stage A's stepper.
+    pub const COARSE: Self = Self {
+        min: SettingKey::CoarseMinNm,
+        max: SettingKey::CoarseMaxNm,
+        speed: SettingKey::CoarseSpeedNmPerS,
+        acceleration: SettingKey::CoarseAccelerationUmPerS2,
+        jerk: SettingKey::CoarseJerkUmPerS3,
+        backlash: SettingKey::CoarseBacklashNm,
+        following: SettingKey::CoarseFollowingNm,
+    };
+    /// Of stage B's stepper.
+    pub const LENS: Self = Self {
+        min: SettingKey::LensMinNm,
+        max: SettingKey::LensMaxNm,
+        speed: SettingKey::LensSpeedNmPerS,
+        acceleration: SettingKey::LensAccelerationUmPerS2,
+        jerk: SettingKey::LensJerkUmPerS3,
+        backlash: SettingKey::LensBacklashNm,
+        following: SettingKey::LensFollowingNm,
+    };
+
+    /// Of an axis; `None` where that is not a stepper.
+    pub const fn of(axis: Axis) -> Option<Self> {
+        match axis {
+            Axis::SensorCoarse => Some(Self::COARSE),
+            Axis::SensorFine => None,
+            Axis::Lens => Some(Self::LENS),
         }
     }
 }

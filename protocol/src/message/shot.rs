@@ -71,6 +71,17 @@ pub struct ShotRecord {
     pub exposure: Micros,
 }
 
+impl ShotRecord {
+    /// Where an axis was at the trigger, by its encoder or gauge.
+    pub const fn measured(&self, axis: Axis) -> Nanometres {
+        match axis {
+            Axis::SensorCoarse => self.coarse,
+            Axis::SensorFine => self.fine,
+            Axis::Lens => self.lens,
+        }
+    }
+}
+
 /// How an exposure comes about.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TriggerMode {

@@ -98,11 +98,6 @@ impl Coefficient {
         self.0
     }
 
-    /// The value; exact.
-    pub fn to_f64(self) -> f64 {
-        f64::from(self.0) / Self::SCALE
-    }
-
     /// The bits with `fraction_bits` (at most 29) after the binary point, truncated.
     pub(super) fn at(self, fraction_bits: u32) -> i32 {
         self.0 >> (Self::FRACTION_BITS - fraction_bits)

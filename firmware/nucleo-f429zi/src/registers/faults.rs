@@ -3,44 +3,26 @@
 
 use core::{arch::naked_asm, panic::PanicInfo};
 
-use cortex_m::peripheral::{MPU, SCB};
+use cortex_m::peripheral::SCB;
 
 use super::retained::{Last, leave};
 
 /// The stack, see `memory.x`: a fault with the stack pointer this close to its lower end, or below, is an overflow.
 const STACK_LOWEST: u32 = 0x2000_0000;
 const STACK_MARGIN: u32 = 128;
+/// Below the stack, down to the option bytes, there is nothing (RM0090, section 2.3), so the bus answers every access
+/// with an error: 16 KiB, more than the largest frame of this program, so that none steps over it.
+const NOTHING: core::ops::Range<u32> = 0x1fff_c010..STACK_LOWEST;
 /// Words of a stacked exception frame before the program counter.
 const FRAME_PC: u32 = 6;
-/// Of the configurable fault status register (ARMv7-M, B3.2.15): the processor could not put its frame on the stack, to the
-/// memory protection's or the bus' displeasure; the address of a protection fault is known.
-const STACKING_FAILED: u32 = 1 << 4 | 1 << 12;
-const ADDRESS_VALID: u32 = 1 << 7;
+/// Of the configurable fault status register (ARMv7-M, B3.2.15): the bus refused the processor's frame on the stack;
+/// the address that the bus refused is known.
+const STACKING_FAILED: u32 = 1 << 12;
+const ADDRESS_VALID: u32 = 1 << 15;
 /// Where that address stands (B3.2.18).
-const MMFAR: *const u32 = 0xe000_ed34 as *const u32;
+const BFAR: *const u32 = 0xe000_ed38 as *const u32;
 /// Configurable fault status register.
 const CFSR: *const u32 = 0xe000_ed28 as *const u32;
-
-/// The 32 KiB below the stack may not be touched (ARMv7-M, B3.5): more than the largest frame of this program, so that
-/// none steps over it. There is no memory there anyway, but what the bus says to that is up to the chip.
-const GUARD: u32 = 0x1fff_8000;
-/// Never executed, no access, 2^15 bytes, on.
-const GUARD_ATTRIBUTES: u32 = 1 << 28 | 14 << 1 | 1;
-/// On; everywhere else the default map holds. Off in the fault handler itself.
-const MPU_ON: u32 = 1 << 2 | 1;
-
-/// Sets the guard below the stack.
-pub fn guard_stack(mpu: &mut MPU) {
-    // SAFETY: the region holds nothing that this program uses.
-    unsafe {
-        mpu.rnr.write(0);
-        mpu.rbar.write(GUARD);
-        mpu.rasr.write(GUARD_ATTRIBUTES);
-        mpu.ctrl.write(MPU_ON);
-    }
-    cortex_m::asm::dsb();
-    cortex_m::asm::isb();
-}
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
@@ -68,9 +50,10 @@ extern "C" fn HardFault() {
 extern "C" fn fault(stack: u32) -> ! {
     cortex_m::interrupt::disable();
     // SAFETY: registers of the core, readable at any time.
-    let (status, address) = unsafe { (CFSR.read_volatile(), MMFAR.read_volatile()) };
-    let guarded = status & ADDRESS_VALID != 0 && (GUARD..STACK_LOWEST).contains(&address);
-    let last = if guarded || status & STACKING_FAILED != 0 || stack < STACK_LOWEST + STACK_MARGIN {
+    let (status, address) = unsafe { (CFSR.read_volatile(), BFAR.read_volatile()) };
+    // A write that the bus refuses too late to name its address still leaves the stack pointer where it was made.
+    let beyond = status & ADDRESS_VALID != 0 && NOTHING.contains(&address);
+    let last = if beyond || status & STACKING_FAILED != 0 || stack < STACK_LOWEST + STACK_MARGIN {
         Last::StackOverflow
     } else {
         // SAFETY: the processor has just stacked its frame there, above the stack's lower end.

@@ -6,13 +6,13 @@
 //! depends on the backlash.
 
 use farnear_protocol::Nanometres;
-use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};
+use farnear_protocol::message::{Axis, Calibration, Failure, StepperKeys};
 
-use super::Step;
+use super::{Step, go_home};
 use crate::motion::axis::{Purpose, Stepper};
 use crate::motion::home::Homing;
+use crate::motion::leg::{Leg, Until};
 use crate::motion::stage::Stage;
-use crate::motion::steps;
 use crate::settings::{Settings, StepperSettings};
 
 /// Reversals that are measured.
@@ -44,13 +44,13 @@ enum Phase {
 pub(crate) struct Backlash {
     axis: Axis,
     phase: Phase,
-    edge: Option<Nanometres>,
+    leg: Leg,
     rounds: heapless::Vec<i32, ROUNDS>,
 }
 
 impl Backlash {
     pub(crate) const fn new(axis: Axis) -> Self {
-        Self { axis, phase: Phase::Home(Homing::new()), edge: None, rounds: heapless::Vec::new() }
+        Self { axis, phase: Phase::Home(Homing::new()), leg: Leg::REST, rounds: heapless::Vec::new() }
     }
 
     pub(crate) const fn axis(&self) -> Axis {
@@ -60,75 +60,47 @@ impl Backlash {
     pub(crate) fn tick(&mut self, stage: &mut Stage, settings: &Settings) -> Step {
         let axis = self.axis;
         let Some((stepper, settings)) = stage.with_numbers(axis, settings) else { return Step::On };
-        match &mut self.phase {
-            Phase::Home(homing) => {
-                match homing.tick(stepper, settings) {
-                    None => {}
-                    Some(Ok(_)) => self.enter(Phase::Clear, stepper, settings),
-                    Some(Err(failure)) => return Step::Failed(axis, failure),
-                }
-                return Step::On;
-            }
+        let next = match &mut self.phase {
+            Phase::Home(homing) => match go_home(homing, axis, stepper, settings) {
+                Ok(()) => Phase::Clear,
+                Err(step) => return step,
+            },
             Phase::HomeAgain(homing) => {
-                return match homing.tick(stepper, settings) {
-                    None => Step::On,
-                    Some(Ok(_)) => Step::Done(self.result(settings)),
-                    Some(Err(failure)) => Step::Failed(axis, failure),
+                return match go_home(homing, axis, stepper, settings) {
+                    Ok(()) => Step::Done(self.result(settings)),
+                    Err(step) => step,
                 };
             }
-            Phase::Clear | Phase::Close | Phase::Pass { .. } | Phase::Open { .. } => {}
-        }
-        let awaited = match self.phase {
-            Phase::Close => stepper.home_closed(),
-            Phase::Open { .. } => !stepper.home_closed(),
-            _ => false,
-        };
-        if awaited && self.edge.is_none() {
-            self.edge = Some(stepper.measured());
-            stepper.stop();
-        }
-        if !stepper.is_still() {
-            return Step::On;
-        }
-        let next = match (&self.phase, self.edge) {
-            (Phase::Clear, _) => Phase::Close,
-            (Phase::Close, Some(closed)) => Phase::Pass { closed },
-            (Phase::Pass { closed }, _) => Phase::Open { closed: *closed },
-            (Phase::Open { closed }, Some(opened)) => {
-                let _ = self.rounds.push(opened.0.saturating_sub(closed.0)); // it is over when it is full
-                if !self.rounds.is_full() {
-                    self.enter(Phase::Clear, stepper, settings);
-                    return Step::On;
+            _ if !self.leg.is_over(stepper) => return Step::On,
+            phase => match (phase, self.leg.edge()) {
+                (Phase::Clear, _) => Phase::Close,
+                (Phase::Close, Some(edge)) => Phase::Pass { closed: edge.measured },
+                (Phase::Pass { closed }, _) => Phase::Open { closed: *closed },
+                (Phase::Open { closed }, Some(opened)) => {
+                    // The routine goes on elsewhere when this is full.
+                    let _ = self.rounds.push(opened.measured.0.saturating_sub(closed.0));
+                    if self.rounds.is_full() {
+                        self.phase = Phase::HomeAgain(Homing::new());
+                        return self.found(settings);
+                    }
+                    Phase::Clear
                 }
-                self.phase = Phase::HomeAgain(Homing::new());
-                let backlash = self.mean(settings);
-                if !(-1_000..=MOST).contains(&backlash) {
-                    return Step::Failed(axis, Failure::Implausible);
-                }
-                let coarse = axis == Axis::SensorCoarse;
-                let key = if coarse { SettingKey::CoarseBacklashNm } else { SettingKey::LensBacklashNm };
-                return Step::Set(key, backlash.max(0));
-            }
-            // The switch was seen to work at homing.
-            _ => return Step::Failed(axis, Failure::Implausible),
+                // The switch was seen to work at homing.
+                _ => return Step::Failed(axis, Failure::Implausible),
+            },
         };
-        self.enter(next, stepper, settings);
+        self.leg = set_off(&next, stepper, settings);
+        self.phase = next;
         Step::On
     }
 
-    fn enter(&mut self, phase: Phase, stepper: &mut Stepper, settings: &StepperSettings) {
-        let (way, speed) = match phase {
-            Phase::Home(_) | Phase::HomeAgain(_) => (0, settings.home_leave_speed),
-            Phase::Clear => {
-                (settings.home_clearance.0 + settings.home_hysteresis.0, settings.home_leave_speed)
-            }
-            Phase::Close => (-settings.home_approach.0, settings.home_approach_speed),
-            Phase::Pass { .. } => (-settings.home_clearance.0, settings.home_leave_speed),
-            Phase::Open { .. } => (settings.home_approach.0, settings.home_approach_speed),
-        };
-        let target = stepper.position().wrapping_add(steps::to_steps(Nanometres(way)));
-        stepper.go_steps(target, speed, Purpose::SeekHome);
-        (self.phase, self.edge) = (phase, None);
+    /// What was found, as a setting.
+    fn found(&self, settings: &StepperSettings) -> Step {
+        let backlash = self.mean(settings);
+        match StepperKeys::of(self.axis) {
+            Some(keys) if (-1_000..=MOST).contains(&backlash) => Step::Set(keys.backlash, backlash.max(0)),
+            _ => Step::Failed(self.axis, Failure::Implausible),
+        }
     }
 
     /// Mean of the rounds, less the switch's own way.
@@ -147,4 +119,19 @@ impl Backlash {
             spread: Nanometres(spread),
         }
     }
+}
+
+/// The leg of a phase.
+fn set_off(phase: &Phase, stepper: &mut Stepper, settings: &StepperSettings) -> Leg {
+    let (leave_speed, approach_speed) = (settings.home_leave_speed, settings.home_approach_speed);
+    let (way, until) = match phase {
+        Phase::Home(_) | Phase::HomeAgain(_) => return Leg::REST,
+        Phase::Clear => {
+            ((settings.home_clearance.0 + settings.home_hysteresis.0, leave_speed), Until::Arrival)
+        }
+        Phase::Close => ((-settings.home_approach.0, approach_speed), Until::Home(true)),
+        Phase::Pass { .. } => ((-settings.home_clearance.0, leave_speed), Until::Arrival),
+        Phase::Open { .. } => ((settings.home_approach.0, approach_speed), Until::Home(false)),
+    };
+    Leg::start(stepper, way, Purpose::SeekHome, until)
 }

@@ -2,18 +2,15 @@
 //!
 //! Numbers are little-endian at fixed places; shots and alarms are in postcard, one a block, as on the wire.
 
-use farnear_protocol::message::{AlarmRecord, Counters, RecordName, Shot};
+use farnear_protocol::message::{AlarmRecord, CorrectionForm, CorrectionInfo, Counters, RecordName, Shot};
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::alarms::{Alarms, KEPT};
 use crate::correction::Kept;
 use crate::io::MEMORY_BYTES;
-use crate::memory::record::{self, BLOCK, Block, Found};
+use crate::memory::record::{self, BLOCK, Block, Found, VALUES};
 use crate::program::{SHOTS_MAX, Shots};
 use crate::settings::{KEYS, Settings, Values};
-
-/// Values in a block.
-const VALUES: usize = BLOCK / 4;
 
 /// Everything that is kept.
 #[derive(Debug)]
@@ -43,7 +40,7 @@ impl Contents<'_> {
             },
             RecordName::Settings => values(self.values.raw(), index),
             RecordName::Program => item(self.shots.get(index as u8)), // an index is below SHOTS_MAX
-            RecordName::Correction => self.correction.map_or([0; BLOCK], |kept| kept.block(index)),
+            RecordName::Correction => self.correction.map_or([0; BLOCK], |kept| correction(kept, index)),
         }
     }
 
@@ -133,14 +130,48 @@ impl Restored {
         }
         if let Some(copy) = copy(RecordName::Correction) {
             let block = |i| record::block(memory, RecordName::Correction, copy, i);
-            restored.correction = Kept::from_blocks(block);
+            restored.correction = kept_correction(block);
         }
         restored
     }
 }
 
+/// A block of a correction: the first says what it is for, the others hold its coefficients.
+fn correction(kept: &Kept, index: usize) -> Block {
+    let Some(index) = index.checked_sub(1) else {
+        let CorrectionInfo { form, width, height, centre_um, half_span_um } = *kept.info();
+        let form = match form {
+            CorrectionForm::Regions => 1,
+            CorrectionForm::Blend => 2,
+            CorrectionForm::Full => 3,
+        };
+        return values(&[form, i32::from(width), i32::from(height), centre_um, half_span_um], 0);
+    };
+    values(kept.bits(), index)
+}
+
+/// And back; `None` where none was kept.
+fn kept_correction(block: impl Fn(usize) -> Block) -> Option<Kept> {
+    let head = block(0);
+    let form = match u32_at(&head, 0) {
+        1 => CorrectionForm::Regions,
+        2 => CorrectionForm::Blend,
+        3 => CorrectionForm::Full,
+        _ => return None,
+    };
+    let info = CorrectionInfo {
+        form,
+        width: u32_at(&head, 4) as u16,
+        height: u32_at(&head, 8) as u16,
+        centre_um: u32_at(&head, 12) as i32,
+        half_span_um: u32_at(&head, 16) as i32,
+    };
+    let bits = core::array::from_fn(|i| u32_at(&block(1 + i / VALUES), i % VALUES * 4) as i32);
+    Kept::restored(info, bits)
+}
+
 /// Eight values of a list; 0 beyond its end.
-pub(crate) fn values(list: &[i32], index: usize) -> Block {
+fn values(list: &[i32], index: usize) -> Block {
     let mut block = [0; BLOCK];
     for (bytes, value) in block.chunks_exact_mut(4).zip(list.iter().skip(index * VALUES)) {
         bytes.copy_from_slice(&value.to_le_bytes());
@@ -149,7 +180,7 @@ pub(crate) fn values(list: &[i32], index: usize) -> Block {
 }
 
 /// A number in a block; 0 beyond its end.
-pub(crate) fn u32_at(block: &Block, at: usize) -> u32 {
+fn u32_at(block: &Block, at: usize) -> u32 {
     block.get(at..at + 4).and_then(|bytes| bytes.try_into().ok()).map_or(0, u32::from_le_bytes)
 }
 

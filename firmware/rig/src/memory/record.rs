@@ -12,12 +12,14 @@
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use farnear_protocol::message::RecordName;
 
-use crate::correction::CORRECTION_BLOCKS;
+use crate::correction::COEFFICIENTS;
 use crate::io::MEMORY_BYTES;
 use crate::program::SHOTS_MAX;
 
 /// Bytes of a block.
 pub(crate) const BLOCK: usize = 32;
+/// Numbers of 32 bits in a block.
+pub(crate) const VALUES: usize = BLOCK / 4;
 /// A block.
 pub(crate) type Block = [u8; BLOCK];
 /// How many records there are.
@@ -55,9 +57,9 @@ pub(crate) const fn blocks(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 2,
         RecordName::Alarms => 1 + crate::alarms::KEPT,
-        RecordName::Settings => 4, // 32 values
+        RecordName::Settings => 4, // 32 values, more than there are: a new one keeps the form
         RecordName::Program => SHOTS_MAX,
-        RecordName::Correction => CORRECTION_BLOCKS,
+        RecordName::Correction => 1 + COEFFICIENTS.div_ceil(VALUES),
     }
 }
 

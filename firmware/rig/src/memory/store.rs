@@ -117,5 +117,4 @@ fn write(address: usize, bytes: Vec<u8, MEMORY_CHUNK>) -> MemoryWrite {
 }
 
 #[cfg(test)]
-#[path = "store_tests.rs"]
 mod tests;

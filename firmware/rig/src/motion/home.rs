@@ -12,7 +12,7 @@ use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
 
 use crate::motion::axis::{Purpose, Stepper};
-use crate::motion::steps;
+use crate::motion::leg::{Leg, Until};
 use crate::settings::StepperSettings;
 
 /// Where homing is.
@@ -30,8 +30,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub(crate) struct Homing {
     phase: Phase,
-    /// Whether the switch did in this phase what the phase waits for, and at which pulse.
-    edge: Option<i32>,
+    leg: Leg,
     /// Whether the position was ever known, so that the shift says something.
     known_before: bool,
 }
@@ -39,7 +38,7 @@ pub(crate) struct Homing {
 impl Homing {
     /// Begins with the next tick, when the switch was read.
     pub(crate) const fn new() -> Self {
-        Self { phase: Phase::Begin, edge: None, known_before: false }
+        Self { phase: Phase::Begin, leg: Leg::REST, known_before: false }
     }
 
     /// Goes on while the axis has no fault; gives the shift of position 0 at the end.
@@ -48,55 +47,46 @@ impl Homing {
         axis: &mut Stepper,
         settings: &StepperSettings,
     ) -> Option<Result<Nanometres, Failure>> {
-        let home_switch = axis.home_closed();
-        let awaited = match self.phase {
-            Phase::Search | Phase::Approach => home_switch,
-            Phase::Leave => !home_switch,
-            Phase::Begin | Phase::Clear | Phase::Return { .. } => false,
-        };
-        if awaited && self.edge.is_none() {
-            self.edge = Some(axis.position());
-            axis.stop();
-        }
-        if !axis.is_still() {
+        if !self.leg.is_over(axis) {
             return None;
         }
-        let next = match (self.phase, self.edge) {
+        self.phase = match (self.phase, self.leg.edge()) {
             (Phase::Begin, _) => {
                 self.known_before = axis.state() != PositionState::Unknown;
                 if axis.state() != PositionState::Homed {
                     axis.follow_encoder();
                 }
-                if home_switch { Phase::Leave } else { Phase::Search }
+                if axis.home_closed() { Phase::Leave } else { Phase::Search }
             }
             (Phase::Search, Some(_)) => Phase::Leave,
             (Phase::Leave, Some(_)) => Phase::Clear,
             (Phase::Clear, _) => Phase::Approach,
             (Phase::Approach, Some(zero)) => {
-                let shift = axis.set_home(zero);
+                let shift = axis.set_home(zero.position);
                 Phase::Return { shift: if self.known_before { shift } else { Nanometres(0) } }
             }
             (Phase::Return { shift }, _) => return Some(Ok(shift)),
             (Phase::Leave, None) => return Some(Err(Failure::HomeSwitchStuck)),
             (Phase::Search | Phase::Approach, None) => return Some(Err(Failure::HomeSwitchNotFound)),
         };
-        self.enter(next, axis, settings);
+        self.leg = set_off(self.phase, axis, settings);
         None
     }
+}
 
-    fn enter(&mut self, phase: Phase, axis: &mut Stepper, settings: &StepperSettings) {
-        (self.phase, self.edge) = (phase, None);
-        let (way, speed) = match phase {
-            Phase::Begin => (0, settings.home_approach_speed),
-            Phase::Search => (-steps::to_steps(settings.home_search), settings.home_search_speed),
-            Phase::Leave => (steps::to_steps(settings.home_leave), settings.home_leave_speed),
-            Phase::Clear => (steps::to_steps(settings.home_clearance), settings.home_leave_speed),
-            Phase::Approach => (-steps::to_steps(settings.home_approach), settings.home_approach_speed),
-            Phase::Return { .. } => {
-                axis.go_from_below(0, settings.home_leave_speed, Purpose::SeekHome);
-                return;
-            }
-        };
-        axis.go_steps(axis.position().wrapping_add(way), speed, Purpose::SeekHome);
-    }
+/// The leg of a phase.
+fn set_off(phase: Phase, axis: &mut Stepper, settings: &StepperSettings) -> Leg {
+    let leave_speed = settings.home_leave_speed;
+    let (way, until) = match phase {
+        Phase::Begin => return Leg::REST,
+        Phase::Search => ((-settings.home_search.0, settings.home_search_speed), Until::Home(true)),
+        Phase::Leave => ((settings.home_leave.0, leave_speed), Until::Home(false)),
+        Phase::Clear => ((settings.home_clearance.0, leave_speed), Until::Arrival),
+        Phase::Approach => ((-settings.home_approach.0, settings.home_approach_speed), Until::Home(true)),
+        Phase::Return { .. } => {
+            axis.go_from_below(0, leave_speed, Purpose::SeekHome);
+            return Leg::REST;
+        }
+    };
+    Leg::start(axis, way, Purpose::SeekHome, until)
 }

@@ -1,9 +1,9 @@
 //! The way to a position on any axis: motion, then settling.
 
 use farnear_protocol::message::{Axis, Failure};
-use farnear_protocol::{BoardMicros, Micros, Nanometres};
+use farnear_protocol::{BoardMicros, Micros, Nanometres, Settle};
 
-use crate::motion::settle::Settle;
+use crate::motion::settling::Settling;
 use crate::motion::since;
 use crate::motion::stage::Stage;
 use crate::settings::Settings;
@@ -13,7 +13,7 @@ use crate::settings::Settings;
 pub(crate) struct Positioning {
     axis: Axis,
     target: Nanometres,
-    settle: Settle,
+    settling: Settling,
     started: BoardMicros,
     /// From when the time to settle counts; for a stepper the end of its motion.
     waiting_since: Option<BoardMicros>,
@@ -26,7 +26,7 @@ impl Positioning {
         stage: &mut Stage,
         settings: &Settings,
         (axis, target): (Axis, Nanometres),
-        (window, dwell): (Nanometres, Micros),
+        settle: Settle,
         now: BoardMicros,
     ) -> Self {
         let (deadline, waiting_since) = match stage.with_numbers(axis, settings) {
@@ -39,17 +39,8 @@ impl Positioning {
                 (settings.fine.settle_deadline, Some(now))
             }
         };
-        let patience = Micros(deadline.0.saturating_add(dwell.0));
-        Self { axis, target, settle: Settle::new(window, dwell), started: now, waiting_since, patience }
-    }
-
-    /// To the settle window of a plain move.
-    pub(crate) const fn plain(settings: &Settings, axis: Axis) -> (Nanometres, Micros) {
-        match axis {
-            Axis::SensorCoarse => (settings.coarse.settle_window, settings.coarse.settle_dwell),
-            Axis::Lens => (settings.lens.settle_window, settings.lens.settle_dwell),
-            Axis::SensorFine => (settings.fine.settle_window, settings.fine.settle_dwell),
-        }
+        let patience = Micros(deadline.0.saturating_add(settle.dwell.0));
+        Self { axis, target, settling: Settling::new(settle), started: now, waiting_since, patience }
     }
 
     /// Goes on while no alarm comes; gives the time from the start once the position is settled. May be asked again
@@ -61,11 +52,11 @@ impl Positioning {
         let error = Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0));
         let at_rest = self.axis != Axis::SensorFine || stage.fine.arrived() && stage.fine.gauge_fresh();
         if at_rest {
-            self.settle.push(error, stage.fine.measured());
+            self.settling.push(error, stage.fine.measured());
         } else {
-            self.settle.interrupt();
+            self.settling.interrupt();
         }
-        if self.settle.is_settled() {
+        if self.settling.is_settled() {
             return Some(Ok(since(self.started, now)));
         }
         let waiting_since = *self.waiting_since.get_or_insert(now);
@@ -74,6 +65,6 @@ impl Positioning {
 
     /// Gauge position, mean over the last whole dwell.
     pub(crate) const fn mean_fine(&self) -> Nanometres {
-        self.settle.mean()
+        self.settling.mean()
     }
 }

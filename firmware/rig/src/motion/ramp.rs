@@ -257,5 +257,4 @@ fn ceil(value: f32) -> u32 {
 }
 
 #[cfg(test)]
-#[path = "ramp_tests.rs"]
 mod tests;

@@ -138,12 +138,3 @@ impl Stage {
         self.coarse.is_still() && self.lens.is_still()
     }
 }
-
-/// Smallest and largest position of an axis.
-pub(crate) const fn limits(settings: &Settings, axis: Axis) -> (Nanometres, Nanometres) {
-    match axis {
-        Axis::SensorCoarse => (settings.coarse.min, settings.coarse.max),
-        Axis::Lens => (settings.lens.min, settings.lens.max),
-        Axis::SensorFine => (settings.fine.min, settings.fine.max),
-    }
-}

@@ -1,6 +1,6 @@
 //! Settings by key: the numbers that the host may change and the memory keeps, with their ranges.
 
-use farnear_protocol::message::{Setting, SettingKey};
+use farnear_protocol::message::{Axis, Setting, SettingKey, StepperKeys};
 use farnear_protocol::{Micros, Nanometres};
 
 use super::{STEP_PM, Settings, StepperSettings};
@@ -31,16 +31,13 @@ impl Values {
 
     /// A setting as the host is told it. Largest and smallest position of an axis bound each other.
     pub fn setting(&self, key: SettingKey) -> Setting {
-        use SettingKey::{CoarseMaxNm, CoarseMinNm, FineMaxNm, FineMinNm, LensMaxNm, LensMinNm};
         let (default, mut min, mut max) = range(key);
-        match key {
-            CoarseMinNm => max = self.get(CoarseMaxNm),
-            CoarseMaxNm => min = self.get(CoarseMinNm),
-            LensMinNm => max = self.get(LensMaxNm),
-            LensMaxNm => min = self.get(LensMinNm),
-            FineMinNm => max = self.get(FineMaxNm),
-            FineMaxNm => min = self.get(FineMinNm),
-            _ => {}
+        for (low, high) in Axis::ALL.map(limit_keys) {
+            if key == low {
+                max = self.get(high);
+            } else if key == high {
+                min = self.get(low);
+            }
         }
         Setting { key, value: self.get(key), default, min, max }
     }
@@ -67,11 +64,7 @@ impl Values {
                 restored.0[key as usize] = value;
             }
         }
-        for (low, high) in [
-            (SettingKey::CoarseMinNm, SettingKey::CoarseMaxNm),
-            (SettingKey::LensMinNm, SettingKey::LensMaxNm),
-            (SettingKey::FineMinNm, SettingKey::FineMaxNm),
-        ] {
+        for (low, high) in Axis::ALL.map(limit_keys) {
             if restored.get(low) > restored.get(high) {
                 restored.0[low as usize] = range(low).0;
                 restored.0[high as usize] = range(high).0;
@@ -82,6 +75,14 @@ impl Values {
 
     pub(crate) const fn raw(&self) -> &[i32; KEYS] {
         &self.0
+    }
+}
+
+/// The settings that bound an axis' positions.
+const fn limit_keys(axis: Axis) -> (SettingKey, SettingKey) {
+    match StepperKeys::of(axis) {
+        Some(StepperKeys { min, max, .. }) => (min, max),
+        None => (SettingKey::FineMinNm, SettingKey::FineMaxNm),
     }
 }
 
@@ -132,30 +133,8 @@ impl Settings {
     pub const fn with(mut self, values: &Values) -> Self {
         self.datum = Nanometres(values.get(SettingKey::DatumNm));
         self.distance_min = Nanometres(values.get(SettingKey::DistanceMinNm));
-        self.coarse = self.coarse.with(
-            values,
-            [
-                SettingKey::CoarseMinNm,
-                SettingKey::CoarseMaxNm,
-                SettingKey::CoarseSpeedNmPerS,
-                SettingKey::CoarseAccelerationUmPerS2,
-                SettingKey::CoarseJerkUmPerS3,
-                SettingKey::CoarseBacklashNm,
-                SettingKey::CoarseFollowingNm,
-            ],
-        );
-        self.lens = self.lens.with(
-            values,
-            [
-                SettingKey::LensMinNm,
-                SettingKey::LensMaxNm,
-                SettingKey::LensSpeedNmPerS,
-                SettingKey::LensAccelerationUmPerS2,
-                SettingKey::LensJerkUmPerS3,
-                SettingKey::LensBacklashNm,
-                SettingKey::LensFollowingNm,
-            ],
-        );
+        self.coarse = self.coarse.with(values, StepperKeys::COARSE);
+        self.lens = self.lens.with(values, StepperKeys::LENS);
         self.fine.min = Nanometres(values.get(SettingKey::FineMinNm));
         self.fine.max = Nanometres(values.get(SettingKey::FineMaxNm));
         self.fine.gain_pm_per_code = values.get(SettingKey::PiezoGainPmPerCode) as u32;
@@ -168,9 +147,8 @@ impl Settings {
 }
 
 impl StepperSettings {
-    /// Keys: smallest, largest position, speed, acceleration, jerk, backlash, following error.
-    const fn with(mut self, values: &Values, keys: [SettingKey; 7]) -> Self {
-        let [min, max, speed, acceleration, jerk, backlash, following] = keys;
+    const fn with(mut self, values: &Values, keys: StepperKeys) -> Self {
+        let StepperKeys { min, max, speed, acceleration, jerk, backlash, following } = keys;
         self.min = Nanometres(values.get(min));
         self.max = Nanometres(values.get(max));
         self.speed = pulses(values.get(speed), 1_000);

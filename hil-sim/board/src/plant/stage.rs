@@ -58,8 +58,6 @@ pub struct Stage {
     screw: Screw,
     home: HomeSwitch,
     stuck_home: Option<bool>,
-    stuck_far: Option<bool>,
-    step_edges: u64,
 }
 
 impl Stage {
@@ -77,12 +75,11 @@ impl Stage {
         let mut screw = Screw::new(&mut noise);
         // It came from its lower end.
         screw.turn(microsteps as f64);
-        Self { motor: Motor::new(microsteps), screw, home, stuck_home: None, stuck_far: None, step_edges: 0 }
+        Self { motor: Motor::new(microsteps), screw, home, stuck_home: None }
     }
 
     /// A STEP pulse reaches the driver while it is on.
     pub fn step(&mut self, away: bool) {
-        self.step_edges += 1;
         self.motor.step(away);
     }
 
@@ -124,12 +121,7 @@ impl Stage {
 
     /// The far switch is closed.
     pub fn far_closed(&self) -> bool {
-        self.stuck_far.unwrap_or(self.position_um() >= FAR_SWITCH_UM)
-    }
-
-    /// STEP edges that reached the driver while it was on.
-    pub fn step_edges(&self) -> u64 {
-        self.step_edges
+        self.position_um() >= FAR_SWITCH_UM
     }
 
     /// Blocks the motor, or frees it.
@@ -150,11 +142,6 @@ impl Stage {
     /// Breaks the home switch so that it says this for ever, or repairs it.
     pub fn set_stuck_home(&mut self, says: Option<bool>) {
         self.stuck_home = says;
-    }
-
-    /// Breaks the far switch so that it says this for ever, or repairs it.
-    pub fn set_stuck_far(&mut self, says: Option<bool>) {
-        self.stuck_far = says;
     }
 }
 
@@ -195,7 +182,6 @@ mod tests {
         let stage = &turned.stage;
         assert!(stage.position_um() > -END_STOP_UM - 5.0 && stage.home_closed() && !stage.far_closed());
         assert!(stage.lost_microsteps() < -1000.0, "the motor has stalled against its stop");
-        assert_eq!(stage.step_edges(), 60_401);
     }
 
     #[test]

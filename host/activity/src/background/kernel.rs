@@ -26,7 +26,7 @@ use std::array::from_fn;
 
 use pulp::{Simd, WithSimd};
 
-use super::Settings;
+use super::settings::Settings;
 
 /// Pixels per tile: the widest vector of f32 (AVX-512).
 pub const TILE: usize = 16;

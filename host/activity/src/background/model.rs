@@ -4,8 +4,8 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 use pulp::Arch;
 
 use super::{
-    Settings, SettingsError,
     kernel::{self, TILE, Update},
+    settings::{Settings, SettingsError},
 };
 
 /// A video frame of 8-bit samples.

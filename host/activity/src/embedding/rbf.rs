@@ -131,11 +131,6 @@ impl Rbf {
         Ok(out)
     }
 
-    /// Squared distance from the sample to the nearest centre: how strange it is to the gallery.
-    pub fn strangeness(&self, sample: ArrayView1<f32>) -> f32 {
-        self.squared_distances(sample).into_iter().fold(f32::INFINITY, f32::min).max(0.0)
-    }
-
     fn squared_distances(&self, sample: ArrayView1<f32>) -> Vec<f32> {
         match &self.fixed {
             Some(fixed) if sample.iter().all(|v| (0.0..=LARGEST).contains(v)) => {

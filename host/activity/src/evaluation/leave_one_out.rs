@@ -2,16 +2,18 @@
 //!
 //! Per left-out subject: the space (gallery, layout, RBF map, codebook) is learned from the other subjects' clips; its
 //! parameters, sharpness and the classifier's parameter are chosen by cross-validation over those subjects
-//! ([`super::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
+//! ([`crate::recognition::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
 //! left-out subject is ever seen before.
 
-use super::choice::{Views, choose, gathered, names, patterns_of, vectors_of};
 use super::confusion::Confusion;
-use super::experiment::Experiment;
 use crate::embedding::EmbeddingError;
+use crate::recognition::choice::{Views, choose, names};
 use crate::recognition::classifier::{Classifier, ClassifierKind};
 use crate::recognition::clip::Clip;
+use crate::recognition::experiment::Experiment;
+use crate::recognition::patterns::{gathered, patterns_of, vectors_of};
 use crate::recognition::space::SpaceSettings;
+use crate::recognition::watch::{Unwatched, Watch};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -35,7 +37,7 @@ pub struct Choice {
     pub views: Views,
     /// The space.
     pub space: SpaceSettings,
-    /// Sharpness of the codebook's shares.
+    /// Sharpness of the codebook's soft assignments.
     pub sharpness: f32,
     /// Classifier.
     pub classifier: ClassifierKind,
@@ -90,11 +92,12 @@ pub fn leave_one_subject_out(
     if subjects.len() < 3 {
         return Err(EvaluationError::Subjects(subjects.len()));
     }
-    train_on_others(clips, &changed, experiment, &[Views::Each, Views::Fused])
+    train_on_others(clips, &changed, experiment, &[Views::Each, Views::Fused], &Unwatched)
 }
 
 /// Recognises the clips of every subject of `test`, trained on the clips of all OTHER subjects of `train` (which may be the same
 /// people: clean clips for damaged ones, say). Only the asked arrangements of views are computed; others stay empty.
+/// `watch` hears of every fold, and may stop the work.
 ///
 /// # Errors
 /// See [`EvaluationError`].
@@ -103,6 +106,7 @@ pub fn train_on_others(
     test: &[Clip],
     experiment: &Experiment,
     arrangements: &[Views],
+    watch: &dyn Watch,
 ) -> Result<Outcome, EvaluationError> {
     let classes = names(train.iter().chain(test).map(|clip| &clip.activity));
     let views = train.first().map_or(0, |clip| clip.views.len());
@@ -131,7 +135,9 @@ pub fn train_on_others(
                 if experiment.mirror { kept.iter().map(|c| c.mirrored()).collect() } else { Vec::new() };
             let training: Vec<&Clip> = kept.into_iter().chain(&mirrors).collect();
             let held: Vec<&Clip> = test.iter().filter(|clip| tested.contains(&&clip.subject)).collect();
-            one_fold(&training, &held, &classes, views, experiment, arrangements)
+            let fold = one_fold(&training, &held, &classes, views, experiment, arrangements, watch)?;
+            watch.fold_done(groups.len());
+            Ok(fold)
         })
         .collect();
     let mut outcome = Outcome::empty(&classes);
@@ -150,6 +156,7 @@ fn one_fold(
     views: usize,
     experiment: &Experiment,
     arrangements: &[Views],
+    watch: &dyn Watch,
 ) -> Result<Outcome, EvaluationError> {
     let label = |clip: &&Clip| classes.iter().position(|class| *class == clip.activity).unwrap_or(0);
     let (train_labels, test_labels): (Vec<usize>, Vec<usize>) =
@@ -160,7 +167,7 @@ fn one_fold(
     };
     let asked: Vec<Views> =
         arrangements.iter().copied().filter(|arrangement| !doubled(arrangement)).collect();
-    let chosen = choose(train, classes, experiment, &asked)?;
+    let chosen = choose(train, classes, experiment, &asked, watch)?;
     let tested = patterns_of(&chosen.space, &vectors_of(&chosen.space, test)?, chosen.sharpness);
     for arrangement in asked {
         let confusion = if arrangement == Views::Each { &mut outcome.each } else { &mut outcome.fused };

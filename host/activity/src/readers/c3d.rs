@@ -3,7 +3,9 @@
 //! Integer and floating-point data, Intel, DEC and SGI numbers. Analogue samples are read past. A point whose residual is
 //! negative was hidden. Nothing in a damaged file makes this panic or ask for more memory than the file holds.
 
-use super::markers::{MarkerError, Markers, unit_mm};
+use super::reader::Reader;
+use super::recording::{Found, Known, RecordingError, Source, Unit, Up};
+use crate::silhouette::capsule::Point3;
 use std::collections::HashMap;
 
 /// Size of the blocks in which everything is counted.
@@ -23,10 +25,10 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    fn raw<const N: usize>(&self, at: usize, what: &'static str) -> Result<[u8; N], MarkerError> {
+    fn raw<const N: usize>(&self, at: usize, what: &'static str) -> Result<[u8; N], RecordingError> {
         let found =
             at.checked_add(N).and_then(|end| self.bytes.get(at..end)).and_then(|raw| raw.try_into().ok());
-        found.ok_or(MarkerError::Truncated {
+        found.ok_or(RecordingError::Truncated {
             kind: "C3D",
             what,
             needed: at.saturating_add(N),
@@ -34,12 +36,12 @@ impl File<'_> {
         })
     }
 
-    fn word(&self, at: usize, what: &'static str) -> Result<u16, MarkerError> {
+    fn word(&self, at: usize, what: &'static str) -> Result<u16, RecordingError> {
         let raw = self.raw::<2>(at, what)?;
         Ok(if self.processor == Processor::Sgi { u16::from_be_bytes(raw) } else { u16::from_le_bytes(raw) })
     }
 
-    fn real(&self, at: usize, what: &'static str) -> Result<f32, MarkerError> {
+    fn real(&self, at: usize, what: &'static str) -> Result<f32, RecordingError> {
         let raw = self.raw::<4>(at, what)?;
         Ok(match self.processor {
             Processor::Intel => f32::from_le_bytes(raw),
@@ -57,12 +59,40 @@ struct Parameter {
     at: usize,
 }
 
-/// Reads the points of a C3D file.
+/// The entry of [`super::READERS`].
+pub const READER: Reader =
+    Reader { name: "C3D", extensions: &["c3d"], about: "Vicon and most other systems, z up", read };
+
+/// Reads the points of a C3D file. The file says nothing of its axes; nearly all have z up.
 ///
 /// # Errors
-/// See [`MarkerError`]; a file without points is an error too.
-pub fn read(bytes: &[u8]) -> Result<Markers, MarkerError> {
-    let bad = |reason: String| MarkerError::Kind { kind: "C3D", reason };
+/// See [`RecordingError`]; a file without points is an error too.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    let (file, parameters_at) = opened(bytes)?;
+    let parameters = parameters(&file, parameters_at + 4);
+    let layout = Layout::read(&file)?;
+    let unit = text_rows(&file, parameters.get("POINT:UNITS")).into_iter().next().unwrap_or_default();
+    let mut names = text_rows(&file, parameters.get("POINT:LABELS"));
+    names.extend(text_rows(&file, parameters.get("POINT:LABELS2")));
+    names.truncate(layout.points);
+    for index in names.len()..layout.points {
+        names.push(format!("*{}", index + 1));
+    }
+    Ok(Found {
+        names,
+        rate_hz: if layout.rate_hz.is_finite() { layout.rate_hz } else { 0.0 },
+        frames: layout.frames(&file)?,
+        unit: match unit.as_str() {
+            "" => Known { value: Unit::MM, source: Source::Format },
+            named => Known { value: Unit::named(named)?, source: Source::File },
+        },
+        up: Known { value: Up::Z, source: Source::Format },
+    })
+}
+
+/// Checks the key and the kind of processor; gives the file and where its parameters stand.
+fn opened(bytes: &[u8]) -> Result<(File<'_>, usize), RecordingError> {
+    let bad = |reason: String| RecordingError::Kind { kind: "C3D", reason };
     let (first_block, magic) = match bytes {
         [block, magic, ..] => (usize::from(*block), *magic),
         _ => return Err(bad("shorter than two bytes".into())),
@@ -81,60 +111,74 @@ pub fn read(bytes: &[u8]) -> Result<Markers, MarkerError> {
         86 => Processor::Sgi,
         other => return Err(bad(format!("unknown processor {other}, expected 84, 85 or 86"))),
     };
-    let parameters = parameters(&file, parameters_at + 4);
-    let header = |word: usize| file.word(2 * (word - 1), "the header");
-    let points = usize::from(header(2)?);
-    let analogue = usize::from(header(3)?);
-    let frames_by_header = usize::from(header(5)?).saturating_sub(usize::from(header(4)?)) + 1;
-    let scale = file.real(12, "the header")?;
-    let data_at = usize::from(header(9)?).max(1) * BLOCK - BLOCK;
-    let rate_hz = f64::from(file.real(20, "the header")?);
-    if points == 0 {
-        return Err(bad("it holds no points".into()));
-    }
-    let unit =
-        text_rows(&file, parameters.get("POINT:UNITS")).into_iter().next().unwrap_or_else(|| "mm".into());
-    let unit = unit_mm(if unit.is_empty() { "mm" } else { &unit })?;
-    let mut names = text_rows(&file, parameters.get("POINT:LABELS"));
-    names.extend(text_rows(&file, parameters.get("POINT:LABELS2")));
-    names.truncate(points);
-    for index in names.len()..points {
-        names.push(format!("*{}", index + 1));
-    }
-    let floating = scale < 0.0;
-    let size = if floating { 4 } else { 2 };
-    let stride = size * (4 * points + analogue);
-    let room = bytes.len().saturating_sub(data_at) / stride;
-    // The 16-bit header cannot count beyond 65535 frames; POINT:FRAMES or the file's length then tells.
-    let frames = if frames_by_header >= 65_535 { room } else { frames_by_header };
-    if frames > room {
-        return Err(MarkerError::Truncated {
-            kind: "C3D",
-            what: "the frames",
-            needed: data_at.saturating_add(frames.saturating_mul(stride)),
-            found: bytes.len(),
-        });
-    }
-    let mut all = Vec::with_capacity(frames);
-    for frame in 0..frames {
-        let mut markers = Vec::with_capacity(points);
-        for point in 0..points {
-            let at = data_at + frame * stride + 4 * size * point;
-            let mut values = [0.0_f64; 4];
-            for (k, value) in values.iter_mut().enumerate() {
-                *value = if floating {
-                    f64::from(file.real(at + 4 * k, "a frame")?)
-                } else {
-                    f64::from(file.word(at + 2 * k, "a frame")? as i16)
-                        * if k < 3 { f64::from(scale) } else { 1.0 }
-                };
-            }
-            let visible = values[3] >= 0.0 && values[..3].iter().all(|v| v.is_finite());
-            markers.push(visible.then(|| [unit * values[0], unit * values[1], unit * values[2]]));
+    Ok((file, parameters_at))
+}
+
+/// What the header says of the frames.
+struct Layout {
+    points: usize,
+    /// Values of a frame that are not points.
+    analogue: usize,
+    frames_by_header: usize,
+    /// Of integer data, in units; negative for floating-point data.
+    scale: f32,
+    data_at: usize,
+    rate_hz: f64,
+}
+
+impl Layout {
+    fn read(file: &File) -> Result<Self, RecordingError> {
+        let word = |number: usize| file.word(2 * (number - 1), "the header");
+        let points = usize::from(word(2)?);
+        if points == 0 {
+            return Err(RecordingError::Kind { kind: "C3D", reason: "it holds no points".into() });
         }
-        all.push(markers);
+        Ok(Self {
+            points,
+            analogue: usize::from(word(3)?),
+            frames_by_header: usize::from(word(5)?).saturating_sub(usize::from(word(4)?)) + 1,
+            scale: file.real(12, "the header")?,
+            data_at: usize::from(word(9)?).max(1) * BLOCK - BLOCK,
+            rate_hz: f64::from(file.real(20, "the header")?),
+        })
     }
-    Ok(Markers { names, rate_hz: if rate_hz.is_finite() { rate_hz } else { 0.0 }, frames: all })
+
+    /// The points of all frames, in the file's unit.
+    fn frames(&self, file: &File) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
+        let size = if self.scale < 0.0 { 4 } else { 2 };
+        let stride = size * (4 * self.points + self.analogue);
+        let room = file.bytes.len().saturating_sub(self.data_at) / stride;
+        // The 16-bit header cannot count beyond 65535 frames; the file's length then tells.
+        let frames = if self.frames_by_header >= 65_535 { room } else { self.frames_by_header };
+        if frames > room {
+            return Err(RecordingError::Truncated {
+                kind: "C3D",
+                what: "the frames",
+                needed: self.data_at.saturating_add(frames.saturating_mul(stride)),
+                found: file.bytes.len(),
+            });
+        }
+        let frame = |frame: usize| {
+            (0..self.points).map(|m| self.point(file, self.data_at + frame * stride + 4 * size * m)).collect()
+        };
+        (0..frames).map(frame).collect()
+    }
+
+    /// The point at a place of the file: three coordinates and the residual, negative where it was hidden.
+    fn point(&self, file: &File, at: usize) -> Result<Option<Point3>, RecordingError> {
+        let mut values = [0.0_f64; 4];
+        for (k, value) in values.iter_mut().enumerate() {
+            *value = if self.scale < 0.0 {
+                f64::from(file.real(at + 4 * k, "a frame")?)
+            } else {
+                let scale = if k < 3 { f64::from(self.scale) } else { 1.0 };
+                f64::from(file.word(at + 2 * k, "a frame")? as i16) * scale
+            };
+        }
+        let [x, y, z, residual] = values;
+        let visible = residual >= 0.0 && [x, y, z].iter().all(|v| v.is_finite());
+        Ok(visible.then_some([x, y, z]))
+    }
 }
 
 /// All parameters by `GROUP:NAME`; stops quietly where the section is damaged (points can be read without names).

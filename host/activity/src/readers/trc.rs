@@ -1,22 +1,28 @@
 //! TRC files (Motion Analysis, OpenSim): tab-separated marker trajectories.
 
-use super::markers::{MarkerError, Markers, unit_mm};
+use super::reader::Reader;
+use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 use crate::silhouette::capsule::Point3;
 
-/// Reads a TRC file. OpenSim and most TRC files have y up; `y_up` turns them to z up (x stays, z becomes -y).
+/// The entry of [`super::READERS`].
+pub const READER: Reader =
+    Reader { name: "TRC", extensions: &["trc"], about: "Motion Analysis and OpenSim markers, y up", read };
+
+/// Reads a TRC file. OpenSim's and most others have y up.
 ///
 /// # Errors
-/// Missing header lines, unknown units, rows of another length, values that are no numbers; each with its line.
-pub fn read(text: &str, y_up: bool) -> Result<Markers, MarkerError> {
+/// Missing header lines, unknown units, rows of another length, values that are not numbers; each with its line.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    let text = text(bytes)?;
     let lines: Vec<&str> = text.lines().collect();
     let line = |n: usize| {
         lines
             .get(n)
             .copied()
-            .ok_or_else(|| MarkerError::Kind { kind: "TRC", reason: format!("it has no line {}", n + 1) })
+            .ok_or_else(|| RecordingError::Kind { kind: "TRC", reason: format!("it has no line {}", n + 1) })
     };
     if !line(0)?.starts_with("PathFileType") {
-        return Err(MarkerError::Kind {
+        return Err(RecordingError::Kind {
             kind: "TRC",
             reason: "its first line does not start with PathFileType".into(),
         });
@@ -25,14 +31,14 @@ pub fn read(text: &str, y_up: bool) -> Result<Markers, MarkerError> {
     let values: Vec<&str> = line(2)?.split('\t').map(str::trim).collect();
     let value = |key: &str| {
         let found = keys.iter().position(|k| *k == key).and_then(|index| values.get(index).copied());
-        found.ok_or_else(|| MarkerError::Line { line: 3, reason: format!("no value of {key}") })
+        found.ok_or_else(|| RecordingError::Line { line: 3, reason: format!("no value of {key}") })
     };
     let number = |key: &str| {
         let text = value(key)?;
         text.parse::<f64>()
-            .map_err(|_| MarkerError::Line { line: 3, reason: format!("{key} = `{text}` is no number") })
+            .map_err(|_| RecordingError::Line { line: 3, reason: format!("{key} = `{text}` is not a number") })
     };
-    let unit = unit_mm(value("Units")?)?;
+    let unit = Unit::named(value("Units")?)?;
     let (rate_hz, count) = (number("DataRate")?, number("NumMarkers")?);
     let names: Vec<String> = line(3)?
         .split('\t')
@@ -42,11 +48,23 @@ pub fn read(text: &str, y_up: bool) -> Result<Markers, MarkerError> {
         .map(str::to_owned)
         .collect();
     if names.len() as f64 != count {
-        return Err(MarkerError::Line {
+        return Err(RecordingError::Line {
             line: 4,
             reason: format!("{} marker names, NumMarkers says {count}", names.len()),
         });
     }
+    let frames = rows(&lines, names.len())?;
+    Ok(Found {
+        names,
+        rate_hz,
+        frames,
+        unit: Known { value: unit, source: Source::File },
+        up: Known { value: Up::Y, source: Source::Format },
+    })
+}
+
+/// The frames of the lines after the header: number, time, then x, y and z of every marker; missing cells at the end are hidden.
+fn rows(lines: &[&str], markers: usize) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
     let mut frames = Vec::new();
     for (index, row) in lines.iter().enumerate().skip(5) {
         // Trailing tabs are common; a row that is only white space separates header and data.
@@ -54,35 +72,30 @@ pub fn read(text: &str, y_up: bool) -> Result<Markers, MarkerError> {
         if row.trim().is_empty() {
             continue;
         }
-        if cells.len() > 2 + 3 * names.len() {
-            let reason = format!("{} values, expected {}", cells.len(), 2 + 3 * names.len());
-            return Err(MarkerError::Line { line: index + 1, reason });
+        if cells.len() > 2 + 3 * markers {
+            let reason = format!("{} values, expected {}", cells.len(), 2 + 3 * markers);
+            return Err(RecordingError::Line { line: index + 1, reason });
         }
-        let mut markers = Vec::with_capacity(names.len());
-        for m in 0..names.len() {
+        let mut points = Vec::with_capacity(markers);
+        for m in 0..markers {
             let cell = |k: usize| cells.get(2 + 3 * m + k).map_or("", |cell| cell.trim());
-            markers.push(point([cell(0), cell(1), cell(2)], unit, y_up, index + 1)?);
+            points.push(point([cell(0), cell(1), cell(2)], index + 1)?);
         }
-        frames.push(markers);
+        frames.push(points);
     }
-    Ok(Markers { names, rate_hz, frames })
+    Ok(frames)
 }
 
-/// Three cells; all empty (or not a number) is a hidden marker.
-pub(super) fn point(
-    cells: [&str; 3],
-    unit: f64,
-    y_up: bool,
-    line: usize,
-) -> Result<Option<Point3>, MarkerError> {
+/// Three cells; one that is empty (or not a number) is a hidden marker.
+pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, RecordingError> {
     if cells.iter().any(|cell| cell.is_empty() || cell.eq_ignore_ascii_case("nan")) {
         return Ok(None);
     }
-    let mut p = [0.0; 3];
-    for (value, cell) in p.iter_mut().zip(cells) {
+    let mut point = [0.0; 3];
+    for (value, cell) in point.iter_mut().zip(cells) {
         let parsed = cell.parse::<f64>();
-        *value = unit
-            * parsed.map_err(|_| MarkerError::Line { line, reason: format!("`{cell}` is no number") })?;
+        *value = parsed
+            .map_err(|_| RecordingError::Line { line, reason: format!("`{cell}` is not a number") })?;
     }
-    Ok(p.iter().all(|v| v.is_finite()).then(|| if y_up { [p[0], -p[2], p[1]] } else { p }))
+    Ok(Some(point))
 }

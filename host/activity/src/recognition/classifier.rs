@@ -1,73 +1,167 @@
-//! From patterns to activities: k nearest neighbours or a linear SVC, with a confidence.
+//! From patterns to activities: the classifiers there are, each with a probability for every class.
+//!
+//! A classifier is a file of this module that implements [`Method`], and a line in the table below. Training, choosing by
+//! cross-validation, model files and the command line's `--classifier` follow from the table.
 
-use super::knn;
-use super::svc::LinearSvc;
-use ndarray::{Array2, ArrayView1, ArrayView2};
+pub mod method;
+pub mod neighbours;
+pub mod svc;
+
+use method::{Fold, Method};
+use ndarray::{ArrayView1, ArrayView2};
+use neighbours::Neighbours;
 use serde::{Deserialize, Serialize};
+use svc::LinearSvc;
 
-/// Which classifier, and its parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ClassifierKind {
-    /// This many nearest neighbours.
-    Knn(usize),
-    /// Linear support vectors with this cost.
-    Svc(f32),
+macro_rules! classifiers {
+    ($($(#[$about:meta])* $name:ident($parameter:ty) => $trained:ty;)+) => {
+        /// Which classifier, its parameter still to be chosen.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Family {
+            $($(#[$about])* $name,)+
+        }
+
+        /// Which classifier, and its parameter.
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "lowercase")]
+        pub enum ClassifierKind {
+            $($(#[$about])* $name($parameter),)+
+        }
+
+        /// A trained classifier.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        pub enum Classifier {
+            $($(#[$about])* $name($trained),)+
+        }
+
+        impl Family {
+            /// All there are.
+            pub const ALL: &[Self] = &[$(Self::$name,)+];
+
+            /// Its name, as users write it.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => <$trained as Method>::NAME,)+
+                }
+            }
+
+            /// The parameters to choose from, the usual one first.
+            pub fn tried(self) -> Vec<ClassifierKind> {
+                match self {
+                    $(Self::$name => {
+                        <$trained as Method>::TRIED.iter().map(|&value| ClassifierKind::$name(value)).collect()
+                    })+
+                }
+            }
+        }
+
+        impl ClassifierKind {
+            /// Its parameter in words, for tables: `k = 3`.
+            pub fn described(self) -> String {
+                match self {
+                    $(Self::$name(parameter) => <$trained as Method>::described(parameter),)+
+                }
+            }
+
+            /// Right answers over a fold of cross-validation.
+            pub(super) fn right(self, fold: &Fold) -> usize {
+                let answers = match self {
+                    $(Self::$name(parameter) => <$trained as Method>::answers(fold, parameter),)+
+                };
+                answers.iter().zip(fold.held).filter(|&(&answer, &row)| answer == fold.labels[row]).count()
+            }
+        }
+
+        impl Classifier {
+            /// Trains on patterns (N x P) with labels below `classes`.
+            pub fn train(
+                kind: ClassifierKind,
+                patterns: ArrayView2<f32>,
+                labels: &[usize],
+                classes: usize,
+            ) -> Self {
+                match kind {
+                    $(ClassifierKind::$name(parameter) => {
+                        Self::$name(<$trained as Method>::train(patterns, labels, classes, parameter))
+                    })+
+                }
+            }
+
+            /// Probability of every class, adding up to 1.
+            pub fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
+                match self {
+                    $(Self::$name(trained) => trained.probabilities(pattern),)+
+                }
+            }
+
+            /// Whether it is one for patterns of so many numbers and so many classes; a model file may hold anything.
+            pub(super) fn fits(&self, width: usize, classes: usize) -> bool {
+                match self {
+                    $(Self::$name(trained) => trained.fits(width, classes),)+
+                }
+            }
+        }
+    };
 }
 
-/// A trained classifier.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Classifier {
-    /// Training patterns, their labels, and k.
-    Knn {
-        /// One training clip per row.
-        patterns: Array2<f32>,
-        /// Class of each row.
-        labels: Vec<usize>,
-        /// Number of classes.
-        classes: usize,
-        /// Neighbours that vote.
-        k: usize,
-    },
-    /// Weights per class.
-    Svc(LinearSvc),
+// Model files number them in this order: new ones come last.
+classifiers! {
+    /// This many nearest neighbours.
+    Knn(usize) => Neighbours;
+    /// Linear support vectors with this cost.
+    Svc(f32) => LinearSvc;
+}
+
+impl std::str::FromStr for Family {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.iter().copied().find(|family| family.name() == text).ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|family| family.name()).collect();
+            format!("unknown classifier `{text}`: expected {}", names.join(" or "))
+        })
+    }
 }
 
 impl Classifier {
-    /// Trains on patterns (N x P) with labels below `classes`.
-    pub fn train(kind: ClassifierKind, patterns: ArrayView2<f32>, labels: &[usize], classes: usize) -> Self {
-        match kind {
-            ClassifierKind::Knn(k) => {
-                Self::Knn { patterns: patterns.to_owned(), labels: labels.to_vec(), classes, k }
-            }
-            ClassifierKind::Svc(c) => Self::Svc(LinearSvc::train(patterns, labels, classes, c)),
-        }
-    }
-
-    /// Share of every class, adding up to 1: votes over k, or the softmax of the decision values.
-    pub fn shares(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
-        match self {
-            Self::Knn { patterns, labels, classes, k } => {
-                let (votes, _) = knn::votes(patterns.view(), labels, *classes, *k, pattern);
-                let total: f32 = votes.iter().sum();
-                votes.into_iter().map(|v| v / total.max(1e-9)).collect()
-            }
-            Self::Svc(svc) => {
-                /// Decision values lie about -1 to 1; this turns a margin of one into odds of twenty.
-                const SLOPE: f32 = 3.0;
-                let decision = svc.decide(pattern);
-                let best = decision.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
-                let raised: Vec<f32> = decision.iter().map(|v| (SLOPE * (v - best)).exp()).collect();
-                let total: f32 = raised.iter().sum();
-                raised.into_iter().map(|v| v / total).collect()
-            }
-        }
-    }
-
-    /// The class with the largest share (the first of equals) and the share.
+    /// The most probable class (the first of equals) and its probability.
     pub fn best(&self, pattern: ArrayView1<f32>) -> (usize, f32) {
-        self.shares(pattern).into_iter().enumerate().fold((0, f32::NEG_INFINITY), |best, (class, share)| {
-            if share > best.1 { (class, share) } else { best }
-        })
+        let best = |best: (usize, f32), (class, probability)| {
+            if probability > best.1 { (class, probability) } else { best }
+        };
+        self.probabilities(pattern).into_iter().enumerate().fold((0, f32::NEG_INFINITY), best)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use rand::{Rng, SeedableRng};
+
+    /// Every classifier of the table, with the first of its parameters, on three clouds.
+    #[test]
+    fn all_tell_separable_classes_apart_trained_and_over_folds() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(9);
+        let centres = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]];
+        let labels: Vec<usize> = (0..60).map(|i| i % 3).collect();
+        let patterns =
+            Array2::from_shape_fn((60, 2), |(i, k)| centres[labels[i]][k] + rng.random_range(-1.0..1.0_f32));
+        let gram = patterns.dot(&patterns.t());
+        let (kept, held): (Vec<usize>, Vec<usize>) = (0..60).partition(|i| i % 4 > 0);
+        for &family in Family::ALL {
+            assert_eq!(family.name().parse(), Ok(family));
+            let kind = family.tried()[0];
+            let trained = Classifier::train(kind, patterns.view(), &labels, 3);
+            for (pattern, &label) in patterns.rows().into_iter().zip(&labels) {
+                let probabilities = trained.probabilities(pattern);
+                assert!((probabilities.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{kind:?} {probabilities:?}");
+                assert_eq!(trained.best(pattern).0, label, "{kind:?}");
+            }
+            let fold = Fold { gram: gram.view(), kept: &kept, held: &held, labels: &labels, classes: 3 };
+            assert_eq!(kind.right(&fold), held.len(), "{kind:?}");
+            assert!(trained.fits(2, 3) && !trained.fits(3, 3) && !trained.fits(2, 4), "{kind:?}");
+        }
+        assert!("forest".parse::<Family>().expect_err("none").contains("knn or svc"));
     }
 }

@@ -2,6 +2,9 @@
 
 use crate::embedding::descriptor::{ANGLES, Scaling, centroid_distance};
 use crate::mask::{BoundingBox, Mask};
+use crate::silhouette::capsule::Capsule;
+use crate::silhouette::raster::Point;
+use crate::silhouette::view::{Canvas, View, draw, extent};
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
@@ -20,12 +23,12 @@ pub struct Track {
     pub empty_frames: usize,
 }
 
-/// One performance.
+/// One performance of an activity by a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
-    /// Who.
+    /// The person, by any name; clips of one subject are never split between training and test.
     pub subject: String,
-    /// What.
+    /// The activity's name, which recognition answers with.
     pub activity: String,
     /// Seen from where; all clips of a set have the same views in the same order.
     pub views: Vec<Track>,
@@ -57,6 +60,18 @@ impl Track {
         let boxes =
             full_frames.then(|| Array2::from_shape_fn((kept.len(), BOX_NUMBERS), |(f, k)| kept[f].1[k]));
         Self { descriptors, boxes, empty_frames: masks.len() - kept.len() }
+    }
+
+    /// Draws every frame of a performance of capsule bodies on one canvas (10 mm per pixel), so that the box's motion is kept, and
+    /// describes it. Bodies without a finite point give an empty track.
+    pub fn from_bodies(bodies: &[Vec<Capsule>], view: &View, scaling: Scaling) -> Self {
+        const MM_PER_PX: f64 = 10.0;
+        let reach: Vec<Point> = bodies.iter().flat_map(|body| extent(body, view)).collect();
+        let masks: Vec<Mask> = match Canvas::fitting(&reach, MM_PER_PX, 2) {
+            Some(canvas) => bodies.iter().map(|body| draw(body, view, &canvas)).collect(),
+            None => Vec::new(),
+        };
+        Self::from_masks(&masks, scaling, true)
     }
 
     /// Number of frames with a silhouette.

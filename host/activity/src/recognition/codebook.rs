@@ -1,7 +1,7 @@
 //! A clip's pattern over a codebook: how often its frames were near each of some hundred typical frames.
 //!
 //! Typical frames are k-means centres of the training frames (in place of the thesis' grid, whose cells grow with the power of the
-//! dimensions). Each frame is shared out over the centres by a Gaussian of its distance; the shares are averaged over the clip and
+//! dimensions). Each frame is assigned softly, to all centres by a Gaussian of its distance; the assignments are averaged over the clip and
 //! square-rooted, which makes the straight product of two patterns the Bhattacharyya coefficient. The average does not know the
 //! order of frames. An ordered pattern adds the same over the clip's halves and thirds. A second, smaller codebook may add its
 //! [`super::residuals`].
@@ -86,14 +86,14 @@ impl Codebook {
         self.centres.nrows().checked_mul(segments(mode).len())?.checked_add(residual)
     }
 
-    /// The frames' shares over the centres (frames x M): each row adds up to 1. `sharpness` scales the Gaussians' exponent
+    /// How much of every frame goes to which centre (frames x M): each row adds up to 1. `sharpness` scales the Gaussians' exponent
     /// (1 = the training frames' spread).
-    pub fn shares(&self, frames: ArrayView2<f32>, sharpness: f32) -> Array2<f32> {
+    pub fn soft_assignments(&self, frames: ArrayView2<f32>, sharpness: f32) -> Array2<f32> {
         // |f - c|^2 up to |f|^2, which the division by the row's sum takes out again.
         let norms = squared_norms(self.centres.view());
-        let mut shares = times_transposed(frames, self.centres.view());
+        let mut assignments = times_transposed(frames, self.centres.view());
         let scale = sharpness / self.spread.max(1e-9);
-        for mut row in shares.rows_mut() {
+        for mut row in assignments.rows_mut() {
             let Some(row) = row.as_slice_mut() else { continue };
             pulp::Arch::new().dispatch(|| {
                 for (value, norm) in row.iter_mut().zip(&norms) {
@@ -107,27 +107,28 @@ impl Codebook {
             let total: f32 = row.iter().sum();
             row.iter_mut().for_each(|v| *v /= total);
         }
-        shares
+        assignments
     }
 
     /// A clip's pattern from its frame vectors (frames x F); empty clips give zeros.
     pub fn pattern(&self, frames: ArrayView2<f32>, mode: Mode, sharpness: f32) -> Array1<f32> {
         let size = self.centres.nrows();
-        let shares = self.shares(frames, sharpness);
+        let assignments = self.soft_assignments(frames, sharpness);
         let segments = segments(mode);
         let mut pattern = Array1::zeros(size * segments.len());
         for (k, &(part, of)) in segments.iter().enumerate() {
-            let (from, to) = (part * shares.nrows() / of, ((part + 1) * shares.nrows()).div_ceil(of));
+            let (from, to) = (part * assignments.nrows() / of, ((part + 1) * assignments.nrows()).div_ceil(of));
             let mut out = pattern.slice_mut(s![k * size..(k + 1) * size]);
-            for share in shares.slice(s![from..to.min(shares.nrows()), ..]).rows() {
-                out += &share;
+            for assigned in assignments.slice(s![from..to.min(assignments.nrows()), ..]).rows() {
+                out += &assigned;
             }
             let weight = 1.0 / (of as f32 * (to - from).max(1) as f32);
             out.mapv_inplace(|v| (v * weight).sqrt());
         }
         if let Some(book) = &self.residual {
-            let parts = [pattern.view(), residuals(book, frames, sharpness).view()].map(|part| part.to_vec());
-            pattern = parts.concat().into();
+            let assignments = book.soft_assignments(frames, sharpness);
+            let more = residuals(book.centres.view(), frames, assignments.view());
+            pattern = [pattern.to_vec(), more.to_vec()].concat().into();
         }
         pattern
     }

@@ -157,8 +157,8 @@ mod tests {
             answer: Answer {
                 activity: activity.map(str::to_owned),
                 confidence,
-                shares: Vec::new(),
-                strangeness: 0.5,
+                probabilities: Vec::new(),
+                outlier_score: 0.5,
             },
         };
         let windows = [

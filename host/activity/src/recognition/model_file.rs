@@ -198,19 +198,7 @@ impl Recogniser {
         };
         let width = of_view.and_then(|width| width.checked_mul(self.views)).unwrap_or(usize::MAX);
         fits(self.patterns.ncols() == width, "the training patterns' width")?;
-        let classes = self.activities.len();
-        match &self.classifier {
-            Classifier::Knn { patterns, labels, classes: known, k } => {
-                let sizes =
-                    patterns.ncols() == width && patterns.nrows() == labels.len() && *known == classes;
-                let neighbours = *k > 0 && !labels.is_empty() && labels.iter().all(|&label| label < classes);
-                fits(sizes && neighbours, "the nearest-neighbour classifier")
-            }
-            Classifier::Svc(svc) => fits(
-                svc.weights.dim() == (classes, width) && svc.offsets.len() == classes,
-                "the SVC's weights",
-            ),
-        }?;
+        fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
         Ok(self)
     }
 }

@@ -1,9 +1,9 @@
-//! Embedded pattern learning exactly as in Li 2014 (eq. 9.11 to 9.13): which cells of a grid over the embedding a clip has visited.
+//! Embedded pattern learning (EPL) exactly as in Li 2014 (eq. 9.11 to 9.13): which cells of a grid over the embedding a clip has visited.
 //!
 //! Per dimension the grid has members at `min + (n - 1/2) R / Nt`; a frame goes to the nearest in each; a visited cell is 1. (Printed
 //! as `n R / Nt + min`, which leaves half a cell unused at the lower end.) The order of frames does not count, and exactly not.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
 /// The grid over the first dimensions of an embedding.
@@ -47,12 +47,6 @@ impl OccupancyGrid {
         }
         pattern
     }
-}
-
-/// Patterns of many clips as rows.
-pub fn rows(patterns: &[Array1<f32>]) -> Array2<f32> {
-    let width = patterns.first().map_or(0, Array1::len);
-    Array2::from_shape_fn((patterns.len(), width), |(i, j)| patterns[i][j])
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub enum Layout {
 pub enum PatternKind {
     /// Visited cells of a grid, exactly as in Li 2014: members per dimension.
     Thesis(Vec<usize>),
-    /// Square-rooted mean shares over a codebook of this size.
+    /// Square-rooted mean soft assignments to a codebook of this size.
     Codebook(usize),
 }
 
@@ -38,7 +38,7 @@ pub enum PatternKind {
 ///
 /// The default lays frames out by twenty principal components: they need no neighbour graph that could fall apart.
 /// [`SpaceSettings::thesis`] keeps Isomap. Accuracies are to be reported for settings that were chosen on other subjects
-/// ([`crate::evaluation::experiment::Experiment::searched`]), not for these defaults.
+/// ([`super::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSettings {
     /// How the gallery is laid out.

@@ -10,7 +10,7 @@
 //! Angles are tried on the outline ([`super::envelope`]), so a cut on 640 x 480 costs a fraction of a millisecond.
 
 use super::camera::CameraFile;
-use super::envelope::{Outline, clear_left_of};
+use super::envelope::{Outline, clear_left_of, row_extent};
 use super::projection::{self, ImageShadow, ShadowError, Subject};
 use crate::mask::Mask;
 use crate::sun::SunPosition;
@@ -127,7 +127,7 @@ fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subjec
     let (mut widest, mut centre) = (1.0_f64, outline.bounds.2 as f64);
     for y in top..=(top + rows).min(bottom) {
         let row = mask.row(y);
-        let Some((first, last)) = row.as_slice().and_then(crate::silhouette::pixels::row_extent) else {
+        let Some((first, last)) = row.as_slice().and_then(row_extent) else {
             continue;
         };
         let width = (last - first + 1) as f64;

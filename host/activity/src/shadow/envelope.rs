@@ -6,7 +6,6 @@
 //! (some thousand points) and no resampling loss.
 
 use crate::mask::Mask;
-use crate::silhouette::pixels::row_extent;
 use ndarray::ArrayView2;
 
 /// The outline's pixels (set, with an unset 4-neighbour or the border beside them), and all row extents.
@@ -138,4 +137,32 @@ pub fn clear_left_of(
         }
     }
     cleared
+}
+
+/// First and last set pixel of a row, `None` if the row is empty. Long empty stretches are skipped 32 pixels at a time.
+pub(super) fn row_extent(row: &[bool]) -> Option<(usize, usize)> {
+    const BLOCK: usize = 32;
+    let any = |part: &[bool]| part.iter().fold(false, |found, &set| found | set);
+    let first_block = row.chunks(BLOCK).position(any)? * BLOCK;
+    let first = first_block + row[first_block..].iter().position(|&set| set)?;
+    let last_block = row.chunks(BLOCK).rposition(any)? * BLOCK;
+    let last =
+        last_block + row[last_block..row.len().min(last_block + BLOCK)].iter().rposition(|&set| set)?;
+    Some((first, last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn row_extents_reach_over_blocks() {
+        let mut row = [false; 130];
+        assert_eq!(row_extent(&row), None);
+        row[101] = true;
+        assert_eq!(row_extent(&row), Some((101, 101)));
+        row[3] = true;
+        row[129] = true;
+        assert_eq!(row_extent(&row), Some((3, 129)));
+    }
 }

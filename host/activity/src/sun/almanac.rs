@@ -1,6 +1,7 @@
 //! The Astronomical Almanac's low-precision formulas for the sun (section C, about 0.01 deg from 1950 to 2050).
 
-use super::{Equatorial, hours_of_day, seconds_since_j2000};
+use super::angles::Equatorial;
+use super::clock::{hours_of_day, seconds_since_j2000};
 use chrono::{DateTime, Utc};
 
 /// Declination and Greenwich hour angle; coefficients in degrees and degrees per day since 2000-01-01 12:00 UT.

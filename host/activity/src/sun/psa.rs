@@ -1,6 +1,7 @@
 //! PSA+ (Blanco, Milidonis, Bonanos: Updating the PSA sun position algorithm, Solar Energy 212, 2020).
 
-use super::{Equatorial, hours_of_day, seconds_since_j2000};
+use super::angles::Equatorial;
+use super::clock::{hours_of_day, seconds_since_j2000};
 use chrono::{DateTime, Utc};
 
 /// Declination and Greenwich hour angle; `n` are days since 2000-01-01 12:00 UT, angles in radians.

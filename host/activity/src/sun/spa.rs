@@ -1,6 +1,7 @@
 //! NREL's SPA through the `solar-positioning` crate: the reference on the host.
 
-use super::{Place, SunError, SunPosition};
+use super::angles::SunPosition;
+use super::place::{Place, SunError};
 use chrono::{DateTime, Utc};
 use solar_positioning::{Location, SolarPositions, delta_t};
 

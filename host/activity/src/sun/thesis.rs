@@ -5,7 +5,8 @@
 //! referred to UTC (standard meridian zero), longitude east, day 1 = 1 January. Up to 1.03 deg of elevation and 10.7 deg of
 //! azimuth off SPA: kept by name so that the thesis can be redone.
 
-use super::{Equatorial, hours_of_day};
+use super::angles::Equatorial;
+use super::clock::hours_of_day;
 use chrono::{DateTime, Datelike, Utc};
 use std::f64::consts::TAU;
 

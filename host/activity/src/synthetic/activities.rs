@@ -6,8 +6,7 @@
 
 use super::body::{Arm, Build, Joints, Pose, joints, walking};
 use crate::embedding::descriptor::Scaling;
-use crate::evaluation::skeleton_clips::track;
-use crate::recognition::clip::Clip;
+use crate::recognition::clip::{Clip, Track};
 use crate::silhouette::capsule::Capsule;
 use crate::silhouette::view::views_round;
 use rand::{Rng, SeedableRng};
@@ -313,7 +312,7 @@ pub fn clips(subjects: usize, views: usize, rate_hz: f64, scaling: Scaling) -> V
             // Starting obliquely, so that no view looks exactly along the path.
             let views = views_round(views, 0.0).into_iter().map(|mut view| {
                 view.gamma_deg += 45.0;
-                track(&bodies, &view, scaling)
+                Track::from_bodies(&bodies, &view, scaling)
             });
             Clip {
                 subject: format!("p{subject:02}"),

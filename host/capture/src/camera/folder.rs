@@ -1,17 +1,21 @@
 //! A folder as a camera: whatever takes the pictures (a maker's program, `gphoto2 --capture-tethered`, a phone
 //! that synchronises) puts an image file into it for each trigger.
 
-use std::collections::BTreeSet;
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    time::{Duration, Instant, SystemTime},
+};
 
-use farnear_protocol::message::{ShotRecord, TriggerMode};
-use farnear_protocol::units::Micros;
+use farnear_files::image_file::{GreyImage, Samples, decode_grey};
+use farnear_protocol::{
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
 
 use super::{Camera, CameraError, Image};
 use crate::describe::trigger_name;
-use farnear_files::image_file::{GreyImage, Samples, decode_grey};
 
 const POLL: Duration = Duration::from_millis(20);
 /// A file that does not change for this long and still is no image will not become one.

@@ -1,15 +1,19 @@
 //! The simulator's camera: images over a loopback TCP stream ([`farnear_protocol::camera`]).
 
-use std::collections::VecDeque;
-use std::io::{self, Read, Write};
-use std::net::{Shutdown, TcpStream, ToSocketAddrs};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::{
+    collections::VecDeque,
+    io::{self, Read, Write},
+    net::{Shutdown, TcpStream, ToSocketAddrs},
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
 
-use farnear_protocol::camera::{Control, FRAME_HEADER, FREE_RUNNING, FrameHeader};
-use farnear_protocol::message::{ShotRecord, TriggerMode};
-use farnear_protocol::units::Micros;
+use farnear_protocol::{
+    camera::{Control, FRAME_HEADER, FREE_RUNNING, FrameHeader},
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
 use ndarray::Array2;
 
 use super::{Camera, CameraError, Image};

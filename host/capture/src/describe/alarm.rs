@@ -81,9 +81,7 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
         }
     };
     match alarm {
-        Some(record) => {
-            format!("{text}; alarm {0}, clear it with `farnear rig alarms --clear {0}`", record.number)
-        }
+        Some(record) => format!("{text}; alarm {} is latched", record.number),
         None => text,
     }
 }

@@ -1,7 +1,9 @@
 //! Why the board refused, with what to do.
 
-use farnear_protocol::RequestError;
-use farnear_protocol::message::{CorrectionFault, ShotFault};
+use farnear_protocol::{
+    RequestError,
+    message::{CorrectionFault, ShotFault},
+};
 
 use super::{alarm_text, axis_name, program_name, state_name, um};
 
@@ -26,9 +28,9 @@ pub fn refusal_text(error: &RequestError) -> String {
         RequestError::NotHomed { axis, state } => {
             format!("the position of the {} is {}; home it first", axis_name(*axis), state_name(*state))
         }
-        RequestError::Busy { request } => format!(
-            "it is still busy with request {request}; wait for its end or stop it (`farnear rig stop`)"
-        ),
+        RequestError::Busy { request } => {
+            format!("it is still busy with request {request}; wait for its end or stop it")
+        }
         RequestError::CannotHome { axis } => {
             format!("the {} has no home switch and needs no homing", axis_name(*axis))
         }
@@ -36,10 +38,7 @@ pub fn refusal_text(error: &RequestError) -> String {
         RequestError::EventGone { oldest, next } => {
             format!("it remembers the events from {oldest} to just before {next} only")
         }
-        RequestError::Alarm { number, alarm } => format!(
-            "alarm {number} is latched: {}; then clear it with `farnear rig alarms --clear {number}`",
-            alarm_text(*alarm)
-        ),
+        RequestError::Alarm { number, alarm } => format!("alarm {number} is latched: {}", alarm_text(*alarm)),
         RequestError::NoSuchAlarm { latched: 0, last: 0 } => "there never was an alarm".into(),
         RequestError::NoSuchAlarm { latched: 0, last } => {
             format!("no such alarm is latched or kept; the last one was number {last}")
@@ -56,11 +55,9 @@ pub fn refusal_text(error: &RequestError) -> String {
             um(*distance) / 1e3,
             um(*min) / 1e3
         ),
-        RequestError::Silence { min, max } => format!(
-            "the deadline for the host's silence must lie between {} and {} ms",
-            min.0 / 1000,
-            max.0 / 1000
-        ),
+        RequestError::Silence { min, max } => {
+            format!("the keep-alive timeout must lie between {} and {} ms", min.0 / 1000, max.0 / 1000)
+        }
         RequestError::Program { state } => {
             format!("the exposure program is {}, which does not go with this", program_name(*state))
         }

@@ -2,14 +2,16 @@
 
 use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 
+use crate::border::reflect;
+use crate::confidence;
 use crate::fill::fill_low_texture;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
-use crate::psf::Psf;
-use crate::run::{
+use crate::pipeline::{
     Backend, DepthMap, MAX_ALPHA, RunError, Settings, SwapEvidence, Warning, check, check_windows,
-    confidence, warnings_after,
+    warnings_after,
 };
+use crate::psf::Psf;
 
 /// A checked pair, each image divided by its mean; pixels without a value hold the mean.
 pub(super) struct Pair {
@@ -178,15 +180,6 @@ pub(super) fn filter(image: &Array2<f32>, taps: &[f32], along: Along) -> Array2<
         }
     }
     out
-}
-
-fn reflect(index: isize, length: usize) -> usize {
-    let last = length as isize - 1;
-    let mut index = index;
-    while !(0..=last).contains(&index) {
-        index = if index < 0 { -index } else { 2 * last - index };
-    }
-    index as usize
 }
 
 /// Along both directions.

@@ -18,8 +18,8 @@ use ndarray::{Array2, Array3, ArrayView2, Axis};
 use super::BaselineError;
 use super::common::{Evidence, Pair};
 use crate::optics::Optics;
+use crate::pipeline::{DepthMap, MAX_ALPHA, Settings};
 use crate::psf::Psf;
-use crate::run::{DepthMap, MAX_ALPHA, Settings};
 
 /// Side of a patch.
 const PATCH_PX: usize = 7;

@@ -15,7 +15,7 @@ use ndarray::{Array2, Zip};
 
 use super::common::{Along, Evidence, Pair, filter, moment, window_sum};
 use crate::optics::Optics;
-use crate::run::Settings;
+use crate::pipeline::Settings;
 
 /// Side of the window, px.
 const WINDOW_PX: usize = 21;

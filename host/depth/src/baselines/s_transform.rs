@@ -12,7 +12,7 @@ use ndarray::{Array2, Zip};
 
 use super::common::{Along, Evidence, Pair, filter, filter_both, moment, window_sum};
 use crate::optics::Optics;
-use crate::run::Settings;
+use crate::pipeline::Settings;
 
 /// SD of the smoothing: frequencies above 1 / SD carry most of what a cubic cannot describe.
 const SMOOTHING_SD_PX: f32 = 1.6;

@@ -18,7 +18,9 @@ use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
 use serde::{Deserialize, Serialize};
 
-use super::{CorrectionError, pattern::Series};
+use super::CorrectionError;
+use super::pattern::Series;
+use super::table::Learned;
 
 /// Widest window: beyond, the "local" residual spans a tenth of a 640x480 map.
 const MAX_WINDOW: usize = 24;
@@ -80,8 +82,11 @@ struct Expanded {
     rows: usize,
 }
 
-impl Cdc {
-    pub(super) fn fit(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError> {
+impl Learned for Cdc {
+    // One pattern and a neighbour on either side.
+    const PATTERNS_NEEDED: usize = 3;
+
+    fn learn(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError> {
         settings.check()?;
         let (height, width) = series.dim();
         let grid_px = settings.grid_px();
@@ -98,12 +103,11 @@ impl Cdc {
         let true_mm = series.patterns().iter().map(|pattern| pattern.true_mm).collect();
         let window = settings.window;
         let mut cdc = Self { window, grid_px, true_mm, distortion_um, expanded: Expanded::default() };
-        cdc.expand(width, height)?;
+        cdc.prepare((height, width))?;
         Ok(cdc)
     }
 
-    /// Checks what was loaded and prepares it for maps of a size.
-    pub(super) fn expand(&mut self, width: usize, height: usize) -> Result<(), CorrectionError> {
+    fn prepare(&mut self, (height, width): (usize, usize)) -> Result<(), CorrectionError> {
         let damaged = |what: String| Err(CorrectionError::Damaged(what));
         if !(1..=MAX_SMOOTHING_PX as usize).contains(&self.grid_px) || self.window > MAX_WINDOW {
             return damaged(format!("grid of {} px, window {}", self.grid_px, self.window));
@@ -131,7 +135,7 @@ impl Cdc {
         Ok(())
     }
 
-    pub(super) fn apply(&self, depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
+    fn apply(&self, depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
         let true_mm: Vec<f32> = self.true_mm.iter().map(|mm| *mm as f32).collect();
         let patterns = scan::Patterns {
             values: &self.expanded.values,

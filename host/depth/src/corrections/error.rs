@@ -6,7 +6,7 @@ use super::{FORMAT, Method};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CorrectionError {
     /// No method of that name.
-    #[error("`{0}` is no correction: use clsf, clsf-blend, clsf-full, cdc or two-step")]
+    #[error("`{0}` is not a correction: use {known}", known = Method::names())]
     UnknownMethod(String),
     /// Too few patterns.
     #[error("{given} patterns at different depths: {method} needs at least {needed}, 20 to 30 are good")]
@@ -131,7 +131,7 @@ pub enum CorrectionError {
     #[error("a stored correction is damaged: {0}")]
     Damaged(String),
     /// A method that only the host has.
-    #[error("the board does not know {0}: it corrects with clsf, clsf-blend and clsf-full")]
+    #[error("the board does not know {0}: it corrects with {known}", known = Method::board_names())]
     NotOnBoard(Method),
     /// Something that does not fit the board's number formats.
     #[error("not for the board: {0}")]

@@ -78,3 +78,15 @@ pub(super) fn scale(far_mm: f64, near_mm: f64) -> Result<DepthScale, CorrectionE
 pub(super) fn normalise(scale: DepthScale, depth_mm: f64) -> f64 {
     (depth_mm - f64::from(scale.centre_mm())) / f64::from(scale.half_span_mm())
 }
+
+/// Normalised coordinate of a pixel: -1 at the first, +1 at the last.
+pub(super) fn coordinate(index: usize, length: usize) -> f64 {
+    2.0 * index as f64 / (length as f64 - 1.0) - 1.0
+}
+
+/// The corrected depth, or NaN where it or the raw one (`d` from the centre) lies beyond the scale.
+#[inline(always)]
+pub(super) fn inside(d: f32, corrected: f32, centre: f32, span: f32) -> f32 {
+    // Not `&&`: no branch, and NaN compares false.
+    if (d.abs() <= span) & ((corrected - centre).abs() <= span) { corrected } else { f32::NAN }
+}

@@ -8,20 +8,23 @@ use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    CorrectionError, coordinate,
-    moments::{Moments, TEN},
-    pattern::{Series, normalise},
-};
+use super::moments::{Moments, TEN};
+use super::pattern::{Series, coordinate, normalise};
+use super::table::Learned;
+use super::{CdcSettings, CorrectionError};
 
+/// Ten coefficients for each step, in the order of [`TEN`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct TwoStep {
     true_of_raw: [f64; 10],
     raw_of_true: [f64; 10],
 }
 
-impl TwoStep {
-    pub(super) fn fit(series: &Series<'_>) -> Result<Self, CorrectionError> {
+impl Learned for TwoStep {
+    // As for `clsf`.
+    const PATTERNS_NEEDED: usize = 4;
+
+    fn learn(series: &Series<'_>, _: &CdcSettings) -> Result<Self, CorrectionError> {
         let scale = series.scale();
         let (height, width) = series.dim();
         let (mut forward, mut backward) = (Moments::new(), Moments::new());
@@ -51,14 +54,14 @@ impl TwoStep {
         })
     }
 
-    pub(super) fn check(&self) -> Result<(), CorrectionError> {
+    fn prepare(&mut self, _: (usize, usize)) -> Result<(), CorrectionError> {
         if self.true_of_raw.iter().chain(&self.raw_of_true).all(|c| c.is_finite()) {
             return Ok(());
         }
         Err(CorrectionError::Damaged("a coefficient of two-step is not finite".to_owned()))
     }
 
-    pub(super) fn apply(&self, mut depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
+    fn apply(&self, mut depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
         let (height, width) = depth_mm.dim();
         let (centre, span) = (scale.centre_mm(), scale.half_span_mm());
         let along_x = |c: &[f64; 10]| -> Vec<f32> {

@@ -3,8 +3,8 @@
 use ndarray::{Array2, ArrayView2};
 
 use super::{GROWN_TEXTURE, Sample, trace_boundary};
-use crate::run::DepthMap;
-use crate::run::confidence::{LOW_TEXTURE, texture_scale};
+use crate::confidence::{LOW_TEXTURE, texture_scale};
+use crate::depth_map::DepthMap;
 
 /// Least and greatest width of a margin, px.
 const MARGIN_PX: [usize; 2] = [7, 112];

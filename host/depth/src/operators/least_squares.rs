@@ -1,4 +1,4 @@
-//! Linear least squares of the operator design: at most a few thousand equations in at most 63 unknowns.
+//! Linear least squares of the operator design: at most a few thousand equations in at most 84 unknowns.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -52,14 +52,13 @@ pub fn design(
     grid: &[GridPoint],
     size: usize,
 ) -> Result<[Kernel; 3], DesignError> {
-    let offsets: Vec<_> = kernel::offsets(size).collect();
-    let n = offsets.len();
+    let n = kernel::free_coefficients(size);
     let samples = alphas();
     let weights = weights(prefilter, grid);
     let multiplicities: f64 = grid.iter().map(|p| p.multiplicity).sum();
     let mut rows: Vec<(Vec<f64>, f64)> = Vec::with_capacity(grid.len() * (samples.len() + 1));
     for (p, weight) in grid.iter().zip(&weights) {
-        let basis: Vec<f64> = offsets.iter().map(|o| kernel::basis_response(*o, p.u, p.v)).collect();
+        let basis = kernel::basis_responses(size, p.u, p.v);
         for alpha in samples {
             let [sum, difference] = sum_and_difference(otf, max_blur_px, p.w, alpha);
             let nir = difference / sum;
@@ -78,7 +77,5 @@ pub fn design(
     }
     let matrix = DMatrix::from_fn(rows.len(), 3 * n, |i, j| rows[i].0[j]);
     let rhs = DVector::from_fn(rows.len(), |i, _| rows[i].1);
-    let solution = solve(matrix, rhs)?;
-    let part = |i: usize| Kernel::new(size, solution.as_slice()[i * n..(i + 1) * n].to_vec());
-    Ok([part(0)?, part(1)?, part(2)?])
+    Ok(Kernel::several(size, solve(matrix, rhs)?.as_slice())?)
 }

@@ -15,10 +15,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 use super::least_squares::solve;
+use crate::cubic::MAX_ALPHA;
 use crate::kernel::Kernel;
 use crate::nir::{GRID, GridPoint, sum_and_difference};
 use crate::psf::Otf;
-use crate::run::MAX_ALPHA;
 
 /// Coefficients of alpha, alpha^3, alpha^5, alpha^7.
 pub type Polynomial = [f64; 4];

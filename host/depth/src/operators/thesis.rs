@@ -11,11 +11,12 @@
 //!
 //! Cost: 152 x 10 residuals in 30 unknowns for 7x7, some hundred iterations, 0.2 to 0.8 s.
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned, VecStorage};
+use levenberg_marquardt::LevenbergMarquardt;
+use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 use super::linear::band_pass;
+use super::minimise::{Misfit, minimise};
 use super::start::kernel_of_radial_response;
 use crate::kernel::{self, Kernel};
 use crate::nir::{ALPHA_SAMPLES, GridPoint, NirFit, alphas, nir};
@@ -48,14 +49,10 @@ pub fn design(
     grid: &[GridPoint],
     size: usize,
 ) -> Result<[Kernel; 3], DesignError> {
-    let start = starting_kernels(fit, size)?;
-    let problem = Problem::new(otf, max_blur_px, prefilter, grid, &start);
-    let (problem, report) =
-        LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE).minimize(problem);
-    if report.termination.was_usage_issue() || !report.objective_function.is_finite() {
-        return Err(DesignError::Minimisation(format!("{:?}", report.termination)));
-    }
-    let [gm1, gp1, gp2] = problem.kernels(size)?;
+    let start = starting_kernels(fit, size)?.each_ref().map(Kernel::octant).concat();
+    let misfit = RatioError::new(otf, max_blur_px, prefilter, grid, size);
+    let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
+    let [gm1, gp1, gp2] = Kernel::several(size, &minimise(misfit, start, &search)?)?;
     // The scale means nothing: give Gp1 the band-pass's peak.
     let peak = (0..=64)
         .map(|i| gp1.response(std::f64::consts::PI * f64::from(i) / 64.0, 0.0).abs())
@@ -89,68 +86,41 @@ pub(super) fn starting_kernels(fit: &NirFit, size: usize) -> Result<[Kernel; 3],
     ])
 }
 
-/// The residuals at the current kernels.
-struct Problem {
+/// `NIR - (Gp1 alpha + Gp2 alpha^3) / Gm1` at each point and depth, weighted; taps of Gm1, Gp1, Gp2 after each other.
+struct RatioError {
     /// Responses of the taps at each point, and the point's weight.
     points: Vec<(Vec<f64>, f64)>,
     /// NIR at each point and alpha.
     nir: Vec<[f64; SAMPLES]>,
-    /// Taps of Gm1, Gp1, Gp2 after each other.
-    taps: DVector<f64>,
 }
 
-impl Problem {
-    fn new(otf: &Otf, max_blur_px: f64, prefilter: &Kernel, grid: &[GridPoint], start: &[Kernel; 3]) -> Self {
-        let size = start[0].size();
-        let mut points = Vec::new();
-        let mut ratios = Vec::new();
+impl RatioError {
+    fn new(otf: &Otf, max_blur_px: f64, prefilter: &Kernel, grid: &[GridPoint], size: usize) -> Self {
+        let (mut points, mut ratios) = (Vec::new(), Vec::new());
         for p in grid.iter().filter(|p| p.w > 0.0) {
             let ratio = depths().map(|a| nir(otf, max_blur_px, p.w, a));
             if ratio.iter().all(|r| r.is_finite()) {
-                let basis = kernel::offsets(size).map(|o| kernel::basis_response(o, p.u, p.v)).collect();
-                points.push((basis, p.multiplicity.sqrt() * prefilter.response(p.u, p.v)));
+                let weight = p.multiplicity.sqrt() * prefilter.response(p.u, p.v);
+                points.push((kernel::basis_responses(size, p.u, p.v), weight));
                 ratios.push(ratio);
             }
         }
-        let taps = DVector::from_iterator(
-            3 * start[0].octant().len(),
-            start.iter().flat_map(|k| k.octant().iter().copied()),
-        );
-        Self { points, nir: ratios, taps }
-    }
-
-    fn kernels(&self, size: usize) -> Result<[Kernel; 3], DesignError> {
-        let n = self.taps.len() / 3;
-        let part = |i: usize| Kernel::new(size, self.taps.as_slice()[i * n..(i + 1) * n].to_vec());
-        Ok([part(0)?, part(1)?, part(2)?])
-    }
-
-    /// `[Gm1, Gp1, Gp2]` at a point.
-    fn responses(&self, basis: &[f64]) -> [f64; 3] {
-        let n = basis.len();
-        [0, 1, 2]
-            .map(|i| basis.iter().zip(&self.taps.as_slice()[i * n..(i + 1) * n]).map(|(b, t)| b * t).sum())
+        Self { points, nir: ratios }
     }
 }
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem {
-    type ResidualStorage = VecStorage<f64, Dyn, nalgebra::U1>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = VecStorage<f64, Dyn, nalgebra::U1>;
+/// `[Gm1, Gp1, Gp2]` at the point where the taps' own responses are `basis`.
+fn responses(basis: &[f64], taps: &[f64]) -> [f64; 3] {
+    let n = basis.len();
+    [0, 1, 2].map(|i| basis.iter().zip(&taps[i * n..(i + 1) * n]).map(|(b, t)| b * t).sum())
+}
 
-    fn set_params(&mut self, taps: &DVector<f64>) {
-        self.taps.copy_from(taps);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.taps.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
+impl Misfit for RatioError {
+    fn residuals(&self, taps: &[f64]) -> DVector<f64> {
         let samples = depths();
         let mut residuals = Vec::with_capacity(self.points.len() * samples.len());
         for ((basis, weight), ratios) in self.points.iter().zip(&self.nir) {
-            let [gm1, gp1, gp2] = self.responses(basis);
+            let [gm1, gp1, gp2] = responses(basis, taps);
             residuals.extend(
                 samples
                     .iter()
@@ -158,15 +128,15 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem {
                     .map(|(a, ratio)| weight * (ratio - (gp1 * a + gp2 * a.powi(3)) / gm1)),
             );
         }
-        Some(DVector::from_vec(residuals))
+        DVector::from_vec(residuals)
     }
 
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
+    fn jacobian(&self, taps: &[f64]) -> DMatrix<f64> {
         let samples = depths();
-        let n = self.taps.len() / 3;
+        let n = taps.len() / 3;
         let mut jacobian = DMatrix::zeros(self.points.len() * samples.len(), 3 * n);
         for (i, (basis, weight)) in self.points.iter().enumerate() {
-            let [gm1, gp1, gp2] = self.responses(basis);
+            let [gm1, gp1, gp2] = responses(basis, taps);
             for (k, a) in samples.iter().enumerate() {
                 let cubic = gp1 * a + gp2 * a.powi(3);
                 let factors = [cubic / (gm1 * gm1), -a / gm1, -a.powi(3) / gm1].map(|f| f * weight);
@@ -177,7 +147,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem {
                 }
             }
         }
-        Some(jacobian)
+        jacobian
     }
 }
 
@@ -195,18 +165,15 @@ mod tests {
         let grid = octant();
         let q = prefilter::fit(&prefilter::target(&otf, rmax, &grid).unwrap(), &grid, 7).unwrap();
         let fit = NirFit::new(&otf, rmax, f64::INFINITY);
-        let start = starting_kernels(&fit, 7).unwrap();
-        let mut problem = Problem::new(&otf, rmax, &q, &grid, &start);
-        let jacobian = problem.jacobian().unwrap();
-        let at = problem.params();
+        let misfit = RatioError::new(&otf, rmax, &q, &grid, 7);
+        let at = starting_kernels(&fit, 7).unwrap().each_ref().map(Kernel::octant).concat();
+        let jacobian = misfit.jacobian(&at);
         for j in [0, 4, 13, 27] {
             let mut moved = at.clone();
             moved[j] += 1e-6;
-            problem.set_params(&moved);
-            let above = problem.residuals().unwrap();
+            let above = misfit.residuals(&moved);
             moved[j] -= 2e-6;
-            problem.set_params(&moved);
-            let below = problem.residuals().unwrap();
+            let below = misfit.residuals(&moved);
             let difference = (above - below) / 2e-6;
             let error = (&difference - jacobian.column(j)).amax();
             assert!(error < 1e-4 * difference.amax().max(1.0), "{j}: {error}");

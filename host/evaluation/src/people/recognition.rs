@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result};
 use farnear_activity::{
     evaluation::{
-        choice::Views,
         confusion::{Confusion, wilson},
-        experiment::{Experiment, Sweep},
         leave_one_out::{Choice, Outcome, leave_one_subject_out},
     },
     recognition::{
-        classifier::ClassifierKind,
+        choice::Views,
+        classifier::Family,
+        experiment::{Experiment, Sweep},
         frames::Mode,
         space::{Layout, PatternKind, SpaceSettings},
     },
@@ -24,7 +24,7 @@ use super::{
 };
 use crate::page::Page;
 
-/// Sharpness of the codebook's shares; twice the training frames' spread, the middle of the usual values.
+/// Sharpness of the codebook's soft assignments; twice the training frames' spread, the middle of the usual values.
 const SHARPNESS: f32 = 2.0;
 
 /// Silhouettes in the gallery: a radial basis map costs as much per frame as there are.
@@ -60,7 +60,7 @@ impl Method {
         let experiment = match self.kind {
             Kind::Thesis => Experiment::thesis(),
             Kind::Neighbours(mode) => {
-                Experiment { sweeps: weights.to_vec(), ..Experiment::searched(mode).with_neighbours() }
+                Experiment { sweeps: weights.to_vec(), ..Experiment::searched(mode).with_classifier(Family::Knn) }
             }
             Kind::Vectors(mode) => {
                 let more = [
@@ -224,9 +224,6 @@ fn chosen(choices: &[Choice], views: usize) -> String {
         let moves = choice.space.mode == Mode::Ordered && !thesis(choice);
         if moves { choice.space.weights.motion_weight.to_string() } else { String::new() }
     });
-    tell("classifier", &|choice| match choice.classifier {
-        ClassifierKind::Knn(k) => format!("k = {k}"),
-        ClassifierKind::Svc(cost) => format!("cost {cost}"),
-    });
+    tell("classifier", &|choice| choice.classifier.described());
     parts.join("; ")
 }

@@ -149,7 +149,7 @@ fn accuracies(mode: Mode, sets: &[Vec<Clip>]) -> Result<Vec<Confusion>> {
                     let mut confusion = Confusion::new(classes.clone());
                     for clip in set.iter().filter(of) {
                         let answer = recogniser.recognise(&clip.views)?;
-                        let best = answer.shares.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+                        let best = answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
                         let place = |name: &str| classes.iter().position(|class| class == name).unwrap_or(0);
                         confusion.count(place(&clip.activity), best.map_or(0, |best| place(&best.0)));
                     }

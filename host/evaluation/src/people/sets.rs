@@ -3,7 +3,6 @@
 use anyhow::Result;
 use farnear_activity::{
     embedding::descriptor::Scaling,
-    evaluation::skeleton_clips,
     recognition::clip::{Clip, Track},
     synthetic::activities,
 };
@@ -11,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{
     data::{Data, numbered_files},
-    strips,
+    skeletons, strips,
 };
 
 /// Synthetic people, and frames per second of their clips.
@@ -47,7 +46,7 @@ pub fn utkinect(data: &Data) -> Result<Option<Set>> {
         short: "utkinect",
         about: "UTKinect-Action3D (Xia et al. 2012): 10 activities, 10 subjects, two repetitions; measured joints dressed with capsules and drawn from \
                 four views, 90 deg apart.",
-        clips: skeleton_clips::utkinect(&bytes, VIEWS, Scaling::default())?,
+        clips: skeletons::utkinect(&bytes, VIEWS, Scaling::default())?,
         mirror: true,
         asked: [Some(74.0), Some(84.0), Some(84.0), Some(93.0)],
     }))
@@ -60,7 +59,7 @@ pub fn florence(data: &Data) -> Result<Option<Set>> {
         name: "Florence",
         short: "florence",
         about: "Florence 3D Actions (Seidenari et al. 2013): 9 activities, 10 subjects; measured joints dressed and drawn likewise.",
-        clips: skeleton_clips::florence(&bytes, VIEWS, Scaling::default())?,
+        clips: skeletons::florence(&bytes, VIEWS, Scaling::default())?,
         mirror: true,
         asked: [Some(70.0), Some(79.0), Some(77.0), Some(85.0)],
     }))

@@ -1,10 +1,8 @@
 //! `farnear activity`: train, recognise, evaluate.
 
-mod confusion;
 mod evaluate;
 mod method;
 mod recognise;
-mod samples;
 mod train;
 
 use anyhow::Result;
@@ -29,8 +27,8 @@ enum Job {
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.job {
-        Job::Train(arguments) => train::run(&arguments),
-        Job::Recognise(arguments) => recognise::run(&arguments),
-        Job::Evaluate(arguments) => evaluate::run(&arguments),
+        Job::Train(arguments) => train::run(arguments),
+        Job::Recognise(arguments) => recognise::run(arguments),
+        Job::Evaluate(arguments) => evaluate::run(arguments),
     }
 }

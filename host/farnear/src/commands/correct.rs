@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use farnear_depth::corrections::Method;
 use farnear_workflows::correct::{self, CorrectSettings};
 
 use crate::{report, terminal};
@@ -20,8 +21,10 @@ pub struct Arguments {
     /// Where to write the corrected map: .npy or .tiff.
     #[arg(long, value_name = "DEPTH")]
     out: PathBuf,
-    /// Compute in the board's fixed-point arithmetic, bit for bit (clsf, clsf-blend, clsf-full).
-    #[arg(long)]
+    #[arg(
+        long,
+        help = format!("Compute in the board's fixed-point arithmetic, bit for bit ({})", Method::board_names())
+    )]
     as_board: bool,
     /// Print one JSON object.
     #[arg(long)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_depth::run::{MAX_SMOOTHING_PX, Settings};
+use farnear_depth::pipeline::{MAX_SMOOTHING_PX, Settings};
 use farnear_workflows::depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs};
 
 use crate::{report, terminal};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use farnear_depth::{
+    kernel::sizes_in_words,
     operators::{Design, Family},
     psf::Psf,
 };
@@ -30,8 +31,12 @@ pub struct Arguments {
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// Width and height of the kernels in pixels: 5, 7, 9 or 11.
-    #[arg(long, value_name = "PX", default_value_t = 7)]
+    #[arg(
+        long,
+        value_name = "PX",
+        default_value_t = 7,
+        help = format!("Width and height of the kernels in pixels: {}", sizes_in_words())
+    )]
     kernel_size: usize,
     /// Where to save the operators, as TOML.
     #[arg(long, value_name = "FILE")]

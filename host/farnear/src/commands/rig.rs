@@ -15,7 +15,7 @@ mod settings;
 mod sun;
 mod target;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, Subcommand, ValueEnum};
 use farnear_protocol::message::Axis;
 
@@ -92,19 +92,4 @@ impl AxisName {
             Self::Lens => Axis::Lens,
         }
     }
-
-    fn of(axis: Axis) -> &'static str {
-        match axis {
-            Axis::SensorCoarse => "coarse",
-            Axis::SensorFine => "fine",
-            Axis::Lens => "lens",
-        }
-    }
-}
-
-/// A position in micrometres as the wire carries it.
-fn nanometres(position_um: f64) -> Result<farnear_protocol::Nanometres> {
-    farnear_capture::sequence::nanometres(position_um).with_context(|| {
-        format!("{position_um} um is no position: expected a number between -2147483 and 2147483 um")
-    })
 }

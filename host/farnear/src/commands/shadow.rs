@@ -23,7 +23,7 @@ enum Job {
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.job {
-        Job::Remove(arguments) => remove::run(&arguments),
-        Job::Score(arguments) => score::run(&arguments),
+        Job::Remove(arguments) => remove::run(arguments),
+        Job::Score(arguments) => score::run(arguments),
     }
 }

@@ -26,9 +26,9 @@ enum Source {
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.source {
-        Source::Skeletons(arguments) => bodies::skeletons(&arguments),
-        Source::Synthetic(arguments) => bodies::synthetic(&arguments),
-        Source::Markers(arguments) => markers::run(&arguments),
-        Source::Video(arguments) => video::run(&arguments),
+        Source::Skeletons(arguments) => bodies::skeletons(arguments),
+        Source::Synthetic(arguments) => bodies::synthetic(arguments),
+        Source::Markers(arguments) => markers::run(arguments),
+        Source::Video(arguments) => video::run(arguments),
     }
 }

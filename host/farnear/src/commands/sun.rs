@@ -3,15 +3,14 @@
 use anyhow::Result;
 use chrono::{DateTime, Utc};
 use clap::Args;
-use farnear_activity::sun::{self, Model, Place};
-use farnear_maths::{angle::BinaryAngle, sun as board};
-use serde::Serialize;
+use farnear_activity::sun::{self, Place};
+use farnear_workflows::sun::{Formula, Moment, position};
 
 use crate::report;
 
 /// A place and a time, as the commands that need the sun ask for them.
 #[derive(Args)]
-pub struct Moment {
+pub struct MomentArguments {
     /// Latitude in degrees, north positive.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = latitude)]
     pub lat: f64,
@@ -23,10 +22,10 @@ pub struct Moment {
     pub time: DateTime<Utc>,
 }
 
-impl Moment {
-    /// The place.
-    pub fn place(&self) -> Place {
-        Place { latitude_deg: self.lat, longitude_deg: self.lon }
+impl MomentArguments {
+    /// As a workflow takes it.
+    pub fn moment(&self) -> Moment {
+        Moment { place: Place { latitude_deg: self.lat, longitude_deg: self.lon }, time: self.time }
     }
 }
 
@@ -35,38 +34,14 @@ impl Moment {
 #[command(after_help = "Example: farnear sun --lat 52.38 --lon -1.56 --time 2014-06-23T11:30:00Z --json")]
 pub struct Arguments {
     #[command(flatten)]
-    moment: Moment,
+    moment: MomentArguments,
     /// psa (PSA+, within 0.01 deg of NREL's SPA), almanac (two sines), thesis (Li 2014, a degree off), spa (NREL's own), or
     /// board (the rig's single-precision answer, bit for bit).
-    #[arg(long, default_value = "psa", value_parser = Formula::parse)]
+    #[arg(long, default_value = "psa", value_parser = str::parse::<Formula>)]
     model: Formula,
     /// Print figures as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// Who computes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Formula {
-    /// The host, in double precision.
-    Host(Model),
-    /// The code that runs on the board.
-    Board,
-}
-
-impl Formula {
-    fn parse(text: &str) -> Result<Self, String> {
-        match text {
-            "board" => Ok(Self::Board),
-            other => other.parse().map(Self::Host).map_err(|error| format!("{error} (or board)")),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Figures {
-    elevation_deg: f64,
-    azimuth_deg: f64,
 }
 
 /// Runs the command.
@@ -74,28 +49,7 @@ struct Figures {
 /// # Errors
 /// Where SPA refuses the time.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let Moment { lat, lon, time } = arguments.moment;
-    let figures = match arguments.model {
-        Formula::Host(model) => {
-            let sun = sun::position(time, arguments.moment.place(), model)?;
-            Figures { elevation_deg: sun.elevation_deg, azimuth_deg: sun.azimuth_deg }
-        }
-        Formula::Board => {
-            let units = |degrees: f64| BinaryAngle::from_degrees_e7((degrees * 1e7).round() as i32);
-            let east_deg = if lon > 180.0 { lon - 360.0 } else { lon };
-            let place = board::Place { latitude: units(lat), longitude: units(east_deg) };
-            let sun = board::Sun::at(time.timestamp(), &place);
-            Figures {
-                elevation_deg: f64::from(sun.elevation_deg()),
-                azimuth_deg: f64::from(sun.azimuth_deg()),
-            }
-        }
-    };
-    let figures = Figures {
-        elevation_deg: report::rounded(figures.elevation_deg, 6),
-        azimuth_deg: report::rounded(figures.azimuth_deg, 6),
-    };
-    report::print(&figures, arguments.json)
+    report::print(&position(&arguments.moment.moment(), arguments.model)?, arguments.json)
 }
 
 fn latitude(text: &str) -> Result<f64, String> {

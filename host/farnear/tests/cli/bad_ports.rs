@@ -130,9 +130,9 @@ fn a_camera_that_is_none_is_named_before_anything_moves() {
     let folder = Folder::new();
     let out = folder.text("out");
     for (camera, code, phrases) in [
-        ("webcam", 2, vec!["unknown camera \"webcam\"", "folder:DIR"]),
+        ("webcam", 2, vec!["camera webcam", "folder:DIR"]),
         ("folder:/farnear-absent", 1, vec!["/farnear-absent", "No such file"]),
-        ("sim", 2, vec!["--camera sim belongs to --port sim"]),
+        ("sim", 2, vec!["camera sim: it belongs to the emulated rig"]),
         ("127.0.0.1:1", 1, vec!["127.0.0.1:1", "refused"]),
     ] {
         // The port is absent as well: it would be the one that is named if it were looked at first.

@@ -1,4 +1,4 @@
-//! `farnear silhouettes markers` on a made CSV suit and, where they are at hand, on real recordings.
+//! `farnear silhouettes markers` on a made CSV suit, on a made BVH skeleton and, where they are at hand, on real recordings.
 
 use std::{fs, path::PathBuf};
 
@@ -95,7 +95,7 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
     let broken = folder.file("broken.csv", recording().replace("1000", "tall"));
     let short = folder.file("short.trc", "PathFileType\t4\n");
     let odd = folder.file("odd.c3d", [2_u8, 0x50, 1, 2, 3]);
-    let other = folder.file("walk.bvh", "HIERARCHY");
+    let other = folder.file("walk.fbx", "Kaydara FBX Binary");
     let one = folder.file("one.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = ['A']\n");
     let doubled = folder.file("doubled.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = []\n");
     let before = folder.listing();
@@ -108,7 +108,7 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
         (&broken, &template, vec!["broken.csv", "line 2", "tall"]),
         (&short, &template, vec!["short.trc", "line"]),
         (&odd, &template, vec!["odd.c3d", "C3D", "ends within"]),
-        (&other, &template, vec!["walk.bvh", ".c3d"]),
+        (&other, &template, vec!["walk.fbx", ".bvh, .c3d"]),
         (&folder.text("none.c3d"), &template, vec!["none.c3d"]),
     ] {
         let out = folder.text("masks");
@@ -116,6 +116,114 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
         fails(&mut farnear(&arguments), 1, &phrases);
     }
     assert_eq!(folder.listing(), before, "nothing is left behind");
+}
+
+/// A body as the CMU library's BVH files have it: joints by their names there, y up, in its units of 56.444 mm, 30.5 of them from
+/// toe to crown. In three frames it walks 10 units along z, and turns about the vertical in the last.
+fn skeleton() -> String {
+    let chain = |joints: &[(&str, [f64; 3])], end: [f64; 3]| {
+        let open: String = joints
+            .iter()
+            .map(|(name, [x, y, z])| {
+                format!("JOINT {name}\n{{\nOFFSET {x} {y} {z}\nCHANNELS 3 Zrotation Yrotation Xrotation\n")
+            })
+            .collect();
+        let [x, y, z] = end;
+        format!("{open}End Site\n{{\nOFFSET {x} {y} {z}\n}}\n{}", "}\n".repeat(joints.len()))
+    };
+    let leg = |side: &str, x: f64| {
+        let names = ["UpLeg", "Leg", "Foot", "ToeBase"].map(|part| format!("{side}{part}"));
+        let offsets = [[x, -1.5, 0.0], [0.0, -7.0, 0.0], [0.0, -7.0, 0.0], [0.0, -1.0, 2.0]];
+        let joints: Vec<(&str, [f64; 3])> = names.iter().map(String::as_str).zip(offsets).collect();
+        chain(&joints, [0.0, 0.0, 1.0])
+    };
+    let arm = |side: &str, x: f64| {
+        let names = ["Arm", "ForeArm", "Hand"].map(|part| format!("{side}{part}"));
+        let offsets = [[x, 7.0, 0.0], [5.0 * x.signum(), 0.0, 0.0], [4.0 * x.signum(), 0.0, 0.0]];
+        let joints: Vec<(&str, [f64; 3])> = names.iter().map(String::as_str).zip(offsets).collect();
+        chain(&joints, [x.signum(), 0.0, 0.0])
+    };
+    let trunk = chain(
+        &[("Spine", [0.0, 2.0, 0.0]), ("Neck", [0.0, 7.0, 0.0]), ("Head", [0.0, 2.0, 0.0])],
+        [0.0, 3.0, 0.0],
+    );
+    let body = [leg("Left", 1.5), leg("Right", -1.5), arm("Left", 3.0), arm("Right", -3.0), trunk].concat();
+    let mut text = format!(
+        "HIERARCHY\nROOT Hips\n{{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n\
+         {body}}}\nMOTION\nFrames: 3\nFrame Time: 0.0083333\n"
+    );
+    let rest = vec!["0"; 3 * body.matches("CHANNELS").count()].join(" ");
+    for (z, turn_deg) in [(0, 0), (10, 0), (10, 90)] {
+        text += &format!("0 17 {z} 0 {turn_deg} 0 {rest}\n");
+    }
+    text
+}
+
+#[test]
+fn a_skeleton_of_joints_is_drawn_and_what_was_guessed_is_said() {
+    let folder = Folder::new();
+    let (file, out) = (folder.file("walk.bvh", skeleton()), folder.text("masks"));
+    let arguments =
+        ["silhouettes", "markers", &file, "--template", "bvh", "--views", "2", "--first-view-deg", "0"];
+    let (figures, said) = succeeds(farnear(&arguments).args(["--mm-per-px", "10", "--out", &out, "--json"]));
+    let figures: serde_json::Value = serde_json::from_str(&figures).expect("JSON");
+    assert_eq!((number(&figures, "silhouettes"), number(&figures, "flagged_frames")), (6.0, 0.0));
+    for phrase in
+        ["warning: ", "walk.bvh: lengths are taken as units of 56.444 mm", "y is taken as up", "--units"]
+    {
+        assert!(said.contains(phrase), "{phrase:?} is not in: {said}");
+    }
+    assert_eq!(figures["warnings"].as_array().map(Vec::len), Some(2), "{figures}");
+    let size = |name: &str| {
+        let mask = image::open(folder.path(name)).expect("a mask").into_luma8();
+        let [top, left, bottom, right] = bounds(&mask);
+        (f64::from(bottom - top), f64::from(right - left))
+    };
+    // The skeleton is 30.5 units from toe to crown, each 56.444 mm, and dressed by some centimetres above and below; its arms
+    // are 26 units from tip to tip. Seen from the front it is as wide as its arms, from the side it is not, and after a
+    // quarter turn the other way round.
+    let (height, width) = size("masks/view1/frame_000001.png");
+    assert!((172.0..195.0).contains(&height) && (147.0..165.0).contains(&width), "{height} {width}");
+    let (_, turned) = size("masks/view1/frame_000003.png");
+    assert!(turned < 0.5 * width, "{turned} {width}");
+    let (_, side) = size("masks/view2/frame_000001.png");
+    assert!(side < 0.5 * width, "{side} {width}");
+
+    // Who knows better is asked nothing and told nothing.
+    let metric = folder.text("metric");
+    let named = ["--units", "cm", "--up", "y", "--mm-per-px", "10", "--out", &metric, "--json"];
+    let (figures, said) = succeeds(farnear(&arguments).args(named));
+    assert!(!said.contains("taken as") && !figures.contains("warnings"), "{said} {figures}");
+    let (small, _) = size("metric/view1/frame_000001.png");
+    assert!(small < 0.3 * height, "{small} {height}: centimetres are smaller");
+}
+
+#[test]
+fn a_broken_skeleton_is_refused_with_its_line() {
+    let folder = Folder::new();
+    let good = skeleton();
+    let promised = good.lines().position(|line| line.starts_with("Frames:")).expect("a count") + 1;
+    let last = good.lines().count();
+    let line = |number: usize| format!("line {number}");
+    let before_last: String = good.lines().take(last - 1).map(|line| format!("{line}\n")).collect();
+    for (name, text, phrases) in [
+        ("angle.bvh", good.replace("0 17 10 0 90", "0 17 10 0 ninety"), vec![line(last), "ninety".into()]),
+        ("short.bvh", before_last, vec![line(last - 1), "2 frames".into(), "3".into()]),
+        ("count.bvh", good.replace("Frames: 3", "Frames: many"), vec![line(promised), "many".into()]),
+        ("axis.bvh", good.replacen("Zrotation", "Wrotation", 1), vec![line(5), "Wrotation".into()]),
+    ] {
+        let (file, out) = (folder.file(name, text), folder.text("masks"));
+        let arguments = ["silhouettes", "markers", &file, "--template", "bvh", "--out", &out];
+        let mut phrases: Vec<&str> = phrases.iter().map(String::as_str).collect();
+        phrases.push(name);
+        fails(&mut farnear(&arguments), 1, &phrases);
+        assert!(!folder.path("masks").exists(), "{name}");
+    }
+    let (file, out) = (folder.file("walk.bvh", good), folder.text("masks"));
+    let wrong = ["silhouettes", "markers", &file, "--template", "bvh", "--units", "furlong", "--out", &out];
+    fails(&mut farnear(&wrong), 2, &["furlong", "cmu"]);
+    let other = ["silhouettes", "markers", &file, "--template", "opencap", "--out", &out];
+    fails(&mut farnear(&other), 1, &["walk.bvh", "`bvh` fits"]);
 }
 
 #[test]

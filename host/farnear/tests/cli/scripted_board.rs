@@ -1,51 +1,9 @@
 //! Boards in trouble, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
 #![cfg(target_os = "linux")]
 
-// The board that the client's own tests talk to; not all of its faults are used here.
-#[path = "../../../capture/tests/peer/mod.rs"]
-mod peer;
-
-use std::{
-    fs::File,
-    io::{Read, Write},
-    thread,
-    time::Duration,
-};
-
-use farnear_capture::Transport;
-use peer::{Faults, Peer};
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use farnear_scripted_board::{Faults, plug_in};
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
-
-/// Puts a scripted board behind a pseudo-terminal; gives the port's name. The port goes away with the board.
-fn plug_in(faults: Faults) -> (String, Peer) {
-    // Not with serialport's pair: the programs that tests start would inherit its ends and hold the line.
-    let far_end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).expect("a pty");
-    grantpt(&far_end).and_then(|()| unlockpt(&far_end)).expect("a pty");
-    let port = ptsname(&far_end, Vec::new()).expect("a pty's name").into_string().expect("a plain name");
-    let near_end = File::options().read(true).write(true).open(&port).expect("the other end");
-    let mut far_end = File::from(far_end);
-    let peer = Peer::new(faults);
-    let mut board = peer.clone();
-    thread::spawn(move || {
-        let _near_end = near_end; // held, so that clients may come and go
-        let mut bytes = [0; 512];
-        while let Ok(count) = far_end.read(&mut bytes) {
-            if board.send(&bytes[..count], Duration::ZERO).is_err() {
-                return;
-            }
-            loop {
-                match board.receive(&mut bytes, Duration::ZERO) {
-                    Ok(0) => break,
-                    Ok(count) => far_end.write_all(&bytes[..count]).expect("a line"),
-                    Err(_) => return, // unplugged
-                }
-            }
-        }
-    });
-    (port, peer)
-}
 
 /// A capture with this port that must fail so and leave nothing behind.
 #[track_caller]

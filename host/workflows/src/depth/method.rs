@@ -6,7 +6,7 @@ use farnear_depth::{
     baselines,
     operators::Operators,
     optics::Optics,
-    run::{DepthMap, Settings, depth_from_pair},
+    pipeline::{DepthMap, Settings, depth_from_pair},
 };
 
 use super::pair::Pair;

@@ -7,7 +7,7 @@ use farnear_depth::{
     fill::FILLED_CONFIDENCE,
     operators::Operators,
     optics::Optics,
-    run::{DepthMap, Settings},
+    pipeline::{DepthMap, Settings},
     uncertainty::{Noise, standard_deviation_mm},
 };
 use farnear_files::image_file::Samples;

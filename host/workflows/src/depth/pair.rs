@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use farnear_capture::record::CAPTURE_FILE;
-use farnear_depth::run::Warning;
+use farnear_depth::pipeline::Warning;
 use farnear_files::image_file::{Samples, read_grey};
 use ndarray::Array2;
 

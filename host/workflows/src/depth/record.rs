@@ -1,6 +1,6 @@
 //! `depth.toml`: what made a map.
 
-use farnear_depth::{operators::Operators, optics::Optics, run::Settings};
+use farnear_depth::{operators::Operators, optics::Optics, pipeline::Settings};
 use farnear_files::map::Scale;
 use serde::Serialize;
 

@@ -1,6 +1,10 @@
 //! The camera that goes with a rig, as users name it.
 
-use std::{path::PathBuf, str::FromStr, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+    time::Duration,
+};
 
 use farnear_capture::{
     camera::{Camera, FolderCamera, SimCamera},
@@ -11,7 +15,8 @@ use farnear_protocol::Micros;
 
 use super::{Rig, RigAddress};
 use crate::{
-    clock,
+    MADE_BY, clock,
+    context::Context,
     error::{Result, WorkflowError},
 };
 
@@ -59,7 +64,24 @@ pub struct CameraSettings {
 /// moves.
 pub struct EarlyCamera(Option<Box<dyn Camera>>);
 
+/// What is wrong with this camera at another rig.
+const OF_THE_EMULATED_RIG: &str = "it belongs to the emulated rig";
+
 impl CameraSettings {
+    /// Opens the camera and connects to the rig, in the order in which the least is done in vain. Everything that takes
+    /// pictures begins with this, after its folder.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`], [`WorkflowError::Camera`], [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+    pub fn connect(
+        &self,
+        address: &RigAddress,
+        optics: Option<(&Path, Psf)>,
+        context: &Context<'_>,
+    ) -> Result<EquippedRig> {
+        self.open_early(address)?.connect(address, optics, context)
+    }
+
     /// Opens the camera, unless it is the one that comes with the emulated rig.
     ///
     /// # Errors
@@ -71,7 +93,7 @@ impl CameraSettings {
                 return Err(WorkflowError::parameter(
                     "camera",
                     "sim",
-                    format!("it belongs to the emulated rig; with {port} give HOST:PORT or folder:DIR"),
+                    format!("{OF_THE_EMULATED_RIG}; {port} needs HOST:PORT or folder:DIR"),
                 ));
             }
             (CameraAddress::Folder(folder), _) => Some(Box::new(FolderCamera::watch(folder)?)),
@@ -82,32 +104,44 @@ impl CameraSettings {
 }
 
 impl EarlyCamera {
-    /// The camera of a connected rig: this one, else the emulated rig's.
+    /// Connects to the rig; without a camera of its own, to the emulated rig's.
     ///
     /// # Errors
-    /// [`WorkflowError::Camera`].
-    pub fn of_rig(self, rig: &Rig) -> Result<Box<dyn Camera>> {
-        match (self.0, &rig.emulation) {
-            (Some(camera), _) => Ok(camera),
-            (None, Some((simulator, _))) => Ok(Box::new(SimCamera::connect(simulator.camera())?)),
-            (None, None) => Err(WorkflowError::parameter("camera", "sim", "it belongs to the emulated rig")),
-        }
+    /// [`WorkflowError::Simulator`], [`WorkflowError::Client`], [`WorkflowError::Camera`].
+    pub fn connect(
+        self,
+        address: &RigAddress,
+        optics: Option<(&Path, Psf)>,
+        context: &Context<'_>,
+    ) -> Result<EquippedRig> {
+        let rig = Rig::connect(address, optics, context)?;
+        let camera = match (self.0, &rig.emulation) {
+            (Some(camera), _) => camera,
+            (None, Some((simulator, _))) => Box::new(SimCamera::connect(simulator.camera())?),
+            (None, None) => return Err(WorkflowError::parameter("camera", "sim", OF_THE_EMULATED_RIG)),
+        };
+        Ok(EquippedRig { camera, rig })
     }
 }
 
-/// What a capture's record says beside what was measured. `made_by` is the program and its version.
-pub fn circumstances(
-    rig: &Rig,
-    camera: &dyn Camera,
-    psf: Psf,
-    optics: toml::Table,
-    made_by: &str,
-) -> Circumstances {
-    Circumstances {
-        made_by: made_by.into(),
-        time: (!rig.client.hello().emulated).then(clock::now_rfc3339).flatten(),
-        camera: camera.kind(),
-        simulation: rig.emulation.as_ref().map(|(_, scenery)| scenery.decided(psf)),
-        optics,
+/// A connected rig with its camera, which goes before the rig does.
+pub struct EquippedRig {
+    /// Where images come from.
+    pub camera: Box<dyn Camera>,
+    /// The rig.
+    pub rig: Rig,
+}
+
+impl EquippedRig {
+    /// What a capture's record says beside what was measured. `psf` and `optics` are those that were captured with, as
+    /// far as they are known.
+    pub fn circumstances(&self, psf: Psf, optics: toml::Table) -> Circumstances {
+        Circumstances {
+            made_by: MADE_BY.into(),
+            time: (!self.rig.client.hello().emulated).then(clock::now_rfc3339).flatten(),
+            camera: self.camera.kind(),
+            simulation: self.rig.emulation.as_ref().map(|(_, scenery)| scenery.decided(psf)),
+            optics,
+        }
     }
 }

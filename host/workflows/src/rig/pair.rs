@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use farnear_capture::{
-    camera::Camera,
     pair::{Exposures, Pair, capture_pair},
     plan::SensorPair,
     record::{CaptureRecord, begin_folder, finish_folder, record_of},
@@ -11,10 +10,10 @@ use farnear_capture::{
 use serde::Serialize;
 
 use super::{
-    Rig, RigAddress,
-    camera::{CameraSettings, circumstances},
+    RigAddress,
+    camera::{CameraSettings, EquippedRig},
 };
-use crate::{MADE_BY, context::Context, error::Result, optics::GivenOptics};
+use crate::{context::Context, error::Result, optics::GivenOptics};
 
 /// What is captured with, and where to.
 #[derive(Clone, Debug)]
@@ -72,10 +71,8 @@ impl From<&Pair> for PairFigures {
 pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let folder = begin_folder(&settings.out)?;
-    let early = settings.camera.open_early(&settings.rig)?;
-    let rig = Rig::connect(&settings.rig, Some(optics.for_emulation()), context)?;
-    let mut camera = early.of_rig(&rig)?;
-    let (pair, record) = take(&rig, camera.as_mut(), &optics, &settings.camera, context)?;
+    let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let (pair, record) = take(&mut rig, &optics, &settings.camera, context)?;
     finish_folder(folder, &pair, &record)?;
     context.say(&format!("wrote {}", settings.out.display()));
     Ok(PairFigures::from(&pair))
@@ -86,8 +83,7 @@ pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFig
 /// # Errors
 /// [`crate::WorkflowError::Capture`].
 pub fn take(
-    rig: &Rig,
-    camera: &mut dyn Camera,
+    equipped: &mut EquippedRig,
     optics: &GivenOptics,
     settings: &CameraSettings,
     context: &Context<'_>,
@@ -96,8 +92,10 @@ pub fn take(
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
     let exposures =
         Exposures { exposure: settings.exposure, image_wait: settings.image_wait, ..Exposures::default() };
-    let pair = capture_pair(&rig.client, camera, &sensor, &exposures, &mut |what| context.say(what))?;
-    let circumstances = circumstances(rig, camera, optics.optics.psf(), optics.table.clone(), MADE_BY);
-    let record = record_of(&pair, &rig.client, circumstances);
+    let EquippedRig { camera, rig } = equipped;
+    let say = &mut |what: &str| context.say(what);
+    let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;
+    let circumstances = equipped.circumstances(optics.optics.psf(), optics.table.clone());
+    let record = record_of(&pair, &equipped.rig.client, circumstances);
     Ok((pair, record))
 }

@@ -56,37 +56,15 @@ fn identity() -> Identity {
     }
 }
 
-fn inputs(now: u64) -> Inputs {
-    let stepper = StepperState { pulses: 0, idle: true, underrun: false, room: 8 };
-    let motor = MotorInputs {
-        encoder_counts: 0,
-        home_switch: false,
-        far_switch: false,
-        driver_fault: false,
-        stepper,
-    };
-    Inputs {
-        now: BoardMicros(now),
-        coarse: motor,
-        lens: motor,
-        gauge_code: Some(GAUGE_CODE_ZERO),
-        emergency_stop: false,
-        supply_low: false,
-        link_overflow: false,
-        exposure: None,
-        strobe: None,
-    }
-}
-
 pub fn tick_at_rest() -> u32 {
     let mut rig = Rig::new(identity(), None, BoardMicros(0));
     let mut now = 0;
     for _ in 0..100 {
         now += u64::from(TICK_US);
-        black_box(rig.tick(&inputs(now)));
+        black_box(rig.tick(&Inputs::idle(BoardMicros(now))));
         while rig.transmit().is_some() {}
     }
-    let inputs = black_box(inputs(now + u64::from(TICK_US)));
+    let inputs = black_box(Inputs::idle(BoardMicros(now + u64::from(TICK_US))));
     cycles(|| rig.tick(&inputs))
 }
 
@@ -114,14 +92,12 @@ impl Motor {
 
     fn inputs(&self) -> MotorInputs {
         let room = (8 - self.queue.len()) as u8;
-        let stepper =
-            StepperState { pulses: self.pulses, idle: self.queue.is_empty(), underrun: false, room };
+        let (pulses, idle) = (self.pulses, self.queue.is_empty());
         MotorInputs {
             encoder_counts: self.position * 5 / 4,
             home_switch: self.position <= 0,
-            far_switch: false,
-            driver_fault: false,
-            stepper,
+            stepper: StepperState { pulses, idle, room, ..StepperState::IDLE },
+            ..MotorInputs::IDLE
         }
     }
 
@@ -174,10 +150,12 @@ impl Bench {
 
     fn tick(&mut self) {
         self.now += u64::from(TICK_US);
-        let mut inputs = inputs(self.now);
-        (inputs.coarse, inputs.lens) = (self.coarse.inputs(), self.lens.inputs());
-        inputs.gauge_code = Some(GAUGE_CODE_ZERO + self.piezo);
-        let inputs = black_box(inputs);
+        let inputs = black_box(Inputs {
+            coarse: self.coarse.inputs(),
+            lens: self.lens.inputs(),
+            gauge_code: Some(GAUGE_CODE_ZERO + self.piezo),
+            ..Inputs::idle(BoardMicros(self.now))
+        });
         let mut outputs = None;
         let rig = &mut self.rig;
         let count = cycles(|| outputs = Some(rig.tick(&inputs)));

@@ -8,7 +8,7 @@
 use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
 
-use crate::corrections::clsf::inside;
+use crate::corrections::pattern::inside;
 
 /// The patterns as the search reads them.
 pub(super) struct Patterns<'a> {

@@ -2,24 +2,25 @@
 
 use std::io::IsTerminal;
 
-use clap::{Args, ValueEnum};
-use farnear_activity::{
-    evaluation::experiment::Experiment,
-    recognition::{frames::Mode, space::SpaceSettings},
+use clap::{
+    Args, ValueEnum,
+    builder::{PossibleValuesParser, TypedValueParser},
 };
+use farnear_activity::recognition::{classifier::Family, frames::Mode};
+use farnear_workflows::activity::method::{Method, Pattern};
 
 /// The method.
 #[derive(Args)]
-pub struct Method {
+pub struct MethodArguments {
     /// Whether the order of frames counts: order-free (the thesis' promise) or ordered (sitting down is not standing up).
     #[arg(long, default_value = "order-free")]
     mode: Mode,
-    /// Patterns as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
     #[arg(long, value_name = "PATTERN", conflicts_with_all = ["mode", "classifier"])]
     epl: Option<Epl>,
     /// svc (linear support vectors) or knn (nearest neighbours).
-    #[arg(long, default_value = "svc")]
-    classifier: Classifier,
+    #[arg(long, default_value = "svc", value_parser = classifiers())]
+    classifier: Family,
     /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
     #[arg(long)]
     no_search: bool,
@@ -30,44 +31,25 @@ enum Epl {
     Thesis,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Classifier {
-    Knn,
-    Svc,
-}
-
-impl Method {
-    /// What is tried and chosen from.
-    pub fn experiment(&self) -> Experiment {
-        let experiment = match (self.epl, self.no_search) {
-            (Some(Epl::Thesis), _) => Experiment::thesis(),
-            (None, false) => Experiment::searched(self.mode),
-            (None, true) => {
-                Experiment::codebook(SpaceSettings { mode: self.mode, ..SpaceSettings::default() })
-            }
-        };
-        let experiment = match (self.epl, self.classifier) {
-            (None, Classifier::Knn) => experiment.with_neighbours(),
-            _ => experiment,
-        };
-        if self.no_search { experiment.fixed() } else { experiment }
-    }
-
-    /// Says on a terminal what takes so long.
-    pub fn announce(&self) {
-        if !self.no_search && std::io::stderr().is_terminal() {
+impl MethodArguments {
+    /// As a workflow takes it. Says on a terminal what will take long.
+    pub fn method(&self) -> Method {
+        let search = !self.no_search;
+        if search && std::io::stderr().is_terminal() {
             eprintln!(
-                "choosing settings by cross-validation over the subjects (--no-search takes the defaults) ..."
+                "settings are chosen by cross-validation over the subjects (--no-search takes the defaults) ..."
             );
         }
+        let pattern = match self.epl {
+            Some(Epl::Thesis) => Pattern::Thesis,
+            None => Pattern::Codebook { mode: self.mode, classifier: self.classifier },
+        };
+        Method { pattern, search }
     }
+}
 
-    /// Its name among figures.
-    pub fn name(&self) -> &'static str {
-        match (self.epl, self.mode) {
-            (Some(Epl::Thesis), _) => "thesis",
-            (None, Mode::OrderFree) => "order-free",
-            (None, Mode::Ordered) => "ordered",
-        }
-    }
+/// The names of all classifiers, so that help and completions list them.
+fn classifiers() -> impl TypedValueParser<Value = Family> {
+    PossibleValuesParser::new(Family::ALL.iter().map(|family| family.name()))
+        .try_map(|name| name.parse::<Family>())
 }

@@ -23,8 +23,7 @@ Example: farnear calibrate correction patterns.toml --method clsf-full --out cor
 pub struct Arguments {
     /// The list of depth maps.
     patterns: PathBuf,
-    /// clsf (3x3 regions), clsf-blend (without steps), clsf-full (one polynomial), cdc (stored patterns) or two-step.
-    #[arg(long)]
+    #[arg(long, help = Method::choices())]
     method: Method,
     /// Where to save the correction.
     #[arg(long, value_name = "FILE")]

@@ -5,12 +5,14 @@ mod targets;
 
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
-use farnear_capture::{describe::um, ready::ensure_homed};
-use farnear_protocol::message::{Axis, Calibration, Routine};
-use serde::Serialize;
+use farnear_protocol::message::{Axis, Routine};
+use farnear_workflows::rig::mechanics;
 
 use super::{AxisName, Target};
-use crate::report::{self, Usage};
+use crate::{
+    report::{self, Usage},
+    terminal,
+};
 
 /// Measure the rig's mechanics, or drive a series of flat targets that teaches the depth correction.
 #[derive(Args)]
@@ -68,14 +70,6 @@ struct PiezoArguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Figures {
-    Travel { axis: &'static str, travel_um: f64 },
-    Backlash { axis: &'static str, backlash_um: f64, spread_um: f64 },
-    Piezo { gain_pm_per_code: u32, hysteresis_percent: f64, creep_percent_per_decade: f64 },
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.what {
@@ -101,22 +95,5 @@ fn stepper(name: AxisName) -> Result<Axis> {
 }
 
 fn measure(target: &Target, routine: Routine, json: bool) -> Result<()> {
-    let rig = target.connect(None)?;
-    if matches!(routine, Routine::Backlash { .. }) {
-        ensure_homed(&rig.client, &mut |what| eprintln!("{what}"))?;
-    }
-    let figures = match rig.client.calibrate(routine)? {
-        Calibration::Travel { axis, length } => {
-            Figures::Travel { axis: AxisName::of(axis), travel_um: um(length) }
-        }
-        Calibration::Backlash { axis, backlash, spread } => {
-            Figures::Backlash { axis: AxisName::of(axis), backlash_um: um(backlash), spread_um: um(spread) }
-        }
-        Calibration::Piezo { gain_pm_per_code, hysteresis_ppm, creep_ppm_per_decade } => Figures::Piezo {
-            gain_pm_per_code,
-            hysteresis_percent: f64::from(hysteresis_ppm) / 1e4,
-            creep_percent_per_decade: f64::from(creep_ppm_per_decade) / 1e4,
-        },
-    };
-    report::print(&figures, json)
+    report::print(&mechanics::measure(&target.address()?, routine, &terminal::context()?)?, json)
 }

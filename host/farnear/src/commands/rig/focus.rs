@@ -2,22 +2,16 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
-use farnear_capture::{
-    describe::um,
-    focus::{FocusSettings, find_focus},
-    ready::{base_nm, ensure_homed},
-};
-use farnear_depth::{focus_measure::FocusMeasure, optics::OpticsFile};
-use farnear_protocol::{Nanometres, message::Axis};
-use serde::Serialize;
+use farnear_depth::focus_measure::FocusMeasure;
+use farnear_workflows::rig::focus::{self, FocusSettings};
 
-use super::{
-    Target,
-    camera::{self, CameraArguments},
+use super::{CameraArguments, Target};
+use crate::{
+    report::{self, Usage},
+    terminal,
 };
-use crate::{files, report};
 
 /// Find the sensor distance at which a target is sharpest (m1), and the working range that begins there.
 ///
@@ -51,93 +45,21 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Figures {
-    /// Where the target is sharpest.
-    m1_mm: f64,
-    /// The second sensor distance of a pair.
-    m2_mm: f64,
-    far_mm: f64,
-    near_mm: f64,
-    alpha0_mm: f64,
-    sensor_travel_mm: f64,
-    coarse_um: f64,
-    fine_um: f64,
-    /// The board's time for the search.
-    board_ms: f64,
-    places: usize,
-    exposures: usize,
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let optics = files::optics::read(&arguments.optics)?;
     let region = match arguments.region[..] {
         [] => None,
         [column, row, width, height] => Some([column, row, width, height]),
-        _ => bail!(report::Usage("--region needs four numbers: COLUMN,ROW,WIDTH,HEIGHT".into())),
+        _ => bail!(Usage("--region needs four numbers: COLUMN,ROW,WIDTH,HEIGHT".into())),
     };
-    if !(arguments.range_mm > 0.0 && arguments.range_mm.is_finite()) {
-        bail!(report::Usage(format!("--range-mm {} must be a positive length", arguments.range_mm)));
-    }
-    let camera = arguments.camera.open_early(&arguments.target)?;
-    let rig = arguments.target.connect(Some((&arguments.optics, optics.psf())))?;
-    let mut camera = camera::of_rig(camera, &rig)?;
-    let mut say = |what: &str| eprintln!("{what}");
-
-    let homings = rig.client.status()?.coarse.state;
-    ensure_homed(&rig.client, &mut say)?;
-    let was_homed = homings == rig.client.status()?.coarse.state;
-    let default = (!was_homed).then_some(optics.working_range().sensor_far_mm);
-    if let Some(start_mm) = arguments.start_mm.or(default) {
-        let status = rig.client.status()?;
-        let limits = rig.client.hello().limits;
-        let middle = i64::from(limits.fine_min.0 + limits.fine_max.0) / 2;
-        let coarse = start_mm * 1e6 - (base_nm(&rig.client, &status) + middle) as f64;
-        let coarse = farnear_capture::sequence::nanometres(coarse / 1e3)
-            .with_context(|| format!("--start-mm {start_mm} is no sensor distance"))?;
-        say(&format!("starting at a sensor distance of {start_mm:.4} mm"));
-        rig.client.move_to(Axis::SensorCoarse, coarse)?;
-        rig.client.move_to(Axis::SensorFine, Nanometres(middle as i32))?;
-    }
     let settings = FocusSettings {
-        measure: arguments.measure,
+        rig: arguments.target.address()?,
+        camera: arguments.camera.settings()?,
+        optics: arguments.optics,
+        start_mm: arguments.start_mm,
         range_mm: arguments.range_mm,
-        exposure: arguments.camera.exposure(),
-        image_wait: arguments.camera.image_wait(),
+        measure: arguments.measure,
         region,
     };
-    let focus = find_focus(&rig.client, camera.as_mut(), &optics, &settings, &mut say)?;
-
-    // The optics with their far focus where the target was found to be.
-    let far_mm = object_mm(optics.focal_length_mm(), focus.sensor_mm)?;
-    let mut file = OpticsFile::from(optics);
-    file.focus.far_mm = far_mm;
-    let range = file.check()?.working_range();
-    let figures = Figures {
-        m1_mm: report::rounded(focus.sensor_mm, 6),
-        m2_mm: report::rounded(range.sensor_near_mm, 6),
-        far_mm: report::rounded(range.far_mm, 4),
-        near_mm: report::rounded(range.near_mm, 4),
-        alpha0_mm: report::rounded(range.alpha0_mm, 4),
-        sensor_travel_mm: report::rounded(range.sensor_travel_mm, 6),
-        coarse_um: um(focus.coarse),
-        fine_um: um(focus.fine),
-        board_ms: focus.board.as_secs_f64() * 1e3,
-        places: focus.places,
-        exposures: focus.exposures,
-    };
-    report::print(&figures, arguments.json)
-}
-
-/// Where an object is whose image is sharp at this sensor distance.
-fn object_mm(focal_length_mm: f64, sensor_mm: f64) -> Result<f64> {
-    let behind = sensor_mm - focal_length_mm;
-    if behind <= 0.0 {
-        bail!(
-            "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: \
-             is the setting datum_nm right (`farnear rig settings`)?"
-        );
-    }
-    Ok(focal_length_mm + focal_length_mm * focal_length_mm / behind)
+    report::print(&focus::focus(&settings, &terminal::context()?)?, arguments.json)
 }

@@ -2,15 +2,13 @@
 
 use anyhow::{Result, bail};
 use clap::Args;
-use farnear_capture::{
-    describe::um,
-    ready::{ensure_homed, steppers},
-};
-use farnear_protocol::message::Axis;
-use serde::Serialize;
+use farnear_workflows::rig::motion::{self, MoveSettings};
 
-use super::{AxisName, Target, nanometres};
-use crate::report::{self, Usage};
+use super::{AxisName, Target};
+use crate::{
+    report::{self, Usage},
+    terminal,
+};
 
 /// Find the home switches and make them position 0: of all stages at once, or of those that are named.
 #[derive(Args)]
@@ -65,50 +63,16 @@ pub struct HaltArguments {
     target: Target,
 }
 
-/// How far each encoder's old zero was from the new one.
-#[derive(Serialize, Default)]
-struct Homed {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shift_um: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    lens_shift_um: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct Moved {
-    axis: &'static str,
-    asked_um: f64,
-    measured_um: f64,
-}
-
-#[derive(Serialize)]
-struct AllMoved {
-    moved: Vec<Moved>,
-}
-
 /// Runs `home`.
 pub fn home(arguments: HomeArguments) -> Result<()> {
-    let rig = arguments.target.connect(None)?;
-    let mut axes: Vec<Axis> = arguments.axis.iter().map(|name| name.axis()).collect();
-    if axes.is_empty() {
-        axes = steppers(&rig.client.hello().capabilities);
-    }
-    let started: Vec<_> =
-        axes.iter().map(|axis| Ok((*axis, rig.client.start_home(*axis)?))).collect::<Result<_>>()?;
-    let mut homed = Homed::default();
-    for (axis, work) in started {
-        let shift = Some(um(work.homed()?));
-        match axis {
-            Axis::Lens => homed.lens_shift_um = shift,
-            Axis::SensorCoarse | Axis::SensorFine => homed.shift_um = shift,
-        }
-    }
-    report::print(&homed, arguments.json)
+    let axes: Vec<_> = arguments.axis.iter().map(|name| name.axis()).collect();
+    let address = arguments.target.address()?;
+    report::print(&motion::home(&address, &axes, &terminal::context()?)?, arguments.json)
 }
 
 /// Runs `move`.
 pub fn go(arguments: MoveArguments) -> Result<()> {
-    let MoveArguments { axis: axes, to_um, .. } = &arguments;
+    let MoveArguments { target, axis: axes, to_um, home, json } = arguments;
     if axes.len() != to_um.len() {
         let (axes, positions) = (axes.len(), to_um.len());
         bail!(Usage(format!("--axis is given {axes} times and --to-um {positions} times: they go together")));
@@ -116,42 +80,19 @@ pub fn go(arguments: MoveArguments) -> Result<()> {
     if let Some(twice) =
         axes.iter().enumerate().find_map(|(at, axis)| axes[..at].contains(axis).then_some(axis))
     {
-        bail!(Usage(format!("--axis {} is given twice", AxisName::of(twice.axis()))));
+        bail!(Usage(format!("--axis {} is given twice", twice.axis().name())));
     }
-    let targets: Vec<_> = axes
-        .iter()
-        .zip(to_um)
-        .map(|(axis, to)| Ok((axis.axis(), nanometres(*to)?)))
-        .collect::<Result<_>>()?;
-    let rig = arguments.target.connect(None)?;
-    if arguments.home {
-        ensure_homed(&rig.client, &mut |what| eprintln!("{what}"))?;
-    }
-    let started: Vec<_> = targets
-        .into_iter()
-        .map(|(axis, target)| Ok((axis, rig.client.start_move(axis, target)?)))
-        .collect::<Result<_>>()?;
-    let mut moved = Vec::new();
-    for (axis, work) in started {
-        let end = work.moved()?;
-        moved.push(Moved {
-            axis: AxisName::of(axis),
-            asked_um: um(end.asked),
-            measured_um: um(end.measured),
-        });
-    }
-    match &moved[..] {
-        [one] => report::print(one, arguments.json),
-        _ => report::print(&AllMoved { moved }, arguments.json),
-    }
+    let targets = axes.iter().map(|name| name.axis()).zip(to_um).collect();
+    let settings = MoveSettings { rig: target.address()?, targets, home };
+    report::print(&motion::move_to(&settings, &terminal::context()?)?, json)
 }
 
 /// Runs `stop`.
 pub fn stop(arguments: StopArguments) -> Result<()> {
-    Ok(arguments.target.connect(None)?.client.stop()?)
+    Ok(motion::stop(&arguments.target.address()?, &terminal::context()?)?)
 }
 
 /// Runs `halt`.
 pub fn halt(arguments: HaltArguments) -> Result<()> {
-    Ok(arguments.target.connect(None)?.client.halt()?)
+    Ok(motion::halt(&arguments.target.address()?, &terminal::context()?)?)
 }

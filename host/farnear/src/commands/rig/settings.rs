@@ -1,12 +1,11 @@
 //! `farnear rig settings`: what the board keeps in its memory.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, Subcommand};
-use farnear_protocol::message::{Setting, SettingKey};
-use serde::Serialize;
+use farnear_workflows::rig::settings;
 
 use super::Target;
-use crate::report::{self, Usage};
+use crate::{report, terminal};
 
 /// List, read or change the settings in the board's memory.
 #[derive(Args)]
@@ -63,50 +62,19 @@ struct SetArguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Entry {
-    key: &'static str,
-    value: i32,
-    default: i32,
-    min: i32,
-    max: i32,
-}
-
-impl From<Setting> for Entry {
-    fn from(setting: Setting) -> Self {
-        let Setting { key, value, default, min, max } = setting;
-        Self { key: key.name(), value, default, min, max }
-    }
-}
-
-#[derive(Serialize)]
-struct All {
-    settings: Vec<Entry>,
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.job {
-        Job::List(arguments) => {
-            let rig = arguments.target.connect(None)?;
-            let settings = SettingKey::ALL.iter().map(|key| Ok(rig.client.setting(*key)?.into()));
-            report::print(&All { settings: settings.collect::<Result<_>>()? }, arguments.json)
+        Job::List(ListArguments { target, json }) => {
+            report::print(&settings::list(&target.address()?, &terminal::context()?)?, json)
         }
-        Job::Get(arguments) => {
-            let key = key(&arguments.key)?;
-            let rig = arguments.target.connect(None)?;
-            report::print(&Entry::from(rig.client.setting(key)?), arguments.json)
+        Job::Get(GetArguments { key, target, json }) => {
+            let key = settings::key(&key)?;
+            report::print(&settings::get(&target.address()?, key, &terminal::context()?)?, json)
         }
-        Job::Set(arguments) => {
-            let key = key(&arguments.key)?;
-            let rig = arguments.target.connect(None)?;
-            report::print(&Entry::from(rig.client.set_setting(key, arguments.value)?), arguments.json)
+        Job::Set(SetArguments { key, value, target, json }) => {
+            let key = settings::key(&key)?;
+            report::print(&settings::set(&target.address()?, key, value, &terminal::context()?)?, json)
         }
     }
-}
-
-fn key(name: &str) -> Result<SettingKey> {
-    let found = SettingKey::ALL.into_iter().find(|key| key.name() == name);
-    let names = || SettingKey::ALL.map(SettingKey::name).join(", ");
-    found.with_context(|| Usage(format!("there is no setting {name:?}; there are {}", names())))
 }

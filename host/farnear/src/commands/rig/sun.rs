@@ -1,19 +1,15 @@
 //! `farnear rig sun`: the board's answer, and the same calculation on this computer.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use chrono::DateTime;
 use clap::Args;
-use farnear_maths::{
-    angle::BinaryAngle,
-    shadow::{Deviations, Geometry, Reliability, Shadow},
-    sun::{Place, Sun},
-};
-use farnear_protocol::message::{
-    QueryDeviations, ShadowAnswer, ShadowQuery, ShadowReliability, SunAnswer, SunQuery,
-};
-use serde::Serialize;
+use farnear_workflows::rig::sun::{self, Person, SunSettings};
 
 use super::Target;
-use crate::report::{self, Usage};
+use crate::{
+    report::{self, Usage},
+    terminal,
+};
 
 /// Ask the board where the sun is and how a person's shadow lies, and hold its answer beside this computer's.
 #[derive(Args)]
@@ -52,184 +48,27 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(Serialize)]
-struct Figures {
-    elevation_deg: f32,
-    azimuth_deg: f32,
-    host_elevation_deg: f32,
-    host_azimuth_deg: f32,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shadow: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    beta_deg: Option<f32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sigma_beta_deg: Option<f32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    mirrored: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shadow_length_m: Option<f32>,
-    /// Whether board and host agree bit for bit.
-    same_bits: bool,
-}
-
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let query = query(&arguments)?;
-    let rig = arguments.target.connect(None)?;
-    let board = rig.client.sun(&query)?;
-    let host = on_host(&query);
-    let same_bits = bits(&board) == bits(&host);
-    let angle = match board.shadow {
-        Some(ShadowAnswer::Angle { beta_deg, sigma_beta_deg, mirrored, length_m, .. }) => {
-            Some((beta_deg, sigma_beta_deg, mirrored, length_m))
-        }
-        _ => None,
-    };
-    let figures = Figures {
-        elevation_deg: board.elevation_deg,
-        azimuth_deg: board.azimuth_deg,
-        host_elevation_deg: host.elevation_deg,
-        host_azimuth_deg: host.azimuth_deg,
-        shadow: board.shadow.map(shadow_name),
-        beta_deg: angle.map(|a| a.0),
-        sigma_beta_deg: angle.map(|a| a.1),
-        mirrored: angle.map(|a| a.2),
-        shadow_length_m: angle.map(|a| a.3),
-        same_bits,
-    };
-    report::print(&figures, arguments.json)?;
-    if !same_bits {
-        bail!("the board's answer differs from this computer's: {board:?} against {host:?}");
-    }
-    Ok(())
-}
-
-fn shadow_name(shadow: ShadowAnswer) -> &'static str {
-    match shadow {
-        ShadowAnswer::Angle { reliability: ShadowReliability::FirstOrder, .. } => "good",
-        ShadowAnswer::Angle { reliability: ShadowReliability::ShadowNearCamera, .. } => "near the camera",
-        ShadowAnswer::Angle { reliability: ShadowReliability::EitherSide, .. } => "to either side",
-        ShadowAnswer::SunTooLow => "the sun is too low",
-        ShadowAnswer::SunOverhead => "the sun is overhead",
-        ShadowAnswer::Senseless => "a length makes no sense",
-    }
-}
-
-fn query(arguments: &Arguments) -> Result<SunQuery> {
-    let time = chrono::DateTime::parse_from_rfc3339(&arguments.time).with_context(|| {
-        Usage(format!("--time {:?} is no RFC 3339 time such as 2012-07-17T12:00:00Z", arguments.time))
+    let time = DateTime::parse_from_rfc3339(&arguments.time).with_context(|| {
+        let time = &arguments.time;
+        Usage(format!("--time {time:?} is not an RFC 3339 time such as 2012-07-17T12:00:00Z"))
     })?;
-    let degrees = |name: &str, value: f64, limit: f64| {
-        if value.abs() <= limit {
-            return Ok((value * 1e7).round() as i32);
-        }
-        bail!(Usage(format!("--{name} {value}: expected -{limit} to {limit} degrees")))
-    };
-    let millimetres = |name: &str, metres: f64| {
-        let mm = (metres * 1e3).round();
-        if mm.abs() <= 1e8 {
-            return Ok(mm as i32);
-        }
-        bail!(Usage(format!("--{name} {metres} m makes no sense")))
-    };
-    let length = |name: &str, metres: f64| {
-        u32::try_from(millimetres(name, metres)?)
-            .with_context(|| Usage(format!("--{name} {metres} m must not be negative")))
-    };
-    let shadow = arguments.azimuth.map(|azimuth| -> Result<ShadowQuery> {
-        Ok(ShadowQuery {
-            azimuth_e7: degrees("azimuth", azimuth, 180.0)?,
-            camera_height_mm: length("camera-height", arguments.camera_height)?,
-            distance_mm: length("distance", arguments.distance)?,
-            lateral_mm: millimetres("lateral", arguments.lateral)?,
-            height_mm: length("height", arguments.height)?,
-            deviations: USUAL,
-        })
+    let shadow = arguments.azimuth.map(|camera_azimuth_deg| Person {
+        camera_azimuth_deg,
+        camera_height_m: arguments.camera_height,
+        distance_m: arguments.distance,
+        lateral_m: arguments.lateral,
+        height_m: arguments.height,
     });
-    Ok(SunQuery {
-        unix_seconds: time.timestamp(),
-        latitude_e7: degrees("lat", arguments.lat, 90.0)?,
-        longitude_e7: degrees("lon", arguments.lon, 180.0)?,
-        shadow: shadow.transpose()?,
-    })
-}
-
-/// How well a careful person knows these: a clock set by hand, a map, a compass, a tape measure.
-const USUAL: QueryDeviations = QueryDeviations {
-    day_e3: 0,
-    time_s: 30,
-    latitude_e7: 1_000,
-    longitude_e7: 1_000,
-    azimuth_e7: 10_000_000,
-    camera_height_mm: 10,
-    height_mm: 30,
-    distance_mm: 100,
-};
-
-/// The same calculation here, by the code that the board runs.
-fn on_host(query: &SunQuery) -> SunAnswer {
-    let place = Place {
-        latitude: BinaryAngle::from_degrees_e7(query.latitude_e7),
-        longitude: BinaryAngle::from_degrees_e7(query.longitude_e7),
+    let settings = SunSettings {
+        rig: arguments.target.address()?,
+        latitude_deg: arguments.lat,
+        longitude_deg: arguments.lon,
+        time: time.to_utc(),
+        shadow,
     };
-    let sun = Sun::at(query.unix_seconds, &place);
-    let shadow = query.shadow.map(|asked| shadow_on_host(query.unix_seconds, &place, &sun, &asked));
-    SunAnswer { elevation_deg: sun.elevation_deg(), azimuth_deg: sun.azimuth_deg(), shadow }
-}
-
-fn shadow_on_host(unix_seconds: i64, place: &Place, sun: &Sun, asked: &ShadowQuery) -> ShadowAnswer {
-    let metres = |mm: u32| mm as f32 * 1e-3;
-    let geometry = Geometry {
-        azimuth: BinaryAngle::from_degrees_e7(asked.azimuth_e7),
-        camera_height_m: metres(asked.camera_height_mm),
-        distance_m: metres(asked.distance_mm),
-        lateral_m: asked.lateral_mm as f32 * 1e-3,
-        height_m: metres(asked.height_mm),
-    };
-    let given = asked.deviations;
-    let deviations = Deviations {
-        day: given.day_e3 as f32 * 1e-3,
-        time_h: given.time_s as f32 * (1.0 / 3600.0),
-        latitude_deg: given.latitude_e7 as f32 * 1e-7,
-        longitude_deg: given.longitude_e7 as f32 * 1e-7,
-        azimuth_deg: given.azimuth_e7 as f32 * 1e-7,
-        camera_height_m: metres(given.camera_height_mm),
-        height_m: metres(given.height_mm),
-        distance_m: metres(given.distance_mm),
-    };
-    match Shadow::of(sun, &geometry) {
-        Ok(shadow) => {
-            let deviation = shadow.deviation(unix_seconds, place, &geometry, &deviations);
-            ShadowAnswer::Angle {
-                beta_deg: shadow.beta_deg,
-                sigma_beta_deg: deviation.beta_deg,
-                mirrored: shadow.mirrored,
-                length_m: shadow.length_m,
-                reliability: match deviation.reliability {
-                    Reliability::FirstOrder => ShadowReliability::FirstOrder,
-                    Reliability::ShadowNearCamera => ShadowReliability::ShadowNearCamera,
-                    Reliability::EitherSide => ShadowReliability::EitherSide,
-                },
-            }
-        }
-        Err(farnear_maths::shadow::Error::SunTooLow { .. }) => ShadowAnswer::SunTooLow,
-        Err(farnear_maths::shadow::Error::SunOverhead { .. }) => ShadowAnswer::SunOverhead,
-        Err(_) => ShadowAnswer::Senseless,
-    }
-}
-
-/// An answer as bits, so that even two NaN are compared.
-fn bits(answer: &SunAnswer) -> [u32; 7] {
-    let shadow = match answer.shadow {
-        None => [0; 5],
-        Some(ShadowAnswer::Angle { beta_deg, sigma_beta_deg, mirrored, length_m, reliability }) => {
-            let kind = 1 + reliability as u32 * 2 + u32::from(mirrored);
-            [kind, beta_deg.to_bits(), sigma_beta_deg.to_bits(), length_m.to_bits(), 0]
-        }
-        Some(ShadowAnswer::SunTooLow) => [0, 0, 0, 0, 1],
-        Some(ShadowAnswer::SunOverhead) => [0, 0, 0, 0, 2],
-        Some(ShadowAnswer::Senseless) => [0, 0, 0, 0, 3],
-    };
-    let [a, b, c, d, e] = shadow;
-    [answer.elevation_deg.to_bits(), answer.azimuth_deg.to_bits(), a, b, c, d, e]
+    let figures = sun::sun(&settings, &terminal::context()?)?;
+    report::print(&figures, arguments.json)?;
+    Ok(figures.check()?)
 }

@@ -1,0 +1,176 @@
+//! The board: its pins, and what the control loop asks of them ([`farnear_rig::control::Board`]).
+
+use defmt::{error, info};
+use embassy_stm32::{
+    Peri, Peripherals,
+    gpio::{Input, Pull},
+    peripherals::{IWDG, PB0, TIM1, TIM3, TIM4, TIM8},
+    usart::{BufferedUartTx, ConfigError},
+    wdg::IndependentWatchdog,
+};
+use farnear_protocol::{BoardMicros, Log, frame::Encoded};
+use farnear_rig::{
+    control::{Board, Note},
+    io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges},
+};
+
+use crate::{
+    axis::{Axis, Switches},
+    camera::CameraPort,
+    clock,
+    encoder::Encoder,
+    link::{self, Link},
+    memory::Memory,
+    piezo::Piezo,
+    registers,
+    stepper::{DriverPins, Stepper},
+    supply::Supply,
+};
+
+/// Without a tick for this long the board is reset (LSI is 17 to 47 kHz, so 68 to 188 ms).
+const WATCHDOG_US: u32 = 100_000;
+
+/// All hardware that the control loop works on.
+pub struct Nucleo {
+    coarse: Axis<TIM1, TIM4>,
+    lens: Axis<TIM8, TIM3>,
+    piezo: Piezo,
+    camera: CameraPort,
+    /// Where records survive without power; `None` where no such chip answers.
+    pub memory: Option<Memory>,
+    supply: Supply,
+    link: Link,
+    watchdog: IndependentWatchdog<'static, IWDG>,
+}
+
+/// The board and what does not belong to the control loop.
+pub struct Parts {
+    /// The board.
+    pub board: Nucleo,
+    /// The sending end of the link.
+    pub sender: BufferedUartTx<'static>,
+    /// The LED that shows that the loop runs.
+    pub led: Peri<'static, PB0>,
+    /// Whether the strap says that this is an emulated board.
+    pub emulated: bool,
+}
+
+impl Nucleo {
+    /// Sets everything up: the drivers are off, the trigger is low, the watchdog sleeps. Fails where the serial port cannot
+    /// be set up. As long as the board has pins: a table, which shorter functions would only tear apart.
+    pub fn new(p: Peripherals) -> Result<Parts, ConfigError> {
+        let emulated = Input::new(p.PD15, Pull::Down).is_high();
+        let (link, sender) = link::open(p.USART3, p.PD8, p.PD9)?;
+        let coarse =
+            DriverPins { step: p.PE9, direction: p.PF13, enable: p.PF14, diagnosis: p.PF15, stop: p.PE15 };
+        let lens = DriverPins { step: p.PC6, direction: p.PF0, enable: p.PF1, diagnosis: p.PF2, stop: p.PA6 };
+        let board = Self {
+            memory: Some(Memory::new(p.SPI4, p.PE2, p.PE5, p.PE6, p.PE4)),
+            coarse: Axis {
+                stepper: Stepper::new(p.TIM1, coarse),
+                encoder: Encoder::new(p.TIM4, p.PD12, p.PD13),
+                switches: Switches::new(p.PG0, p.PG1),
+            },
+            lens: Axis {
+                stepper: Stepper::new(p.TIM8, lens),
+                encoder: Encoder::new(p.TIM3, p.PB4, p.PB5),
+                switches: Switches::new(p.PG2, p.PG3),
+            },
+            piezo: Piezo::new(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD0, p.PD1),
+            camera: CameraPort::new(p.TIM2, p.PB10, p.PB11),
+            supply: Supply::new(),
+            link,
+            watchdog: IndependentWatchdog::new(p.IWDG, WATCHDOG_US),
+        };
+        Ok(Parts { board, sender, led: p.PB0, emulated })
+    }
+
+    /// Wakes the watchdog: from now on it wants to be fed.
+    pub fn wake_watchdog(&mut self) {
+        self.watchdog.unleash();
+    }
+}
+
+impl Board for Nucleo {
+    fn now(&mut self) -> BoardMicros {
+        clock::now()
+    }
+
+    fn receive(&mut self, take: impl FnMut(u8)) -> bool {
+        self.link.drain(take)
+    }
+
+    fn gauge(&mut self) -> Option<u32> {
+        self.piezo.gauge()
+    }
+
+    fn coarse(&mut self) -> MotorInputs {
+        self.coarse.read()
+    }
+
+    fn lens(&mut self) -> MotorInputs {
+        self.lens.read()
+    }
+
+    fn emergency_stop(&mut self) -> bool {
+        // Both, for a look forgets what was before it.
+        let [coarse, lens] = [self.coarse.stepper.emergency_stop(), self.lens.stepper.emergency_stop()];
+        coarse || lens
+    }
+
+    fn supply_low(&mut self) -> bool {
+        self.supply.is_low()
+    }
+
+    fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
+        self.camera.take_edges(now)
+    }
+
+    fn strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges> {
+        self.camera.take_strobe(now)
+    }
+
+    fn apply(&mut self, outputs: &Outputs) {
+        self.piezo.set(outputs.piezo_dac);
+        self.coarse.apply(&outputs.coarse);
+        self.lens.apply(&outputs.lens);
+        self.camera.listen(outputs.listen);
+        if let Some(length) = outputs.trigger {
+            self.camera.expose(length);
+        }
+        if let (Some(memory), Some(order)) = (&mut self.memory, &outputs.memory) {
+            memory.write(order);
+        }
+    }
+
+    fn has_room(&self) -> bool {
+        self.link.has_room()
+    }
+
+    fn send(&mut self, frame: Encoded) {
+        self.link.send(frame);
+    }
+
+    fn all_sent(&self) -> bool {
+        self.link.is_idle()
+    }
+
+    fn take_log(&mut self) -> Option<(u32, Log)> {
+        registers::take_log()
+    }
+
+    fn note(&mut self, note: Note) {
+        match note {
+            Note::StepQueueDry { time } => error!("a STEP queue ran dry at {} us", time.0),
+            Note::Reset => info!("reset on request"),
+        }
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+
+    fn reset(&mut self) {
+        cortex_m::peripheral::SCB::sys_reset()
+    }
+}

@@ -1,0 +1,176 @@
+//! The control loop: what a board does in a tick, and in which order.
+//!
+//! A board implements [`Board`], a few small things that only it can do, and calls [`Control::tick`]
+//! [`crate::io::TICK_HZ`] times a second. The order is here, once for all boards:
+//!
+//! 1. Bytes from the link go to the rig, stamped with the tick's first look at the clock.
+//! 2. The hardware is read. The emergency stop comes after the step timers: its circuit stops them by itself, and one
+//!    that opens between the two readings must not look like a timer that ran dry.
+//! 3. The rig decides, and its outputs are carried out.
+//! 4. The link is given what there is to say: answers and events first, then the log.
+//! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
+//!
+//! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
+
+use farnear_protocol::frame::{Encoded, Header, Kind, encode};
+use farnear_protocol::{BoardMicros, Log, Micros, PROTOCOL_CURRENT};
+
+use crate::Rig;
+use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, StrobeEdges};
+use crate::motion::since;
+
+/// A reset waits so long for the last frame: the longest takes 1.3 ms on the wire, and one may wait before it.
+pub const LAST_FRAME: Micros = Micros(10_000);
+
+/// What the loop has to tell whoever reads the board's log.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Note {
+    /// A STEP queue ran dry; said once, until none is dry any more.
+    StepQueueDry {
+        /// When it was seen.
+        time: BoardMicros,
+    },
+    /// The board is going to be reset, for the host asked for it.
+    Reset,
+}
+
+/// The hardware of a board, as the loop sees it. Each method does one thing, at once.
+pub trait Board {
+    /// The board's time.
+    fn now(&mut self) -> BoardMicros;
+
+    /// Hands over the bytes that came in over the link; `true` where some may have been lost.
+    fn receive(&mut self, take: impl FnMut(u8)) -> bool;
+
+    /// Samples the strain gauge: [`Inputs::gauge_code`].
+    fn gauge(&mut self) -> Option<u32>;
+
+    /// Reads stage A's stepper.
+    fn coarse(&mut self) -> MotorInputs;
+
+    /// Reads stage B's stepper.
+    fn lens(&mut self) -> MotorInputs;
+
+    /// Whether the emergency stop's circuit is open, or was since the last look.
+    fn emergency_stop(&mut self) -> bool;
+
+    /// Whether the supply is below the level at which the board can still stop in order.
+    fn supply_low(&mut self) -> bool;
+
+    /// [`Inputs::exposure`]; edges are stamped as moments before `now`.
+    fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges>;
+
+    /// [`Inputs::strobe`]; likewise.
+    fn strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges>;
+
+    /// Carries the outputs out in the order of their fields; the reset is the loop's.
+    fn apply(&mut self, outputs: &Outputs);
+
+    /// Whether another frame can be sent.
+    fn has_room(&self) -> bool;
+
+    /// Sends a frame; only where there is room.
+    fn send(&mut self, frame: Encoded);
+
+    /// Whether the last bit of the last frame has left the board.
+    fn all_sent(&self) -> bool;
+
+    /// The next piece of the board's log and its number.
+    fn take_log(&mut self) -> Option<(u32, Log)>;
+
+    /// Writes a line into the log.
+    fn note(&mut self, note: Note);
+
+    /// Keeps the watchdog from resetting the board.
+    fn feed_watchdog(&mut self);
+
+    /// Resets the board.
+    fn reset(&mut self);
+}
+
+/// The loop's state: the rig, and what was said of the hardware.
+#[derive(Debug)]
+pub struct Control<'r> {
+    rig: &'r mut Rig,
+    /// A STEP queue is dry, and it was said.
+    dry: bool,
+    /// Since when the board is about to be reset.
+    leaving: Option<BoardMicros>,
+}
+
+impl<'r> Control<'r> {
+    /// A loop that has not begun.
+    pub const fn new(rig: &'r mut Rig) -> Self {
+        Self { rig, dry: false, leaving: None }
+    }
+
+    /// One tick.
+    pub fn tick(&mut self, board: &mut impl Board) {
+        if let Some(since) = self.leaving {
+            return leave(board, since);
+        }
+        let now = board.now();
+        let link_overflow = board.receive(|byte| self.rig.receive(byte, now));
+        let inputs = read(board, link_overflow);
+        self.tell_of_dry_queues(board, &inputs);
+        let outputs = self.rig.tick(&inputs);
+        board.apply(&outputs);
+        self.speak(board);
+        if outputs.reset {
+            board.note(Note::Reset);
+            let now = board.now();
+            self.leaving = Some(now);
+            return leave(board, now);
+        }
+        board.feed_watchdog();
+    }
+
+    fn tell_of_dry_queues(&mut self, board: &mut impl Board, inputs: &Inputs) {
+        let dry = inputs.coarse.stepper.underrun || inputs.lens.stepper.underrun;
+        if dry && !self.dry {
+            board.note(Note::StepQueueDry { time: inputs.now });
+        }
+        self.dry = dry;
+    }
+
+    fn speak(&mut self, board: &mut impl Board) {
+        while board.has_room()
+            && let Some(frame) = self.rig.transmit()
+        {
+            board.send(frame);
+        }
+        if board.has_room()
+            && let Some((id, log)) = board.take_log()
+        {
+            let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };
+            if let Some(frame) = encode(header, &log) {
+                board.send(frame);
+            }
+        }
+    }
+}
+
+/// Reads the hardware; what is read when matters, see the module's documentation.
+fn read(board: &mut impl Board, link_overflow: bool) -> Inputs {
+    let gauge_code = board.gauge();
+    let now = board.now();
+    let (coarse, lens) = (board.coarse(), board.lens());
+    let emergency_stop = board.emergency_stop();
+    Inputs {
+        now,
+        coarse,
+        lens,
+        gauge_code,
+        emergency_stop,
+        supply_low: board.supply_low(),
+        link_overflow,
+        exposure: board.exposure(now),
+        strobe: board.strobe(now),
+    }
+}
+
+fn leave(board: &mut impl Board, asked: BoardMicros) {
+    if board.all_sent() || since(asked, board.now()) >= LAST_FRAME {
+        board.reset();
+    }
+}

@@ -1,0 +1,99 @@
+//! What must hold before a request is carried out.
+
+use farnear_protocol::message::{Axis, PositionState, RequestError, sensor_distance_nm};
+use farnear_protocol::{Micros, Nanometres};
+
+use crate::motion::axis::Stepper;
+use crate::rig::Rig;
+use crate::work::Active;
+
+impl Rig {
+    /// Nothing forbids motion, and the host's deadline is sensible.
+    pub(super) fn may_move(&self, silence: Micros) -> Result<(), RequestError> {
+        if let Some(record) = self.alarms.latched() {
+            return Err(RequestError::Alarm { number: record.number, alarm: record.alarm });
+        }
+        let (min, max) = (self.settings.link.silence_min, self.settings.link.silence_max);
+        if (min..=max).contains(&silence) { Ok(()) } else { Err(RequestError::Silence { min, max }) }
+    }
+
+    pub(super) fn must_be_free(&self, axis: Axis) -> Result<(), RequestError> {
+        let reboot = self.reboot.map(|reboot| reboot.request);
+        match self.works.request_on(axis).or(reboot) {
+            Some(request) => Err(RequestError::Busy { request }),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn all_must_be_free(&self) -> Result<(), RequestError> {
+        Axis::ALL.into_iter().try_for_each(|axis| self.must_be_free(axis))
+    }
+
+    /// Nothing moves: what takes longer than a tick harms nobody.
+    pub(super) fn must_stand(&self) -> Result<(), RequestError> {
+        match self.works.any() {
+            Some(request) => Err(RequestError::Busy { request }),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn no_program_runs(&self) -> Result<(), RequestError> {
+        match &self.works.whole {
+            Some(Active { request, .. }) => Err(RequestError::Busy { request: *request }),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn must_be_homed(&self, axis: Axis) -> Result<(), RequestError> {
+        match self.stage.state(axis) {
+            PositionState::Homed => Ok(()),
+            state => Err(RequestError::NotHomed { axis, state }),
+        }
+    }
+
+    pub(super) fn must_be_inside(&self, axis: Axis, asked: Nanometres) -> Result<(), RequestError> {
+        let (min, max) = self.settings.limits(axis);
+        if (min..=max).contains(&asked) {
+            Ok(())
+        } else {
+            Err(RequestError::OutOfRange { axis, asked, min, max })
+        }
+    }
+
+    /// The lowest that an axis comes on the way it is on.
+    pub(super) fn lowest(&self, axis: Axis) -> Nanometres {
+        self.stage.stepper(axis).map_or_else(|| self.stage.fine.lowest(), Stepper::lowest)
+    }
+
+    /// The lowest that an axis comes on its way to a target.
+    pub(super) fn lowest_to(&self, axis: Axis, target: Nanometres) -> Nanometres {
+        self.with_approach(axis, target).min(self.stage.measured(axis))
+    }
+
+    /// The lowest that an axis comes where it comes to a target from below.
+    pub(super) fn with_approach(&self, axis: Axis, target: Nanometres) -> Nanometres {
+        let approach = self.stage.stepper(axis).map_or(0, |stepper| stepper.approach().0);
+        Nanometres(target.0.saturating_sub(approach))
+    }
+
+    /// With an axis at its lowest, and the others on their ways, sensor and lens stay apart. To move apart is always
+    /// allowed.
+    pub(super) fn must_not_come_close(&self, axis: Axis, lowest: Nanometres) -> Result<(), RequestError> {
+        let homed = self.stage.state(axis) == PositionState::Homed;
+        if homed && lowest >= self.stage.measured(axis) {
+            return Ok(());
+        }
+        self.must_be_apart(|other| if other == axis { lowest } else { self.lowest(other) })
+    }
+
+    /// With the axes at these positions there is the smallest distance between sensor and lens.
+    pub(super) fn must_be_apart(&self, position: impl Fn(Axis) -> Nanometres) -> Result<(), RequestError> {
+        let min = self.settings.distance_min;
+        let distance = sensor_distance_nm(self.settings.datum, position);
+        if distance >= i64::from(min.0) {
+            return Ok(());
+        }
+        let distance = distance.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+        Err(RequestError::TooClose { distance: Nanometres(distance), min })
+    }
+}

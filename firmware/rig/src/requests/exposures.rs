@@ -1,0 +1,80 @@
+//! Requests about the exposure program.
+
+use farnear_protocol::message::{Axis, RecordName, RequestError, Response, Shot, ShotFault};
+use farnear_protocol::{BoardMicros, Micros};
+
+use super::Answer;
+use crate::program::{Run, SHOTS_MAX};
+use crate::rig::Rig;
+use crate::work::{Active, WholeWork};
+
+impl Rig {
+    pub(super) fn load_shot(&mut self, index: u8, shot: &Shot) -> Answer {
+        self.no_program_runs()?;
+        self.must_be_inside(shot.axis, shot.target)?;
+        self.shots
+            .load(index, *shot, &self.settings)
+            .map_err(|reason| RequestError::Shot { index, reason })?;
+        self.store.mark(RecordName::Program);
+        Ok(Response::Accepted)
+    }
+
+    pub(super) fn arm_program(&mut self, count: u8) -> Answer {
+        self.no_program_runs()?;
+        self.check_program(count)?;
+        self.shots.arm(count);
+        Ok(Response::Accepted)
+    }
+
+    pub(super) fn run_program(&mut self, (request, silence): (u32, Micros), now: BoardMicros) -> Answer {
+        self.may_move(silence)?;
+        self.all_must_be_free()?;
+        let count = self.shots.armed();
+        let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
+            return Err(RequestError::Program { state: self.program_status().state });
+        };
+        self.check_program(count)?; // since it was armed axes may have lost their positions, or moved
+        let run = Run::start(count, first, &mut self.stage, &self.settings, now);
+        self.works.whole = Some(Active { request, silence, work: WholeWork::Program(run) });
+        Ok(Response::Accepted)
+    }
+
+    /// Whether the first `count` shots can be run from here.
+    pub(super) fn check_program(&self, count: u8) -> Result<(), RequestError> {
+        if count == 0 || usize::from(count) > SHOTS_MAX {
+            return Err(RequestError::Shot { index: count, reason: ShotFault::Index });
+        }
+        let mut at = Axis::ALL.map(|axis| self.lowest(axis));
+        for index in 0..count {
+            let missing = RequestError::Shot { index, reason: ShotFault::Missing };
+            let shot = self.shots.get(index).ok_or(missing)?;
+            self.must_be_inside(shot.axis, shot.target)?; // the limits may have changed
+            self.must_be_homed(shot.axis)?;
+            let place = shot.axis as usize;
+            at[place] = self.with_approach(shot.axis, shot.target).min(at[place]);
+            self.must_be_apart(|axis| at[axis as usize])?;
+            at[place] = shot.target;
+        }
+        Ok(())
+    }
+
+    pub(super) fn pause_program(&mut self) -> Answer {
+        match &mut self.works.whole {
+            Some(Active { work: WholeWork::Program(run), .. }) => {
+                run.pause();
+                Ok(Response::Accepted)
+            }
+            _ => Err(RequestError::Program { state: self.program_status().state }),
+        }
+    }
+
+    pub(super) fn resume_program(&mut self, now: BoardMicros) -> Answer {
+        match &mut self.works.whole {
+            Some(Active { work: WholeWork::Program(run), .. }) if run.is_pausing() => {
+                run.resume(&mut self.stage, &self.settings, now);
+                Ok(Response::Accepted)
+            }
+            _ => Err(RequestError::Program { state: self.program_status().state }),
+        }
+    }
+}

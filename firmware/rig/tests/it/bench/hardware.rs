@@ -1,0 +1,172 @@
+//! A model of the rig's hardware: two stepper axes, piezo, gauge, camera, the safety inputs. And its faults.
+
+use farnear_protocol::{BoardMicros, Micros};
+use farnear_rig::io::{DAC_FULL_SCALE_NM, ExposureEdges, GAUGE_CODE_ZERO, Inputs, Outputs, StrobeEdges};
+
+use super::motor::Motor;
+
+/// What can be wrong beside the motors.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Faults {
+    /// The gauge answers this whatever the position.
+    pub gauge: Option<Option<u32>>,
+    /// The piezo does not move.
+    pub piezo_dead: bool,
+    /// The camera does not answer.
+    pub no_strobe: bool,
+    /// The emergency-stop circuit is open.
+    pub emergency_stop: bool,
+    /// The supply is low.
+    pub supply_low: bool,
+    /// The link overflows.
+    pub link_overflow: bool,
+}
+
+/// The hardware.
+pub struct Hardware {
+    pub faults: Faults,
+    pub coarse: Motor,
+    pub lens: Motor,
+    pub piezo_nm: f64,
+    piezo_velocity: f64,
+    pub dac: u16,
+    random: u64,
+    exposure: Option<(BoardMicros, Micros)>,
+    /// Rising edges of the trigger: when, and how long.
+    pub triggers: Vec<(u64, Micros)>,
+    /// Where the piezo was at each trigger.
+    pub piezo_at_trigger: Vec<f64>,
+    /// A camera that runs freely: period and exposure, us.
+    pub free_running: Option<(u64, u64)>,
+    /// An exposure that the host makes: start and end.
+    pub exposed_by_host: Option<(u64, u64)>,
+    listened_since: Option<u64>,
+}
+
+impl Hardware {
+    pub fn new(position_um: f64) -> Self {
+        Self {
+            faults: Faults::default(),
+            coarse: Motor::new(position_um),
+            lens: Motor::new(position_um + 500.0),
+            piezo_nm: 0.0,
+            piezo_velocity: 0.0,
+            dac: 0,
+            random: 1,
+            exposure: None,
+            triggers: Vec::new(),
+            piezo_at_trigger: Vec::new(),
+            free_running: None,
+            exposed_by_host: None,
+            listened_since: None,
+        }
+    }
+
+    /// Where stage A is.
+    pub fn position_um(&self) -> f64 {
+        self.coarse.position_um()
+    }
+
+    /// The power goes: mechanics stay, everything else forgets.
+    pub fn power_off(&mut self) {
+        self.coarse.power_off();
+        self.lens.power_off();
+        (self.dac, self.exposure, self.listened_since) = (0, None, None);
+    }
+
+    /// What the board reads now.
+    pub fn inputs(&mut self, now: BoardMicros) -> Inputs {
+        Inputs {
+            now,
+            gauge_code: self.gauge(),
+            coarse: self.coarse.inputs(),
+            lens: self.lens.inputs(),
+            emergency_stop: self.faults.emergency_stop,
+            supply_low: self.faults.supply_low,
+            link_overflow: self.faults.link_overflow,
+            exposure: self.exposure(now),
+            strobe: self.strobe(now),
+        }
+    }
+
+    /// The gauge's code.
+    pub fn gauge(&mut self) -> Option<u32> {
+        let code = (self.piezo_nm + self.noise() + f64::from(GAUGE_CODE_ZERO)).round();
+        self.faults.gauge.unwrap_or(Some(code as u32))
+    }
+
+    /// The triggered exposure, once it is over.
+    pub fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
+        let (trigger, length) = self.exposure?;
+        let strobe_start = BoardMicros(trigger.0 + 20);
+        let strobe_end = BoardMicros(strobe_start.0 + u64::from(length.0));
+        if strobe_end >= now {
+            return None;
+        }
+        self.exposure = None;
+        (!self.faults.no_strobe).then_some(ExposureEdges { trigger, strobe_start, strobe_end })
+    }
+
+    /// An exposure without a trigger that ended in the last tick and began while somebody listened.
+    pub fn strobe(&self, BoardMicros(now): BoardMicros) -> Option<StrobeEdges> {
+        let since = self.listened_since.filter(|_| !self.faults.no_strobe)?;
+        let last_of = |(period, length): (u64, u64)| {
+            let start = now.saturating_sub(length + 1) / period * period;
+            (start, start + length)
+        };
+        let (start, end) = self.exposed_by_host.or(self.free_running.map(last_of))?;
+        (start >= since && end < now && now - end <= 200)
+            .then_some(StrobeEdges { start: BoardMicros(start), end: BoardMicros(end) })
+    }
+
+    /// The emergency stop's circuit opens.
+    pub fn open_circuit(&mut self) {
+        self.faults.emergency_stop = true;
+        self.coarse.cut();
+        self.lens.cut();
+    }
+
+    /// Carries the outputs out and lets a control tick pass.
+    pub fn run(&mut self, outputs: &Outputs, now: u64) {
+        self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
+        self.lens.run(&outputs.lens, now, self.faults.emergency_stop);
+        self.dac = outputs.piezo_dac;
+        if let Some(length) = outputs.trigger {
+            assert!(self.exposure.is_none(), "triggered while exposing");
+            assert!(!outputs.listen, "triggered while listening");
+            self.exposure = Some((BoardMicros(now + 10), length));
+            self.triggers.push((now + 10, length));
+            self.piezo_at_trigger.push(self.piezo_nm);
+        }
+        if outputs.listen {
+            self.listened_since.get_or_insert(now);
+        } else {
+            self.listened_since = None;
+        }
+        self.swing();
+    }
+
+    /// The piezo: 200 Hz, damping 0.03, by steps of 10 us.
+    pub fn swing(&mut self) {
+        if self.faults.piezo_dead {
+            return;
+        }
+        let target = f64::from(self.dac) / 65_535.0 * f64::from(DAC_FULL_SCALE_NM);
+        let omega = 2.0 * std::f64::consts::PI * 200.0;
+        for _ in 0..20 {
+            let force = omega * omega * (target - self.piezo_nm) - 0.06 * omega * self.piezo_velocity;
+            self.piezo_velocity += 10e-6 * force;
+            self.piezo_nm += 10e-6 * self.piezo_velocity;
+        }
+    }
+
+    /// 3 nm RMS, roughly normal.
+    fn noise(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.random = self.random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            sum += (self.random >> 11) as f64 / (1u64 << 53) as f64;
+        }
+        3.0 * sum
+    }
+}

@@ -1,0 +1,129 @@
+//! The calibration routines through the rig's public face.
+
+use crate::bench::motor::{FAR_SWITCH_UM, PLAY, STEP_UM};
+use crate::bench::{self, Bench, SILENCE, failure, go};
+use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, PositionState, Routine, SettingKey};
+use farnear_protocol::{Nanometres, Request, RequestError, Response};
+
+fn calibrate(routine: Routine) -> Request {
+    Request::Calibrate { routine, silence: SILENCE }
+}
+
+fn result(end: &EventKind) -> Calibration {
+    match end {
+        EventKind::Calibrated { result, .. } => *result,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn setting(bench: &mut Bench, key: SettingKey) -> i32 {
+    match bench.ask(&Request::ReadSetting { key }).1 {
+        Ok(Response::Setting(setting)) => setting.value,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_travel_is_the_way_between_the_switches() {
+    let mut bench = Bench::new(6_000.0);
+    for axis in [Axis::SensorCoarse, Axis::Lens] {
+        let Calibration::Travel { axis: of, length } =
+            result(&bench.work(&calibrate(Routine::Travel { axis })))
+        else {
+            panic!("another routine's result")
+        };
+        assert_eq!(of, axis);
+        assert!((f64::from(length.0) / 1e3 - FAR_SWITCH_UM).abs() <= 0.5, "{length:?}");
+    }
+    let status = bench.status();
+    assert_eq!((status.coarse.state, status.lens.state), (PositionState::Homed, PositionState::Homed));
+    assert!(status.coarse.measured.0.abs() <= 300 && status.lens.measured.0.abs() <= 300, "back");
+    assert_eq!(bench.alarm(), None, "the far switch was expected");
+}
+
+#[test]
+fn the_backlash_is_found_kept_and_taken_out() {
+    let mut bench = Bench::new(2_000.0);
+    for (axis, key) in
+        [(Axis::SensorCoarse, SettingKey::CoarseBacklashNm), (Axis::Lens, SettingKey::LensBacklashNm)]
+    {
+        bench.ask(&Request::WriteSetting { key, value: 0 }).1.expect("0 is allowed");
+        let end = bench.work(&calibrate(Routine::Backlash { axis }));
+        let Calibration::Backlash { backlash, spread, .. } = result(&end) else { panic!("{end:?}") };
+        let truth = PLAY as f64 * STEP_UM;
+        // The switch is read once in 200 us at a pulse a millisecond: half a step at each edge, and the encoder's count.
+        assert!((f64::from(backlash.0) / 1e3 - truth).abs() <= 0.35, "{backlash:?} for {truth} um");
+        assert!(spread.0 <= 300, "{spread:?}");
+        assert_eq!(setting(&mut bench, key), backlash.0);
+    }
+    for target in [3_000_000, 1_000_000, 2_000_000] {
+        bench.work(&go(Axis::SensorCoarse, target));
+        let off = bench.hardware.coarse.position_um() - f64::from(target) / 1e3;
+        assert!(off.abs() <= 0.6, "{off} um");
+    }
+}
+
+#[test]
+fn with_the_backlash_set_to_0_moves_come_from_both_sides() {
+    let mut bench = Bench::homed();
+    let key = SettingKey::CoarseBacklashNm;
+    bench.ask(&Request::WriteSetting { key, value: 0 }).1.expect("0 is allowed");
+    bench.work(&bench::home(Axis::SensorCoarse));
+    let mut places = Vec::new();
+    for target in [1_000_000, 2_000_000, 3_000_000, 2_000_000] {
+        bench.work(&go(Axis::SensorCoarse, target));
+        places.push(bench.hardware.coarse.position_um());
+    }
+    let play = places[3] - places[1];
+    assert!((play - PLAY as f64 * STEP_UM).abs() < 0.3, "{play} um between the two sides");
+}
+
+#[test]
+fn the_piezo_is_swept_and_its_figures_are_settings() {
+    let mut bench = Bench::new(700.0);
+    bench.work(&go(Axis::SensorFine, 120_000));
+    let end = bench.work(&calibrate(Routine::Piezo));
+    let Calibration::Piezo { gain_pm_per_code, hysteresis_ppm, creep_ppm_per_decade } = result(&end) else {
+        panic!("{end:?}")
+    };
+    // The bench's piezo has neither hysteresis nor creep.
+    assert!(gain_pm_per_code.abs_diff(3_052) < 5, "{gain_pm_per_code}");
+    assert!(hysteresis_ppm < 2_000 && creep_ppm_per_decade < 500, "{hysteresis_ppm}, {creep_ppm_per_decade}");
+    assert_eq!(setting(&mut bench, SettingKey::PiezoGainPmPerCode), gain_pm_per_code as i32);
+    assert_eq!(bench.hardware.dac, 0, "relaxed again");
+    assert!(matches!(bench.work(&go(Axis::SensorFine, 20_000)), EventKind::MoveDone { .. }));
+}
+
+#[test]
+fn a_routine_occupies_the_rig_and_can_be_stopped() {
+    let mut bench = Bench::new(2_000.0);
+    for routine in [Routine::Travel { axis: Axis::SensorFine }, Routine::Backlash { axis: Axis::SensorFine }]
+    {
+        assert_eq!(bench.ask(&calibrate(routine)).1, Err(RequestError::NoSuchRoutine));
+    }
+    for routine in [Routine::Travel { axis: Axis::Lens }, Routine::Piezo] {
+        let request = bench.accepted(&calibrate(routine));
+        bench.run_ms(300);
+        assert_eq!(bench.ask(&go(Axis::SensorFine, 20_000)).1, Err(RequestError::Busy { request }));
+        bench.accepted(&Request::Stop);
+        assert_eq!(failure(&bench.end_of(request)), Failure::Stopped);
+    }
+    bench.work(&go(Axis::SensorFine, 20_000));
+    assert!((bench.hardware.piezo_nm - 20e3).abs() <= 50.0);
+}
+
+#[test]
+fn a_dead_gauge_ends_the_sweep_and_a_missing_switch_the_travel() {
+    let mut bench = Bench::new(2_000.0);
+    let id = bench.accepted(&calibrate(Routine::Piezo));
+    bench.run_ms(100);
+    bench.hardware.faults.gauge = Some(None);
+    assert_eq!(failure(&bench.end_of(id)), Failure::Gauge);
+    bench.hardware.faults.gauge = None;
+    bench.run_ms(1);
+    bench.clear();
+    bench.hardware.coarse.faults.far_switch = Some(false);
+    let end = bench.work(&calibrate(Routine::Travel { axis: Axis::SensorCoarse }));
+    assert_eq!(failure(&end), Failure::Implausible);
+    assert!(bench.status().coarse.measured <= Nanometres(14_600_000));
+}

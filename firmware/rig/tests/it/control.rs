@@ -1,0 +1,187 @@
+//! The control loop against a fake board: what it does in which order, what it waits for, and what it says once.
+
+mod fake;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use farnear_protocol::frame::{Decoder, Kind, Packet};
+use farnear_protocol::message::{Alarm, Axis, EventKind, ResetCause};
+use farnear_protocol::{BoardMicros, Event, Log, Request};
+use farnear_rig::Rig;
+use farnear_rig::control::{Control, LAST_FRAME, Note};
+use farnear_rig::io::TICK_US;
+
+use self::fake::{Call, Fake};
+use crate::bench::{self, BOOT};
+
+/// All that happens in a tick in which there is an event and a line of the log to send.
+const TICK: [Call; 15] = [
+    Call::Now,
+    Call::Receive,
+    Call::Gauge,
+    Call::Now,
+    Call::Coarse,
+    Call::Lens,
+    Call::EmergencyStop,
+    Call::SupplyLow,
+    Call::Exposure,
+    Call::Strobe,
+    Call::Apply,
+    Call::Send,
+    Call::TakeLog,
+    Call::Send,
+    Call::FeedWatchdog,
+];
+
+fn rig() -> Rig {
+    Rig::new(bench::identity(BOOT, ResetCause::Pin), None, BoardMicros(0))
+}
+
+fn log() -> Log {
+    Log { bytes: b"a line".as_slice().try_into().expect("it fits") }
+}
+
+fn packets(fake: &Fake) -> Vec<Packet> {
+    let mut decoder = Decoder::new();
+    let bytes = fake.sent.iter().flatten();
+    bytes.filter_map(|byte| Some(decoder.push(*byte)?.expect("whole frames"))).collect()
+}
+
+fn events(fake: &Fake) -> Vec<EventKind> {
+    let packets = packets(fake);
+    let events = packets.iter().filter(|packet| packet.header.kind == Kind::Event);
+    events.map(|packet| packet.message::<Event>().expect("an event").kind).collect()
+}
+
+fn run(control: &mut Control<'_>, fake: &mut Fake, ticks: usize) {
+    for _ in 0..ticks {
+        control.tick(fake);
+        fake.pass();
+    }
+}
+
+#[test]
+fn a_tick_goes_in_this_order() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    fake.logs.push_back(log());
+    Control::new(&mut rig).tick(&mut fake);
+    assert_eq!(fake.calls, TICK);
+}
+
+#[test]
+fn a_stage_is_homed_by_way_of_the_loop_and_each_tick_feeds_the_watchdog() {
+    let (mut rig, mut fake) = (rig(), Fake::new(4_000.0));
+    fake.ask(&bench::home(Axis::SensorCoarse));
+    let mut control = Control::new(&mut rig);
+    let mut ticks = 0;
+    while !matches!(events(&fake).last(), Some(EventKind::Homed { axis: Axis::SensorCoarse, .. })) {
+        run(&mut control, &mut fake, 1_000);
+        ticks += 1_000;
+        assert!(ticks < 50_000, "it is not homed after ten seconds: {:?}", events(&fake));
+    }
+    assert!(ticks > 5_000 && fake.hardware.position_um().abs() <= 0.5, "{}", fake.hardware.position_um());
+    assert_eq!((fake.fed, fake.notes.as_slice(), fake.resets), (ticks, [].as_slice(), 0));
+}
+
+#[test]
+fn whatever_hangs_in_a_tick_leaves_the_watchdog_hungry() {
+    for (place, call) in TICK.iter().enumerate().filter(|(_, call)| **call != Call::FeedWatchdog) {
+        let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+        fake.logs.push_back(log());
+        fake.hangs_after = Some(place);
+        let tick = catch_unwind(AssertUnwindSafe(|| Control::new(&mut rig).tick(&mut fake)));
+        assert!(tick.is_err() && fake.fed == 0, "{call:?}");
+    }
+}
+
+/// The circuit cuts the pulses by itself. Read too early it would still look closed in the tick in which a step timer
+/// shows that it stands.
+#[test]
+fn a_circuit_that_opens_between_two_readings_is_not_told_as_a_late_step() {
+    for moment in [Call::Receive, Call::Gauge, Call::Coarse, Call::Lens, Call::EmergencyStop, Call::Apply] {
+        // 20 ticks are two of the longest segments.
+        for ticks in 2_000..2_020 {
+            let (mut rig, mut fake) = (rig(), Fake::new(5_000.0));
+            fake.ask(&bench::home(Axis::SensorCoarse));
+            let mut control = Control::new(&mut rig);
+            run(&mut control, &mut fake, ticks);
+            let before = fake.hardware.position_um();
+            assert!(before < 4_990.0, "it moves");
+            fake.opens_before = Some(moment);
+            run(&mut control, &mut fake, 100);
+            let alarms: Vec<Alarm> = events(&fake)
+                .iter()
+                .filter_map(|kind| match kind {
+                    EventKind::Alarm(record) => Some(record.alarm),
+                    _ => None,
+                })
+                .collect();
+            assert_eq!(alarms, [Alarm::EmergencyStop], "{moment:?} in tick {ticks}");
+        }
+    }
+}
+
+#[test]
+fn a_queue_that_runs_dry_is_told_once() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    for (dry, ticks) in [(false, 3), (true, 5), (false, 2), (true, 2)] {
+        fake.dry = dry;
+        run(&mut control, &mut fake, ticks);
+    }
+    let time = |tick: u64| BoardMicros(tick * u64::from(TICK_US));
+    assert_eq!(fake.notes, [Note::StepQueueDry { time: time(3) }, Note::StepQueueDry { time: time(10) }]);
+}
+
+#[test]
+fn the_log_takes_the_room_that_is_left() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    fake.logs.push_back(log());
+    fake.room = 0;
+    run(&mut control, &mut fake, 3);
+    assert!(fake.sent.is_empty() && fake.logs.len() == 1, "no room");
+    fake.room = 1;
+    run(&mut control, &mut fake, 1);
+    assert_eq!((fake.sent.len(), fake.logs.len()), (1, 1), "the event goes first");
+    run(&mut control, &mut fake, 1);
+    let kinds: Vec<Kind> = packets(&fake).iter().map(|packet| packet.header.kind).collect();
+    assert_eq!(kinds, [Kind::Event, Kind::Log]);
+    let packet = packets(&fake).pop().expect("the log");
+    assert_eq!((packet.header.id, packet.header.boot, packet.message()), (0, BOOT, Some(log())));
+}
+
+/// Runs a board that is asked to reboot and whose last frame takes its time; gives the microseconds from the order to
+/// the reset.
+fn reset_after(ticks_until_sent: usize) -> u64 {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    fake.ask(&Request::Reboot);
+    while fake.notes.is_empty() {
+        fake.sending = ticks_until_sent;
+        run(&mut control, &mut fake, 1);
+        assert!(fake.now < 100_000, "it was not asked to reset");
+    }
+    assert_eq!(fake.notes, [Note::Reset]);
+    let (asked, fed) = (fake.now - u64::from(TICK_US), fake.fed);
+    fake.calls.clear();
+    while fake.resets == 0 {
+        run(&mut control, &mut fake, 1);
+        assert!(fake.now < asked + 100_000, "it is not reset");
+    }
+    let idle = |call: &Call| matches!(call, Call::Now | Call::Reset);
+    assert!(fake.calls.iter().all(idle) && fake.fed == fed, "nothing else is done: {:?}", fake.calls);
+    fake.reset_at - asked
+}
+
+#[test]
+fn a_reset_waits_for_the_last_frame() {
+    for ticks in [1, 2, 7] {
+        assert_eq!(reset_after(ticks), ticks as u64 * u64::from(TICK_US));
+    }
+}
+
+#[test]
+fn a_reset_does_not_wait_for_ever() {
+    assert_eq!(reset_after(usize::MAX), u64::from(LAST_FRAME.0));
+}

@@ -1,0 +1,198 @@
+//! A board that is none: the bench's hardware behind the loop's trait, with a record of what the loop did.
+
+use std::collections::VecDeque;
+
+use farnear_protocol::frame::{Encoded, Header, Kind, encode};
+use farnear_protocol::{BoardMicros, Log, PROTOCOL_CURRENT, Request};
+use farnear_rig::control::{Board, Note};
+use farnear_rig::io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges, TICK_US};
+
+use crate::bench::BOOT;
+use crate::bench::hardware::Hardware;
+
+/// What the loop did.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Call {
+    Now,
+    Receive,
+    Gauge,
+    Coarse,
+    Lens,
+    EmergencyStop,
+    SupplyLow,
+    Exposure,
+    Strobe,
+    Apply,
+    Send,
+    TakeLog,
+    FeedWatchdog,
+    Reset,
+}
+
+/// The board.
+pub struct Fake {
+    pub hardware: Hardware,
+    pub now: u64,
+    /// Everything the loop did, in order.
+    pub calls: Vec<Call>,
+    /// After so many calls the board hangs.
+    pub hangs_after: Option<usize>,
+    /// The emergency stop's circuit opens just before this is done.
+    pub opens_before: Option<Call>,
+    /// A step timer says that it ran dry.
+    pub dry: bool,
+    received: VecDeque<u8>,
+    next_id: u32,
+    /// Frames that fit the link in a tick, and those that were sent in this one.
+    pub room: usize,
+    taken: usize,
+    /// Ticks until the last frame has left.
+    pub sending: usize,
+    pub sent: Vec<Encoded>,
+    pub logs: VecDeque<Log>,
+    log_number: u32,
+    pub notes: Vec<Note>,
+    pub fed: usize,
+    pub resets: usize,
+    pub reset_at: u64,
+}
+
+impl Fake {
+    /// A board whose stage A stands at `position_um` from its home switch.
+    pub fn new(position_um: f64) -> Self {
+        Self {
+            hardware: Hardware::new(position_um),
+            now: 0,
+            calls: Vec::new(),
+            hangs_after: None,
+            opens_before: None,
+            dry: false,
+            received: VecDeque::new(),
+            next_id: 1,
+            room: 4,
+            taken: 0,
+            sending: 0,
+            sent: Vec::new(),
+            logs: VecDeque::new(),
+            log_number: 0,
+            notes: Vec::new(),
+            fed: 0,
+            resets: 0,
+            reset_at: 0,
+        }
+    }
+
+    /// Puts a request on the line.
+    pub fn ask(&mut self, request: &Request) {
+        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.next_id, boot: BOOT };
+        self.next_id += 1;
+        self.received.extend(encode(header, request).expect("every request fits"));
+    }
+
+    /// Time passes until the next tick.
+    pub fn pass(&mut self) {
+        self.now += u64::from(TICK_US);
+        self.sending = self.sending.saturating_sub(1);
+        self.taken = 0;
+    }
+
+    fn did(&mut self, call: Call) {
+        if self.opens_before == Some(call) {
+            self.opens_before = None;
+            self.hardware.open_circuit();
+        }
+        assert!(self.hangs_after != Some(self.calls.len()), "the board hangs");
+        self.calls.push(call);
+    }
+}
+
+impl Board for Fake {
+    fn now(&mut self) -> BoardMicros {
+        self.did(Call::Now);
+        BoardMicros(self.now)
+    }
+
+    fn receive(&mut self, take: impl FnMut(u8)) -> bool {
+        self.did(Call::Receive);
+        self.received.drain(..).for_each(take);
+        self.hardware.faults.link_overflow
+    }
+
+    fn gauge(&mut self) -> Option<u32> {
+        self.did(Call::Gauge);
+        self.hardware.gauge()
+    }
+
+    fn coarse(&mut self) -> MotorInputs {
+        self.did(Call::Coarse);
+        let mut inputs = self.hardware.coarse.inputs();
+        inputs.stepper.underrun |= self.dry;
+        inputs
+    }
+
+    fn lens(&mut self) -> MotorInputs {
+        self.did(Call::Lens);
+        self.hardware.lens.inputs()
+    }
+
+    fn emergency_stop(&mut self) -> bool {
+        self.did(Call::EmergencyStop);
+        self.hardware.faults.emergency_stop
+    }
+
+    fn supply_low(&mut self) -> bool {
+        self.did(Call::SupplyLow);
+        self.hardware.faults.supply_low
+    }
+
+    fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
+        self.did(Call::Exposure);
+        self.hardware.exposure(now)
+    }
+
+    fn strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges> {
+        self.did(Call::Strobe);
+        self.hardware.strobe(now)
+    }
+
+    fn apply(&mut self, outputs: &Outputs) {
+        self.did(Call::Apply);
+        self.hardware.run(outputs, self.now);
+    }
+
+    fn has_room(&self) -> bool {
+        self.taken < self.room
+    }
+
+    fn send(&mut self, frame: Encoded) {
+        assert!(self.has_room(), "a frame without room");
+        self.did(Call::Send);
+        self.taken += 1;
+        self.sent.push(frame);
+    }
+
+    fn all_sent(&self) -> bool {
+        self.sending == 0
+    }
+
+    fn take_log(&mut self) -> Option<(u32, Log)> {
+        self.did(Call::TakeLog);
+        let log = self.logs.pop_front()?;
+        self.log_number += 1;
+        Some((self.log_number - 1, log))
+    }
+
+    fn note(&mut self, note: Note) {
+        self.notes.push(note);
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.did(Call::FeedWatchdog);
+        self.fed += 1;
+    }
+
+    fn reset(&mut self) {
+        self.did(Call::Reset);
+        (self.resets, self.reset_at) = (self.resets + 1, self.now);
+    }
+}

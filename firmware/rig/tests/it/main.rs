@@ -1,0 +1,12 @@
+//! The rig through its public face, on a bench that models its hardware; one program for all of it.
+
+mod bench;
+mod calibration;
+mod coarse;
+mod control;
+mod faults;
+mod link;
+mod maths;
+mod program;
+mod requests;
+mod safety;

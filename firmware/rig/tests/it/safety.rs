@@ -1,0 +1,329 @@
+//! What stops the rig: emergency stop, halt, the host's silence, supply, the link; and what survives the reset.
+
+use crate::bench::{self, Bench, failure, go, home};
+use farnear_protocol::message::{
+    Alarm, AlarmRecord, Axis, EventKind, Failure, PositionState, RecordName, ResetCause, SettingKey,
+};
+use farnear_protocol::{Micros, Nanometres, Request, RequestError, Response};
+
+/// Both stages in full motion and the piezo on its way; gives their requests.
+fn all_moving(bench: &mut Bench) -> [u32; 3] {
+    let coarse = bench.accepted(&go(Axis::SensorCoarse, 9_000_000));
+    let lens = bench.accepted(&go(Axis::Lens, 8_000_000));
+    bench.run_ms(400);
+    let fine = bench.accepted(&go(Axis::SensorFine, 120_000));
+    bench.run_ms(3);
+    [coarse, fine, lens]
+}
+
+fn alarms(bench: &Bench) -> Vec<AlarmRecord> {
+    let alarm = |kind: &EventKind| match kind {
+        EventKind::Alarm(record) => Some(*record),
+        _ => None,
+    };
+    bench.events.iter().filter_map(|(_, event)| alarm(&event.kind)).collect()
+}
+
+#[test]
+fn both_steppers_and_the_piezo_move_at_once() {
+    let mut bench = Bench::both_homed();
+    let [coarse, fine, lens] = all_moving(&mut bench);
+    let status = bench.status();
+    assert_eq!(
+        [status.coarse.request, status.fine.request, status.lens.request],
+        [Some(coarse), Some(fine), Some(lens)]
+    );
+    for (axis, request) in [(Axis::SensorCoarse, coarse), (Axis::Lens, lens)] {
+        assert_eq!(bench.ask(&go(axis, 1_000)).1, Err(RequestError::Busy { request }));
+    }
+    for request in [fine, lens, coarse] {
+        assert!(matches!(bench.end_of(request), EventKind::MoveDone { .. }));
+    }
+    assert!((bench.hardware.coarse.position_um() - 9_000.0).abs() <= 0.5);
+    assert!((bench.hardware.lens.position_um() - 8_000.0).abs() <= 0.5);
+    assert!(bench.hardware.coarse.closest_edges_us >= 24.9 && bench.hardware.lens.closest_edges_us >= 24.9);
+}
+
+#[test]
+fn every_stop_ends_the_pulses_within_a_millisecond_and_is_latched() {
+    type Break = fn(&mut Bench);
+    let breaks: [(Break, Alarm); 4] = [
+        (|bench| bench.hardware.faults.emergency_stop = true, Alarm::EmergencyStop),
+        (|bench| bench.hardware.faults.supply_low = true, Alarm::SupplyLow),
+        (|bench| bench.hardware.faults.link_overflow = true, Alarm::QueueOverflow),
+        (|bench| assert!(bench.ask(&Request::Halt).1.is_ok()), Alarm::Halt),
+    ];
+    for (stop, alarm) in breaks {
+        let mut bench = Bench::both_homed();
+        let requests = all_moving(&mut bench);
+        let broken = bench.now as f64;
+        stop(&mut bench);
+        bench.run_ms(3);
+        for motor in [&bench.hardware.coarse, &bench.hardware.lens] {
+            assert!(motor.last_edge_us - broken <= 1_200.0, "{alarm:?}: {} us", motor.last_edge_us - broken);
+        }
+        for request in requests {
+            assert_eq!(failure(&bench.end_of(request)), Failure::Alarm { number: 1 }, "{alarm:?}");
+        }
+        let raised = bench.events.iter().position(|(_, event)| matches!(event.kind, EventKind::Alarm(_)));
+        let failed =
+            bench.events.iter().position(|(_, event)| matches!(event.kind, EventKind::Failed { .. }));
+        assert!(raised < failed, "the alarm comes first");
+        assert_eq!(alarms(&bench).len(), 1, "{alarm:?} once");
+        let status = bench.status();
+        assert_eq!(status.alarm.map(|record| (record.number, record.alarm)), Some((1, alarm)));
+        assert_eq!((status.coarse.state, status.lens.state), (PositionState::Lost, PositionState::Lost));
+        let refused = RequestError::Alarm { number: 1, alarm };
+        let requests = [
+            go(Axis::SensorFine, 20_000),
+            home(Axis::Lens),
+            go(Axis::SensorCoarse, 0),
+            Request::RunProgram { silence: bench::SILENCE },
+        ];
+        for request in requests {
+            assert_eq!(bench.ask(&request).1, Err(refused.clone()), "{request:?}");
+        }
+        let persists = matches!(alarm, Alarm::EmergencyStop | Alarm::SupplyLow);
+        if persists {
+            let remains = Err(RequestError::AlarmRemains { alarm });
+            assert_eq!(bench.ask(&Request::ClearAlarm { number: 1 }).1, remains);
+        }
+        bench.hardware.faults = bench::hardware::Faults::default();
+        bench.run_ms(1);
+        let unknown = RequestError::NoSuchAlarm { latched: 1, last: 1 };
+        assert_eq!(bench.ask(&Request::ClearAlarm { number: 2 }).1, Err(unknown));
+        bench.clear();
+        assert!(bench.events.iter().any(|(_, event)| event.kind == EventKind::AlarmCleared { number: 1 }));
+        for axis in [Axis::SensorCoarse, Axis::Lens] {
+            assert!(matches!(bench.work(&home(axis)), EventKind::Homed { .. }), "{alarm:?}");
+        }
+    }
+}
+
+#[test]
+fn a_stop_at_rest_keeps_the_position() {
+    let mut bench = Bench::homed();
+    bench.hardware.faults.emergency_stop = true;
+    bench.run_ms(5);
+    assert_eq!(bench.status().coarse.state, PositionState::Homed);
+    bench.hardware.faults.emergency_stop = false;
+    bench.run_ms(1);
+    bench.clear();
+    assert!(matches!(bench.work(&go(Axis::SensorCoarse, 1_000_000)), EventKind::MoveDone { .. }));
+}
+
+#[test]
+fn a_silent_host_is_reminded_and_then_everything_stops() {
+    let mut bench = Bench::homed();
+    let silence = Micros(300_000);
+    let request = Request::Move { axis: Axis::SensorCoarse, target: Nanometres(13_000_000), silence };
+    let id = bench.accepted(&request);
+    let start = bench.now;
+    assert_eq!(failure(&bench.end_of(id)), Failure::Alarm { number: 1 });
+    let stopped = bench.hardware.coarse.last_edge_us - start as f64;
+    assert!((299_000.0..301_500.0).contains(&stopped), "{stopped} us");
+    let times = |wanted: fn(&EventKind) -> bool| {
+        let of = bench.events.iter().filter(|(_, event)| wanted(&event.kind));
+        of.map(|(_, event)| event.time.0 - start).collect::<Vec<_>>()
+    };
+    let reminders = times(|kind| matches!(kind, EventKind::StillThere { .. }));
+    assert!(matches!(reminders[..], [at] if (149_000..151_000).contains(&at)), "{reminders:?}");
+    assert_eq!(alarms(&bench)[0].alarm, Alarm::HostSilence { request: id });
+    // A host that answers the reminders moves as far as it likes.
+    bench.clear();
+    bench.work(&home(Axis::SensorCoarse));
+    let id = bench.accepted(&request);
+    while bench.status().coarse.request == Some(id) {
+        bench.run_ms(250);
+    }
+    assert!(matches!(bench.end_of(id), EventKind::MoveDone { .. }));
+    for silence in [Micros(99_999), Micros(60_000_001)] {
+        let answer = bench.ask(&Request::Home { axis: Axis::Lens, silence }).1;
+        assert!(matches!(answer, Err(RequestError::Silence { .. })), "{answer:?}");
+    }
+}
+
+#[test]
+fn sensor_and_lens_are_kept_apart() {
+    let mut bench = Bench::both_homed();
+    bench.work(&go(Axis::SensorCoarse, 3_000_000));
+    bench.work(&go(Axis::Lens, 3_000_000));
+    let min = 51_000_000;
+    let answer = bench.ask(&Request::WriteSetting { key: SettingKey::DistanceMinNm, value: min }).1;
+    assert!(matches!(answer, Ok(Response::Setting(setting)) if setting.value == min), "{answer:?}");
+    // 47 + 3 + 3 mm, and a way that goes 6 um lower to come from below.
+    let lens = bench.accepted(&go(Axis::Lens, 1_500_000));
+    let refused = bench.ask(&go(Axis::SensorCoarse, 2_000_000)).1;
+    let Err(RequestError::TooClose { distance, min: Nanometres(51_000_000) }) = refused else {
+        panic!("{refused:?}: with the way that is under way it would be 50.5 mm")
+    };
+    assert!((50_400_000..=50_500_000).contains(&distance.0), "{distance:?}");
+    assert!(matches!(bench.end_of(lens), EventKind::MoveDone { .. }));
+    assert!(matches!(bench.work(&go(Axis::SensorCoarse, 2_600_000)), EventKind::MoveDone { .. }));
+    assert!(matches!(bench.ask(&go(Axis::SensorCoarse, 2_500_000)).1, Err(RequestError::TooClose { .. })));
+    assert!(matches!(bench.ask(&home(Axis::Lens)).1, Err(RequestError::TooClose { .. })));
+    // Apart is always allowed, also where they are too close already.
+    bench
+        .ask(&Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 60_000_000 })
+        .1
+        .expect("in range");
+    assert!(matches!(bench.work(&go(Axis::SensorCoarse, 2_700_000)), EventKind::MoveDone { .. }));
+}
+
+#[test]
+fn an_alarm_survives_the_loss_of_power_until_it_is_cleared() {
+    let mut bench = Bench::homed();
+    bench.accepted(&Request::Halt);
+    bench.run_ms(5);
+    let before = bench.status().alarm;
+    let boot = bench.rig.boot();
+    bench.restart(1, ResetCause::PowerOn);
+    assert_eq!(bench.rig.boot(), boot + 1, "boot numbers go on");
+    assert_eq!(bench.status().alarm, before);
+    assert!(matches!(bench.ask(&home(Axis::Lens)).1, Err(RequestError::Alarm { number: 1, .. })));
+    assert_eq!(bench.ask(&Request::ReadAlarm { number: 0 }).1, Ok(Response::Alarm(before.expect("latched"))));
+    bench.clear();
+    bench.run_ms(5);
+    bench.restart(1, ResetCause::PowerOn);
+    assert_eq!(bench.status().alarm, None);
+    assert!(bench.ask(&Request::ReadAlarm { number: 1 }).1.is_ok(), "it is still kept");
+    assert_eq!(bench.status().coarse.state, PositionState::Unknown, "at rest it was, so nothing was lost");
+}
+
+#[test]
+fn power_lost_in_motion_is_known_afterwards_wherever_it_goes() {
+    for ms in [1, 11, 12, 13, 100, 700] {
+        let mut bench = Bench::both_homed();
+        bench.run_ms(5);
+        let edges = bench.hardware.coarse.edges;
+        bench.accepted(&go(Axis::SensorCoarse, 9_000_000));
+        bench.run_ms(ms);
+        let moved = bench.hardware.coarse.edges > edges;
+        bench.restart(1, ResetCause::PowerOn);
+        bench.tick();
+        let status = bench.status();
+        let interrupted = Alarm::MotionInterrupted { axis: Axis::SensorCoarse };
+        if moved {
+            assert_eq!(status.coarse.state, PositionState::Lost, "after {ms} ms");
+            assert_eq!(status.alarm.map(|record| record.alarm), Some(interrupted), "after {ms} ms");
+        }
+        assert_eq!(status.lens.state, PositionState::Unknown);
+        if status.alarm.is_some() {
+            bench.clear();
+        }
+        assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+        bench.run_ms(5);
+        bench.restart(1, ResetCause::PowerOn);
+        assert_eq!(bench.alarm(), None, "it is known that it came to rest");
+    }
+}
+
+#[test]
+fn the_cause_of_a_reset_is_latched() {
+    for (cause, alarm) in [(ResetCause::Watchdog, Alarm::Watchdog), (ResetCause::BrownOut, Alarm::BrownOut)] {
+        let mut bench = Bench::new(700.0);
+        bench.run_ms(5);
+        bench.restart(8, cause);
+        assert_eq!(bench.alarm(), Some(alarm));
+        bench.tick();
+        assert_eq!(alarms(&bench).len(), 1, "and told");
+    }
+}
+
+#[test]
+fn settings_shots_and_counters_survive() {
+    let mut bench = Bench::both_homed();
+    for (key, value) in [(SettingKey::CoarseMaxNm, 6_000_000), (SettingKey::LensSpeedNmPerS, 1_000_000)] {
+        assert!(bench.ask(&Request::WriteSetting { key, value }).1.is_ok());
+    }
+    let refused = bench.ask(&Request::WriteSetting { key: SettingKey::CoarseMinNm, value: 6_000_001 }).1;
+    assert!(matches!(refused, Err(RequestError::SettingRange(_))), "{refused:?}");
+    let shot = farnear_protocol::message::Shot {
+        axis: Axis::Lens,
+        target: Nanometres(2_000_000),
+        exposure: Micros(1_000),
+        settle_window: Nanometres(1_000),
+        settle_dwell: Micros(2_000),
+        repeat: 3,
+        mode: farnear_protocol::message::TriggerMode::Hardware,
+    };
+    bench.accepted(&Request::LoadShot { index: 0, shot });
+    bench.run_ms(20);
+    let counters = |bench: &mut Bench| match bench.ask(&Request::ReadCounters).1 {
+        Ok(Response::Counters(counters)) => counters,
+        other => panic!("{other:?}"),
+    };
+    let before = counters(&mut bench);
+    assert_eq!((before.homings, before.coarse_steps), (2, bench.hardware.coarse.edges));
+    bench.restart(1, ResetCause::PowerOn);
+    assert_eq!(bench.hello().limits.coarse_max, Nanometres(6_000_000));
+    let after = counters(&mut bench);
+    assert_eq!((after.homings, after.coarse_steps, after.boots), (2, before.coarse_steps, before.boots + 1));
+    let beyond = bench.ask(&go(Axis::SensorCoarse, 6_000_001)).1;
+    assert!(matches!(beyond, Err(RequestError::OutOfRange { .. })), "{beyond:?}");
+    bench.work(&home(Axis::Lens));
+    bench.accepted(&Request::ArmProgram { shots: 1 });
+    let end = bench.work(&Request::RunProgram { silence: bench::SILENCE });
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 3, .. }), "{end:?}");
+}
+
+#[test]
+fn damaged_records_are_told_and_lost_ones_are_an_alarm() {
+    let mut bench = Bench::new(700.0);
+    for value in [5_000_000, 6_000_000] {
+        assert!(bench.ask(&Request::WriteSetting { key: SettingKey::CoarseMaxNm, value }).1.is_ok());
+        bench.run_ms(5);
+    }
+    // The newer copy of the settings holds 6 mm; find it by that.
+    let find = |memory: &[u8], nm: i32| {
+        memory.windows(4).position(|bytes| bytes == nm.to_le_bytes()).expect("it was written")
+    };
+    let newer = find(&bench.memory[..], 6_000_000);
+    bench.memory[newer] ^= 0x10;
+    bench.restart(1, ResetCause::PowerOn);
+    bench.tick();
+    let repaired = bench.events.iter().any(|(_, event)| {
+        matches!(event.kind, EventKind::RecordRepaired { record: RecordName::Settings, .. })
+    });
+    assert!(repaired, "{:?}", bench.events);
+    assert_eq!(bench.hello().limits.coarse_max, Nanometres(5_000_000), "the copy before");
+    bench.run_ms(10);
+    bench.restart(1, ResetCause::PowerOn);
+    bench.tick();
+    assert_eq!(bench.events.len(), 1, "it was mended: {:?}", bench.events);
+    // Both copies.
+    while let Some(at) = bench.memory.windows(4).position(|bytes| bytes == 5_000_000i32.to_le_bytes()) {
+        bench.memory[at] ^= 0x10;
+    }
+    bench.restart(1, ResetCause::PowerOn);
+    assert_eq!(bench.alarm(), Some(Alarm::RecordLost { record: RecordName::Settings }));
+    assert_eq!(bench.hello().limits.coarse_max, Nanometres(13_000_000), "the default");
+}
+
+#[test]
+fn a_board_without_memory_works_and_says_so() {
+    let mut bench = Bench::new(700.0);
+    bench.rig = farnear_rig::Rig::new(*bench.rig.identity(), None, farnear_protocol::BoardMicros(0));
+    assert!(!bench.hello().capabilities.memory);
+    assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+    assert!(matches!(bench.work(&go(Axis::SensorCoarse, 50_000)), EventKind::MoveDone { .. }));
+}
+
+#[test]
+fn a_slow_rig_homes_slowly_and_a_fast_one_fast_again() {
+    let mut bench = Bench::new(9_000.0);
+    let mut times = Vec::new();
+    for value in [6_250_000, 800_000, 6_250_000] {
+        let key = SettingKey::CoarseSpeedNmPerS;
+        assert!(bench.ask(&Request::WriteSetting { key, value }).1.is_ok());
+        bench.hardware.coarse.turn(57_600 - bench.hardware.coarse.microsteps);
+        bench.run_ms(1);
+        if bench.alarm().is_some() {
+            bench.clear(); // it was homed, and pushed
+        }
+        let start = bench.now;
+        assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+        times.push((bench.now - start) / 100_000);
+    }
+    assert!(times[1] > 2 * times[0] && times[2] == times[0], "{times:?} tenths of a second");
+}

@@ -1,0 +1,190 @@
+//! Access to a running rig between two instructions: press its buttons, break its parts, take its power away, look into
+//! the chip's memory.
+
+use rigless::{
+    device::Level,
+    emulator::{Host, Memory, Stop},
+    mcu::Operate,
+    session::Session,
+    soc::Width,
+};
+
+use crate::{
+    board::{Chip, RAM, RigBoard, SpiChip, pins},
+    chips::{SharedPlant, with_plant},
+    plant::{Noise, Plant, StageName},
+    wiring::Wiring,
+};
+
+/// What cortex-m-rt paints the stack with before the program runs.
+const STACK_PAINT: u64 = 0xcccc_cccc;
+/// Where the firmware's stack lies, see its `memory.x`: first address and length.
+pub const STACK: (u64, u64) = (0x2000_0000, 128 << 10);
+/// RAM that the firmware does not use: its variables end well before.
+const FREE_RAM: u64 = 0x2002_f000;
+
+/// A rig that stands still between two instructions, for tests that break it or look into it.
+pub struct RigAccess<'a, 'h> {
+    pub(crate) session: &'a mut Session<RigBoard>,
+    pub(crate) host: &'a mut (dyn Host + 'h),
+    pub(crate) stop: Stop,
+    pub(crate) plant: &'a SharedPlant,
+    pub(crate) wiring: &'a mut Wiring,
+}
+
+impl RigAccess<'_, '_> {
+    /// Works on the plant.
+    pub fn plant<T>(&mut self, work: impl FnOnce(&mut Plant) -> T) -> T {
+        with_plant(self.plant, work)
+    }
+
+    fn chip(&mut self) -> &mut Chip {
+        &mut self.session.board_mut().chip
+    }
+
+    /// Presses the reset button.
+    pub fn press_reset(&mut self) {
+        self.session.reset_by_pin(self.stop.at, self.stop.instruction_count, self.host);
+    }
+
+    /// Presses the emergency stop (its circuit opens), or releases it.
+    pub fn set_emergency_stop(&mut self, pressed: bool) {
+        let at = self.stop.at;
+        for stage in [StageName::Sensor, StageName::Lens] {
+            self.chip().drive_pin(at, pins(stage).stop.0, Level::from(pressed));
+        }
+        self.chip().join_breaks(at);
+    }
+
+    /// The stepper driver reports a fault on DIAG, or takes it back.
+    pub fn set_driver_fault(&mut self, stage: StageName, fault: bool) {
+        let at = self.stop.at;
+        self.chip().drive_pin(at, pins(stage).diagnosis, Level::from(fault));
+    }
+
+    /// Cuts the data lines of a chip, or mends them.
+    pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
+        self.chip().disconnect(chip, cut);
+    }
+
+    /// Sets the supply, millivolts. The emulator's chip knows its detector but no brown-out: for that, see
+    /// [`RigAccess::brown_out`].
+    pub fn set_supply_mv(&mut self, millivolts: u32) {
+        self.chip().part().set_supply(millivolts);
+    }
+
+    /// Takes the power away: what is in the volatile memory is lost. Or gives it back.
+    pub fn set_power(&mut self, on: bool) {
+        let at = self.stop.at;
+        self.chip().power(at, on);
+        if !on {
+            forget(self.host);
+        }
+    }
+
+    /// The supply dips just long enough to reset the chip.
+    pub fn brown_out(&mut self) {
+        self.chip().expect_brown_out();
+        self.press_reset();
+    }
+
+    /// Lets the power fail when the firmware has written this many more bytes to its memory.
+    pub fn fail_power_after_memory_bytes(&mut self, bytes: u64) {
+        if let Some(memory) = self.chip().memory() {
+            memory.fail_after(bytes);
+        }
+    }
+
+    /// What the memory holds.
+    pub fn memory(&mut self) -> Vec<u8> {
+        self.chip().memory().map(|memory| memory.contents().to_vec()).unwrap_or_default()
+    }
+
+    /// Changes what the memory holds.
+    pub fn change_memory(&mut self, change: impl FnOnce(&mut [u8])) {
+        let mut contents = self.memory();
+        change(&mut contents);
+        let Ok(contents) = contents.try_into() else { return };
+        if let Some(memory) = self.chip().memory() {
+            memory.set_contents(&contents);
+        }
+    }
+
+    /// Writes a register of the chip behind the firmware's back, as a stray pointer would.
+    pub fn write_register(&mut self, address: u64, value: u64) {
+        let at = self.stop.at;
+        // An address without a register is what a stray pointer may have, too.
+        let _ = Operate::write(self.chip(), at, address, Width::W32, value);
+    }
+
+    /// Reads a word of the chip's volatile memory.
+    pub fn read_word(&mut self, address: u64) -> Option<u32> {
+        Memory::read(self.host, address, Width::W32).ok().map(|word| word as u32)
+    }
+
+    /// Writes a word of the chip's volatile memory, as a stray pointer would.
+    pub fn write_word(&mut self, address: u64, value: u32) {
+        let _ = Memory::write(self.host, address, Width::W32, u64::from(value));
+    }
+
+    /// Lets the firmware go on with this code, as a stray pointer would: the code is laid into free RAM, and the first
+    /// word of a variable (its address and length) that `is_function` takes for a pointer to a function is made to point
+    /// there. `false` where there is none.
+    pub fn lead_astray(
+        &mut self,
+        (variable, length): (u64, u64),
+        is_function: impl Fn(u32) -> bool,
+        code: &[u16],
+    ) -> bool {
+        let mut words = (variable..variable + length).step_by(4);
+        let found = words.find(|at| self.read_word(*at).is_some_and(&is_function));
+        let Some(at) = found else { return false };
+        for (half, i) in code.iter().zip(0..) {
+            if Memory::write(self.host, FREE_RAM + 2 * i, Width::W16, u64::from(*half)).is_err() {
+                return false;
+            }
+        }
+        self.write_word(at, FREE_RAM as u32 | 1);
+        true
+    }
+
+    /// The largest depth that the firmware's stack has had since the reset, bytes; start-up code paints it.
+    pub fn stack_depth(&mut self) -> u64 {
+        let (begin, length) = STACK;
+        let painted = (begin..begin + length)
+            .step_by(4)
+            .take_while(|address| Memory::read(self.host, *address, Width::W32).ok() == Some(STACK_PAINT));
+        length - 4 * painted.count() as u64
+    }
+
+    /// Begins to note when each STEP edge comes.
+    pub fn record_steps(&mut self) {
+        self.wiring.record_steps();
+    }
+
+    /// The STEP edges noted so far, stage A's and stage B's, in virtual nanoseconds.
+    pub fn take_steps(&mut self) -> [Vec<u64>; 2] {
+        self.wiring.take_steps()
+    }
+
+    /// The camera's host triggers it by software, for an image of this name.
+    pub fn expose(&mut self, exposure_us: u64, id: u32) {
+        self.wiring.camera_mut().expose(self.stop.at.0, exposure_us * 1000, id);
+    }
+
+    /// The camera's host lets it run freely, or (period 0) stops that.
+    pub fn run_camera_freely(&mut self, period_us: u64, exposure_us: u64) {
+        self.wiring.camera_mut().run_freely(self.stop.at.0, period_us * 1000, exposure_us * 1000);
+    }
+}
+
+/// The volatile memory loses what it held: at power-on it holds what nobody chose.
+pub fn forget(host: &mut dyn Host) {
+    let mut noise = Noise::new(0, "memory at power-on");
+    for (begin, length) in RAM {
+        for address in (begin..begin + length).step_by(8) {
+            // The emulator has these memories; what it refused would stay as it was.
+            let _ = Memory::write(host, address, Width::W64, noise.bits());
+        }
+    }
+}

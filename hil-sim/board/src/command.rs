@@ -1,0 +1,40 @@
+//! What a running rig can be asked from other threads, and where it puts what comes out of it.
+
+use std::sync::mpsc::Sender;
+
+use crate::{access::RigAccess, report::Report, wiring::Shot};
+
+/// Work to be done on a rig between two instructions.
+pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
+
+/// What the rig can be asked.
+pub enum Command {
+    /// Put bytes on the line to the board.
+    Bytes(Vec<u8>),
+    /// Let this much time pass.
+    Advance {
+        /// How much.
+        nanos: u64,
+        /// Told when it has passed.
+        done: Sender<Report>,
+    },
+    /// Let time pass until the board owes nothing.
+    Settle {
+        /// Told then.
+        done: Sender<Report>,
+    },
+    /// Do something with the rig between two instructions.
+    Access(Work),
+    /// Something that the camera's host asks of the camera; the host of the rig has spoken.
+    Camera(Work),
+    /// End.
+    End,
+}
+
+/// Where bytes and exposures go that come out of the rig.
+pub struct Outlets {
+    /// Bytes for the host, as the line delivers them; dropped when the port goes away.
+    pub bytes: Option<Sender<Vec<u8>>>,
+    /// Exposures, when they end.
+    pub shots: Sender<Shot>,
+}

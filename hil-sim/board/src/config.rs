@@ -1,0 +1,39 @@
+//! What an emulated rig is made of, and how its time passes.
+
+use std::path::PathBuf;
+
+use crate::faults::Faults;
+
+/// How virtual time passes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Pace {
+    /// Only as long as it is told to.
+    #[default]
+    Told,
+    /// While the board owes an answer or an event, and when told to.
+    Lockstep,
+    /// With the wall clock.
+    Realtime,
+}
+
+/// What an emulated rig is made of.
+#[derive(Clone, Debug)]
+pub struct RigConfig {
+    /// The firmware's ELF; `None` looks beside the program and the tests ([`crate::firmware::find`]).
+    pub firmware: Option<PathBuf>,
+    /// Decides everything random: the mechanics' errors, noise, jitter, the unique id, the line's faults.
+    pub seed: u64,
+    /// What goes wrong.
+    pub faults: Faults,
+    /// How time passes.
+    pub pace: Pace,
+    /// Where to write what the plant really did, as CSV.
+    pub trace: Option<PathBuf>,
+}
+
+impl Default for RigConfig {
+    /// Seed 1, no faults, time only when told.
+    fn default() -> Self {
+        Self { firmware: None, seed: 1, faults: Faults::default(), pace: Pace::Told, trace: None }
+    }
+}

@@ -1,0 +1,250 @@
+//! A host that speaks the protocol to the rig in this process.
+
+use farnear_protocol::{
+    Event, EventKind, Log, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
+    frame::{Header, Kind, Packet, encode},
+    message::{Alarm, AlarmRecord, Axis, Hello, Shot, Status, TriggerMode},
+};
+use farnear_sim::{EmulatedRig, Report, RigAccess, RigConfig};
+use object::{Object, ObjectSymbol, Symbol, SymbolKind};
+
+/// Long enough that no test's host is silent for so long, unless silence is what it tests.
+pub const SILENCE: Micros = Micros(60_000_000);
+
+/// A rig and a host that keeps count of its requests.
+pub struct Bench {
+    pub rig: EmulatedRig,
+    pub boot: u32,
+    next: u32,
+    pub events: Vec<Event>,
+    /// Bytes of the board's log.
+    pub log: Vec<u8>,
+}
+
+pub type Answer = Result<Response, RequestError>;
+
+/// The frame of a request.
+pub fn request_frame(id: u32, boot: u32, request: &Request) -> Vec<u8> {
+    encode(Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot }, request)
+        .expect("requests fit")
+        .to_vec()
+}
+
+/// The answer that a frame carries, if it is one.
+pub fn answer_in(packet: &Packet) -> Option<(u32, Answer)> {
+    let answer = match packet.header.kind {
+        Kind::Response => Ok(packet.message().expect("a response of this version")),
+        Kind::Error => Err(packet.message().expect("an error of this version")),
+        _ => return None,
+    };
+    Some((packet.header.id, answer))
+}
+
+impl Bench {
+    /// A rig with this seed that has said hello.
+    pub fn new(seed: u64) -> Self {
+        Self::with(&RigConfig { seed, ..RigConfig::default() })
+    }
+
+    pub fn with(config: &RigConfig) -> Self {
+        let rig = EmulatedRig::new(config).unwrap_or_else(|error| panic!("{error}"));
+        let mut bench = Self { rig, boot: 0, next: 0, events: Vec::new(), log: Vec::new() };
+        bench.say_hello();
+        bench
+    }
+
+    /// Says hello; from now on requests carry the board's boot number.
+    pub fn say_hello(&mut self) -> Hello {
+        self.boot = 0;
+        match self.ask(&Request::Hello) {
+            Ok(Response::Hello(hello)) => {
+                self.boot = hello.boot;
+                hello
+            }
+            other => panic!("no hello but {other:?}"),
+        }
+    }
+
+    /// Sends a request and gives its id, without letting time pass.
+    pub fn send(&mut self, request: &Request) -> u32 {
+        self.next += 1;
+        let frame = request_frame(self.next, self.boot, request);
+        self.rig.send(&frame).expect("the rig runs");
+        self.next
+    }
+
+    /// The answers that have come; events are kept in [`Bench::events`].
+    pub fn answers(&mut self) -> Vec<(u32, Answer)> {
+        let mut answers = Vec::new();
+        for packet in self.rig.take_frames() {
+            match answer_in(&packet) {
+                Some(answer) => answers.push(answer),
+                None if packet.header.kind == Kind::Log => {
+                    self.log.extend(packet.message::<Log>().expect("a log frame of this version").bytes);
+                }
+                None => self.events.push(packet.message().expect("an event of this version")),
+            }
+        }
+        answers
+    }
+
+    /// Sends a request and lets time pass until it is answered; asks again as hosts do, and gives up after three
+    /// repeats. Hosts wait 50 ms; the board answers within 2 ms, so waiting 10 ms is as good and cheaper.
+    pub fn try_ask(&mut self, request: &Request) -> Option<Answer> {
+        let id = self.send(request);
+        for attempt in 0..4 {
+            if attempt > 0 {
+                self.rig.send(&request_frame(id, self.boot, request)).expect("the rig runs");
+            }
+            for _ in 0..50 {
+                self.rig.advance_us(200).expect("the rig runs");
+                if let Some((_, answer)) = self.answers().into_iter().find(|(answered, _)| *answered == id) {
+                    return Some(answer);
+                }
+            }
+        }
+        None
+    }
+
+    /// The same, where an answer must come.
+    pub fn ask(&mut self, request: &Request) -> Answer {
+        self.try_ask(request).unwrap_or_else(|| panic!("no answer to {request:?}"))
+    }
+
+    /// Asks for something long and lets it end; gives the terminal event.
+    pub fn carry_out(&mut self, request: &Request) -> EventKind {
+        assert_eq!(self.ask(request), Ok(Response::Accepted), "{request:?}");
+        self.settle()
+    }
+
+    /// Lets the board come to rest; gives the last event.
+    pub fn settle(&mut self) -> EventKind {
+        self.rig.settle().expect("the rig runs");
+        self.answers();
+        self.events.last().expect("a terminal event").kind.clone()
+    }
+
+    /// Homes a stepper axis.
+    pub fn home_axis(&mut self, axis: Axis) {
+        let end = self.carry_out(&Request::Home { axis, silence: SILENCE });
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
+    }
+
+    /// Homes both stepper axes.
+    pub fn home(&mut self) {
+        self.home_axis(Axis::SensorCoarse);
+        self.home_axis(Axis::Lens);
+    }
+
+    pub fn move_to(&mut self, axis: Axis, target: Nanometres) -> EventKind {
+        self.carry_out(&go(axis, target.0))
+    }
+
+    /// Does something to the rig.
+    pub fn access(&mut self, work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static) {
+        self.rig.access(work).expect("the rig runs");
+    }
+
+    /// Looks at something in the rig.
+    pub fn peek<T: Send + 'static>(
+        &mut self,
+        look: impl FnOnce(&mut RigAccess<'_, '_>) -> T + Send + 'static,
+    ) -> T {
+        let (tell, told) = std::sync::mpsc::channel();
+        self.access(move |rig| tell.send(look(rig)).expect("somebody waits"));
+        told.recv().expect("the rig runs")
+    }
+
+    /// Address and length of a variable of the firmware, by a part of its name.
+    pub fn variable(&mut self, part: &str) -> (u64, u64) {
+        let found = symbols(|symbol| {
+            let named =
+                symbol.kind() == SymbolKind::Data && symbol.name().is_ok_and(|name| name.contains(part));
+            named && symbol.address() >= 0x2000_0000
+        });
+        *found.first().unwrap_or_else(|| panic!("the firmware has no {part}"))
+    }
+
+    /// Cycles of the firmware's longest control tick since its reset.
+    pub fn longest_tick(&mut self) -> u32 {
+        let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
+        self.peek(move |rig| rig.read_word(at)).expect("RAM")
+    }
+
+    /// Counts the longest tick anew.
+    pub fn forget_longest_tick(&mut self) {
+        let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
+        self.access(move |rig| rig.write_word(at, 0));
+    }
+
+    /// The alarm that is latched.
+    pub fn alarm(&mut self) -> Option<AlarmRecord> {
+        self.status().alarm
+    }
+
+    /// Clears the latched alarm, which must be this one.
+    pub fn clear(&mut self, expected: impl FnOnce(&Alarm) -> bool) {
+        let latched = self.alarm().expect("an alarm is latched");
+        assert!(expected(&latched.alarm), "{latched:?}");
+        let cleared = self.ask(&Request::ClearAlarm { number: latched.number });
+        assert_eq!(cleared, Ok(Response::Accepted), "{latched:?}");
+        assert_eq!(self.alarm(), None);
+    }
+
+    /// Loads and arms a program.
+    pub fn arm(&mut self, shots: &[Shot]) {
+        for (index, shot) in (0..).zip(shots) {
+            assert_eq!(self.ask(&Request::LoadShot { index, shot: *shot }), Ok(Response::Accepted));
+        }
+        let shots = u8::try_from(shots.len()).expect("a program's length");
+        assert_eq!(self.ask(&Request::ArmProgram { shots }), Ok(Response::Accepted));
+    }
+
+    /// Runs the armed program; gives its last event.
+    pub fn run(&mut self) -> EventKind {
+        self.carry_out(&Request::RunProgram { silence: SILENCE })
+    }
+
+    pub fn status(&mut self) -> Status {
+        match self.ask(&Request::Status) {
+            Ok(Response::Status(status)) => status,
+            other => panic!("no status but {other:?}"),
+        }
+    }
+
+    pub fn report(&mut self) -> Report {
+        self.rig.report().expect("the rig runs")
+    }
+}
+
+/// The request to move.
+pub fn go(axis: Axis, target_nm: i32) -> Request {
+    Request::Move { axis, target: Nanometres(target_nm), silence: SILENCE }
+}
+
+/// A shot on the piezo with a trigger pulse.
+pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32) -> Shot {
+    Shot {
+        axis: Axis::SensorFine,
+        target: Nanometres(target_nm),
+        exposure: Micros(exposure_us),
+        settle_window: Nanometres(window_nm),
+        settle_dwell: Micros(dwell_us),
+        repeat: 1,
+        mode: TriggerMode::Hardware,
+    }
+}
+
+/// How much of something a test does: what the environment says (`cargo xtask campaign` says more), or else this.
+pub fn amount<T: std::str::FromStr>(variable: &str, else_this: T) -> T {
+    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(else_this)
+}
+
+/// Address and length of the firmware's symbols that `wanted` takes.
+pub fn symbols(wanted: impl Fn(&Symbol<'_, '_>) -> bool) -> Vec<(u64, u64)> {
+    let elf = farnear_sim::firmware::find(None).expect("a firmware");
+    let bytes = std::fs::read(elf).expect("readable");
+    let elf = object::File::parse(&*bytes).expect("an ELF");
+    let found = elf.symbols().filter(|symbol| wanted(symbol));
+    found.map(|symbol| (symbol.address(), symbol.size())).collect()
+}

@@ -1,0 +1,199 @@
+//! Anything may come over the link: the board answers what is a request, stays alive, and never leaves its limits.
+
+use std::time::{Duration, Instant};
+
+use crate::bench::{Bench, amount, fine_shot, request_frame};
+use farnear_protocol::{
+    Micros, Nanometres, Request, Response,
+    message::{
+        Axis, CorrectionForm, CorrectionInfo, QueryDeviations, ResetCause, Routine, SettingKey, ShadowQuery,
+        SunQuery, TriggerMode,
+    },
+};
+use farnear_sim::plant::Noise;
+
+/// By the wall clock; the campaign fuzzes for a minute.
+const SECONDS: u64 = 5;
+/// Most positions and durations are wild, some are near the limits, some sensible.
+const EDGES: [i32; 12] =
+    [0, 1, -1, i32::MIN, i32::MAX, 13_000_000, 13_000_001, 5_000, 195_000, 100_000, 500_000, 6_000_000];
+
+struct Fuzz {
+    noise: Noise,
+    boot: u32,
+    id: u32,
+}
+
+impl Fuzz {
+    fn below(&mut self, end: u64) -> u64 {
+        self.noise.bits() % end
+    }
+
+    fn number(&mut self) -> i32 {
+        match self.below(3) {
+            0 => EDGES[self.below(EDGES.len() as u64) as usize],
+            1 => self.below(13_000_000) as i32,
+            _ => self.noise.bits() as i32,
+        }
+    }
+
+    fn axis(&mut self) -> Axis {
+        [Axis::SensorCoarse, Axis::SensorFine, Axis::Lens][self.below(3) as usize]
+    }
+
+    fn silence(&mut self) -> Micros {
+        [Micros(200_000), Micros(60_000_000), Micros(self.number() as u32)][self.below(3) as usize]
+    }
+
+    fn codes(&mut self) -> heapless::Vec<i16, 72> {
+        let count = self.below(73);
+        (0..count).map(|_| self.noise.bits() as i16).collect()
+    }
+
+    fn request(&mut self) -> Request {
+        let (axis, silence) = (self.axis(), self.silence());
+        let small = self.below(256) as u8;
+        match self.below(26) {
+            0 => Request::Hello,
+            1 => Request::Status,
+            2 => Request::Home { axis, silence },
+            3..=5 => Request::Move { axis, target: Nanometres(self.number()), silence },
+            6 => Request::Stop,
+            7 => {
+                let mode = [TriggerMode::Hardware, TriggerMode::Software, TriggerMode::FreeRunning];
+                let mut shot =
+                    fine_shot(self.number(), self.number() as u32, self.number(), self.number() as u32);
+                (shot.axis, shot.repeat) = (axis, self.below(4) as u16);
+                shot.mode = mode[self.below(3) as usize];
+                Request::LoadShot { index: small % 70, shot }
+            }
+            8 => Request::RunProgram { silence },
+            9 => Request::ReadEvent { number: self.number() as u32 },
+            10 => Request::Halt,
+            11 => Request::ArmProgram { shots: small % 70 },
+            12 => Request::PauseProgram,
+            13 => Request::ResumeProgram,
+            14 => {
+                let routine = [Routine::Travel { axis }, Routine::Backlash { axis }, Routine::Piezo];
+                Request::Calibrate { routine: routine[self.below(3) as usize], silence }
+            }
+            15 => Request::ReadAlarm { number: self.number() as u32 },
+            16 => Request::ClearAlarm { number: self.below(40) as u32 },
+            17 => {
+                let key = [
+                    SettingKey::CoarseBacklashNm,
+                    SettingKey::LensSpeedNmPerS,
+                    SettingKey::PiezoHysteresisPpm,
+                ];
+                Request::WriteSetting { key: key[self.below(3) as usize], value: self.number() }
+            }
+            18 => Request::ReadCounters,
+            19 => {
+                let deviations = QueryDeviations {
+                    day_e3: 0,
+                    time_s: self.number() as u32,
+                    latitude_e7: 0,
+                    longitude_e7: 0,
+                    azimuth_e7: self.number() as u32,
+                    camera_height_mm: 10,
+                    height_mm: self.number() as u32,
+                    distance_mm: 10,
+                };
+                let shadow = ShadowQuery {
+                    azimuth_e7: self.number(),
+                    camera_height_mm: self.number() as u32,
+                    distance_mm: self.number() as u32,
+                    lateral_mm: self.number(),
+                    height_mm: self.number() as u32,
+                    deviations,
+                };
+                Request::Sun(SunQuery {
+                    unix_seconds: self.noise.bits() as i64,
+                    latitude_e7: self.number(),
+                    longitude_e7: self.number(),
+                    shadow: Some(shadow),
+                })
+            }
+            20 => {
+                let form = [CorrectionForm::Regions, CorrectionForm::Blend, CorrectionForm::Full];
+                Request::OpenCorrection(CorrectionInfo {
+                    form: form[self.below(3) as usize],
+                    width: [640, 6, 1024, self.number() as u16][self.below(4) as usize],
+                    height: [480, 6, self.number() as u16][self.below(3) as usize],
+                    centre_um: self.number(),
+                    half_span_um: self.number(),
+                })
+            }
+            21 => Request::FitSamples {
+                row: self.below(500) as u16,
+                first: self.below(700) as u16,
+                step: self.below(9) as u16,
+                truth: self.noise.bits() as i16,
+                codes: self.codes(),
+            },
+            22 => Request::SolveFit,
+            23 => Request::PutRow { first: self.below(1100) as u16, codes: self.codes() },
+            24 => Request::CorrectRow { row: self.below(500) as u16 },
+            _ => Request::GetRow { first: self.below(1100) as u16, count: small },
+        }
+    }
+
+    /// Bytes for the line: mostly good frames, some spoilt, some garbage.
+    fn bytes(&mut self) -> Vec<u8> {
+        self.id += 1;
+        let request = self.request();
+        let mut frame = request_frame(self.id, self.boot, &request);
+        match self.below(8) {
+            0 => {
+                let place = self.below(frame.len() as u64) as usize;
+                frame[place] ^= 1 << self.below(8);
+            }
+            1 => frame.truncate(self.below(frame.len() as u64) as usize),
+            2 => {
+                let count = self.below(600);
+                frame = (0..count).map(|_| self.noise.bits() as u8).collect();
+            }
+            _ => {}
+        }
+        frame
+    }
+}
+
+#[test]
+fn nothing_on_the_link_stops_the_board() {
+    let mut bench = Bench::new(amount("FARNEAR_SEED", 1));
+    let mut fuzz = Fuzz { noise: Noise::new(amount("FARNEAR_SEED", 1), "fuzz"), boot: bench.boot, id: 1_000 };
+    let until = Instant::now() + Duration::from_secs(amount("FARNEAR_FUZZ_SECONDS", SECONDS));
+    let mut sent = 0u64;
+    while Instant::now() < until {
+        for _ in 0..20 {
+            let bytes = fuzz.bytes();
+            bench.rig.send(&bytes).expect("runs");
+            sent += 1;
+            let pause = fuzz.below(3_000);
+            bench.rig.advance_us(pause).expect("the emulated board runs");
+        }
+        // Whatever was said: the ends of the travel are not touched, and the board is the same boot.
+        let report = bench.report();
+        assert_eq!(report.resets, 0, "the board was reset after {sent} frames");
+        for stage in [report.coarse, report.lens] {
+            assert!((-500.0..13_600.0).contains(&stage.position_um), "{report:?}");
+        }
+        bench.rig.take_bytes();
+    }
+    // The end of a broken frame, and the board answers as ever.
+    bench.rig.send(&[0]).expect("runs");
+    bench.rig.advance_us(5_000).expect("runs");
+    bench.rig.take_bytes();
+    let hello = bench.say_hello();
+    assert_eq!((hello.boot, hello.reset_cause), (fuzz.boot, ResetCause::PowerOn));
+    assert_eq!(bench.ask(&Request::Stop), Ok(Response::Accepted));
+    bench.rig.advance_us(3_000_000).expect("runs");
+    bench.answers();
+    if let Some(latched) = bench.alarm() {
+        assert_eq!(bench.ask(&Request::ClearAlarm { number: latched.number }), Ok(Response::Accepted));
+    }
+    let longest = bench.longest_tick();
+    let depth = bench.peek(|rig| rig.stack_depth());
+    println!("{sent} frames; the longest tick took {longest} instructions; the stack was {depth} bytes deep");
+}

@@ -1,0 +1,17 @@
+//! The emulated board: the real firmware, the plant around it, and the program that offers both to clients. One
+//! program for all of it, so that it is linked once and its tests run side by side.
+
+mod accuracy;
+mod bad_line;
+mod bench;
+mod calibration;
+mod fuzz;
+mod maths;
+mod memory;
+mod program;
+mod pty;
+mod repeat;
+mod reset;
+mod session;
+mod silence;
+mod steps;

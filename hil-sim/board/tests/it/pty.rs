@@ -1,0 +1,268 @@
+//! The program as a client sees it: its JSON line, the pty through `serialport`, the camera endpoint, its end.
+
+use std::{
+    collections::VecDeque,
+    io::{BufRead, BufReader, Read, Write},
+    net::TcpStream,
+    path::Path,
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use crate::bench::{Answer, SILENCE, answer_in, fine_shot, go, request_frame};
+use farnear_protocol::{
+    Event, EventKind, Request, Response,
+    camera::{Control, FRAME_HEADER, FrameHeader},
+    frame::{Decoder, Kind},
+    message::Axis,
+};
+use serialport::SerialPort;
+
+/// Far longer than anything here takes, so that a hang fails instead of hanging.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct Program {
+    child: Child,
+    port: String,
+    camera: String,
+}
+
+impl Program {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+            .arg("run")
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("farnear-sim starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("text");
+        let value = |key: &str| {
+            let (_, rest) =
+                line.split_once(&format!("\"{key}\": \"")).unwrap_or_else(|| panic!("no {key}: {line}"));
+            rest.split('"').next().expect("a value").to_string()
+        };
+        let (port, camera) = (value("port"), value("camera"));
+        Self { child, port, camera }
+    }
+
+    /// Closes its standard input and waits for its end.
+    fn end(mut self) -> std::process::ExitStatus {
+        drop(self.child.stdin.take());
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("can be waited for") {
+                return status;
+            }
+            if Instant::now() > deadline {
+                self.child.kill().expect("can be killed");
+                panic!("farnear-sim did not end when its standard input closed");
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+struct Client {
+    port: Box<dyn SerialPort>,
+    decoder: Decoder,
+    /// Bytes that came behind what was waited for.
+    rest: VecDeque<u8>,
+    boot: u32,
+    next: u32,
+}
+
+impl Client {
+    fn open(name: &str) -> Self {
+        let port = serialport::new(name, 2_000_000)
+            .timeout(Duration::from_millis(100))
+            .open()
+            .expect("the pty opens");
+        let mut client = Self { port, decoder: Decoder::new(), rest: VecDeque::new(), boot: 0, next: 0 };
+        match client.ask(&Request::Hello) {
+            Ok(Response::Hello(hello)) => client.boot = hello.boot,
+            other => panic!("no hello but {other:?}"),
+        }
+        client
+    }
+
+    /// The next frame that `wanted` takes.
+    fn wait<T>(&mut self, wanted: impl Fn(&farnear_protocol::frame::Packet) -> Option<T>) -> T {
+        let deadline = Instant::now() + PATIENCE;
+        let mut bytes = [0; 256];
+        while Instant::now() < deadline {
+            let read = if self.rest.is_empty() { self.port.read(&mut bytes) } else { Ok(0) };
+            let count = match read {
+                Ok(count) => count,
+                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => 0,
+                Err(error) => panic!("the port failed: {error}"),
+            };
+            self.rest.extend(&bytes[..count]);
+            while let Some(byte) = self.rest.pop_front() {
+                if let Some(Ok(packet)) = self.decoder.push(byte)
+                    && let Some(found) = wanted(&packet)
+                {
+                    return found;
+                }
+            }
+        }
+        panic!("nothing came");
+    }
+
+    fn ask(&mut self, request: &Request) -> Answer {
+        self.next += 1;
+        let id = self.next;
+        self.port.write_all(&request_frame(id, self.boot, request)).expect("the port takes bytes");
+        self.wait(|packet| {
+            answer_in(packet).filter(|(answered, _)| *answered == id).map(|(_, answer)| answer)
+        })
+    }
+
+    fn time_us(&mut self) -> u64 {
+        match self.ask(&Request::Status) {
+            Ok(Response::Status(status)) => status.time.0,
+            other => panic!("no status but {other:?}"),
+        }
+    }
+
+    fn carry_out(&mut self, request: &Request) -> EventKind {
+        assert_eq!(self.ask(request), Ok(Response::Accepted));
+        self.wait(|packet| {
+            let event: Event = (packet.header.kind == Kind::Event).then(|| packet.message())??;
+            let ended = !matches!(event.kind, EventKind::Started { .. } | EventKind::ShotDone { .. });
+            ended.then_some(event.kind)
+        })
+    }
+}
+
+fn receive_frame(camera: &mut TcpStream) -> (FrameHeader, Vec<u8>) {
+    let mut length = [0; 4];
+    camera.read_exact(&mut length).expect("a frame");
+    let mut header = [0; FRAME_HEADER];
+    camera.read_exact(&mut header).expect("a header");
+    let mut pixels = vec![0; u32::from_le_bytes(length) as usize - FRAME_HEADER];
+    camera.read_exact(&mut pixels).expect("pixels");
+    (FrameHeader::from_bytes(&header).expect("a valid header"), pixels)
+}
+
+/// Homes, goes to the far focus, exposes far and near; gives both frames.
+fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
+    let mut client = Client::open(&program.port);
+    for axis in [Axis::SensorCoarse, Axis::Lens] {
+        let homed = client.carry_out(&Request::Home { axis, silence: SILENCE });
+        assert!(matches!(homed, EventKind::Homed { .. }), "{homed:?}");
+    }
+    for (axis, target) in [(Axis::SensorCoarse, 5_821_300), (Axis::Lens, 1_000)] {
+        let moved = client.carry_out(&go(axis, target));
+        assert!(matches!(moved, EventKind::MoveDone { .. }), "{moved:?}");
+    }
+    for (index, target) in [(0, 10_000), (1, 166_270)] {
+        let shot = fine_shot(target, 5_000, 50, 2_000);
+        assert_eq!(client.ask(&Request::LoadShot { index, shot }), Ok(Response::Accepted));
+    }
+    assert_eq!(client.ask(&Request::ArmProgram { shots: 2 }), Ok(Response::Accepted));
+    let done = client.carry_out(&Request::RunProgram { silence: SILENCE });
+    assert!(matches!(done, EventKind::ProgramDone { exposures: 2, .. }), "{done:?}");
+    // The frames have waited for us.
+    let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
+    camera.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+    (0..2).map(|_| receive_frame(&mut camera)).collect()
+}
+
+#[test]
+fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
+    let arguments = ["--scene", "staircase", "--noise", "8bit", "--seed", "3"];
+    let program = Program::start(&arguments);
+    let first = capture(&program);
+    assert!(program.end().success());
+    assert_eq!((first[0].0.width, first[0].0.height, first[0].0.bits), (640, 480, 8));
+    assert_eq!([first[0].0.shot_id, first[1].0.shot_id], [0, 1]);
+    assert_ne!(first[0].1, first[1].1, "far and near look alike");
+    let program = Program::start(&arguments);
+    let second = capture(&program);
+    assert!(program.end().success());
+    assert!(first == second, "two programs with one seed differ");
+}
+
+#[test]
+fn time_stands_still_unless_told_to_pass() {
+    let program = Program::start(&[]);
+    let mut client = Client::open(&program.port);
+    let before = client.time_us();
+    std::thread::sleep(Duration::from_millis(300));
+    let asked_us = client.time_us() - before;
+    assert!(asked_us < 50_000, "{asked_us} us passed while nobody asked for anything");
+
+    let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
+    let mut body = [0; 16];
+    let body = postcard::to_slice(&Control::AdvanceMicros(2_000_000), &mut body).expect("fits");
+    camera.write_all(&(body.len() as u32).to_le_bytes()).expect("open");
+    camera.write_all(body).expect("open");
+    let deadline = Instant::now() + PATIENCE;
+    while client.time_us() < before + 2_000_000 {
+        assert!(Instant::now() < deadline, "time does not pass");
+    }
+    assert!(program.end().success());
+}
+
+#[test]
+fn a_paced_rig_answers_too() {
+    let program = Program::start(&["--paced"]);
+    let mut client = Client::open(&program.port);
+    let before = client.time_us();
+    while client.time_us() < before + 100_000 {}
+    assert!(program.end().success());
+}
+
+#[test]
+fn garbage_comes_first_and_the_port_goes_away_in_mid_move() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let faults = folder.path().join("faults.toml");
+    std::fs::write(&faults, "garbage = [1, 255, 0, 66, 7]\nunplug_after_ms = 1000\n").expect("can write");
+    let program = Program::start(&["--faults", faults.to_str().expect("text")]);
+    let mut client = Client::open(&program.port);
+    assert_eq!(
+        client.ask(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE }),
+        Ok(Response::Accepted)
+    );
+    let deadline = Instant::now() + PATIENCE;
+    let mut bytes = [0; 64];
+    let gone = loop {
+        assert!(Instant::now() < deadline, "the port is still there");
+        match client.port.read(&mut bytes) {
+            Err(error) if error.kind() != std::io::ErrorKind::TimedOut => break error,
+            _ => {}
+        }
+    };
+    println!("the client sees: {gone}");
+    assert!(!Path::new(&program.port).exists(), "its name has gone, too");
+    assert!(program.end().success());
+}
+
+#[test]
+fn a_missing_firmware_names_the_command_that_builds_it() {
+    let output = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+        .args(["run", "--firmware", "no/such.elf"])
+        .output()
+        .expect("starts");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && output.stdout.is_empty());
+    assert!(message.contains("no/such.elf") && message.contains("cargo xtask firmware"), "{message}");
+}
+
+#[test]
+fn a_file_that_is_no_firmware_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let elf = folder.path().join("no.elf");
+    for content in [&b"this is no ELF"[..], b""] {
+        std::fs::write(&elf, content).expect("can write");
+        let output = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+            .args(["run", "--firmware", elf.to_str().expect("text")])
+            .output()
+            .expect("starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{message}");
+        assert!(message.contains("no.elf"), "{message}");
+    }
+}

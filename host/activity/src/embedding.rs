@@ -1,0 +1,144 @@
+//! From silhouettes to points in few dimensions (Li 2014, section 9.3.1).
+//!
+//! A mask becomes a 360-number centroid distance ([`descriptor`]); a gallery of those is laid out by [`isomap`] (or [`landmark`]
+//! Isomap for large galleries, or [`pca`] for comparison); [`rbf`] learns the map that embeds new silhouettes.
+//!
+//! Matrices are row-major `Array2<f32>`, one sample per row. Work is spread over the current rayon pool: inside a pool of one
+//! thread everything runs on that thread.
+
+pub mod descriptor;
+pub mod geodesic;
+pub mod isomap;
+pub mod landmark;
+pub mod neighbours;
+pub mod pca;
+pub mod rbf;
+mod spectral;
+
+use ndarray::{Array2, ArrayView2};
+
+/// Why an embedding could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EmbeddingError {
+    /// Whoever watches the work stopped it.
+    #[error("stopped before the embedding was made")]
+    Stopped,
+    /// Fewer samples than needed.
+    #[error("{found} samples are too few: {needed} are needed")]
+    TooFewSamples {
+        /// Samples given.
+        found: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// A value is not a number.
+    #[error("sample {row} holds a value that is not finite")]
+    NotFinite {
+        /// Row of the sample.
+        row: usize,
+    },
+    /// The neighbour graph falls apart.
+    #[error("the neighbour graph falls into {} parts ({}); raise the number of neighbours (now {neighbours}), or drop the samples that lie apart", .components.len(), describe(.components))]
+    Disconnected {
+        /// The samples of each part, largest part first.
+        components: Vec<Vec<usize>>,
+        /// What was asked for.
+        neighbours: String,
+    },
+    /// Fewer dimensions carry anything than were asked for.
+    #[error(
+        "only {found} eigenvalues are positive, {asked} dimensions were asked for: ask for at most {found}"
+    )]
+    TooFewDimensions {
+        /// Positive eigenvalues.
+        found: usize,
+        /// Dimensions asked for.
+        asked: usize,
+    },
+    /// The RBF system cannot be solved.
+    #[error(
+        "the RBF system is singular with ridge {ridge}: raise it (1e-4 to 1e-2 are usual) or drop doubled samples"
+    )]
+    Singular {
+        /// The ridge used.
+        ridge: f64,
+    },
+    /// Shapes that do not belong together.
+    #[error("{what}: expected {expected}, found {found}")]
+    Shape {
+        /// Which array.
+        what: &'static str,
+        /// Expected length.
+        expected: usize,
+        /// Found length.
+        found: usize,
+    },
+}
+
+/// Sizes and first members of the parts of a graph, for the error's text.
+fn describe(components: &[Vec<usize>]) -> String {
+    const SHOWN: usize = 4;
+    let mut text: Vec<String> = components
+        .iter()
+        .take(SHOWN)
+        .map(|members| match members.as_slice() {
+            [only] => format!("sample {only} alone"),
+            [first, second] => format!("samples {first} and {second}"),
+            [first, second, ..] => format!("{} samples from {first}, {second} on", members.len()),
+            [] => String::from("empty"),
+        })
+        .collect();
+    if components.len() > SHOWN {
+        text.push(format!("and {} more", components.len() - SHOWN));
+    }
+    text.join("; ")
+}
+
+/// Checks that all rows are finite and that there are enough.
+fn check(samples: ArrayView2<f32>, needed: usize) -> Result<(), EmbeddingError> {
+    if samples.nrows() < needed {
+        return Err(EmbeddingError::TooFewSamples { found: samples.nrows(), needed });
+    }
+    match samples.rows().into_iter().position(|row| row.iter().any(|v| !v.is_finite())) {
+        Some(row) => Err(EmbeddingError::NotFinite { row }),
+        None => Ok(()),
+    }
+}
+
+/// `a b^T` of two row-major matrices over the current rayon pool.
+pub(crate) fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2<f32> {
+    let (a, b) = (a.as_standard_layout(), b.as_standard_layout());
+    let mut product = Array2::<f32>::zeros((a.nrows(), b.nrows()));
+    if let (Some(left), Some(right)) = (a.as_slice(), b.as_slice()) {
+        let (rows, columns) = product.dim();
+        if let Some(out) = product.as_slice_mut() {
+            faer::linalg::matmul::matmul(
+                faer::MatMut::from_row_major_slice_mut(out, rows, columns),
+                faer::Accum::Replace,
+                faer::MatRef::from_row_major_slice(left, a.nrows(), a.ncols()),
+                faer::MatRef::from_row_major_slice(right, b.nrows(), b.ncols()).transpose(),
+                1.0,
+                faer::Par::rayon(0),
+            );
+        }
+    }
+    product
+}
+
+/// Squared Euclidean norm of every row.
+pub(crate) fn squared_norms(samples: ArrayView2<f32>) -> Vec<f32> {
+    samples.rows().into_iter().map(|row| row.iter().map(|v| v * v).sum()).collect()
+}
+
+/// Squared distance in eight partial sums, so that it vectorises.
+#[inline(always)]
+pub(crate) fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for k in 0..8 {
+            sums[k] += (a[k] - b[k]) * (a[k] - b[k]);
+        }
+    }
+    let rest = a.chunks_exact(8).remainder().iter().zip(b.chunks_exact(8).remainder());
+    sums.iter().sum::<f32>() + rest.map(|(a, b)| (a - b) * (a - b)).sum::<f32>()
+}

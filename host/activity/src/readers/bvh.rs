@@ -1,0 +1,43 @@
+//! BVH motion capture (Biovision hierarchical data): a skeleton and its joints' angles, turned into joints in space.
+//!
+//! [`parse`] reads the text, [`kinematics`] puts the joints where the angles say, [`guess`] tells the unit and the axis that points
+//! up, which BVH files do not state. Every joint and every end site becomes a named point, visible in every frame, so that templates
+//! dress them as they dress markers. Cost: linear in the file.
+
+pub mod guess;
+pub mod kinematics;
+pub mod parse;
+
+use super::reader::Reader;
+use super::recording::{Found, RecordingError, text};
+use kinematics::Kinematics;
+
+/// The entry of [`super::READERS`].
+pub const READER: Reader = Reader {
+    name: "BVH",
+    extensions: &["bvh"],
+    about: "joints of a skeleton (CMU's library, Mixamo and many others); unit and up are guessed from the body",
+    read,
+};
+
+/// Reads a BVH file.
+///
+/// # Errors
+/// [`RecordingError::Line`]: what stands there and what was expected.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    let motion = parse::parse(text(bytes)?)?;
+    let kinematics = Kinematics::new(&motion);
+    let frames = motion
+        .frames
+        .iter()
+        .map(|frame| kinematics.places(frame).into_iter().map(Some).collect())
+        .collect();
+    let rate_hz = 1.0 / motion.frame_time_s;
+    Ok(Found {
+        unit: guess::unit(&motion.joints),
+        up: guess::up(&motion, &kinematics),
+        names: motion.joints.iter().map(|joint| joint.name.clone()).collect(),
+        rate_hz: if rate_hz.is_finite() { rate_hz } else { 0.0 },
+        frames,
+    })
+}

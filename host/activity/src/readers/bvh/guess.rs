@@ -1,0 +1,215 @@
+//! What a BVH file does not say: its unit of length and which axis points up. Both are told from the body.
+//!
+//! Joints are known by their names: whatever holds `head` is the head, whatever holds `foot`, `ankle` or `toe` a foot. Some writers
+//! keep every bone along one axis and put the body upright by rotations only, so that the rest pose folds head and feet to one
+//! side of the hips; it then says nothing of up, and the frames are asked. Lengths along the bones hold in every pose.
+
+use super::super::recording::{Known, Source, Unit, Up};
+use super::kinematics::{Kinematics, at_rest};
+use super::parse::{Joint, Motion};
+use crate::silhouette::capsule::Point3;
+
+/// Statures that a person has, metres.
+const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
+/// The middle of them by ratio.
+const TYPICAL_M: f64 = 1.7;
+/// Part of the way from the feet to the head that lies along an axis for it to be up beyond doubt.
+const UPRIGHT: f64 = 0.8;
+/// Frames that are asked for up at most, spread over the recording.
+const FRAMES_ASKED: usize = 100;
+
+/// The joints by which a body is measured.
+struct Body {
+    root: usize,
+    head: usize,
+    feet: Vec<usize>,
+}
+
+impl Body {
+    /// By names; `None` where no joint is named head or no joint foot.
+    fn of(joints: &[Joint]) -> Option<Self> {
+        let named = |keys: &[&str]| -> Vec<usize> {
+            let holds = |joint: &Joint| {
+                let name = joint.name.to_lowercase();
+                keys.iter().any(|key| name.contains(key))
+            };
+            (0..joints.len()).filter(|&j| holds(&joints[j])).collect()
+        };
+        // The end of the longest way up is the crown, or as near to it as the file goes.
+        let longest = |among: Vec<usize>| {
+            among.into_iter().max_by(|&a, &b| length(joints, a).total_cmp(&length(joints, b)))
+        };
+        let (head, feet) = (longest(named(&["head"]))?, named(&["foot", "ankle", "toe"]));
+        let mut root = head;
+        while let Some(parent) = joints[root].parent {
+            root = parent;
+        }
+        (!feet.is_empty()).then_some(Self { root, head, feet })
+    }
+
+    /// From the feet to the head.
+    fn upward(&self, places: &[Point3]) -> Point3 {
+        let feet: Point3 = std::array::from_fn(|k| {
+            self.feet.iter().map(|&foot| places[foot][k]).sum::<f64>() / self.feet.len() as f64
+        });
+        std::array::from_fn(|k| places[self.head][k] - feet[k])
+    }
+
+    /// Whether head and feet lie on either side of the root.
+    fn unfolded(&self, places: &[Point3]) -> bool {
+        let root = places[self.root];
+        let up = self.upward(places);
+        let head: f64 = (0..3).map(|k| (places[self.head][k] - root[k]) * up[k]).sum();
+        let all: f64 = up.iter().map(|v| v * v).sum();
+        0.0 < head && head < all
+    }
+
+    /// From head to toe along the bones.
+    fn stature(&self, joints: &[Joint]) -> f64 {
+        let leg = self.feet.iter().map(|&foot| length(joints, foot)).fold(0.0, f64::max);
+        length(joints, self.head) + leg
+    }
+}
+
+/// The length of the way from a joint to its root along the bones; the root's own offset is a place and not a bone.
+fn length(joints: &[Joint], mut joint: usize) -> f64 {
+    let mut sum = 0.0;
+    while let Some(parent) = joints[joint].parent {
+        sum += joints[joint].offset.iter().map(|v| v * v).sum::<f64>().sqrt();
+        joint = parent;
+    }
+    sum
+}
+
+/// The unit that makes the skeleton a person's.
+pub fn unit(joints: &[Joint]) -> Known<Unit> {
+    let (size, what) = match Body::of(joints) {
+        Some(body) => (body.stature(joints), "from head to toe along the bones"),
+        None => (extent(joints), "at its longest, without a joint that is named head or foot"),
+    };
+    let far = |mm: f64| (size * mm / 1000.0 / TYPICAL_M).ln().abs();
+    let mut value = Unit::MM;
+    for (_, mm, _) in Unit::NAMED {
+        if far(mm) < far(value.mm) {
+            value = Unit { mm };
+        }
+    }
+    let metres = size * value.mm / 1000.0;
+    let sure = STATURE_M.contains(&metres);
+    let (low, high) = (STATURE_M.start(), STATURE_M.end());
+    let person = if sure { "as a person of" } else { "not a person of" };
+    let reason = format!(
+        "for the skeleton is {size:.2} long {what}, which makes {metres:.2} m ({person} {low} to {high} m)"
+    );
+    Known { value, source: Source::Guess { reason, sure } }
+}
+
+/// The largest extent of the rest pose along an axis: a body with its arms out is as wide as it is tall.
+fn extent(joints: &[Joint]) -> f64 {
+    let places = at_rest(joints);
+    let along = |k: usize| {
+        let values = || places.iter().map(|place| place[k]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    (0..3).map(along).fold(0.0, f64::max)
+}
+
+/// The axis along which the head lies above the feet.
+pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
+    let Some(body) = Body::of(&motion.joints) else {
+        let reason = "for BVH files mostly have it so, and no joint is named head or foot to tell by".into();
+        return Known { value: Up::Y, source: Source::Guess { reason, sure: false } };
+    };
+    let rest = at_rest(&motion.joints);
+    let (upward, what) = if body.unfolded(&rest) {
+        (body.upward(&rest), "in the rest pose")
+    } else {
+        let step = motion.frames.len().div_ceil(FRAMES_ASKED).max(1);
+        let mut sum = [0.0; 3];
+        for frame in motion.frames.iter().step_by(step) {
+            let upward = body.upward(&kinematics.places(frame));
+            (0..3).for_each(|k| sum[k] += upward[k]);
+        }
+        (sum, "over the frames (the rest pose is folded up)")
+    };
+    let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let axes = [Up::X, Up::Y, Up::Z].into_iter().zip(upward);
+    // BVH files mostly have y up: another axis must do better, not as well.
+    let (value, along) =
+        axes.fold((Up::Y, upward[1]), |best, next| if next.1 > best.1 { next } else { best });
+    let part = if length > 0.0 { along / length } else { 0.0 };
+    let reason = format!("for {:.0} % of the way from the feet to the head {what} lie along it", 100.0 * part);
+    Known { value, source: Source::Guess { reason, sure: part >= UPRIGHT } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parse::parse;
+    use super::*;
+
+    /// A body of 17 from toe to head at rest, `scale` times as large, its rest pose turned by a function of the axes.
+    fn body(scale: f64, turned: fn(Point3) -> Point3, frame: &str) -> Motion {
+        let at = |p: Point3| {
+            let [x, y, z] = turned(p.map(|v| v * scale));
+            format!("OFFSET {x} {y} {z}")
+        };
+        let joint = "CHANNELS 3 Zrotation Xrotation Yrotation";
+        let (head, crown, leg, foot) =
+            (at([0.0, 5.0, 0.0]), at([0.0, 3.0, 0.0]), at([0.0, -4.0, 0.0]), at([0.0, -5.0, 0.0]));
+        parse(&format!(
+            "HIERARCHY\nROOT Hips\n{{ OFFSET 0 0 0 {joint}\nJOINT Head\n{{ {head} {joint} End Site {{ {crown} }} }}\n\
+             JOINT Leg\n{{ {leg} {joint}\nJOINT LeftFoot\n{{ {foot} {joint} }} }} }}\nMOTION\nFrames: 1\nFrame Time: 1\n{frame}\n"
+        ))
+        .expect("a BVH file")
+    }
+
+    const STILL: &str = "0 0 0 0 0 0 0 0 0 0 0 0";
+
+    fn sure<T>(known: &Known<T>) -> bool {
+        matches!(known.source, Source::Guess { sure: true, .. })
+    }
+
+    #[test]
+    fn the_unit_makes_a_person_of_the_skeleton() {
+        for (scale, mm) in [(0.1, 1000.0), (10.0, 10.0), (4.0, 25.4), (100.0, 1.0), (1.8, 25.4 / 0.45)] {
+            let found = unit(&body(scale, |p| p, STILL).joints);
+            assert!((found.value.mm - mm).abs() < 1e-9 && sure(&found), "{scale} {found:?}");
+        }
+        // 17 x 60 units: a metre if they are millimetres, and nothing else is nearer.
+        let dwarf = unit(&body(60.0, |p| p, STILL).joints);
+        assert!(!sure(&dwarf), "{dwarf:?}");
+    }
+
+    #[test]
+    fn up_is_the_axis_that_the_head_lies_above_the_feet_along() {
+        let turns: [(fn(Point3) -> Point3, Up); 3] = [
+            (|p| p, Up::Y),
+            (|[x, y, z]| [x, -z, y], Up::Z),
+            (|[x, y, z]| [y, z, x], Up::X),
+        ];
+        for (turned, expected) in turns {
+            let motion = body(1.0, turned, STILL);
+            let found = up(&motion, &Kinematics::new(&motion));
+            assert!(found.value == expected && sure(&found), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_folded_rest_pose_is_not_asked() {
+        // All bones along x; the hips' rotation by 90 deg about z points the head up, the leg's by 180 deg the foot down.
+        let motion = body(1.0, |[x, y, z]| [y.abs(), x, z], "90 0 0 0 0 0 180 0 0 0 0 0");
+        let found = up(&motion, &Kinematics::new(&motion));
+        // The leg's own joint is 4 up; the foot hangs 5 below that.
+        assert_eq!(found.value, Up::Y);
+        assert!(matches!(&found.source, Source::Guess { reason, .. } if reason.contains("over the frames")), "{found:?}");
+    }
+
+    #[test]
+    fn without_names_the_guess_is_doubtful() {
+        let text = "HIERARCHY ROOT a\n{ OFFSET 0 0 0 CHANNELS 1 Xrotation End Site { OFFSET 0 170 0 } } MOTION\nFrames: 1\nFrame Time: 1\n0\n";
+        let motion = parse(text).expect("a BVH file");
+        assert_eq!(unit(&motion.joints).value.mm, 10.0);
+        let found = up(&motion, &Kinematics::new(&motion));
+        assert!(found.value == Up::Y && !sure(&found), "{found:?}");
+    }
+}

@@ -1,0 +1,164 @@
+//! Forward kinematics: from a frame's numbers to where every joint is.
+//!
+//! A joint's rotation is the product of its rotation channels in the order of the file, each about the axes as the ones before
+//! have turned them (intrinsic): `Zrotation Yrotation Xrotation` is `Rz Ry Rx` before a column vector. A joint lies at its parent's
+//! place plus the parent's whole turn times its own translation; its own rotation turns what hangs on it. O(joints) a frame.
+
+use super::parse::{Channel, Joint, Motion};
+use crate::silhouette::capsule::Point3;
+
+type Matrix = [[f64; 3]; 3];
+
+const STRAIGHT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// The joints' places at rest: all rotations nought, every joint at its offset. The file's unit and axes.
+pub fn at_rest(joints: &[Joint]) -> Vec<Point3> {
+    let mut places: Vec<Point3> = Vec::with_capacity(joints.len());
+    for joint in joints {
+        let from = joint.parent.map_or([0.0; 3], |parent| places[parent]);
+        places.push(std::array::from_fn(|k| from[k] + joint.offset[k]));
+    }
+    places
+}
+
+/// Where the joints are, frame by frame.
+#[derive(Clone, Debug)]
+pub struct Kinematics<'a> {
+    joints: &'a [Joint],
+    /// Per joint, whether its position channels take the place of its offset (or are added to it).
+    replaces: Vec<bool>,
+}
+
+impl<'a> Kinematics<'a> {
+    /// For the joints of a motion, whose first frame tells how position channels are meant.
+    ///
+    /// Biovision's own description adds them to the joint's offset; most of today's writers put the whole translation into the
+    /// channels. With offset o and first position p the channels replace the offset where p is nearer to o than to nought.
+    pub fn new(motion: &'a Motion) -> Self {
+        let mut replaces = Vec::with_capacity(motion.joints.len());
+        let mut from = 0;
+        for joint in &motion.joints {
+            let values = motion.frames.first().and_then(|frame| frame.get(from..)).unwrap_or_default();
+            let mut along = 0.0;
+            for (channel, value) in joint.channels.iter().zip(values) {
+                if let Channel::Position(axis) = *channel {
+                    along += value * joint.offset[axis];
+                }
+            }
+            let length: f64 = joint.offset.iter().map(|v| v * v).sum();
+            replaces.push(2.0 * along > length);
+            from += joint.channels.len();
+        }
+        Self { joints: &motion.joints, replaces }
+    }
+
+    /// The joints' places in a frame of as many values as there are channels; the file's unit and axes.
+    pub fn places(&self, frame: &[f64]) -> Vec<Point3> {
+        let mut values = frame.iter().copied();
+        let mut places: Vec<Point3> = Vec::with_capacity(self.joints.len());
+        let mut turns: Vec<Matrix> = Vec::with_capacity(self.joints.len());
+        for (joint, replaces) in self.joints.iter().zip(&self.replaces) {
+            let (from, turn) = joint.parent.map_or(([0.0; 3], STRAIGHT), |p| (places[p], turns[p]));
+            let (mut translation, mut rotation) = (joint.offset, STRAIGHT);
+            for (channel, value) in joint.channels.iter().zip(values.by_ref()) {
+                match *channel {
+                    Channel::Position(axis) if *replaces => translation[axis] = value,
+                    Channel::Position(axis) => translation[axis] += value,
+                    Channel::Rotation(axis) => rotation = product(&rotation, &about(axis, value)),
+                }
+            }
+            places.push(std::array::from_fn(|i| {
+                from[i] + (0..3).map(|k| turn[i][k] * translation[k]).sum::<f64>()
+            }));
+            turns.push(product(&turn, &rotation));
+        }
+        places
+    }
+}
+
+/// The rotation about a coordinate axis, anticlockwise as seen from its tip.
+fn about(axis: usize, angle_deg: f64) -> Matrix {
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut matrix = STRAIGHT;
+    (matrix[j][j], matrix[j][k], matrix[k][j], matrix[k][k]) = (cos, -sin, sin, cos);
+    matrix
+}
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parse::parse;
+    use super::*;
+
+    /// Root with an arm up by 2 and out by 1, whose hand is 3 along z; `order` of the root's rotations and of the arm's.
+    fn places(order: &str, frame: &str) -> Vec<Point3> {
+        let text = format!(
+            "HIERARCHY\nROOT root\n{{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition {order}\nJOINT arm\n{{\n\
+             OFFSET 1 2 0\nCHANNELS 3 {order}\nEnd Site\n{{\nOFFSET 0 0 3\n}}\n}}\n}}\nMOTION\nFrames: 1\nFrame Time: 1\n{frame}\n"
+        );
+        let motion = parse(&text).expect("a BVH file");
+        Kinematics::new(&motion).places(&motion.frames[0])
+    }
+
+    #[track_caller]
+    fn are(found: &[Point3], expected: &[Point3]) {
+        for (found, expected) in found.iter().zip(expected) {
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {expected:?}");
+        }
+    }
+
+    /// By hand. Quarter turns: Rx(90) takes (x, y, z) to (x, -z, y), Ry(90) to (z, y, -x), Rz(90) to (-y, x, z).
+    ///
+    /// ZXY with Z = 90, X = 90, Y = 0, root at (10, 20, 30). Root's turn is Rz Rx.
+    /// Arm: Rx (1, 2, 0) = (1, 0, 2); Rz of that = (0, 1, 2); the arm is at (10, 21, 32).
+    /// The arm turns by Y = 90 only: Ry (0, 0, 3) = (3, 0, 0); Rx = (3, 0, 0); Rz = (0, 3, 0); the hand is at (10, 24, 32).
+    #[test]
+    fn zxy_as_worked_out_by_hand() {
+        let found = places("Zrotation Xrotation Yrotation", "10 20 30 90 90 0 0 0 90");
+        are(&found, &[[10.0, 20.0, 30.0], [10.0, 21.0, 32.0], [10.0, 24.0, 32.0]]);
+    }
+
+    /// The same angles about the same axes listed as X, Y, Z: the root's turn is Rx Rz (Y = 0).
+    /// Arm: Rz (1, 2, 0) = (-2, 1, 0); Rx of that = (-2, 0, 1); the arm is at (8, 20, 31).
+    /// The arm by Y = 90: Ry (0, 0, 3) = (3, 0, 0); Rz = (0, 3, 0); Rx = (0, 0, 3); the hand is at (8, 20, 34).
+    #[test]
+    fn xyz_as_worked_out_by_hand() {
+        let found = places("Xrotation Yrotation Zrotation", "10 20 30 90 0 90 0 90 0");
+        are(&found, &[[10.0, 20.0, 30.0], [8.0, 20.0, 31.0], [8.0, 20.0, 34.0]]);
+    }
+
+    /// ZYX with angles that are no quarter turns, root Z = 30 deg, Y = 0, X = 0, arm Z = 60, Y = 30, X = 0. Turns about z add: the
+    /// hand's offset (0, 0, 3) is turned by Ry(30) to (1.5, 0, 3 cos 30), then by Rz(90) to (0, 1.5, 3 cos 30).
+    /// Arm: Rz(30) (1, 2, 0) = (cos 30 - 1, 0.5 + 2 cos 30, 0).
+    #[test]
+    fn zyx_as_worked_out_by_hand() {
+        let found = places("Zrotation Yrotation Xrotation", "0 0 0 30 0 0 60 30 0");
+        let c = 0.75_f64.sqrt();
+        let arm = [c - 1.0, 0.5 + 2.0 * c, 0.0];
+        are(&found, &[[0.0; 3], arm, [arm[0], arm[1] + 1.5, 3.0 * c]]);
+    }
+
+    #[test]
+    fn positions_replace_an_offset_that_they_repeat_and_are_added_to_one_that_they_do_not() {
+        let root_at = |frame: &str| {
+            let text = format!(
+                "HIERARCHY ROOT a\n{{ OFFSET 0 90 0 CHANNELS 3 Xposition Yposition Zposition }} MOTION\nFrames: 1\nFrame Time: 1\n{frame}"
+            );
+            let motion = parse(&text).expect("a BVH file");
+            Kinematics::new(&motion).places(&motion.frames[0])[0]
+        };
+        assert_eq!(root_at("5 92 1"), [5.0, 92.0, 1.0]);
+        assert_eq!(root_at("5 2 1"), [5.0, 92.0, 1.0]);
+    }
+
+    #[test]
+    fn rest_is_the_sum_of_offsets() {
+        let text = "HIERARCHY ROOT a\n{ OFFSET 1 2 3 CHANNELS 1 Xrotation JOINT b\n{ OFFSET 1 0 0 End Site { OFFSET 0 1 0 } } } MOTION\nFrames: 0\nFrame Time: 1\n";
+        let motion = parse(text).expect("a BVH file");
+        assert_eq!(at_rest(&motion.joints), [[1.0, 2.0, 3.0], [2.0, 2.0, 3.0], [2.0, 3.0, 3.0]]);
+    }
+}

@@ -1,0 +1,353 @@
+//! A recording of named points over time: the common form of all motion-capture files, and what a reader makes of its file.
+//!
+//! A reader gives what the file holds in the file's own unit and axes ([`Found`]), each with where it is known from;
+//! [`Found::settled`] turns that to millimetres and z up, or to whatever the caller knows better.
+
+use crate::silhouette::capsule::Point3;
+use std::collections::HashMap;
+use std::fmt;
+use std::str::FromStr;
+
+/// A length of one in a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// Its length, millimetres.
+    pub mm: f64,
+}
+
+impl Unit {
+    /// The units that have a name: what is read, millimetres, what is shown. The last is the CMU library's, whose skeletons
+    /// count 1/0.45 inch; its BVH conversions kept that.
+    pub const NAMED: [(&str, f64, &str); 5] = [
+        ("mm", 1.0, "millimetres"),
+        ("cm", 10.0, "centimetres"),
+        ("m", 1000.0, "metres"),
+        ("in", 25.4, "inches"),
+        ("cmu", 25.4 / 0.45, "units of 56.444 mm (1/0.45 inch, the CMU library's)"),
+    ];
+
+    /// Millimetres themselves.
+    pub const MM: Self = Self { mm: 1.0 };
+
+    /// The unit of a name, as files write it: short or written out.
+    ///
+    /// # Errors
+    /// [`RecordingError::Unit`] for any other name.
+    pub fn named(name: &str) -> Result<Self, RecordingError> {
+        let name = name.trim().trim_matches('\0').to_ascii_lowercase();
+        let short = match name.as_str() {
+            "millimeters" | "millimetres" => "mm",
+            "centimeters" | "centimetres" => "cm",
+            "meters" | "metres" => "m",
+            "inches" => "in",
+            other => other,
+        };
+        let found = Self::NAMED.iter().find(|(known, _, _)| *known == short);
+        found.map(|&(_, mm, _)| Self { mm }).ok_or(RecordingError::Unit(name))
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match Self::NAMED.iter().find(|(_, mm, _)| *mm == self.mm) {
+            Some((_, _, shown)) => f.write_str(shown),
+            None => write!(f, "units of {} mm", self.mm),
+        }
+    }
+}
+
+impl FromStr for Unit {
+    type Err = RecordingError;
+
+    /// The unit of a name (see [`Unit::named`]), or of a positive number of millimetres.
+    fn from_str(text: &str) -> Result<Self, RecordingError> {
+        Self::named(text).or_else(|unknown| match text.trim().parse::<f64>() {
+            Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(Self { mm }),
+            _ => Err(unknown),
+        })
+    }
+}
+
+/// The axis of a file that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Up {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    Z,
+}
+
+impl Up {
+    /// A point of the file with this axis up, turned (never mirrored) to z up.
+    pub fn to_z(self, [x, y, z]: Point3) -> Point3 {
+        match self {
+            Self::X => [y, z, x],
+            Self::Y => [x, -z, y],
+            Self::Z => [x, y, z],
+        }
+    }
+}
+
+impl fmt::Display for Up {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+        })
+    }
+}
+
+impl FromStr for Up {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.to_ascii_lowercase().as_str() {
+            "x" => Ok(Self::X),
+            "y" => Ok(Self::Y),
+            "z" => Ok(Self::Z),
+            _ => Err(format!("unknown axis `{text}`: expected x, y or z")),
+        }
+    }
+}
+
+/// Where something about a recording is known from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The caller named it.
+    Caller,
+    /// The file states it.
+    File,
+    /// Files of this format have it so.
+    Format,
+    /// Nothing states it: it was guessed.
+    Guess {
+        /// From what.
+        reason: String,
+        /// Whether the guess stands clear of the other possibilities.
+        sure: bool,
+    },
+}
+
+/// Something about a recording, and where it is known from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known<T> {
+    /// The value.
+    pub value: T,
+    /// Where it is known from.
+    pub source: Source,
+}
+
+impl<T> Known<T> {
+    /// The caller's value in place of this one, where there is one.
+    fn unless(self, named: Option<T>) -> Self {
+        match named {
+            Some(value) => Self { value, source: Source::Caller },
+            None => self,
+        }
+    }
+}
+
+/// What the caller knows better than the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Choices {
+    /// The unit of length.
+    pub unit: Option<Unit>,
+    /// The axis that points up.
+    pub up: Option<Up>,
+}
+
+/// What a file holds, in its own unit and axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Names in file order.
+    pub names: Vec<String>,
+    /// Frames per second, 0 if the file does not say.
+    pub rate_hz: f64,
+    /// `frames[f][m]`: point m in frame f.
+    pub frames: Vec<Vec<Option<Point3>>>,
+    /// The unit of length.
+    pub unit: Known<Unit>,
+    /// The axis that points up.
+    pub up: Known<Up>,
+}
+
+impl Found {
+    /// The recording in millimetres with z up. Points that are not finite count as hidden.
+    pub fn settled(self, choices: Choices) -> Recording {
+        let (unit, up) = (self.unit.unless(choices.unit), self.up.unless(choices.up));
+        let mut frames = self.frames;
+        for point in frames.iter_mut().flatten() {
+            let settled = point.map(|p| up.value.to_z(p.map(|v| unit.value.mm * v)));
+            *point = settled.filter(|p| p.iter().all(|v| v.is_finite()));
+        }
+        Recording { names: self.names, rate_hz: self.rate_hz, frames, unit, up }
+    }
+}
+
+/// Named points (markers or joints) over time, `None` where one was hidden: millimetres, z up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Names in file order.
+    pub names: Vec<String>,
+    /// Frames per second, 0 if the file does not say.
+    pub rate_hz: f64,
+    /// `frames[f][m]`: point m in frame f, millimetres.
+    pub frames: Vec<Vec<Option<Point3>>>,
+    /// The file's unit of length.
+    pub unit: Known<Unit>,
+    /// The file's axis that points up.
+    pub up: Known<Up>,
+}
+
+impl Recording {
+    /// Positions of a frame by name, hidden points left out. Names are given without a prefix (`Nick:LASI` is `LASI`)
+    /// as well as whole.
+    pub fn by_name(&self, frame: usize) -> HashMap<&str, Point3> {
+        let mut found = HashMap::new();
+        for (name, point) in self.names.iter().zip(self.frames.get(frame).into_iter().flatten()) {
+            if let Some(point) = point {
+                found.insert(name.as_str(), *point);
+                if let Some((_, short)) = name.rsplit_once(':') {
+                    found.entry(short).or_insert(*point);
+                }
+            }
+        }
+        found
+    }
+
+    /// What was guessed about the file, one sentence each: to be shown, for the caller can name it better.
+    pub fn remarks(&self) -> Vec<String> {
+        let remark = |what: String, source: &Source| match source {
+            Source::Guess { reason, sure } => {
+                Some(format!("{what}: a{} guess, {reason}", if *sure { "" } else { " doubtful" }))
+            }
+            Source::Caller | Source::File | Source::Format => None,
+        };
+        let unit = remark(format!("lengths are taken as {}", self.unit.value), &self.unit.source);
+        let up = remark(format!("{} is taken as up", self.up.value), &self.up.source);
+        unit.into_iter().chain(up).collect()
+    }
+}
+
+/// Why a recording could not be read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordingError {
+    /// No reader knows files with this ending.
+    #[error("no reader of motion capture knows files that end in `.{found}`: expected {known}")]
+    Extension {
+        /// The ending.
+        found: String,
+        /// The endings that are known.
+        known: String,
+    },
+    /// Not a file of this kind.
+    #[error("not a {kind} file: {reason}")]
+    Kind {
+        /// Kind expected.
+        kind: &'static str,
+        /// What the file has in place of what such a file has.
+        reason: String,
+    },
+    /// The file ends early.
+    #[error("the {kind} file ends within {what}: {needed} bytes are needed, {found} are there")]
+    Truncated {
+        /// Kind of file.
+        kind: &'static str,
+        /// What was being read.
+        what: &'static str,
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes there.
+        found: usize,
+    },
+    /// A line that cannot be read.
+    #[error("line {line}: {reason}")]
+    Line {
+        /// Line number from 1.
+        line: usize,
+        /// What stands there and what was expected.
+        reason: String,
+    },
+    /// An unknown unit.
+    #[error("unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres")]
+    Unit(String),
+}
+
+/// The text of a file; a byte-order mark at its beginning is left out.
+///
+/// # Errors
+/// Bytes that are not UTF-8, with the line in which the first of them stands.
+pub(super) fn text(bytes: &[u8]) -> Result<&str, RecordingError> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Ok(text.trim_start_matches('\u{feff}')),
+        Err(error) => {
+            let at = error.valid_up_to();
+            let line = 1 + bytes.iter().take(at).filter(|&&byte| byte == b'\n').count();
+            let byte = bytes.get(at).copied().unwrap_or_default();
+            let reason = format!("byte {byte:#04x} is not text, expected a file of UTF-8 text");
+            Err(RecordingError::Line { line, reason })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(point: Point3) -> Found {
+        let guess = Source::Guess { reason: "for it is 1.7 m tall".into(), sure: true };
+        Found {
+            names: vec!["Nick:HEAD".into()],
+            rate_hz: 0.0,
+            frames: vec![vec![Some(point)], vec![None], vec![Some([f64::MAX, 0.0, 0.0])]],
+            unit: Known { value: Unit { mm: 10.0 }, source: guess },
+            up: Known { value: Up::Y, source: Source::Format },
+        }
+    }
+
+    #[test]
+    fn recordings_come_in_millimetres_with_z_up_unless_the_caller_knows_better() {
+        let by_itself = found([1.0, 2.0, 3.0]).settled(Choices::default());
+        assert_eq!(by_itself.frames[0], vec![Some([10.0, -30.0, 20.0])]);
+        assert_eq!(by_itself.by_name(0)["HEAD"], by_itself.by_name(0)["Nick:HEAD"]);
+        assert_eq!(
+            by_itself.remarks(),
+            ["lengths are taken as centimetres: a guess, for it is 1.7 m tall"],
+            "what the format fixes is not a guess"
+        );
+        assert_eq!(by_itself.frames[2], vec![None], "what overflows is hidden");
+        let told = found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X) });
+        assert_eq!(told.frames[0], vec![Some([2.0, 3.0, 1.0])]);
+        assert_eq!((told.unit.source.clone(), told.remarks().len()), (Source::Caller, 0));
+    }
+
+    #[test]
+    fn turning_up_keeps_hands_apart() {
+        // A right-handed frame stays one: x cross y is z, whichever axis points up.
+        for up in [Up::X, Up::Y, Up::Z] {
+            let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| up.to_z(p));
+            let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+            assert_eq!(cross, z, "{up}");
+        }
+    }
+
+    #[test]
+    fn units_are_read_and_shown() {
+        assert_eq!("Meters".parse(), Ok(Unit { mm: 1000.0 }));
+        assert_eq!("cmu".parse::<Unit>().map(|unit| (unit.mm * 1000.0).round()), Ok(56_444.0));
+        assert_eq!("5.5".parse::<Unit>().map(|unit| unit.to_string()), Ok("units of 5.5 mm".into()));
+        for bad in ["furlong", "-2", "0", "inf", ""] {
+            assert_eq!(bad.parse::<Unit>(), Err(RecordingError::Unit(bad.into())));
+        }
+    }
+
+    #[test]
+    fn what_is_not_text_is_named_with_its_line() {
+        assert_eq!(text(b"\xef\xbb\xbfabc"), Ok("abc"));
+        let error = text(b"one\ntwo\n\xff").expect_err("not UTF-8");
+        assert!(error.to_string().starts_with("line 3: byte 0xff"), "{error}");
+    }
+}

@@ -1,0 +1,81 @@
+//! k nearest neighbours over patterns, by Euclidean distance.
+
+use super::method::{Fold, Method, largest};
+use ndarray::{Array2, ArrayView1, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+/// Training patterns, which vote for their classes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Neighbours {
+    /// One training clip per row.
+    pub patterns: Array2<f32>,
+    /// Class of each row.
+    pub labels: Vec<usize>,
+    /// Number of classes.
+    pub classes: usize,
+    /// Neighbours that vote.
+    pub k: usize,
+}
+
+impl Method for Neighbours {
+    type Parameter = usize;
+    const NAME: &'static str = "knn";
+    const TRIED: &'static [usize] = &[1, 3, 5];
+
+    fn described(k: usize) -> String {
+        format!("k = {k}")
+    }
+
+    fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, k: usize) -> Self {
+        Self { patterns: patterns.to_owned(), labels: labels.to_vec(), classes, k }
+    }
+
+    fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
+        let squared = |row: ArrayView1<f32>| row.iter().zip(pattern).map(|(a, b)| (a - b) * (a - b)).sum();
+        let distances = self.patterns.rows().into_iter().map(squared).zip(self.labels.iter().copied());
+        let votes = vote(distances.collect(), self.classes, self.k);
+        let total: f32 = votes.iter().sum();
+        votes.into_iter().map(|v| v / total.max(1e-9)).collect()
+    }
+
+    fn answers(fold: &Fold, k: usize) -> Vec<usize> {
+        // |a - b|^2 up to |b|^2, which is the same for all neighbours.
+        let distance = |i: usize, j: usize| fold.gram[[j, j]] - 2.0 * fold.gram[[i, j]];
+        let answer = |&i: &usize| {
+            let distances = fold.kept.iter().map(|&j| (distance(i, j), fold.labels[j])).collect();
+            largest(&vote(distances, fold.classes, k))
+        };
+        fold.held.iter().map(answer).collect()
+    }
+
+    fn fits(&self, width: usize, classes: usize) -> bool {
+        let sizes = self.patterns.ncols() == width && self.patterns.nrows() == self.labels.len();
+        let labels = !self.labels.is_empty() && self.labels.iter().all(|&label| label < classes);
+        sizes && labels && self.classes == classes && self.k > 0
+    }
+}
+
+/// Votes per class of the `k` smallest of (squared distance, class), each weighing 1 plus a hair for nearness, so that ties go
+/// to the nearer class.
+fn vote(mut distances: Vec<(f32, usize)>, classes: usize, k: usize) -> Vec<f32> {
+    distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut votes = vec![0.0; classes];
+    for (rank, &(_, label)) in distances.iter().take(k.max(1)).enumerate() {
+        votes[label] += 1.0 + 1e-3 / (1.0 + rank as f32);
+    }
+    votes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn the_majority_of_the_nearest_wins_and_ties_go_to_the_nearer() {
+        let rows = array![[0.0_f32], [1.0], [1.2], [5.0]];
+        let by = |k| Neighbours::train(rows.view(), &[0, 1, 1, 0], 2, k).probabilities(array![0.4_f32].view());
+        let (two, three) = (by(2), by(3));
+        assert!(three[1] > three[0] && two[0] > two[1], "{three:?} {two:?}");
+    }
+}

@@ -1,0 +1,41 @@
+//! Patterns of many clips: from their views to the rows that classifiers are trained on.
+
+use super::clip::Clip;
+use super::space::Space;
+use crate::embedding::EmbeddingError;
+use ndarray::{Array1, Array2};
+use rayon::prelude::*;
+
+/// Frame vectors of clips: `[clip][view]`.
+pub(crate) fn vectors_of(space: &Space, clips: &[&Clip]) -> Result<Vec<Vec<Array2<f32>>>, EmbeddingError> {
+    clips.par_iter().map(|clip| clip.views.iter().map(|view| space.vectors(view)).collect()).collect()
+}
+
+/// Patterns of frame vectors: `[clip][view]`.
+pub(crate) fn patterns_of(
+    space: &Space,
+    clips: &[Vec<Array2<f32>>],
+    sharpness: f32,
+) -> Vec<Vec<Array1<f32>>> {
+    let clip =
+        |views: &Vec<Array2<f32>>| views.iter().map(|v| space.pattern_of(v.view(), sharpness)).collect();
+    clips.par_iter().map(clip).collect()
+}
+
+/// The chosen views' patterns, one clip per row.
+pub(crate) fn gathered(patterns: &[Vec<Array1<f32>>], chosen: &[usize]) -> Array2<f32> {
+    rows(&patterns.iter().map(|views| joined(views, chosen)).collect::<Vec<_>>())
+}
+
+/// The patterns of some views, one after the other, over the square root of their number: the product of two joined patterns is the mean
+/// of the views' products, so that a classifier's cost means the same for one view and for many.
+pub(crate) fn joined(views: &[Array1<f32>], chosen: &[usize]) -> Array1<f32> {
+    let scale = 1.0 / (chosen.len().max(1) as f32).sqrt();
+    chosen.iter().flat_map(|&view| views[view].iter().map(move |v| scale * v)).collect()
+}
+
+/// Patterns as rows.
+fn rows(patterns: &[Array1<f32>]) -> Array2<f32> {
+    let width = patterns.first().map_or(0, Array1::len);
+    Array2::from_shape_fn((patterns.len(), width), |(i, j)| patterns[i][j])
+}

@@ -1,0 +1,110 @@
+//! Cameras: a folder in which images appear, and the simulator's endpoint.
+
+use std::{
+    fs,
+    io::{Read, Write},
+    net::TcpListener,
+    thread,
+    time::Duration,
+};
+
+use farnear_capture::camera::{Camera, CameraError, FolderCamera, SimCamera};
+use farnear_files::image_file::encode_png;
+use farnear_protocol::{
+    camera::FrameHeader,
+    message::{Axis, ShotRecord},
+    units::{BoardMicros, Micros, Nanometres},
+};
+use ndarray::Array2;
+
+fn shot(trigger_number: u32) -> ShotRecord {
+    ShotRecord {
+        index: 0,
+        repeat: 0,
+        trigger_number,
+        axis: Axis::SensorFine,
+        asked: Nanometres(0),
+        coarse: Nanometres(0),
+        fine: Nanometres(0),
+        lens: Nanometres(0),
+        settle: Micros(0),
+        trigger: BoardMicros(0),
+        strobe_start: BoardMicros(0),
+        strobe_end: BoardMicros(0),
+        exposure: Micros(0),
+    }
+}
+
+#[test]
+fn a_folder_gives_its_new_images_in_order_and_waits_for_half_written_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, value: u16| {
+        fs::write(folder.path().join(name), encode_png(Array2::from_elem((2, 2), value).view(), 8).unwrap())
+            .unwrap();
+    };
+    write("old.png", 1);
+    let mut camera = FolderCamera::watch(folder.path()).unwrap();
+    let path = folder.path().to_path_buf();
+    let writer = thread::spawn(move || {
+        let png = encode_png(Array2::from_elem((2, 2), 2).view(), 8).unwrap();
+        fs::write(path.join("b.png"), &png[..20]).unwrap();
+        thread::sleep(Duration::from_millis(60));
+        fs::write(path.join("b.png"), &png).unwrap();
+        fs::write(path.join("notes.txt"), b"no image").unwrap();
+    });
+    let value = |camera: &mut FolderCamera| {
+        camera.image(&shot(0), Duration::from_secs(20)).map(|image| image.pixels[[0, 0]])
+    };
+    assert_eq!(value(&mut camera).unwrap(), 2);
+    writer.join().unwrap();
+    write("a.png", 3);
+    assert_eq!(value(&mut camera).unwrap(), 3);
+    let late = camera.image(&shot(7), Duration::from_millis(30)).unwrap_err();
+    assert!(late.to_string().contains("exposure 7"), "{late}");
+}
+
+/// A camera endpoint that sends images with these shot ids and then hangs up.
+fn endpoint(shots: &'static [u32], trailing: &'static [u8]) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        for shot_id in shots {
+            let header =
+                FrameHeader { shot_id: *shot_id, exposure: BoardMicros(9), width: 2, height: 1, bits: 8 };
+            stream.write_all(&header.length().to_le_bytes()).unwrap();
+            stream.write_all(&header.to_bytes()).unwrap();
+            stream.write_all(&[*shot_id as u8, 0, 255, 0]).unwrap();
+        }
+        stream.write_all(trailing).unwrap();
+        if trailing.is_empty() {
+            let _ = stream.read(&mut [0]); // until the client hangs up
+        }
+    });
+    address
+}
+
+#[test]
+fn the_simulators_images_are_matched_to_their_exposures() {
+    let mut camera = SimCamera::connect(&endpoint(&[3, 4, 5, 7], &[])).unwrap();
+    let wait = Duration::from_secs(20);
+    assert_eq!(camera.image(&shot(4), wait).unwrap().pixels[[0, 0]], 4);
+    assert_eq!(camera.image(&shot(5), wait).unwrap().pixels[[0, 1]], 255);
+    let skipped = camera.image(&shot(6), wait).unwrap_err();
+    assert!(matches!(skipped, CameraError::Skipped { wanted: 6, came: 7 }), "{skipped:?}");
+    let late = camera.image(&shot(8), Duration::from_millis(30)).unwrap_err();
+    assert!(matches!(late, CameraError::Late { .. }), "{late:?}");
+}
+
+#[test]
+fn a_camera_that_hangs_up_or_is_none_is_named() {
+    let wait = Duration::from_secs(20);
+    let mut camera = SimCamera::connect(&endpoint(&[], &[1, 2])).unwrap();
+    let gone = camera.image(&shot(0), wait).unwrap_err();
+    assert!(matches!(gone, CameraError::Gone { .. }), "{gone:?}");
+    let mut camera = SimCamera::connect(&endpoint(&[], b"HTTP/1.1 400 Bad Request\r\n\r\n")).unwrap();
+    let nonsense = camera.image(&shot(0), wait).unwrap_err();
+    assert!(matches!(nonsense, CameraError::Nonsense { .. }), "{nonsense:?}");
+    let absent = SimCamera::connect("127.0.0.1:1").err().unwrap();
+    assert!(matches!(absent, CameraError::Connect { .. }), "{absent:?}");
+}

@@ -1,0 +1,104 @@
+//! What the client makes of a bad line.
+
+use std::time::Duration;
+
+use farnear_capture::{Client, ClientError, Transport};
+use farnear_protocol::{
+    Response,
+    message::{Axis, Status},
+    units::Nanometres,
+};
+use farnear_scripted_board::{Faults, Peer};
+use proptest::prelude::*;
+
+use crate::scripted::{SHOT, connect, run_shots};
+
+#[test]
+fn lost_requests_and_lost_answers_are_asked_again_and_act_once() {
+    let (client, peer) = connect(Faults::default());
+    peer.board().faults.lose_requests = 2;
+    client.home(Axis::SensorCoarse).unwrap();
+    peer.board().faults.lose_answers = 3;
+    client.home(Axis::SensorCoarse).unwrap();
+    assert_eq!(peer.board().acts, 2);
+}
+
+#[test]
+fn a_board_that_falls_silent_is_an_error_after_three_retries() {
+    let (client, peer) = connect(Faults::default());
+    peer.board().faults.lose_requests = 100;
+    let error = client.status().err().unwrap();
+    assert!(matches!(error, ClientError::Silent { attempts: 4, bytes: 0, .. }), "{error:?}");
+    assert_eq!(peer.board().faults.lose_requests, 96);
+}
+
+#[test]
+fn answers_that_come_twice_do_not_answer_the_next_request() {
+    let (client, _) = connect(Faults { duplicate_answers: true, ..Faults::default() });
+    client.home(Axis::SensorCoarse).unwrap();
+    for target in [1_000, 2_000, 3_000] {
+        client.move_to(Axis::SensorFine, Nanometres(target)).unwrap();
+        let Status { fine, .. } = client.status().unwrap();
+        assert_eq!(fine.measured.0, target - 2);
+    }
+}
+
+#[test]
+fn what_an_earlier_program_left_on_the_line_is_not_believed() {
+    let peer = Peer::new(Faults::default());
+    // The hello and status of this session will have the ids 1 and 2; so had those of the last one.
+    let mut stale = peer.board().hello.clone();
+    stale.boot = 3;
+    peer.board().put_stale(1, &Response::Hello(stale));
+    peer.board().put_stale(2, &Response::Accepted);
+    let client = Client::connect(peer.connect(), "scripted").unwrap();
+    assert_eq!(client.hello().boot, 7);
+}
+
+#[test]
+fn a_line_that_breaks_in_mid_program_is_named() {
+    let (client, _) = connect(Faults { gone_at_program: true, ..Faults::default() });
+    let shot = SHOT;
+    let error = run_shots(&client, &[shot], |_| Ok::<(), ClientError>(())).err().unwrap();
+    assert!(matches!(error, ClientError::Gone { .. }), "{error:?}");
+    assert!(error.to_string().starts_with("port scripted went away while running the exposure"), "{error}");
+}
+
+#[test]
+fn a_line_with_noise_and_no_board_is_told_from_a_dead_one() {
+    struct Noise;
+    impl Transport for Noise {
+        fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+            std::thread::sleep(wait.min(Duration::from_millis(20)));
+            buffer[..5].copy_from_slice(b"ab\0cd");
+            Ok(5)
+        }
+        fn send(&mut self, _: &[u8], _: Duration) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn discard_input(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let error =
+        Client::connect(Box::new(|| Ok(Box::new(Noise) as Box<dyn Transport>)), "scripted").err().unwrap();
+    assert!(matches!(error, ClientError::Silent { bad_frames: 1.., .. }), "{error:?}");
+    assert!(error.to_string().contains("broken frames came: is it the right port"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Garbage that ends with a delimiter costs nothing; without one it costs the frame after it, whose
+    /// request is asked again behind a flushing delimiter.
+    #[test]
+    fn garbage_on_the_line_is_survived(garbage in proptest::collection::vec(any::<u8>(), 0..600)) {
+        let mut delimited = garbage;
+        delimited.push(0);
+        let (client, peer) = connect(Faults { garbage: delimited, ..Faults::default() });
+        client.home(Axis::SensorCoarse).unwrap();
+        for step in 0..5 {
+            client.move_to(Axis::SensorFine, Nanometres(step)).unwrap();
+        }
+        prop_assert_eq!(peer.board().acts, 6);
+    }
+}

@@ -1,0 +1,10 @@
+//! farnear-capture through its public face, one program for all of it: a scripted board stands at the other end of the line.
+#![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
+
+mod cameras;
+mod line;
+mod pair;
+mod requests;
+mod scripted;
+mod session;
+mod work;

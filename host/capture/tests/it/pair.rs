@@ -1,0 +1,128 @@
+//! Taking a pair with a scripted board, and cameras that do and do not deliver.
+
+use std::{fs, path::Path, time::Duration};
+
+use farnear_capture::{
+    Client, ClientError,
+    camera::{Camera, CameraError, FolderCamera, Image},
+    pair::{CaptureError, Exposures, capture_pair},
+    plan::SensorPair,
+    record::{Circumstances, begin_folder, finish_folder, read_record, record_of},
+};
+use farnear_protocol::{
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
+use farnear_scripted_board::{Faults, Peer};
+use ndarray::Array2;
+
+const SENSOR: SensorPair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
+
+/// Gives each exposure a picture that tells its trigger number.
+struct Numbered;
+
+impl Camera for Numbered {
+    fn kind(&self) -> &'static str {
+        "numbered"
+    }
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn image(&mut self, shot: &ShotRecord, _: Duration) -> Result<Image, CameraError> {
+        Ok(Image { pixels: Array2::from_elem((3, 4), shot.trigger_number as u16), bits: 8 })
+    }
+}
+
+fn client() -> (Client, Peer) {
+    let peer = Peer::new(Faults::default());
+    (Client::connect(peer.connect(), "scripted").unwrap(), peer)
+}
+
+fn exposures() -> Exposures {
+    Exposures { image_wait: Duration::from_millis(200), ..Exposures::default() }
+}
+
+fn circumstances() -> Circumstances {
+    Circumstances {
+        made_by: "test".into(),
+        time: None,
+        camera: "numbered",
+        simulation: None,
+        optics: "[lens]\nfocal_length_mm = 50.0".parse().unwrap(),
+    }
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_pair_is_homed_moved_exposed_and_written() {
+    let (client, peer) = client();
+    let mut said = Vec::new();
+    let pair =
+        capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
+            .unwrap();
+    assert!(said[0].contains("homing the sensor's coarse axis (its position is unknown)"), "{said:?}");
+    assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 1));
+    // The piezo makes up for the 375 nm that the scripted coarse stage is off; its own 2 nm remain.
+    for taken in [&pair.far, &pair.near] {
+        assert!((taken.sensor_measured_mm - taken.sensor_asked_mm + 2e-6).abs() < 1.5e-6, "{taken:?}");
+    }
+    assert_eq!(pair.near.record.asked.0 - pair.far.record.asked.0, 156_200);
+
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("pair");
+    let record = record_of(&pair, &client, circumstances());
+    finish_folder(begin_folder(&folder).unwrap(), &pair, &record).unwrap();
+    assert_eq!(names(&folder), ["capture.toml", "far.png", "near.png"]);
+    assert_eq!(read_record(&folder).unwrap().unwrap(), record);
+    assert_eq!(names(root.path()), ["pair"]);
+
+    // The second time it is homed already, and needs no homing.
+    let acts = peer.board().acts;
+    let mut said = Vec::new();
+    capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
+        .unwrap();
+    assert!(!said.iter().any(|text| text.contains("homing")), "{said:?}");
+    assert_eq!(peer.board().acts - acts, 2);
+}
+
+#[test]
+fn a_port_that_goes_away_leaves_no_folder() {
+    let (client, peer) = client();
+    peer.board().faults.gone_at_program = true;
+    let root = tempfile::tempdir().unwrap();
+    let staging = begin_folder(&root.path().join("pair")).unwrap();
+    let error = capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
+    drop(staging);
+    assert!(matches!(error, CaptureError::Board(ClientError::Gone { .. })), "{error:?}");
+    assert_eq!(names(root.path()), Vec::<String>::new());
+}
+
+#[test]
+fn a_camera_that_gives_nothing_stops_the_rig() {
+    let (client, peer) = client();
+    let folder = tempfile::tempdir().unwrap();
+    let mut camera = FolderCamera::watch(folder.path()).unwrap();
+    let error = capture_pair(&client, &mut camera, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
+    assert!(matches!(error, CaptureError::Camera(CameraError::Late { .. })), "{error:?}");
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn optics_out_of_reach_move_nothing() {
+    let (client, peer) = client();
+    let far_away = SensorPair { far_mm: 90.0, near_mm: 90.1 };
+    let error = capture_pair(&client, &mut Numbered, &far_away, &exposures(), &mut |_| {}).unwrap_err();
+    assert!(matches!(error, CaptureError::Plan(_)), "{error:?}");
+    assert_eq!(peer.board().acts, 0);
+}

@@ -1,0 +1,58 @@
+//! A client with the scripted board at the other end of the line.
+
+use std::time::Duration;
+
+use farnear_capture::{Client, ClientError, Timing};
+use farnear_protocol::{
+    message::{Axis, EventKind, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
+use farnear_scripted_board::{Board, Faults, Peer};
+
+/// Short waits: the board answers at once or never.
+pub const SHORT: Timing = Timing {
+    reply: Duration::from_millis(4),
+    retries: 3,
+    poll: Duration::from_millis(10),
+    work_factor: 0,
+    work_slack: Duration::from_millis(80),
+    keep_alive: Duration::from_secs(2),
+};
+
+/// A shot by piezo.
+pub const SHOT: Shot = Shot {
+    axis: Axis::SensorFine,
+    target: Nanometres(10_000),
+    exposure: Micros(1_000),
+    settle_window: Nanometres(50),
+    settle_dwell: Micros(1_000),
+    repeat: 1,
+    mode: TriggerMode::Hardware,
+};
+
+/// A connected client and the board.
+pub fn connect(faults: Faults) -> (Client, Peer) {
+    let peer = Peer::new(faults);
+    let client = Client::connect(peer.connect(), "scripted").unwrap();
+    client.set_timing(SHORT);
+    (client, peer)
+}
+
+/// Why a board with these faults and this change cannot be talked to.
+pub fn connect_error(faults: Faults, change: impl FnOnce(&mut Board)) -> ClientError {
+    let peer = Peer::new(faults);
+    change(&mut peer.board());
+    Client::connect(peer.connect(), "scripted").err().unwrap()
+}
+
+/// Arms and runs a program; `on_shot` is told of each exposure.
+pub fn run_shots(
+    client: &Client,
+    shots: &[Shot],
+    mut on_shot: impl FnMut(&ShotRecord) -> Result<(), ClientError>,
+) -> Result<u16, ClientError> {
+    client.run_program(shots, |kind| match kind {
+        EventKind::ShotDone { shot, .. } => on_shot(shot),
+        _ => Ok(()),
+    })
+}

@@ -1,0 +1,130 @@
+//! Who is there, and what becomes of a session: versions, resets, an unplugged board.
+
+use std::time::Duration;
+
+use farnear_capture::{Client, ClientError};
+use farnear_protocol::{
+    message::{Axis, ResetCause},
+    units::Nanometres,
+};
+use farnear_scripted_board::{Faults, Peer};
+
+use crate::scripted::{SHORT, connect, connect_error};
+
+#[test]
+fn hello_gives_the_board_and_its_boot() {
+    let (client, _) = connect(Faults::default());
+    assert_eq!(client.hello().boot, 7);
+    assert_eq!(client.hello().board.as_str(), "scripted");
+    assert_eq!(client.protocol(), 2);
+}
+
+#[test]
+fn handles_are_used_from_many_threads_and_the_port_is_closed_with_the_last() {
+    let (client, peer) = connect(Faults::default());
+    std::thread::scope(|scope| {
+        for thread in 0..4 {
+            let client = client.clone();
+            scope.spawn(move || {
+                for step in 0..20 {
+                    client.move_to(Axis::SensorFine, Nanometres(1_000 * thread + step)).unwrap();
+                }
+            });
+        }
+    });
+    assert_eq!(peer.board().acts, 80);
+    let log = client.logs().unwrap();
+    drop(client);
+    // The last handle has gone, and with it the thread that told the log.
+    assert!(log.next_within(Duration::ZERO).is_err());
+}
+
+#[test]
+fn a_board_that_was_unplugged_is_found_again() {
+    let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
+    let mut client = Client::connect(peer.connect(), "scripted").unwrap();
+    client.set_timing(SHORT);
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().gone = true;
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Gone { .. }), "{error:?}");
+    assert!(error.to_string().contains("went away while homing the sensor's coarse axis"), "{error}");
+    assert!(matches!(client.status(), Err(ClientError::Gone { .. })));
+    let absent = client.reopen().err().unwrap();
+    assert!(matches!(absent, ClientError::Port(_)), "{absent:?}");
+    peer.board().gone = false;
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    assert_eq!(client.hello().boot, 7, "the board went on");
+    client.stop().unwrap();
+}
+
+#[test]
+fn a_reset_while_nothing_is_asked_has_to_be_understood() {
+    let (mut client, peer) = connect(Faults::default());
+    client.home(Axis::SensorCoarse).unwrap();
+    peer.board().reset(ResetCause::BrownOut);
+    for _ in 0..2 {
+        let error = client.status().err().unwrap();
+        assert!(matches!(error, ClientError::Reset { was: 7, now: 8, .. }), "{error:?}");
+    }
+    client.reopen().unwrap();
+    assert_eq!(client.hello().boot, 8);
+    client.home(Axis::SensorCoarse).unwrap();
+}
+
+#[test]
+fn a_reset_in_mid_move_is_seen_whether_it_announces_itself_or_not() {
+    for silent_reset in [false, true] {
+        let (mut client, peer) = connect(Faults { silent_reset, ..Faults::default() });
+        client.home(Axis::SensorCoarse).unwrap();
+        peer.board().faults.reset_at_move = true;
+        let error = client.move_to(Axis::SensorCoarse, Nanometres(5_000)).err().unwrap();
+        let ClientError::Reset { was: 7, now: 8, cause, .. } = &error else { panic!("{error:?}") };
+        assert_eq!(*cause, if silent_reset { None } else { Some(ResetCause::Watchdog) });
+        assert!(error.to_string().contains("boot 7 became 8"), "{error}");
+        client.reopen().unwrap();
+        assert_eq!(client.hello().boot, 8);
+        client.home(Axis::SensorCoarse).unwrap();
+    }
+}
+
+#[test]
+fn a_reboot_happens_once_though_its_answer_is_lost() {
+    let (mut client, peer) = connect(Faults::default());
+    peer.board().faults.lose_answers = 1;
+    client.reboot().unwrap();
+    assert_eq!(client.hello().boot, 8);
+}
+
+#[test]
+fn a_board_of_another_protocol_is_refused_with_both_versions() {
+    let error = connect_error(Faults { other_version: Some(3), ..Faults::default() }, |_| {});
+    assert!(matches!(error, ClientError::Version { board_min: 3, host_current: 2, .. }), "{error:?}");
+    assert!(
+        error.to_string().contains("protocol 3 to 3, this program 2 to 2; use a newer farnear"),
+        "{error}"
+    );
+
+    let error = connect_error(Faults::default(), |board| {
+        board.hello.protocol_min = 3;
+        board.hello.protocol_current = 5;
+    });
+    assert!(matches!(error, ClientError::Version { board_min: 3, board_current: 5, .. }), "{error:?}");
+}
+
+#[test]
+fn a_newer_board_that_still_speaks_our_version_is_welcome_whatever_its_key() {
+    let peer = Peer::new(Faults::default());
+    peer.board().hello.protocol_current = 9;
+    peer.board().hello.schema_key ^= 1;
+    let client = Client::connect(peer.connect(), "scripted").unwrap();
+    assert_eq!(client.protocol(), 2);
+}
+
+#[test]
+fn another_message_table_under_the_same_number_is_refused_with_both_keys() {
+    let error = connect_error(Faults::default(), |board| board.hello.schema_key ^= 0xff);
+    let ClientError::Schema { board_key, host_key, .. } = error else { panic!("{error:?}") };
+    assert_eq!(board_key, host_key ^ 0xff);
+    assert!(error.to_string().contains(&format!("{board_key:016x}")), "{error}");
+}

@@ -1,0 +1,149 @@
+//! Long work: its end, its deadline, its interruption, and what is lost on the way.
+
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::{Duration, Instant},
+};
+
+use farnear_capture::{ClientError, Step, Timing};
+use farnear_protocol::{
+    message::{Axis, EventKind, Shot, TriggerMode},
+    units::{Micros, Nanometres},
+};
+use farnear_scripted_board::Faults;
+
+use crate::scripted::{SHORT, SHOT, connect, run_shots};
+
+#[test]
+fn homing_and_moving_end_with_their_events() {
+    let (client, peer) = connect(Faults::default());
+    client.home(Axis::SensorCoarse).unwrap();
+    let moved = client.move_to(Axis::SensorCoarse, Nanometres(5_000_000)).unwrap();
+    assert_eq!((moved.asked.0, moved.measured.0), (5_000_000, 5_000_375));
+    assert_eq!(peer.board().acts, 2);
+}
+
+#[test]
+fn lost_events_are_read_again() {
+    // Event 0 is the start, 1 homed, 2 the move, 3 and 4 the shots, 5 the end of the program.
+    for lost in [vec![1], vec![3], vec![5], vec![1, 2, 3, 4, 5]] {
+        let (client, peer) = connect(Faults { lose_events: lost.clone(), ..Faults::default() });
+        client.home(Axis::SensorCoarse).unwrap();
+        client.move_to(Axis::SensorCoarse, Nanometres(1_000)).unwrap();
+        let shot = Shot { repeat: 2, ..SHOT };
+        let mut seen = Vec::new();
+        let exposures = run_shots(&client, &[shot], |record| {
+            seen.push(record.repeat);
+            Ok::<(), ClientError>(())
+        })
+        .unwrap();
+        assert_eq!((exposures, seen), (2, vec![0, 1]), "lost {lost:?}");
+        assert_eq!(peer.board().acts, 3);
+    }
+}
+
+#[test]
+fn events_that_the_board_forgot_are_an_error() {
+    let (client, _) = connect(Faults { lose_events: vec![1], forgetful: true, ..Faults::default() });
+    let error = client.home(Axis::SensorCoarse).err().unwrap();
+    assert!(matches!(error, ClientError::EventsLost { from: 1, to: 1, .. }), "{error:?}");
+}
+
+#[test]
+fn work_whose_end_is_never_told_is_an_error() {
+    let (client, _) = connect(Faults { end_unsaid: true, ..Faults::default() });
+    let error = client.home(Axis::SensorCoarse).err().unwrap();
+    assert!(matches!(error, ClientError::NoEnd { .. }), "{error:?}");
+}
+
+#[test]
+fn work_that_does_not_end_is_stopped_at_its_deadline() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let error = client.home(Axis::SensorCoarse).err().unwrap();
+    assert!(matches!(error, ClientError::Overdue { .. }), "{error:?}");
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn an_interruption_stops_the_rig() {
+    let (mut client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let flag = Arc::new(AtomicBool::new(false));
+    client.interrupt_by(flag.clone());
+    client.set_timing(Timing { work_slack: Duration::from_secs(60), ..SHORT });
+    let interrupter = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(20));
+        flag.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    let error = client.home(Axis::SensorCoarse).err().unwrap();
+    interrupter.join().unwrap();
+    assert!(matches!(error, ClientError::Interrupted { .. }), "{error:?}");
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn an_error_in_mid_program_stops_the_rig() {
+    let (client, peer) = connect(Faults::default());
+    let shot = SHOT;
+    let no_image = || ClientError::NoEnd { during: "waiting for the image".into() };
+    let error = run_shots(&client, &[shot], |_| Err(no_image())).err().unwrap();
+    assert!(error.to_string().contains("waiting for the image"), "{error}");
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn a_board_that_asks_is_answered_as_long_as_somebody_holds_the_work() {
+    let (client, peer) = connect(Faults { asks_first: 3, ..Faults::default() });
+    client.home(Axis::SensorCoarse).unwrap();
+    assert_eq!(peer.board().still_there, 3);
+    assert_eq!(peer.board().keep_alives, [Micros(2_000_000)]);
+    // Held, but not waited for: the thread that owns the port answers.
+    let work = client.start_home(Axis::Lens).unwrap();
+    let until = Instant::now() + Duration::from_secs(20);
+    while peer.board().still_there < 6 && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(peer.board().still_there, 6);
+    work.homed().unwrap();
+    // Nobody holds it: the rig is stopped.
+    peer.board().faults = Faults { never_ends: true, ..Faults::default() };
+    let stops = peer.board().stops;
+    drop(client.start_home(Axis::Lens).unwrap());
+    assert_eq!(peer.board().stops, stops + 1);
+}
+
+#[test]
+fn two_axes_move_at_the_same_time() {
+    let (client, peer) = connect(Faults::default());
+    for axis in [Axis::SensorCoarse, Axis::Lens] {
+        client.home(axis).unwrap();
+    }
+    let coarse = client.start_move(Axis::SensorCoarse, Nanometres(2_000_000)).unwrap();
+    let lens = client.start_move(Axis::Lens, Nanometres(3_000_000)).unwrap();
+    assert_eq!(lens.moved().unwrap().measured, Nanometres(3_000_125));
+    assert_eq!(coarse.moved().unwrap().measured, Nanometres(2_000_375));
+    assert_eq!(peer.board().acts, 4);
+}
+
+#[test]
+fn a_program_is_armed_once_run_twice_and_told_of_shots_that_the_host_triggers() {
+    let (client, peer) = connect(Faults::default());
+    let error = client.start_program(&[]).err().unwrap();
+    assert!(matches!(error, ClientError::NotArmed), "{error:?}");
+    let shot = Shot { repeat: 2, mode: TriggerMode::Software, ..SHOT };
+    let error = client.arm(&[shot; 17]).err().unwrap();
+    assert!(error.to_string().contains("a program of 17 shots, the board can hold 16"), "{error}");
+    client.arm(&[shot]).unwrap();
+    for run in 0..2 {
+        let mut work = client.start_program(&[shot]).unwrap();
+        let mut said = Vec::new();
+        let end = loop {
+            match work.step().unwrap() {
+                Step::Done(kind) => break kind,
+                Step::Event(kind) => said.push(matches!(kind, EventKind::ShotReady { .. })),
+            }
+        };
+        assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
+        assert_eq!(said, [true, false, true, false], "run {run}");
+    }
+    assert_eq!(peer.board().triggers, 4);
+}

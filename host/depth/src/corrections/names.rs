@@ -1,0 +1,58 @@
+//! The corrections by name, as the command line and messages write them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{CorrectionError, Method};
+
+impl Method {
+    /// The names of all methods, such as "clsf, cdc or spline".
+    pub fn names() -> String {
+        Self::listed(Self::ALL.map(|method| method.name().to_owned()).to_vec(), "or")
+    }
+
+    /// The names of all methods, each with what it is: the text of a help.
+    pub fn choices() -> String {
+        Self::listed(Self::ALL.map(Self::with_summary).to_vec(), "or")
+    }
+
+    /// As [`Self::choices`] of the methods that a board can compute.
+    pub fn board_choices() -> String {
+        Self::listed(Self::on_board().map(Self::with_summary).collect(), "or")
+    }
+
+    /// The names of the methods that a board can compute, such as "clsf and clsf-full".
+    pub fn board_names() -> String {
+        Self::listed(Self::on_board().map(|method| method.name().to_owned()).collect(), "and")
+    }
+
+    fn on_board() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|method| method.board_form().is_some())
+    }
+
+    fn with_summary(self) -> String {
+        format!("{} ({})", self.name(), self.summary())
+    }
+
+    fn listed(mut words: Vec<String>, conjunction: &str) -> String {
+        match words.pop() {
+            Some(last) if !words.is_empty() => format!("{} {conjunction} {last}", words.join(", ")),
+            last => last.unwrap_or_default(),
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = CorrectionError;
+
+    fn from_str(text: &str) -> Result<Self, CorrectionError> {
+        let known = Self::ALL.into_iter().find(|method| method.name() == text.trim());
+        known.ok_or_else(|| CorrectionError::UnknownMethod(text.to_owned()))
+    }
+}

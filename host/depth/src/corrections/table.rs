@@ -1,0 +1,110 @@
+//! What a correction's file provides, and what is made of the table of corrections.
+
+use farnear_maths::clsf::DepthScale;
+use ndarray::ArrayViewMut2;
+
+use super::board::BoardForm;
+use super::pattern::Series;
+use super::{CdcSettings, CorrectionError};
+
+/// A correction that was learned. Its fields are its stored form.
+pub(super) trait Learned: Sized {
+    /// The least number of patterns, at different depths, that can teach it.
+    const PATTERNS_NEEDED: usize;
+
+    /// How a board computes it; none where only this computer can.
+    const BOARD_FORM: Option<BoardForm> = None;
+
+    /// Learns from checked patterns.
+    fn learn(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError>;
+
+    /// Checks what was loaded, and prepares it for maps of (height, width).
+    fn prepare(&mut self, dim: (usize, usize)) -> Result<(), CorrectionError>;
+
+    /// Corrects a map in standard layout in place; what is beyond the scale becomes NaN.
+    fn apply(&self, depth_mm: ArrayViewMut2<f32>, scale: DepthScale);
+
+    /// The bits of the coefficients for a board, in the order of its form; empty without one.
+    fn quantised(&self) -> Result<Vec<i32>, CorrectionError> {
+        Ok(Vec::new())
+    }
+}
+
+/// Makes [`Method`](super::Method), the names, and the stored form `Map` of the table of corrections.
+macro_rules! corrections {
+    ($(#[doc = $summary:literal] $variant:ident = $name:literal: $learned:ty,)+) => {
+        /// Which correction.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        pub enum Method {
+            $(
+                #[doc = $summary]
+                #[serde(rename = $name)]
+                $variant,
+            )+
+        }
+
+        impl Method {
+            /// All methods.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+
+            /// The name as the command line writes it.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)+ }
+            }
+
+            /// What it is, in a few words.
+            pub fn summary(self) -> &'static str {
+                match self { $(Self::$variant => $summary.trim_ascii(),)+ }
+            }
+
+            /// The least number of patterns, at different depths, that can teach it.
+            pub fn patterns_needed(self) -> usize {
+                match self { $(Self::$variant => <$learned>::PATTERNS_NEEDED,)+ }
+            }
+
+            /// How a board computes it; none where only this computer can.
+            pub fn board_form(self) -> Option<BoardForm> {
+                match self { $(Self::$variant => <$learned>::BOARD_FORM,)+ }
+            }
+        }
+
+        /// The part of a correction that differs from method to method.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "method")]
+        enum Map {
+            $(
+                #[serde(rename = $name)]
+                $variant($learned),
+            )+
+        }
+
+        impl Map {
+            fn learn(
+                method: Method,
+                series: &Series<'_>,
+                settings: &CdcSettings,
+            ) -> Result<Self, CorrectionError> {
+                Ok(match method {
+                    $(Method::$variant => Self::$variant(<$learned>::learn(series, settings)?),)+
+                })
+            }
+
+            fn method(&self) -> Method {
+                match self { $(Self::$variant(_) => Method::$variant,)+ }
+            }
+
+            fn prepare(&mut self, dim: (usize, usize)) -> Result<(), CorrectionError> {
+                match self { $(Self::$variant(learned) => learned.prepare(dim),)+ }
+            }
+
+            fn apply(&self, depth_mm: ArrayViewMut2<f32>, scale: DepthScale) {
+                match self { $(Self::$variant(learned) => learned.apply(depth_mm, scale),)+ }
+            }
+
+            fn quantised(&self) -> Result<Vec<i32>, CorrectionError> {
+                match self { $(Self::$variant(learned) => learned.quantised(),)+ }
+            }
+        }
+    };
+}
+pub(super) use corrections;

@@ -1,0 +1,95 @@
+//! A depth map with what is known about it: confidence, and what a user should know before trusting it.
+
+use std::fmt;
+
+use ndarray::Array2;
+
+use crate::psf::Psf;
+
+/// A depth map and what is known about it.
+#[derive(Debug, Clone)]
+pub struct DepthMap {
+    /// Object distance in mm, (height, width); NaN = no value.
+    pub depth_mm: Array2<f32>,
+    /// Confidence, 0 (none) to 1; 0 exactly where the depth is NaN.
+    pub confidence: Array2<f32>,
+    /// Part of the pixels whose texture energy is below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median.
+    pub low_texture_fraction: f64,
+    /// What a user should know before trusting the map.
+    pub warnings: Vec<Warning>,
+}
+
+/// What a user should know before trusting a map.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// Pixels are NaN or infinite.
+    NotFinite {
+        /// Number of pixels that are so in at least one image.
+        pixels: usize,
+    },
+    /// Pixels share the largest value of the pair in flat patches: they are saturated.
+    Saturated {
+        /// Part of the pixels that are so in at least one image.
+        fraction: f64,
+    },
+    /// The operators were designed for another PSF than the optics have.
+    PsfMismatch {
+        /// PSF of the operators.
+        operators: Psf,
+        /// PSF of the optics.
+        optics: Psf,
+    },
+    /// The far image seems to be the near one. Exchanging the images turns alpha into -alpha and nothing else, so only what
+    /// is known of scenes can tell; a scene that says nothing, as a plane, draws no warning.
+    LooksSwapped(SwapEvidence),
+}
+
+/// What speaks for a swapped pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SwapEvidence {
+    /// Much of the scene would lie before the near focus and almost nothing beyond the far focus; backgrounds do the
+    /// opposite.
+    BeyondNear {
+        /// Part of the confident pixels before the near focus.
+        fraction: f64,
+    },
+    /// The lower third of the image would lie farther away than the upper third; grounds and tables do the opposite.
+    LowerPartFarther {
+        /// Difference of the median depths, mm.
+        difference_mm: f64,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { pixels } => {
+                write!(f, "{pixels} pixels are NaN or infinite: there is no depth around them")
+            }
+            Self::Saturated { fraction } => {
+                write!(
+                    f,
+                    "{:.1} % of the pixels are saturated: there is no depth around them",
+                    100.0 * fraction
+                )
+            }
+            Self::PsfMismatch { operators, optics } => write!(
+                f,
+                "the operators were designed for the PSF {operators}, the optics have {optics}: expect errors of millimetres"
+            ),
+            Self::LooksSwapped(evidence) => {
+                write!(f, "the pair looks swapped: ")?;
+                match evidence {
+                    SwapEvidence::BeyondNear { fraction } => {
+                        write!(f, "{:.0} % of the scene would lie before the near focus", 100.0 * fraction)?;
+                    }
+                    SwapEvidence::LowerPartFarther { difference_mm } => write!(
+                        f,
+                        "the lower part of the scene would lie {difference_mm:.0} mm farther away than the upper part"
+                    )?,
+                }
+                write!(f, "; is FAR really the far-focused image?")
+            }
+        }
+    }
+}

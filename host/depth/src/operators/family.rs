@@ -1,0 +1,73 @@
+//! The families of operators and the procedures of their design, by name.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::psf::Psf;
+
+/// Which operators, and for which PSF.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// Watanabe & Nayar 1998, pill-box, by their procedure ([`watanabe`](super::watanabe)) whatever the [`Design`].
+    Watanabe,
+    /// Raj & Staunton 2012, pill-box, by their procedure ([`raj`](super::raj)) whatever the [`Design`].
+    Raj,
+    /// Pill-box rational operators by the procedures of Li 2014.
+    Ro,
+    /// Gaussian rational operators (Li 2014, section 5.2.1).
+    Gro,
+    /// Generalised Gaussian rational operators (Li 2014, section 5.2.2).
+    Ggro,
+}
+
+impl Family {
+    /// All families.
+    pub const ALL: [Self; 5] = [Self::Watanabe, Self::Raj, Self::Ro, Self::Gro, Self::Ggro];
+
+    /// The family that a PSF gets if none is asked for.
+    pub fn of(psf: Psf) -> Self {
+        match psf {
+            Psf::PillBox => Self::Ro,
+            Psf::Gaussian { .. } => Self::Gro,
+            Psf::Generalised { .. } => Self::Ggro,
+        }
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Watanabe => "watanabe",
+            Self::Raj => "raj",
+            Self::Ro => "ro",
+            Self::Gro => "gro",
+            Self::Ggro => "ggro",
+        }
+    }
+}
+
+impl fmt::Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How the kernels of the families `ro`, `gro` and `ggro` are fitted to the NIR.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Design {
+    /// One linear least squares ([`linear`](super::linear)): the most accurate, and milliseconds.
+    #[default]
+    Linear,
+    /// Levenberg-Marquardt on eq. 5.18 of Li 2014, put right ([`thesis`](super::thesis)).
+    Thesis,
+}
+
+impl fmt::Display for Design {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Linear => "linear",
+            Self::Thesis => "thesis",
+        })
+    }
+}

@@ -1,0 +1,256 @@
+//! `optics.toml`: what a user writes, and the check that makes [`Optics`] of it.
+//!
+//! The renderer (`hil-sim/scene`) reads the same files with a parser of its own, so that neither's physics leans on the
+//! other's; a test of this crate holds both to the same numbers and the same messages.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Optics, OpticsError, image_mm};
+use crate::psf::Psf;
+
+/// The largest relative difference between a given blur radius and the one that `near_mm` leads to.
+const AGREEMENT: f64 = 0.02;
+
+/// `[lens]` of an optics file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensSection {
+    /// Focal length F.
+    pub focal_length_mm: f64,
+    /// Diameter 2a of the telecentric aperture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aperture_mm: Option<f64>,
+    /// f-number `Fe = F / (2a)`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_number: Option<f64>,
+}
+
+/// `[sensor]` of an optics file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSection {
+    /// Pixel pitch.
+    pub pixel_um: f64,
+}
+
+/// `[focus]` of an optics file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FocusSection {
+    /// Object distance that is sharp in the far-focused image.
+    pub far_mm: f64,
+    /// Blur radius in the far-focused image of an object at the near focus.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_blur_px: Option<f64>,
+    /// Object distance that is sharp in the near-focused image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub near_mm: Option<f64>,
+}
+
+/// An optics file as written, before [`OpticsFile::check`] makes [`Optics`] of it.
+///
+/// `max_blur_px` and `near_mm` follow from each other: one suffices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OpticsFile {
+    /// Lens and aperture.
+    pub lens: LensSection,
+    /// Sensor.
+    pub sensor: SensorSection,
+    /// Focus distances.
+    pub focus: FocusSection,
+    /// Point-spread function; a pill-box where the file names none.
+    #[serde(default)]
+    pub psf: Psf,
+}
+
+impl OpticsFile {
+    /// Checks the values and completes what follows from them.
+    ///
+    /// # Errors
+    /// An [`OpticsError`] that names the offending value and, for contradictions, the value that would agree.
+    pub fn check(&self) -> Result<Optics, OpticsError> {
+        let focal_length_mm = positive("lens", "focal_length_mm", self.lens.focal_length_mm, " of mm")?;
+        let f_number = self.f_number(focal_length_mm)?;
+        let pixel_um = positive("sensor", "pixel_um", self.sensor.pixel_um, " of um")?;
+        let far_mm = positive("focus", "far_mm", self.focus.far_mm, " of mm")?;
+        beyond_focal_length("far_mm", far_mm, focal_length_mm)?;
+        let psf = self.psf.checked()?;
+        let of_blur = |max_blur_px| Optics { focal_length_mm, f_number, pixel_um, far_mm, max_blur_px, psf };
+        let of_near = |near_mm: f64| -> Result<Optics, OpticsError> {
+            beyond_focal_length("near_mm", near_mm, focal_length_mm)?;
+            if near_mm >= far_mm {
+                return Err(OpticsError::NearBeyondFar { far_mm, near_mm });
+            }
+            let travel_mm = image_mm(focal_length_mm, near_mm) - image_mm(focal_length_mm, far_mm);
+            Ok(of_blur(travel_mm / (2.0 * f_number) / (pixel_um * 1e-3)))
+        };
+        let blur =
+            self.focus.max_blur_px.map(|r| positive("focus", "max_blur_px", r, " of px")).transpose()?;
+        let near = self.focus.near_mm.map(|u| positive("focus", "near_mm", u, " of mm")).transpose()?;
+        match (blur, near) {
+            (None, None) => Err(OpticsError::NoRange),
+            (Some(max_blur_px), None) => Ok(of_blur(max_blur_px)),
+            (None, Some(near_mm)) => of_near(near_mm),
+            (Some(max_blur_px), Some(near_mm)) => {
+                let blur_would_be_px = of_near(near_mm)?.max_blur_px;
+                let optics = of_blur(max_blur_px);
+                let difference = (max_blur_px / blur_would_be_px - 1.0).abs();
+                if difference > AGREEMENT {
+                    return Err(OpticsError::RangeDisagrees {
+                        max_blur_px,
+                        near_mm,
+                        near_would_be_mm: optics.working_range().near_mm,
+                        blur_would_be_px,
+                        percent: 100.0 * difference,
+                    });
+                }
+                Ok(optics)
+            }
+        }
+    }
+
+    fn f_number(&self, focal_length_mm: f64) -> Result<f64, OpticsError> {
+        let aperture =
+            self.lens.aperture_mm.map(|a| positive("lens", "aperture_mm", a, " of mm")).transpose()?;
+        let f_number = self.lens.f_number.map(|f| positive("lens", "f_number", f, "")).transpose()?;
+        match (aperture, f_number) {
+            (None, None) => Err(OpticsError::NoAperture),
+            (Some(aperture_mm), None) => Ok(focal_length_mm / aperture_mm),
+            (None, Some(f_number)) => Ok(f_number),
+            (Some(aperture_mm), Some(f_number)) => {
+                let would_be = focal_length_mm / aperture_mm;
+                if (f_number / would_be - 1.0).abs() > AGREEMENT {
+                    return Err(OpticsError::ApertureDisagrees {
+                        focal_length_mm,
+                        aperture_mm,
+                        f_number,
+                        would_be,
+                    });
+                }
+                Ok(f_number)
+            }
+        }
+    }
+}
+
+fn positive(
+    section: &'static str,
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+) -> Result<f64, OpticsError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(OpticsError::NotPositive { section, name, value, unit })
+    }
+}
+
+fn beyond_focal_length(name: &'static str, value_mm: f64, focal_length_mm: f64) -> Result<(), OpticsError> {
+    if value_mm > focal_length_mm {
+        Ok(())
+    } else {
+        Err(OpticsError::InsideFocalLength { name, value_mm, focal_length_mm })
+    }
+}
+
+impl TryFrom<OpticsFile> for Optics {
+    type Error = OpticsError;
+
+    fn try_from(file: OpticsFile) -> Result<Self, OpticsError> {
+        file.check()
+    }
+}
+
+impl From<Optics> for OpticsFile {
+    fn from(optics: Optics) -> Self {
+        Self {
+            lens: LensSection {
+                focal_length_mm: optics.focal_length_mm,
+                aperture_mm: None,
+                f_number: Some(optics.f_number),
+            },
+            sensor: SensorSection { pixel_um: optics.pixel_um },
+            focus: FocusSection {
+                far_mm: optics.far_mm,
+                max_blur_px: Some(optics.max_blur_px),
+                near_mm: None,
+            },
+            psf: optics.psf,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Li 2014's rig (section 5.3); the distances were worked out by hand from the thin lens.
+    const RIG: &str = "
+        [lens]
+        focal_length_mm = 50.0
+        aperture_mm = 12.8
+        [sensor]
+        pixel_um = 7.4
+        [focus]
+        far_mm = 933.0
+        max_blur_px = 2.703
+        [psf]
+        model = \"generalised\"
+        p = 1.8
+        k = 0.4802
+    ";
+
+    fn rig() -> OpticsFile {
+        toml::from_str(RIG).unwrap()
+    }
+
+    #[test]
+    fn near_distance_and_blur_follow_from_each_other() {
+        let mut file = rig();
+        let near_mm = file.check().unwrap().working_range().near_mm;
+        file.focus = FocusSection { far_mm: 933.0, max_blur_px: None, near_mm: Some(near_mm) };
+        assert!((file.check().unwrap().max_blur_px() - 2.703).abs() < 1e-9);
+    }
+
+    #[test]
+    fn contradictions_name_the_value_that_would_agree() {
+        let mut file = rig();
+        file.focus.near_mm = Some(880.0);
+        let message = file.check().unwrap_err().to_string();
+        assert!(message.contains("near_mm = 886.81") && message.contains("max_blur_px = 3.1"), "{message}");
+        file.focus.near_mm = Some(886.5);
+        assert!(file.check().is_ok());
+        file.lens.f_number = Some(5.0);
+        assert!(file.check().unwrap_err().to_string().contains("f_number = 3.90625"));
+    }
+
+    #[test]
+    fn senseless_optics_are_refused() {
+        let spoil = |change: fn(&mut OpticsFile)| {
+            let mut file = rig();
+            change(&mut file);
+            file.check().unwrap_err()
+        };
+        assert!(matches!(
+            spoil(|f| f.lens.f_number = Some(0.0)),
+            OpticsError::NotPositive { name: "f_number", .. }
+        ));
+        assert!(matches!(spoil(|f| f.sensor.pixel_um = f64::NAN), OpticsError::NotPositive { .. }));
+        assert!(matches!(spoil(|f| f.focus.near_mm = Some(940.0)), OpticsError::NearBeyondFar { .. }));
+        assert!(matches!(
+            spoil(|f| f.focus.far_mm = 40.0),
+            OpticsError::InsideFocalLength { name: "far_mm", .. }
+        ));
+        assert!(matches!(spoil(|f| f.focus.max_blur_px = None), OpticsError::NoRange));
+        assert!(matches!(spoil(|f| f.lens.aperture_mm = None), OpticsError::NoAperture));
+    }
+
+    #[test]
+    fn checked_optics_survive_a_round_trip_through_toml() {
+        let optics = rig().check().unwrap();
+        let text = toml::to_string(&optics).unwrap();
+        assert_eq!(toml::from_str::<Optics>(&text).unwrap(), optics);
+    }
+}

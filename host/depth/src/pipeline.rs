@@ -1,0 +1,238 @@
+//! Run time: a defocused pair and operators to a depth map with its confidence.
+//!
+//! [`depth_from_pair`] does one pair, a [`Processor`] one after the other.
+//!
+//! 1. `M = Q * (I2 - I1)`, `P = Q * (I2 + I1)`; `m = Gm1 * M`, `p1 = Gp1 * P`, `p2 = Gp2 * P` (Li 2014, eqs. 1.7 to
+//!    1.9), borders reflected without repeating the edge pixel.
+//! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
+//! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 (`crate::cubic`), median, alpha to mm.
+//! 4. The rim, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`rim`).
+//! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`crate::confidence`]).
+//!
+//! Images may have any common gain and offset: they are normalised first. `I1` is the far-focused image.
+
+mod check;
+mod fast;
+mod processor;
+#[cfg(test)]
+mod reference;
+mod repair;
+mod rim;
+
+use ndarray::ArrayView2;
+use serde::{Deserialize, Serialize};
+
+use crate::operators::Operators;
+use crate::optics::Optics;
+
+pub use crate::cubic::MAX_ALPHA;
+pub use crate::depth_map::{DepthMap, SwapEvidence, Warning};
+pub use crate::simd::Backend;
+pub(crate) use check::{after as warnings_after, check, check_windows};
+pub use processor::Processor;
+
+/// Smallest width and height that can be processed: below, the operators see little but reflections.
+pub const MIN_SIDE_PX: usize = 16;
+
+/// Largest smoothing window.
+pub const MAX_SMOOTHING_PX: usize = 63;
+
+/// Why no depth could be computed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RunError {
+    /// The images differ in size.
+    #[error(
+        "the far image is {far_width}x{far_height} and the near image {near_width}x{near_height}: a pair must have one size"
+    )]
+    SizeMismatch {
+        /// Width of the far-focused image.
+        far_width: usize,
+        /// Height of the far-focused image.
+        far_height: usize,
+        /// Width of the near-focused image.
+        near_width: usize,
+        /// Height of the near-focused image.
+        near_height: usize,
+    },
+    /// The images are too small.
+    #[error("images of {width}x{height} px are too small: at least 16x16 are needed")]
+    TooSmall {
+        /// Width.
+        width: usize,
+        /// Height.
+        height: usize,
+    },
+    /// No pixel has a finite value in both images.
+    #[error("no pixel has a finite value in both images")]
+    NothingFinite,
+    /// An image has the same value everywhere.
+    #[error("the {which} image is constant ({value}): without texture there is no depth")]
+    Constant {
+        /// `far` or `near`.
+        which: &'static str,
+        /// The value.
+        value: f32,
+    },
+    /// The smoothing or median window is unusable.
+    #[error("{what} window of {size} px: must be odd and from 1 to {largest}")]
+    Window {
+        /// Which window.
+        what: &'static str,
+        /// The size asked for.
+        size: usize,
+        /// The largest allowed.
+        largest: usize,
+    },
+    /// The operators were designed for another blur.
+    #[error(
+        "the operators were designed for a largest blur of {operators_px} px, the optics have {optics_px} px: depths \
+         would be wrong by {percent:.0} %; design operators for these optics"
+    )]
+    BlurMismatch {
+        /// Blur radius of the operators.
+        operators_px: f64,
+        /// Blur radius of the optics.
+        optics_px: f64,
+        /// Difference in percent.
+        percent: f64,
+    },
+}
+
+/// How a pair is processed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// Side of the window over which the cubic's coefficients are summed, odd; 1 = none.
+    pub smoothing_px: usize,
+    /// Side of the median window over alpha: 1 (none), 3, 5 or 7.
+    pub median_px: usize,
+    /// Whether regions of low texture are filled from what surrounds them ([`crate::fill`]).
+    pub fill: bool,
+    /// Number of threads; 0 = as many as the machine has.
+    pub threads: usize,
+    /// Vector unit; the fastest that the processor has if none is named.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub backend: Option<Backend>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { smoothing_px: 7, median_px: 3, fill: false, threads: 1, backend: None }
+    }
+}
+
+impl Settings {
+    /// Number of threads that are used.
+    pub(crate) fn thread_count(&self) -> usize {
+        match self.threads {
+            0 => rayon::current_num_threads(),
+            n => n.min(rayon::current_num_threads()),
+        }
+    }
+}
+
+/// Depth of one pair; for many pairs of one size a [`Processor`] keeps its buffers and is faster. `far` and `near` are the far- and near-focused images, (height, width), of any common scale.
+///
+/// # Errors
+/// [`RunError`]: sizes, windows, constant or wholly invalid images, operators for another blur. Single invalid or
+/// saturated pixels are no error: depth is NaN and confidence 0 wherever they take part, and a warning says so.
+pub fn depth_from_pair(
+    far: ArrayView2<f32>,
+    near: ArrayView2<f32>,
+    operators: &Operators,
+    optics: &Optics,
+    settings: &Settings,
+) -> Result<DepthMap, RunError> {
+    let mut processor = Processor::new(operators, optics, settings)?;
+    processor.run(far, near)?;
+    Ok(processor.into_map())
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::{Array2, CowArray};
+
+    use super::*;
+    use crate::depth_of_alpha::DepthOfAlpha;
+    use crate::operators::{Request, design};
+    use crate::optics::OpticsFile;
+
+    /// Two different random images whose spatial scale is that of a texture.
+    fn random_pair(height: usize, width: usize) -> [Array2<f32>; 2] {
+        let value = |y: usize, x: usize, seed: usize| {
+            let mut h = (y * 7919 + x * 104_729 + seed * 1_299_709) as u64;
+            h = (h ^ (h >> 13)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            ((h >> 40) as f32) / 16_777_216.0
+        };
+        [1, 2].map(|seed| {
+            Array2::from_shape_fn((height, width), |(y, x)| {
+                40.0 + 100.0
+                    * (value(y / 2, x / 2, 0) + 0.15 * value(y / 3, x / 2, seed) + 0.05 * value(y, x, seed))
+            })
+        })
+    }
+
+    fn optics() -> Optics {
+        let text = "[lens]\nfocal_length_mm = 50.0\nf_number = 3.90625\n[sensor]\npixel_um = 7.4\n\
+                    [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703";
+        toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
+    }
+
+    /// All variants, odd sizes, tiles wider than one and several bands against the plain stages.
+    #[test]
+    fn every_variant_agrees_with_the_plain_run_time() {
+        let optics = optics();
+        for (height, width, kernel_size, smoothing_px, median_px) in [
+            (16, 16, 7, 7, 3),
+            (37, 51, 5, 3, 1),
+            (23, 1500, 7, 7, 3),
+            (130, 40, 11, 9, 5),
+            (64, 70, 9, 1, 7),
+        ] {
+            let request = Request { kernel_size, ..Request::for_optics(&optics) };
+            let operators = design(&request).unwrap();
+            let pair = random_pair(height, width);
+            let [far, near] = pair.each_ref().map(|i| CowArray::from(i.view()));
+            let settings = Settings { smoothing_px, median_px, ..Settings::default() };
+            let input = check::check(&far, &near, Backend::best(), 1).unwrap();
+            let plain = reference::maps(&input, &operators, &settings);
+            for backend in Backend::available() {
+                for threads in [1, 2] {
+                    let settings = Settings { threads, backend: Some(backend), ..settings };
+                    let [mut depth_mm, mut texture, mut misfit] =
+                        [(); 3].map(|()| Array2::zeros((height, width)));
+                    let depth_of = DepthOfAlpha::new(&operators, &optics);
+                    fast::Job {
+                        input: &input,
+                        operators: &operators,
+                        settings: &settings,
+                        depth_of,
+                        backend,
+                    }
+                    .run(
+                        &mut Vec::new(),
+                        fast::Maps {
+                            depth_mm: depth_mm.view_mut(),
+                            texture: texture.view_mut(),
+                            misfit: misfit.view_mut(),
+                        },
+                    );
+                    let scale = plain.texture.iter().copied().fold(0.0, f32::max);
+                    let at = format!("{backend:?} {width}x{height} kernel {kernel_size} threads {threads}");
+                    for (a, b) in texture.iter().zip(&plain.texture) {
+                        assert!((a - b).abs() <= 1e-5 * scale, "texture {a} {b} {at}");
+                    }
+                    for ((y, x), alpha) in plain.alpha.indexed_iter() {
+                        // Low texture magnifies rounding; alpha spans 46 mm of depth over 2.
+                        let weight = (plain.texture[(y, x)] / scale).sqrt();
+                        let error = weight * (depth_mm[(y, x)] - depth_of.depth_mm(*alpha)).abs() / 23.0;
+                        assert!(error < 1e-4, "alpha {error} at ({x}, {y}) {at}");
+                    }
+                    for ((a, b), c) in misfit.iter().zip(&plain.misfit).zip(&plain.texture) {
+                        assert!(c / scale * (a - b).abs() < 1e-4 * (1.0 + b), "misfit {a} {b} {at}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! The run time as a stream of rows: every stage takes a few rows from the one before while they are in the cache.
+//!
+//! A tile (all rows of a band, at most [`MAX_TILE_PX`] columns) needs `halo` pixels around it; beyond the image the
+//! input is reflected there, which with symmetric kernels is the same as reflecting at every stage. Rows go in blocks of
+//! [`BLOCK`] through normalisation, pre-filter, the three operators, the window sums and the cubic; each stage keeps what
+//! it still needs, so nothing is computed twice within a tile. Beside the three maps a tile holds about 100 rows: less
+//! than 1 MB whatever the size of the image.
+//!
+//! Bands are independent: threads share nothing but the input.
+
+use ndarray::{ArrayViewMut2, Axis, s};
+use rayon::prelude::*;
+
+use super::check::Input;
+use super::{Backend, Settings};
+use crate::border::reflect;
+use crate::depth_of_alpha::DepthOfAlpha;
+use crate::operators::Operators;
+use crate::simd::{self, CubicRow, Plane, Taps, WindowRow};
+
+/// Rows that go through a stage at a time.
+const BLOCK: usize = simd::SEVEN_BLOCK;
+
+/// Widest tile: its rows of all stages fit a second-level cache of 1 MB; narrower ones would break the images' rows, and thereby
+/// the processor's reading ahead, more often.
+const MAX_TILE_PX: usize = 1024;
+
+/// Shortest band worth a thread: its halo of some 20 rows is computed twice.
+const MIN_BAND_PX: usize = 48;
+
+/// What every tile needs to know.
+pub(crate) struct Job<'a> {
+    pub input: &'a Input<'a>,
+    pub operators: &'a Operators,
+    pub settings: &'a Settings,
+    pub depth_of: DepthOfAlpha,
+    pub backend: Backend,
+}
+
+/// The maps that tiles write, (height, width).
+pub(crate) struct Maps<'a> {
+    /// Depth in mm after the median.
+    pub depth_mm: ArrayViewMut2<'a, f32>,
+    /// Texture energy c1.
+    pub texture: ArrayViewMut2<'a, f32>,
+    /// Misfit relative to c1.
+    pub misfit: ArrayViewMut2<'a, f32>,
+}
+
+impl Job<'_> {
+    /// Fills the maps, on as many threads as the settings ask for; `tiles` keeps the buffers for the next pair.
+    pub fn run(&self, tiles: &mut Vec<Tile>, maps: Maps<'_>) {
+        let (height, width) = maps.depth_mm.dim();
+        let bands = self.settings.thread_count().min(height / MIN_BAND_PX).max(1);
+        let rows = height.div_ceil(bands);
+        let tile_width = width.div_ceil(width.div_ceil(MAX_TILE_PX));
+        if tiles.len() != bands || tiles.iter().any(|tile| tile.width != tile_width) {
+            *tiles = (0..bands).map(|_| Tile::new(self, tile_width)).collect();
+        }
+        let Maps { mut depth_mm, mut texture, mut misfit } = maps;
+        if let [tile] = &mut tiles[..] {
+            self.band(tile, 0, Maps { depth_mm, texture, misfit });
+            return;
+        }
+        tiles
+            .par_iter_mut()
+            .zip(depth_mm.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+            .zip(texture.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+            .zip(misfit.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+            .enumerate()
+            .for_each(|(i, (((tile, depth_mm), texture), misfit))| {
+                self.band(tile, i * rows, Maps { depth_mm, texture, misfit });
+            });
+    }
+
+    fn band(&self, tile: &mut Tile, top: usize, maps: Maps<'_>) {
+        let width = maps.depth_mm.ncols();
+        let Maps { mut depth_mm, mut texture, mut misfit } = maps;
+        for left in (0..width).step_by(tile.width) {
+            let columns = s![.., left..(left + tile.width).min(width)];
+            let [depth_mm, texture, misfit] =
+                [&mut depth_mm, &mut texture, &mut misfit].map(|map| map.slice_mut(columns));
+            tile.run(self, top, left, Maps { depth_mm, texture, misfit });
+        }
+    }
+}
+
+/// The buffers of a tile.
+#[derive(Debug)]
+pub(crate) struct Tile {
+    /// Largest width of a tile.
+    width: usize,
+    /// Pixels around the tile that take part.
+    halo: usize,
+    radius: usize,
+    smoothing: usize,
+    median: usize,
+    difference: Plane,
+    sum: Plane,
+    filtered: [Plane; 2],
+    filters: [Taps; 2],
+    m: Plane,
+    p: [Plane; 2],
+    operators: [Taps; 3],
+    window: WindowRow,
+    sums: Plane,
+    alpha: Plane,
+    scratch: Plane,
+    /// Sorted columns of the median's windows.
+    sorted: Plane,
+}
+
+impl Tile {
+    fn new(job: &Job, width: usize) -> Self {
+        let radius = job.operators.kernel_size() / 2;
+        let [smoothing, median] = [job.settings.smoothing_px, job.settings.median_px];
+        let halo = 2 * radius + smoothing / 2 + median / 2;
+        let full = width + 2 * halo;
+        let plane = || Plane::new(BLOCK, full);
+        let ring = || Plane::new(2 * BLOCK, full);
+        let taps = |kernel| Taps::new(kernel, full);
+        let o = job.operators;
+        Self {
+            width,
+            halo,
+            radius,
+            smoothing,
+            median,
+            difference: plane(),
+            sum: plane(),
+            filtered: [plane(), plane()],
+            filters: [taps(o.prefilter()), taps(o.prefilter())],
+            m: ring(),
+            p: [ring(), ring()],
+            operators: [taps(o.gm1()), taps(o.gp1()), taps(o.gp2())],
+            window: WindowRow::new(smoothing, full),
+            sums: Plane::new(4 * BLOCK, full),
+            alpha: Plane::new(median, full),
+            scratch: Plane::new(3, full),
+            sorted: Plane::new(median, full),
+        }
+    }
+
+    fn run(&mut self, job: &Job, top: usize, left: usize, mut maps: Maps<'_>) {
+        let (height, width) = maps.depth_mm.dim();
+        for taps in self.filters.iter_mut().chain(&mut self.operators) {
+            taps.reset();
+        }
+        self.window.reset();
+        let backend = job.backend;
+        let inputs = height + 2 * self.halo;
+        // Columns left after each stage.
+        let filtered = width + 2 * (self.halo - self.radius);
+        let operated = filtered - 2 * self.radius;
+        let solved = operated - (self.smoothing - 1);
+        // Rows that go in before the first complete alpha comes out.
+        let lag = 4 * self.radius + self.smoothing - 1;
+        for begin in (0..inputs).step_by(BLOCK) {
+            let rows = BLOCK.min(inputs - begin);
+            for y in 0..rows {
+                let image_row = (top + begin + y) as isize - self.halo as isize;
+                self.load_row(job, image_row, left, width, y);
+            }
+            for (input, (filter, output)) in
+                [&self.difference, &self.sum].into_iter().zip(self.filters.iter_mut().zip(&mut self.filtered))
+            {
+                simd::convolve(backend, filter, input, output, 0, rows, filtered);
+            }
+            let [difference, sum] = &self.filtered;
+            let [gm1, gp1, gp2] = &mut self.operators;
+            let [p1, p2] = &mut self.p;
+            // The sums over seven rows need the block before: it stays in the other half of the ring.
+            let half = begin / BLOCK % 2;
+            let first = half * BLOCK;
+            simd::convolve(backend, gm1, difference, &mut self.m, first, rows, operated);
+            simd::convolve(backend, gp1, sum, p1, first, rows, operated);
+            simd::convolve(backend, gp2, sum, p2, first, rows, operated);
+            let operated_rows = [&self.m, p1, p2];
+            if self.smoothing == 7 {
+                simd::vertical_sums_of_seven(backend, operated_rows, half, &mut self.sums, operated);
+            } else {
+                simd::vertical_sums(
+                    backend,
+                    &mut self.window,
+                    operated_rows,
+                    first,
+                    &mut self.sums,
+                    rows,
+                    operated,
+                );
+            }
+            for y in 0..rows {
+                if let Some(row) = (begin + y).checked_sub(lag) {
+                    self.finish_row(job, row, y, solved, &mut maps);
+                }
+            }
+        }
+    }
+
+    /// Normalises one row of the image with its halo.
+    fn load_row(&mut self, job: &Job, image_row: isize, left: usize, width: usize, y: usize) {
+        let input = job.input;
+        let [image_height, image_width] = [input.height, input.width];
+        let row = reflect(image_row, image_height);
+        let [far, near] =
+            [input.far, input.near].map(|image| &image[row * image_width..(row + 1) * image_width]);
+        let [difference, sum] = [self.difference.row_mut(y), self.sum.row_mut(y)];
+        let full = width + 2 * self.halo;
+        // Columns of the image that the halo covers, and where they go.
+        let from = left.saturating_sub(self.halo);
+        let to = (left + width + self.halo).min(image_width);
+        let at = from + self.halo - left;
+        let inside = at..at + (to - from);
+        let (difference_part, sum_part) = (&mut difference[inside.clone()], &mut sum[inside.clone()]);
+        simd::normalise_row(
+            job.backend,
+            &far[from..to],
+            &near[from..to],
+            input.offset,
+            input.gain,
+            difference_part,
+            sum_part,
+        );
+        if input.bad().is_some() {
+            // Holes are filled with the middle value; whatever they touch is taken out again later.
+            for value in difference_part.iter_mut().chain(sum_part) {
+                if !value.is_finite() {
+                    *value = 0.0;
+                }
+            }
+        }
+        for x in (0..inside.start).chain(inside.end..full) {
+            let column = reflect((left + x) as isize - self.halo as isize, image_width);
+            // Reflection leads beyond what was loaded only if the tile is narrower than its halo.
+            [difference[x], sum[x]] = match (column + self.halo).checked_sub(left) {
+                Some(source) if inside.contains(&source) => [difference[source], sum[source]],
+                _ => input.normalised(row, column),
+            };
+        }
+    }
+
+    /// Solves the cubic for one row of sums and finishes the row of the maps that thereby becomes complete.
+    fn finish_row(&mut self, job: &Job, row: usize, y: usize, solved: usize, maps: &mut Maps<'_>) {
+        let (height, width) = maps.depth_mm.dim();
+        let stride = self.scratch.stride();
+        let reach = self.median / 2;
+        let (texture, rest) = self.scratch.all_mut().split_at_mut(stride);
+        let (misfit, depth) = rest.split_at_mut(stride);
+        let mut cubic = CubicRow { alpha: self.alpha.row_mut(row % self.median), texture, misfit };
+        cubic.solve(job.backend, &self.sums, y, self.smoothing, solved);
+        if let Some(at) = row.checked_sub(reach).filter(|at| *at < height) {
+            copy(&texture[reach..reach + width], &mut maps.texture, at);
+            copy(&misfit[reach..reach + width], &mut maps.misfit, at);
+        }
+        if let Some(at) = row.checked_sub(self.median - 1) {
+            let rows: [&[f32]; 7] = std::array::from_fn(|i| self.alpha.row(i.min(self.median - 1)));
+            simd::median_row(job.backend, &rows[..self.median], &mut self.sorted, job.depth_of, depth, width);
+            copy(&depth[..width], &mut maps.depth_mm, at);
+        }
+    }
+}
+
+fn copy(from: &[f32], to: &mut ArrayViewMut2<f32>, row: usize) {
+    if let Some(to) = to.row_mut(row).as_slice_mut() {
+        to.copy_from_slice(from);
+    }
+}

@@ -1,0 +1,42 @@
+//! The parts of `docs/activity.md`: people's shadows, silhouettes and activities, like Li 2014, chapters 8 and 9.
+
+mod broken;
+mod damage;
+pub mod data;
+mod layout;
+mod matrix;
+mod recognition;
+mod robustness;
+mod sets;
+mod shadows;
+mod skeletons;
+mod strips;
+mod sun;
+
+use anyhow::Result;
+
+use crate::page::Page;
+use data::Data;
+
+/// A part's name and what measures it.
+type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
+
+/// In the order of the page.
+pub const PARTS: [Part; 9] = [
+    ("synthetic-people", |page, _| recognition::measure(page)),
+    ("utkinect", |page, data| recognition::measure_real(page, data, sets::utkinect, "UTKinect")),
+    ("florence", |page, data| recognition::measure_real(page, data, sets::florence, "Florence")),
+    ("weizmann", |page, data| recognition::measure_real(page, data, sets::weizmann, "the Weizmann strips")),
+    ("robustness", robustness::measure),
+    ("broken-silhouettes", broken::measure),
+    ("layout", |page, _| layout::measure(page)),
+    ("shadows", shadows::measure),
+    ("sun", sun::measure),
+];
+
+/// What a reader must know before the first figure.
+pub const INTRODUCTION: &str = "# Shadows and activities
+
+Written by `cargo xtask evaluate`; seeds are fixed and no clock enters, so that two runs on one kind of processor write the same bytes. Sets that are not part of this
+repository are measured where they are at hand, and said to be skipped where not. *Li 2014* is Ang Li's PhD thesis (University of Warwick, 2014), whose
+chapters 8 and 9 these tables redo; its own recordings were never published, so figures cannot be compared set for set.";

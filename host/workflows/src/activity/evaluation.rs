@@ -1,0 +1,252 @@
+//! How well the method recognises subjects that it was not trained on.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use farnear_activity::{
+    evaluation::{
+        confusion::Confusion,
+        leave_one_out::{Choice, EvaluationError, Outcome, train_on_others},
+    },
+    mask::Mask,
+    recognition::{
+        choice::{Views, names},
+        clip::{Clip, Track},
+        model::Recogniser,
+        watch::Unwatched,
+    },
+};
+use farnear_files::{masks, staging::Staging};
+use serde::Serialize;
+
+use super::{
+    confusion_picture,
+    method::Method,
+    samples::{SCALING, Samples, SamplesError, are_full_frames},
+    watched,
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
+
+/// How often the time of an answer is taken; the shortest counts.
+const TIMINGS: usize = 3;
+
+/// What is evaluated, how, and where to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct EvaluationSettings {
+    /// The samples that are recognised, TOML.
+    pub samples: PathBuf,
+    /// What is learned from.
+    pub learn_from: LearnFrom,
+    /// How activities are told apart.
+    pub method: Method,
+    /// Which views are recognised together; without it fused, or each by itself where clips differ in their views.
+    pub views: Option<Views>,
+    /// A new folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold).
+    pub out: Option<PathBuf>,
+}
+
+/// What is learned from; never the subject that is recognised.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum LearnFrom {
+    /// The other subjects, each left out in turn.
+    OtherSubjects,
+    /// Other samples of other people.
+    Samples(PathBuf),
+    /// Other samples, of which the subject's own are left out in turn.
+    SamplesOfOthers(PathBuf),
+}
+
+impl LearnFrom {
+    fn path(&self) -> Option<&Path> {
+        match self {
+            Self::OtherSubjects => None,
+            Self::Samples(path) | Self::SamplesOfOthers(path) => Some(path),
+        }
+    }
+}
+
+/// How well people were recognised.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct EvaluationFigures {
+    /// Share of right answers, 0 to 1.
+    pub accuracy: f64,
+    /// Its 95 % interval (Wilson).
+    pub confidence_interval: [f64; 2],
+    /// Right answers.
+    pub right: u32,
+    /// Answers.
+    pub answers: u32,
+    /// Clips.
+    pub clips: usize,
+    /// People.
+    pub subjects: usize,
+    /// Which views were recognised together.
+    pub views: Views,
+    /// The method's name.
+    pub mode: &'static str,
+    /// Whether masks are full frames, so that the box's motion counts.
+    pub full_frames: bool,
+    /// Masks.
+    pub frames: usize,
+    /// Masks without anybody.
+    pub empty_frames: usize,
+    /// From a mask in memory to its part of an answer, one thread.
+    pub seconds_per_frame: f64,
+    /// Time for all.
+    pub seconds: f64,
+    /// `counts[truth][answer]`.
+    pub confusion: Confusion,
+}
+
+/// `evaluation.toml`: nothing that differs between two runs.
+#[derive(Serialize)]
+struct Record<'a> {
+    accuracy: f64,
+    confidence_interval: [f64; 2],
+    mode: &'static str,
+    views: Views,
+    fold: &'a [Choice],
+}
+
+/// Recognises every subject by what was learned from others.
+///
+/// # Errors
+/// Samples that cannot be read or used, too few subjects, results that cannot be written.
+pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<EvaluationFigures> {
+    let start = Instant::now();
+    let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
+    let test = Samples::read(&settings.samples, context)?;
+    let train = settings.learn_from.path().map(|path| Samples::read(path, context)).transpose()?;
+    let (frames, empty_frames, full_frames) = (test.frames, test.empty_frames, test.full_frames);
+    let folders = test.folders.clone();
+    let Clips { views, test, train } = Clips::of(test, train, settings.views)?;
+    let subjects = names(test.iter().map(|clip| &clip.subject));
+    let learned = train.as_deref().unwrap_or(&test);
+    check_subjects(settings, &subjects, learned)?;
+    let experiment = settings.method.experiment();
+    let outcome = train_on_others(learned, &test, &experiment, &[views], &watched::Folds::new(context));
+    let outcome = watched::outcome(outcome, context, "evaluating")?;
+    let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
+    let (low, high) = confusion.interval();
+    let (right, answers) = confusion.right_of();
+    let mut figures = EvaluationFigures {
+        accuracy: rounded(confusion.accuracy(), 5),
+        confidence_interval: [rounded(low, 5), rounded(high, 5)],
+        right,
+        answers,
+        clips: test.len(),
+        subjects: subjects.len(),
+        views,
+        mode: settings.method.name(),
+        full_frames,
+        frames,
+        empty_frames,
+        seconds_per_frame: 0.0,
+        seconds: 0.0,
+        confusion: confusion.clone(),
+    };
+    if let (Some(staged), Some(out)) = (out, &settings.out) {
+        keep(&figures, &outcome, staged)?;
+        context.say(&format!("wrote {}", out.display()));
+    }
+    figures.seconds_per_frame = seconds_per_frame(learned, &settings.method, &folders, context)?;
+    figures.seconds = rounded(start.elapsed().as_secs_f64(), 3);
+    Ok(figures)
+}
+
+/// The clips of an evaluation, and which of their views are recognised together.
+struct Clips {
+    views: Views,
+    test: Vec<Clip>,
+    /// What is learned from, where that is not the same.
+    train: Option<Vec<Clip>>,
+}
+
+impl Clips {
+    fn of(test: Samples, train: Option<Samples>, asked: Option<Views>) -> Result<Self> {
+        if let Some(train) = &train {
+            test.check_kind(train)?;
+        }
+        let alike = test.views.is_some() && train.as_ref().is_none_or(|train| train.views == test.views);
+        let views = asked.unwrap_or(if alike { Views::Fused } else { Views::Each });
+        // Views that correspond each have a classifier of their own; others share one.
+        if views == Views::Each && !alike {
+            return Ok(Self { views, test: test.split(), train: train.map(Samples::split) });
+        }
+        if let (false, Some(_), Some(train)) = (alike, &test.views, &train) {
+            let (test, train) = (test.path.clone(), train.path.clone());
+            return Err(SamplesError::OtherViews { test, train }.into());
+        }
+        Ok(Self { views, test: test.fused()?, train: train.map(Samples::fused).transpose()? })
+    }
+}
+
+/// Refuses evaluations whose answers would mean nothing.
+fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &[Clip]) -> Result<()> {
+    match &settings.learn_from {
+        LearnFrom::OtherSubjects if subjects.len() < 3 => {
+            Err(EvaluationError::Subjects(subjects.len()).into())
+        }
+        LearnFrom::OtherSubjects | LearnFrom::SamplesOfOthers(_) => Ok(()),
+        LearnFrom::Samples(train) => {
+            let known = names(learned.iter().map(|clip| &clip.subject));
+            let Some(both) = subjects.iter().find(|subject| known.contains(subject)) else { return Ok(()) };
+            let (test, train) = (settings.samples.clone(), train.clone());
+            Err(SamplesError::SamePerson { subject: both.clone(), test, train }.into())
+        }
+    }
+}
+
+fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<()> {
+    let record = Record {
+        accuracy: figures.accuracy,
+        confidence_interval: figures.confidence_interval,
+        mode: figures.mode,
+        views: figures.views,
+        fold: &outcome.chosen,
+    };
+    out.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
+    out.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
+    out.write("evaluation.toml", toml::to_string(&record)?.as_bytes())?;
+    Ok(out.finish()?)
+}
+
+/// One thread's time from masks in memory to an answer, over the frames of the first clip.
+fn seconds_per_frame(
+    clips: &[Clip],
+    method: &Method,
+    folders: &[PathBuf],
+    context: &Context<'_>,
+) -> Result<f64> {
+    let views = clips.first().map_or(0, |clip| clip.views.len());
+    let (model, _) = Recogniser::train_searched(clips, &method.experiment().fixed(), SCALING, &Unwatched)?;
+    let sequences = folders
+        .iter()
+        .take(views)
+        .map(|folder| Ok(masks::read_all(folder)?.into_iter().map(|named| named.mask).collect()))
+        .collect::<Result<Vec<Vec<Mask>>>>()?;
+    let frames: usize = sequences.iter().map(Vec::len).sum();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let one = one.map_err(|error| WorkflowError::Thread { reason: error.to_string() })?;
+    let best = one.install(|| -> Result<f64> {
+        let mut best = f64::INFINITY;
+        for _ in 0..TIMINGS {
+            context.cancel.check("taking the time of an answer")?;
+            let start = Instant::now();
+            let tracks: Vec<Track> = sequences
+                .iter()
+                .map(|masks| Track::from_masks(masks, SCALING, are_full_frames(masks)))
+                .collect();
+            model.recognise(&tracks)?;
+            best = best.min(start.elapsed().as_secs_f64());
+        }
+        Ok(best)
+    })?;
+    Ok(rounded(best / frames.max(1) as f64, 7))
+}

@@ -1,0 +1,258 @@
+//! A running answer over masks or video, then windows and the whole.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use farnear_activity::{
+    mask::{centre::SIDE_PX, subject::Flag},
+    recognition::{
+        clip::Track,
+        live::{Live, joined, segments, windows},
+        model::{Answer, Recogniser},
+    },
+};
+use serde::Serialize;
+
+use super::views::{Frames, Seen, View};
+use crate::{
+    context::Context,
+    error::{About, Result, WorkflowError},
+    figures::rounded,
+    parameters::at_least,
+};
+
+/// A model and the file it comes from.
+pub struct Model {
+    path: PathBuf,
+    recogniser: Recogniser,
+}
+
+impl Model {
+    /// Reads a model.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged, or of another version.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).map_err(WorkflowError::read("the model", path))?;
+        let recogniser = Recogniser::from_bytes(&bytes).about(|| path.display().to_string())?;
+        Ok(Self { path: path.into(), recogniser })
+    }
+}
+
+/// What is recognised.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct RecognitionSettings {
+    /// As many views as the model fuses, in its order.
+    pub views: Vec<View>,
+    /// Frames of the running answer and of windows over a long recording; without it as many as a training clip had.
+    pub window: Option<usize>,
+}
+
+/// More or other views than the model's.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{}: the model fuses {expected} views, {found} were given", model.display())]
+pub struct ViewsError {
+    /// The model.
+    pub model: PathBuf,
+    /// Its views.
+    pub expected: usize,
+    /// Views given.
+    pub found: usize,
+}
+
+/// The answer for the frames so far, at most a window of them.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct FrameAnswer {
+    /// Number of the frame, from 1.
+    pub frame: usize,
+    /// Its name in the first view.
+    pub name: String,
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
+    pub strangeness: Option<f64>,
+    /// What is doubtful about the frame's masks.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flags: Vec<String>,
+}
+
+/// The answer for the whole recording.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RecognitionFigures {
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// Outlier score, as in [`FrameAnswer`].
+    pub strangeness: Option<f64>,
+    /// Probability of every activity.
+    pub shares: Vec<Share>,
+    /// Frames of a view.
+    pub frames: usize,
+    /// Masks of all views without anybody.
+    pub empty_frames: usize,
+    /// Frames with something doubtful.
+    pub flagged_frames: usize,
+    /// Frames of a window.
+    pub window: usize,
+    /// Answers for windows that overlap by half.
+    pub windows: Vec<Part>,
+    /// The recording cut where the answer changes.
+    pub segments: Vec<Part>,
+    /// From a file to its part of a running answer.
+    pub seconds_per_frame: f64,
+}
+
+/// Probability of an activity.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Share {
+    /// The activity.
+    pub activity: String,
+    /// 0 to 1; all add up to 1.
+    pub share: f64,
+}
+
+/// A stretch of the recording; frames from 1, both ends included.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Part {
+    /// First frame.
+    pub from: usize,
+    /// Last frame.
+    pub to: usize,
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+}
+
+/// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
+pub struct Recognition<'m> {
+    model: &'m Recogniser,
+    views: Vec<Frames>,
+    window: usize,
+    live: Live<'m>,
+    /// Everything seen so far: `[view][frame]`.
+    tracks: Vec<Vec<Track>>,
+    frames: usize,
+    flagged_frames: usize,
+    seconds: f64,
+}
+
+impl<'m> Recognition<'m> {
+    /// Opens the views.
+    ///
+    /// # Errors
+    /// [`ViewsError`], views that cannot be opened.
+    pub fn begin(model: &'m Model, settings: &RecognitionSettings) -> Result<Self> {
+        let Model { path, recogniser: model } = model;
+        let (expected, found) = (model.views, settings.views.len());
+        if found != expected {
+            return Err(ViewsError { model: path.clone(), expected, found }.into());
+        }
+        if let Some(window) = settings.window {
+            at_least("window", window, 1, "frames")?;
+        }
+        let views = settings.views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
+        let window = settings.window.unwrap_or(model.typical_frames).max(1);
+        Ok(Self {
+            live: Live::new(model, window, true),
+            tracks: vec![Vec::new(); views.len()],
+            model,
+            views,
+            window,
+            frames: 0,
+            flagged_frames: 0,
+            seconds: 0.0,
+        })
+    }
+
+    /// Takes the next frame of every view and answers for those so far; `None` where the first view ends.
+    ///
+    /// # Errors
+    /// Frames that cannot be read or do not fit the model, [`WorkflowError::Cancelled`].
+    pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameAnswer>> {
+        context.cancel.check("recognising")?;
+        let start = Instant::now();
+        let moment: Option<Vec<Seen>> =
+            self.views.iter_mut().map(Frames::next).collect::<Result<Option<Vec<Seen>>>>()?;
+        let Some(moment) = moment else { return Ok(None) };
+        let Some(name) = moment.first().map(|seen| seen.name.clone()) else { return Ok(None) };
+        self.frames += 1;
+        let scaling = self.model.settings.scaling;
+        let described = |seen: &Seen| {
+            let full = seen.mask.dim() != (SIDE_PX, SIDE_PX);
+            Track::from_masks(std::slice::from_ref(&seen.mask), scaling, full)
+        };
+        let described: Vec<Track> = moment.iter().map(described).collect();
+        for (all, track) in self.tracks.iter_mut().zip(&described) {
+            all.push(track.clone());
+        }
+        let answer = self.live.push_described(described).about(|| name.clone())?;
+        self.seconds += start.elapsed().as_secs_f64();
+        let flags: Vec<String> =
+            moment.iter().flat_map(|seen| seen.flags.iter().map(Flag::to_string)).collect();
+        self.flagged_frames += usize::from(!flags.is_empty());
+        Ok(Some(FrameAnswer {
+            frame: self.frames,
+            name,
+            confidence: rounded_share(answer.confidence),
+            strangeness: outlier_score(&answer),
+            activity: answer.activity,
+            flags,
+        }))
+    }
+
+    /// Answers for the whole and for its windows.
+    ///
+    /// # Errors
+    /// Views that do not fit the model.
+    pub fn finish(self) -> Result<RecognitionFigures> {
+        let whole: Vec<Track> = self.tracks.iter().map(|parts| joined(parts.iter())).collect();
+        let answer = self.model.recognise(&whole)?;
+        let stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
+        let part = |from: usize, to, activity: &Option<String>, confidence| Part {
+            from: from + 1,
+            to,
+            activity: activity.clone(),
+            confidence: rounded_share(confidence),
+        };
+        Ok(RecognitionFigures {
+            confidence: rounded_share(answer.confidence),
+            strangeness: outlier_score(&answer),
+            activity: answer.activity,
+            shares: answer
+                .probabilities
+                .into_iter()
+                .map(|(activity, value)| Share { activity, share: rounded_share(value) })
+                .collect(),
+            frames: self.frames,
+            empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
+            flagged_frames: self.flagged_frames,
+            window: self.window,
+            windows: stretches
+                .iter()
+                .map(|s| part(s.from, s.to, &s.answer.activity, s.answer.confidence))
+                .collect(),
+            segments: segments(&stretches)
+                .iter()
+                .map(|s| part(s.from, s.to, &s.activity, s.confidence))
+                .collect(),
+            seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
+        })
+    }
+}
+
+/// A share with four decimals, without the digits that f32 does not have.
+fn rounded_share(value: f32) -> f64 {
+    rounded(f64::from(value), 4)
+}
+
+/// JSON has no infinity: nothing was seen.
+fn outlier_score(answer: &Answer) -> Option<f64> {
+    answer.outlier_score.is_finite().then(|| rounded_share(answer.outlier_score))
+}

@@ -1,0 +1,297 @@
+//! SAMPLES.toml: which masks show whom doing what from where, read into described clips.
+//!
+//! Samples of one performance from several views are one clip: those with one `clip` name, or, without names, the first of
+//! each view, the second of each, and so on in the file's order.
+
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use farnear_activity::{
+    embedding::descriptor::Scaling,
+    mask::{Mask, centre::SIDE_PX},
+    recognition::clip::{Clip, Track},
+};
+use farnear_files::masks;
+use rayon::prelude::*;
+use serde::Deserialize;
+
+use crate::{
+    context::Context,
+    counter::Counter,
+    error::{About, Result, WorkflowError},
+};
+
+/// How all masks are scaled before they are described.
+pub const SCALING: Scaling = Scaling::KeepAspect;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(rename = "sample", default)]
+    samples: Vec<Sample>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sample {
+    masks: PathBuf,
+    subject: String,
+    activity: String,
+    #[serde(default = "first")]
+    view: u32,
+    clip: Option<String>,
+}
+
+fn first() -> u32 {
+    1
+}
+
+/// Why samples cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SamplesError {
+    /// Nothing in it.
+    #[error("it has no [[sample]] (masks, subject, activity, view)")]
+    None,
+    /// A sample without a person or without an activity.
+    #[error("a sample has an empty subject or activity")]
+    Nameless,
+    /// A folder in which nobody is seen.
+    #[error("{}: all {count} masks are empty", folder.display())]
+    NobodySeen {
+        /// The folder.
+        folder: PathBuf,
+        /// Its masks.
+        count: usize,
+    },
+    /// Full frames beside cut-out silhouettes.
+    #[error(
+        "the masks of {} are full frames, those of {} cut out at 100x100; samples must be alike", full.display(), cut_out.display()
+    )]
+    Kinds {
+        /// A folder, or a file of samples, with full frames.
+        full: PathBuf,
+        /// One with cut-out silhouettes.
+        cut_out: PathBuf,
+    },
+    /// Two samples for one view of a clip.
+    #[error("clip `{clip}` of {subject} at {activity} has view {view} twice")]
+    Twice {
+        /// The clip's name.
+        clip: String,
+        /// Who.
+        subject: String,
+        /// What.
+        activity: String,
+        /// The view.
+        view: u32,
+    },
+    /// Clips with other views, where all views were to be fused.
+    #[error(
+        "clips differ in their views (from {least} to {most} of them): fused views must be the same in all clips"
+    )]
+    Views {
+        /// Fewest views of a clip.
+        least: usize,
+        /// Most.
+        most: usize,
+    },
+    /// Samples to test with other views than those to learn from.
+    #[error("{} and {} hold other views, which cannot be fused", test.display(), train.display())]
+    OtherViews {
+        /// Samples to test with.
+        test: PathBuf,
+        /// Samples to learn from.
+        train: PathBuf,
+    },
+    /// The same person in what is learned and what is tested.
+    #[error(
+        "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()
+    )]
+    SamePerson {
+        /// Who.
+        subject: String,
+        /// Samples to test with.
+        test: PathBuf,
+        /// Samples to learn from.
+        train: PathBuf,
+    },
+}
+
+/// What a file of samples holds.
+pub struct Samples {
+    /// The file.
+    pub path: PathBuf,
+    /// Clips whose views are in the order of their numbers.
+    pub clips: Vec<Clip>,
+    /// Numbers of the views of every clip; `None` where clips differ in that.
+    pub views: Option<Vec<u32>>,
+    /// Frames read, and how many of them were empty.
+    pub frames: usize,
+    /// Frames without a subject.
+    pub empty_frames: usize,
+    /// Whether masks are full frames, so that the box's motion counts.
+    pub full_frames: bool,
+    /// Folders of the first clips, one per view: what times are taken with.
+    pub folders: Vec<PathBuf>,
+}
+
+/// Whether masks of this size are full frames rather than cut-out silhouettes.
+pub fn are_full_frames(masks: &[Mask]) -> bool {
+    masks.first().is_some_and(|mask| mask.dim() != (SIDE_PX, SIDE_PX))
+}
+
+impl Samples {
+    /// Reads a file of samples and describes all of its masks.
+    ///
+    /// # Errors
+    /// Files, folders and masks that cannot be read or hold nothing, samples of which some are full frames and others are not.
+    pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
+        let file: File = toml::from_str(&text).about(|| path.display().to_string())?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        Self::described(file.samples, base, path, context).about(|| path.display().to_string())
+    }
+
+    fn described(samples: Vec<Sample>, base: &Path, path: &Path, context: &Context<'_>) -> Result<Self> {
+        if samples.is_empty() {
+            return Err(SamplesError::None.into());
+        }
+        let folders: Vec<PathBuf> = samples.iter().map(|sample| base.join(&sample.masks)).collect();
+        let counter = Counter::new(context, "samples read");
+        let described: Result<Vec<(Track, bool)>> = folders
+            .par_iter()
+            .map(|folder| {
+                counter.check("reading samples")?;
+                let described = described(folder);
+                counter.one(Some(folders.len()));
+                described
+            })
+            .collect();
+        let described = described?;
+        let full_frames = described[0].1;
+        if let Some(other) = described.iter().position(|(_, full)| *full != full_frames) {
+            return Err(kinds(&folders[0], &folders[other], full_frames).into());
+        }
+        let frames = described.iter().map(|(track, _)| track.frames() + track.empty_frames).sum();
+        let empty_frames = described.iter().map(|(track, _)| track.empty_frames).sum();
+        let tracks = described.into_iter().map(|(track, _)| track);
+        let (clips, views) = grouped(samples.iter().zip(tracks))?;
+        let count = views.as_ref().map_or(1, Vec::len);
+        let folders = first_folders(&samples, &folders, count);
+        Ok(Self { path: path.into(), clips, views, frames, empty_frames, full_frames, folders })
+    }
+
+    /// Whether these and others are both full frames, or both cut out.
+    ///
+    /// # Errors
+    /// [`SamplesError::Kinds`].
+    pub fn check_kind(&self, other: &Self) -> Result<(), SamplesError> {
+        if self.full_frames == other.full_frames {
+            return Ok(());
+        }
+        Err(kinds(&self.path, &other.path, self.full_frames))
+    }
+
+    /// Clips that all have the same views.
+    ///
+    /// # Errors
+    /// [`SamplesError::Views`], with the file.
+    pub fn fused(self) -> Result<Vec<Clip>> {
+        if self.views.is_some() {
+            return Ok(self.clips);
+        }
+        let counts = || self.clips.iter().map(|clip| clip.views.len());
+        let (least, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+        Err(SamplesError::Views { least, most }).about(|| self.path.display().to_string())
+    }
+
+    /// Every view of every clip as a clip of its own.
+    pub fn split(self) -> Vec<Clip> {
+        let alone = |clip: Clip| {
+            let Clip { subject, activity, views } = clip;
+            views.into_iter().map(move |view| Clip {
+                subject: subject.clone(),
+                activity: activity.clone(),
+                views: vec![view],
+            })
+        };
+        self.clips.into_iter().flat_map(alone).collect()
+    }
+}
+
+/// Of two places that differ in it, which holds full frames and which cut-out silhouettes.
+fn kinds(one: &Path, other: &Path, one_is_full: bool) -> SamplesError {
+    let (full, cut_out) = if one_is_full { (one, other) } else { (other, one) };
+    SamplesError::Kinds { full: full.into(), cut_out: cut_out.into() }
+}
+
+/// The track of a folder of masks, and whether they are full frames.
+fn described(folder: &Path) -> Result<(Track, bool)> {
+    let read: Vec<Mask> = masks::read_all(folder)?.into_iter().map(|named| named.mask).collect();
+    let full = are_full_frames(&read);
+    let track = Track::from_masks(&read, SCALING, full);
+    if track.frames() == 0 {
+        return Err(SamplesError::NobodySeen { folder: folder.into(), count: read.len() }.into());
+    }
+    Ok((track, full))
+}
+
+/// Clips in the order in which they first appear, and the views that all of them have.
+fn grouped<'a>(
+    samples: impl Iterator<Item = (&'a Sample, Track)>,
+) -> Result<(Vec<Clip>, Option<Vec<u32>>), SamplesError> {
+    let mut seen: HashMap<(&str, &str, u32), usize> = HashMap::new();
+    let mut places: HashMap<(&str, &str, String), usize> = HashMap::new();
+    let mut clips: Vec<(&Sample, BTreeMap<u32, Track>)> = Vec::new();
+    for (sample, track) in samples {
+        let (subject, activity) = (sample.subject.as_str(), sample.activity.as_str());
+        if subject.is_empty() || activity.is_empty() {
+            return Err(SamplesError::Nameless);
+        }
+        let name = match &sample.clip {
+            Some(name) => name.clone(),
+            None => {
+                let count = seen.entry((subject, activity, sample.view)).or_default();
+                *count += 1;
+                format!("\0{count}") // no name that a user can give
+            }
+        };
+        let place = *places.entry((subject, activity, name)).or_insert_with(|| {
+            clips.push((sample, BTreeMap::new()));
+            clips.len() - 1
+        });
+        if clips[place].1.insert(sample.view, track).is_some() {
+            return Err(SamplesError::Twice {
+                clip: sample.clip.clone().unwrap_or_default(),
+                subject: subject.into(),
+                activity: activity.into(),
+                view: sample.view,
+            });
+        }
+    }
+    let kinds: BTreeSet<Vec<u32>> = clips.iter().map(|(_, views)| views.keys().copied().collect()).collect();
+    let common = (kinds.len() == 1).then(|| kinds.into_iter().next().unwrap_or_default());
+    let clip = |(sample, views): (&Sample, BTreeMap<u32, Track>)| Clip {
+        subject: sample.subject.clone(),
+        activity: sample.activity.clone(),
+        views: views.into_values().collect(),
+    };
+    Ok((clips.into_iter().map(clip).collect(), common))
+}
+
+/// The folders of the first clip's views, in the order of the views.
+fn first_folders(samples: &[Sample], folders: &[PathBuf], count: usize) -> Vec<PathBuf> {
+    let Some(first) = samples.first() else { return Vec::new() };
+    let mut found: BTreeMap<u32, &PathBuf> = BTreeMap::new();
+    for (sample, folder) in samples.iter().zip(folders) {
+        let of_first = (&sample.subject, &sample.activity, &sample.clip)
+            == (&first.subject, &first.activity, &first.clip);
+        if of_first {
+            found.entry(sample.view).or_insert(folder);
+        }
+    }
+    found.into_values().take(count).cloned().collect()
+}

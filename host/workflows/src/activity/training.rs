@@ -1,0 +1,136 @@
+//! Training a model on samples of masks.
+
+use std::{path::PathBuf, time::Instant};
+
+use farnear_activity::recognition::{
+    choice::names,
+    clip::Clip,
+    model::Recogniser,
+    space::{Map, PatternKind},
+};
+use farnear_files::staging;
+use serde::Serialize;
+
+use super::{
+    method::Method,
+    samples::{SCALING, Samples},
+    watched,
+};
+use crate::{
+    context::Context,
+    error::{About, Result},
+    figures::rounded,
+    parameters::at_least,
+};
+
+/// Fewest frames of a window that shows something.
+const WINDOW_MIN: usize = 5;
+
+/// What is trained on, how, and where the model goes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TrainingSettings {
+    /// The samples, TOML.
+    pub samples: PathBuf,
+    /// The model.
+    pub out: PathBuf,
+    /// How activities are told apart.
+    pub method: Method,
+    /// Cut clips into windows of so many frames first, at least 5: for recordings that nobody cut.
+    pub window: Option<usize>,
+    /// Take every view as a clip of its own, so that the model recognises from one view, whichever it is.
+    pub any_view: bool,
+}
+
+/// What was trained.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TrainingFigures {
+    /// Clips.
+    pub clips: usize,
+    /// People.
+    pub subjects: usize,
+    /// Activities.
+    pub activities: usize,
+    /// Views that the model fuses.
+    pub views: usize,
+    /// Masks.
+    pub frames: usize,
+    /// Masks without anybody.
+    pub empty_frames: usize,
+    /// Whether masks are full frames, so that the box's motion is learned.
+    pub full_frames: bool,
+    /// The method's name.
+    pub mode: &'static str,
+    /// How silhouettes are laid out.
+    pub layout: String,
+    /// What clips are turned into.
+    pub pattern: String,
+    /// Of the Gaussians of the RBF map.
+    pub gamma: Option<f32>,
+    /// Of the RBF map's system.
+    pub condition_number: Option<f64>,
+    /// Over the folds in which the settings were chosen, 0 to 1.
+    pub inner_accuracy: Option<f64>,
+    /// Time for all.
+    pub seconds: f64,
+}
+
+/// Trains a model. With two or more subjects and a search, its settings are chosen by cross-validation over them.
+///
+/// # Errors
+/// Samples that cannot be read or used, a model that cannot be written.
+pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<TrainingFigures> {
+    if let Some(window) = settings.window {
+        at_least("window", window, WINDOW_MIN, "frames")?;
+    }
+    let start = Instant::now();
+    let samples = Samples::read(&settings.samples, context)?;
+    let (frames, empty_frames, full_frames) = (samples.frames, samples.empty_frames, samples.full_frames);
+    let clips: Vec<Clip> = if settings.any_view { samples.split() } else { samples.fused()? };
+    let clips: Vec<Clip> = match settings.window {
+        Some(length) => clips.iter().flat_map(|clip| clip.windows(length)).collect(),
+        None => clips,
+    };
+    let experiment = settings.method.experiment();
+    let trained = Recogniser::train_searched(&clips, &experiment, SCALING, &watched::Training::new(context));
+    let (model, inner_accuracy) =
+        watched::outcome(trained, context, "training").about(|| settings.samples.display().to_string())?;
+    staging::write_file(&settings.out, &model.to_bytes()?)?;
+    context.say(&format!("wrote {}", settings.out.display()));
+    let (gamma, condition_number) = match &model.space.map {
+        Map::Rbf(rbf) => (Some(rbf.gamma), Some(rbf.condition)),
+        Map::Pca(_) => (None, None),
+    };
+    Ok(TrainingFigures {
+        clips: clips.len(),
+        subjects: names(clips.iter().map(|clip| &clip.subject)).len(),
+        activities: model.activities.len(),
+        views: model.views,
+        frames,
+        empty_frames,
+        full_frames,
+        mode: settings.method.name(),
+        layout: layout(&model),
+        pattern: pattern(&model),
+        gamma,
+        condition_number: condition_number.map(|value| rounded(value, 0)),
+        inner_accuracy: inner_accuracy.map(|value| rounded(value, 4)),
+        seconds: rounded(start.elapsed().as_secs_f64(), 3),
+    })
+}
+
+fn layout(model: &Recogniser) -> String {
+    let dimensions = model.settings.space.dimensions;
+    match model.space.neighbours {
+        0 => format!("pca:{dimensions}"),
+        k => format!("isomap:{dimensions},k={k}"),
+    }
+}
+
+fn pattern(model: &Recogniser) -> String {
+    match &model.settings.space.pattern {
+        PatternKind::Thesis(bins) => {
+            format!("grid:{}", bins.iter().map(ToString::to_string).collect::<Vec<_>>().join("x"))
+        }
+        PatternKind::Codebook(size) => format!("codebook:{size}"),
+    }
+}

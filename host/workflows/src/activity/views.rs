@@ -1,0 +1,120 @@
+//! Where the masks of a view come from: a folder of them, or a video.
+
+use std::path::{Path, PathBuf};
+
+use farnear_activity::mask::{
+    Mask,
+    centre::SIDE_PX,
+    extractor::{Extractor, ExtractorSettings},
+    subject::{Flag, SubjectChooser, SubjectSettings},
+};
+use farnear_files::{
+    masks::{self, MaskError},
+    video::{Pixels, Video, VideoFrame, pictures},
+};
+
+use crate::{error::Result, silhouettes::frame_of};
+
+/// What a view is given as.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ViewKind {
+    /// Masks: pictures of black and white.
+    Masks,
+    /// A video, from which masks are made first.
+    Video,
+}
+
+impl ViewKind {
+    /// What a path most likely holds: masks are folders of pictures (or one picture) with nothing but black and white.
+    ///
+    /// # Errors
+    /// Folders without pictures, pictures that cannot be read.
+    pub fn guess(path: &Path) -> Result<Self> {
+        let first = if path.is_dir() { pictures::list(path)?.swap_remove(0) } else { path.to_path_buf() };
+        let ending = first.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if !pictures::EXTENSIONS.contains(&ending.as_str()) {
+            return Ok(Self::Video);
+        }
+        Ok(match pictures::read(&first)? {
+            Pixels::Grey(levels) if levels.iter().all(|level| matches!(level, 0 | 255)) => Self::Masks,
+            _ => Self::Video,
+        })
+    }
+}
+
+/// A view: where it lies, and what it is.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct View {
+    /// A folder, a picture or a video.
+    pub path: PathBuf,
+    /// What it is.
+    pub kind: ViewKind,
+}
+
+/// A frame's mask and what is doubtful about it.
+pub(super) struct Seen {
+    pub name: String,
+    pub mask: Mask,
+    pub flags: Vec<Flag>,
+}
+
+/// The frames of a view, one by one.
+pub(super) enum Frames {
+    Masks { files: std::vec::IntoIter<PathBuf>, first: Option<First> },
+    Video { video: Box<Video>, extractor: Option<Box<Extractor>> },
+}
+
+/// What the first mask of a view fixes for the others.
+pub(super) struct First {
+    name: String,
+    size: (usize, usize),
+    chooser: SubjectChooser,
+}
+
+impl Frames {
+    pub fn open(view: &View) -> Result<Self> {
+        Ok(match view.kind {
+            ViewKind::Masks => Self::Masks { files: masks::listed(&view.path)?.into_iter(), first: None },
+            ViewKind::Video => Self::Video { video: Box::new(Video::open(&view.path)?), extractor: None },
+        })
+    }
+
+    /// The next frame; `None` at the end.
+    pub fn next(&mut self) -> Result<Option<Seen>> {
+        match self {
+            Self::Masks { files, first } => files.next().map(|file| seen_in_mask(&file, first)).transpose(),
+            Self::Video { video, extractor } => {
+                video.next().transpose()?.map(|frame| seen_in_frame(frame, extractor)).transpose()
+            }
+        }
+    }
+}
+
+fn seen_in_mask(file: &Path, first: &mut Option<First>) -> Result<Seen> {
+    let mask = masks::read(file)?;
+    let (name, found) = (pictures::stem(file), mask.dim());
+    let First { name: first_name, size, chooser } = first.get_or_insert_with(|| First {
+        name: name.clone(),
+        size: found,
+        chooser: SubjectChooser::new(SubjectSettings::for_size(found)),
+    });
+    if found != *size {
+        let (path, first) = (file.into(), first_name.clone());
+        return Err(MaskError::Size { path, found, first, expected: *size }.into());
+    }
+    let mut flags = chooser.choose(mask.view()).flags;
+    // Cut-out silhouettes fill their picture, so touching its edge says nothing.
+    flags.retain(|flag| found != (SIDE_PX, SIDE_PX) || *flag != Flag::CutByEdge);
+    Ok(Seen { name, mask, flags })
+}
+
+fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> Result<Seen> {
+    let VideoFrame { name, pixels } = frame;
+    let frame = frame_of(&pixels);
+    let extractor = match extractor {
+        Some(extractor) => extractor,
+        None => extractor.insert(Box::new(Extractor::like(frame, ExtractorSettings::for_frame(frame))?)),
+    };
+    let found = extractor.extract(frame)?.subject;
+    Ok(Seen { name, mask: found.mask, flags: found.flags })
+}

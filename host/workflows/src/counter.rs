@@ -1,0 +1,65 @@
+//! Counting what several threads get done.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::{context::Context, error::Result};
+
+/// Counts parts of a work over threads, so that whoever watches sees the count rise by one each time.
+pub(crate) struct Counter<'a> {
+    context: &'a Context<'a>,
+    unit: &'static str,
+    done: Mutex<usize>,
+}
+
+impl<'a> Counter<'a> {
+    /// Nothing is done yet of what `unit` names.
+    pub fn new(context: &'a Context<'_>, unit: &'static str) -> Self {
+        Self { context, unit, done: Mutex::new(0) }
+    }
+
+    /// One part is done, of so many where that is known.
+    pub fn one(&self, total: Option<usize>) {
+        // Held while it is told, or another thread's higher count might be told first. A count cannot be half-changed.
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        *done += 1;
+        self.context.progress.advance(self.unit, *done, total);
+    }
+
+    /// # Errors
+    /// [`crate::WorkflowError::Cancelled`] where the work is to stop.
+    pub fn check(&self, during: &str) -> Result<()> {
+        self.context.cancel.check(during)
+    }
+
+    /// Whether the work is to stop.
+    pub fn is_cancelled(&self) -> bool {
+        self.context.cancel.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{Cancel, Nobody, Progress};
+    use rayon::prelude::*;
+
+    #[derive(Default)]
+    struct Heard(Mutex<Vec<(usize, Option<usize>)>>);
+
+    impl Progress for Heard {
+        fn say(&self, _: &str) {}
+        fn advance(&self, _: &'static str, done: usize, total: Option<usize>) {
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).push((done, total));
+        }
+    }
+
+    #[test]
+    fn counts_rise_by_one_whoever_counts() {
+        let heard = Heard::default();
+        let context = Context { progress: &heard, questions: &Nobody, cancel: Cancel::default() };
+        let counter = Counter::new(&context, "clips");
+        (0..100).into_par_iter().for_each(|_| counter.one(Some(100)));
+        let expected: Vec<_> = (1..=100).map(|done| (done, Some(100))).collect();
+        assert_eq!(*heard.0.lock().unwrap_or_else(PoisonError::into_inner), expected);
+    }
+}

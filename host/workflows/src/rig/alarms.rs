@@ -1,0 +1,51 @@
+//! What stopped the rig, and clearing it.
+
+use farnear_capture::describe::alarm_text;
+use serde::Serialize;
+
+use super::{Rig, RigAddress};
+use crate::{context::Context, error::Result};
+
+/// The alarms that the board keeps.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct AlarmFigures {
+    /// Number of the latched alarm; 0 = none.
+    pub latched: u32,
+    /// The last one first.
+    pub alarms: Vec<AlarmEntry>,
+}
+
+/// An alarm.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct AlarmEntry {
+    /// Its number, by which it is cleared.
+    pub number: u32,
+    /// The boot in which it came up.
+    pub boot: u32,
+    /// When, since that boot.
+    pub time_s: f64,
+    /// What it is, with what to do.
+    pub text: String,
+}
+
+/// Lists the alarms, after clearing the one with this number.
+///
+/// # Errors
+/// [`crate::WorkflowError::Client`], also where another alarm is latched or the cause remains.
+pub fn alarms(rig: &RigAddress, clear: Option<u32>, context: &Context<'_>) -> Result<AlarmFigures> {
+    let rig = Rig::connect(rig, None, context)?;
+    if let Some(number) = clear {
+        rig.client.clear_alarm(number)?;
+        context.say(&format!(
+            "alarm {number} is cleared; a stage that moved has lost its position: home it again"
+        ));
+    }
+    let latched = rig.client.status()?.alarm.map_or(0, |record| record.number);
+    let alarms = rig.client.alarms()?.into_iter().map(|record| AlarmEntry {
+        number: record.number,
+        boot: record.boot,
+        time_s: record.time.0 as f64 / 1e6,
+        text: alarm_text(record.alarm),
+    });
+    Ok(AlarmFigures { latched, alarms: alarms.collect() })
+}

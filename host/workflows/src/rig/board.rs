@@ -1,0 +1,77 @@
+//! The board itself: what it has counted, and starting it anew.
+
+use farnear_capture::describe::{alarm_text, cause_name};
+use serde::Serialize;
+
+use super::{Rig, RigAddress};
+use crate::{context::Context, error::Result};
+
+/// What the board has counted in its life.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct CounterFigures {
+    /// Starts.
+    pub boots: u32,
+    /// Alarms that came up.
+    pub alarms: u32,
+    /// Exposures that were triggered.
+    pub triggers: u64,
+    /// Steps of the sensor's coarse axis.
+    pub coarse_steps: u64,
+    /// Steps of the lens stage.
+    pub lens_steps: u64,
+    /// Homings.
+    pub homings: u32,
+    /// Records in the memory of which one copy was bad.
+    pub repaired_records: u32,
+}
+
+/// A reset.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct ResetFigures {
+    /// Number of the boot that it ended.
+    pub boot_before: u32,
+    /// Number of the boot that it began.
+    pub boot: u32,
+    /// Its cause, as the board knows it.
+    pub cause: &'static str,
+    /// Number of the latched alarm; 0 = none.
+    pub alarm: u32,
+}
+
+/// Reads the counters.
+///
+/// # Errors
+/// [`crate::WorkflowError::Simulator`], [`crate::WorkflowError::Client`].
+pub fn counters(rig: &RigAddress, context: &Context<'_>) -> Result<CounterFigures> {
+    let counters = Rig::connect(rig, None, context)?.client.counters()?;
+    Ok(CounterFigures {
+        boots: counters.boots,
+        alarms: counters.alarms,
+        triggers: counters.triggers,
+        coarse_steps: counters.coarse_steps,
+        lens_steps: counters.lens_steps,
+        homings: counters.homings,
+        repaired_records: counters.repaired,
+    })
+}
+
+/// Resets the board; the stages have to be homed again afterwards.
+///
+/// # Errors
+/// [`crate::WorkflowError::Simulator`], [`crate::WorkflowError::Client`].
+pub fn reset(rig: &RigAddress, context: &Context<'_>) -> Result<ResetFigures> {
+    let mut rig = Rig::connect(rig, None, context)?;
+    let boot_before = rig.client.hello().boot;
+    rig.client.reboot()?;
+    let alarm = rig.client.status()?.alarm;
+    if let Some(record) = alarm {
+        context.say(&format!("alarm {} is latched: {}", record.number, alarm_text(record.alarm)));
+    }
+    let hello = rig.client.hello();
+    Ok(ResetFigures {
+        boot_before,
+        boot: hello.boot,
+        cause: cause_name(hello.reset_cause),
+        alarm: alarm.map_or(0, |record| record.number),
+    })
+}

@@ -1,0 +1,248 @@
+//! The bring-up checklist: its steps in order, each with a verdict and what was found.
+//!
+//! Before each step with somebody's hands in it the person is asked; what the board can tell by itself is measured. On an
+//! emulated rig nobody has hands: those steps are passed over and say what shows the same thing later.
+
+mod hands;
+mod moving;
+mod resting;
+
+use farnear_capture::Client;
+use serde::Serialize;
+
+use super::{
+    RigAddress,
+    camera::{CameraSettings, EquippedRig},
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// A step.
+struct Step {
+    name: &'static str,
+    check: fn(&mut Checkup<'_>) -> Found,
+}
+
+/// Steps that belong together. After a phase with a failure no other begins.
+struct Phase {
+    /// Whether anything moves by motor.
+    moves: bool,
+    /// Whether each step rests on the one before: the first failure ends the phase.
+    in_turn: bool,
+    steps: &'static [Step],
+}
+
+/// The order is that of docs/rig.md: the first half is done with the motors disconnected.
+const PHASES: [Phase; 3] = [
+    Phase {
+        moves: false,
+        in_turn: true,
+        steps: &[
+            Step { name: "the link", check: resting::link },
+            Step { name: "who the board is", check: resting::identity },
+            Step { name: "alarms", check: resting::alarms },
+            Step { name: "memory", check: resting::memory },
+        ],
+    },
+    Phase {
+        moves: false,
+        in_turn: false, // each may fail without harm to the next
+        steps: &[
+            Step { name: "end switches by hand", check: hands::switches },
+            Step { name: "emergency stop", check: hands::emergency_stop },
+            Step { name: "encoder direction", check: hands::encoders },
+        ],
+    },
+    Phase {
+        moves: true,
+        in_turn: true,
+        steps: &[
+            Step { name: "motors on", check: hands::connect_motors },
+            Step { name: "first slow homing", check: moving::slow_homing },
+            Step { name: "homing repeats", check: moving::homing_repeats },
+            Step { name: "a move at full speed", check: moving::full_speed },
+            Step { name: "halt and its alarm", check: moving::halt },
+            Step { name: "piezo sweep", check: moving::piezo },
+            Step { name: "far and near by piezo", check: moving::toggle },
+            Step { name: "camera and strobe", check: moving::strobe },
+        ],
+    },
+];
+
+/// What is checked.
+#[derive(Clone, PartialEq, Debug)]
+pub struct CheckSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Its camera.
+    pub camera: CameraSettings,
+    /// Only the steps with the motors disconnected: nothing moves.
+    pub resting_only: bool,
+    /// Whether somebody is there to press switches; never at an emulated rig.
+    pub hands: bool,
+}
+
+/// How a step ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// It is as it should be.
+    Passed,
+    /// It is not.
+    Failed,
+    /// It was not looked at; the detail says why.
+    PassedOver,
+}
+
+impl Verdict {
+    /// As it is said.
+    fn text(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "FAILED",
+            Self::PassedOver => "passed over",
+        }
+    }
+}
+
+/// A step that was taken.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Outcome {
+    /// Its name.
+    pub step: &'static str,
+    /// How it ended.
+    pub verdict: Verdict,
+    /// What was found.
+    pub detail: String,
+}
+
+/// The checklist, as far as it went.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Checklist {
+    /// Steps that passed.
+    pub passed: usize,
+    /// Steps that failed.
+    pub failed: usize,
+    /// Steps that were not looked at.
+    pub passed_over: usize,
+    /// All that were taken, in order.
+    pub steps: Vec<Outcome>,
+    /// Number of the alarm that is latched after a failure.
+    #[serde(skip)]
+    pub alarm: Option<u32>,
+}
+
+impl Checklist {
+    /// # Errors
+    /// [`WorkflowError::StepsFailed`] where any did.
+    pub fn check(&self) -> Result<()> {
+        match self.failed {
+            0 => Ok(()),
+            failed => Err(WorkflowError::StepsFailed { failed, alarm: self.alarm }),
+        }
+    }
+}
+
+/// What a step found: how it ended, and what to say of it.
+type Found = Result<(Verdict, String)>;
+
+/// The rig while it is checked.
+struct Checkup<'a> {
+    equipped: EquippedRig,
+    settings: &'a CheckSettings,
+    context: &'a Context<'a>,
+    /// Whether somebody can press switches.
+    hands: bool,
+    outcomes: Vec<Outcome>,
+}
+
+/// Goes through the checklist.
+///
+/// # Errors
+/// Camera and rig that are not there, and cancelling. Any other error is the failure of its step.
+pub fn check(settings: &CheckSettings, context: &Context<'_>) -> Result<Checklist> {
+    let equipped = settings.camera.connect(&settings.rig, None, context)?;
+    let hands = settings.hands && !equipped.rig.client.hello().emulated;
+    let mut checkup = Checkup { equipped, settings, context, hands, outcomes: Vec::new() };
+    for phase in PHASES.iter().filter(|phase| !(settings.resting_only && phase.moves)) {
+        if !checkup.go_through(phase)? {
+            break;
+        }
+    }
+    context.say("");
+    let count = |verdict| checkup.outcomes.iter().filter(|outcome| outcome.verdict == verdict).count();
+    let failed = count(Verdict::Failed);
+    let latched = || checkup.client().status().ok()?.alarm.map(|record| record.number);
+    Ok(Checklist {
+        passed: count(Verdict::Passed),
+        failed,
+        passed_over: count(Verdict::PassedOver),
+        alarm: if failed > 0 { latched() } else { None },
+        steps: checkup.outcomes,
+    })
+}
+
+impl Checkup<'_> {
+    fn client(&self) -> &Client {
+        &self.equipped.rig.client
+    }
+
+    /// Gives whether no step of the phase failed.
+    fn go_through(&mut self, phase: &Phase) -> Result<bool> {
+        let mut sound = true;
+        for step in phase.steps {
+            sound &= self.take(step)?;
+            if phase.in_turn && !sound {
+                break;
+            }
+        }
+        Ok(sound)
+    }
+
+    /// Carries out a step; gives whether it did not fail.
+    fn take(&mut self, step: &Step) -> Result<bool> {
+        self.context.say(&format!("\n{}. {}", self.outcomes.len() + 1, step.name));
+        let (verdict, detail) = match (step.check)(self) {
+            Ok(found) => found,
+            Err(error) if self.context.cancel.is_cancelled() => return Err(error),
+            Err(error) => (Verdict::Failed, error.to_string()),
+        };
+        self.context.say(&format!("   {}: {detail}", verdict.text()));
+        self.outcomes.push(Outcome { step: step.name, verdict, detail });
+        Ok(verdict != Verdict::Failed)
+    }
+
+    /// Says what to do with the hands while the board is watched.
+    fn say(&self, what: &str) {
+        self.context.say(&format!("   {what}"));
+    }
+
+    /// Asks the person to do something and waits until it is done.
+    fn ask(&self, what: &str) -> Result<()> {
+        self.answer(&format!("   {what}, then press Enter: ")).map(|_| ())
+    }
+
+    /// Asks a question and takes everything but an n for yes.
+    fn yes(&self, question: &str) -> Result<bool> {
+        let answer = self.answer(&format!("   {question} [Y/n] "))?;
+        Ok(!answer.trim().to_lowercase().starts_with('n'))
+    }
+
+    fn answer(&self, question: &str) -> Result<String> {
+        self.context.questions.ask(question, &self.context.cancel)
+    }
+}
+
+fn passed(detail: impl Into<String>) -> Found {
+    Ok((Verdict::Passed, detail.into()))
+}
+
+fn failed(detail: impl Into<String>) -> Found {
+    Ok((Verdict::Failed, detail.into()))
+}
+
+fn passed_over(detail: impl Into<String>) -> Found {
+    Ok((Verdict::PassedOver, detail.into()))
+}

@@ -1,0 +1,185 @@
+//! What moves: homing, full speed, halt, piezo, camera.
+
+use farnear_capture::{
+    ClientError,
+    describe::{axis_name, um},
+    expose::{CaptureError, expose},
+    ready::steppers,
+    sequence::ShotDefaults,
+};
+use farnear_protocol::{
+    Micros, Nanometres, Settle,
+    message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord},
+};
+
+use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
+
+/// Speed of the first move, a twelfth of the usual one.
+const SLOW_NM_PER_S: i32 = 500_000;
+/// Two homings agree within this.
+const REPEATS_UM: f64 = 1.5;
+/// Exposures of the strobe's check, and how far the strobe's length may be from the exposure asked for.
+const EXPOSURES: u16 = 5;
+const STROBE_US: u64 = 200;
+
+fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
+    let (min, max) = limits.of(axis);
+    (min.0, max.0)
+}
+
+/// Where an axis may stand from where it was sent: within the window in which the board calls a move settled.
+fn tolerance_um(axis: Axis) -> f64 {
+    um(Settle::of_move(axis).window)
+}
+
+fn speed_key(axis: Axis) -> SettingKey {
+    StepperKeys::of(axis).unwrap_or(StepperKeys::COARSE).speed
+}
+
+/// Homes at a twelfth of the speed, so that what is wired wrongly has time to be noticed.
+pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
+    let axes = steppers(&checkup.client().hello().capabilities);
+    if checkup.hands {
+        checkup
+            .ask("keep a hand on the emergency stop: each stage now goes slowly towards its home switch")?;
+    }
+    for axis in &axes {
+        let client = checkup.client();
+        let usual = client.setting(speed_key(*axis))?;
+        client.set_setting(speed_key(*axis), SLOW_NM_PER_S.clamp(usual.min, usual.max))?;
+        let homed = client.home(*axis);
+        // Whatever happened: a rig that crawls for ever would be a riddle.
+        let restored = client.set_setting(speed_key(*axis), usual.value);
+        homed?;
+        restored?;
+        if checkup.hands && !checkup.yes(&format!("did the {} move smoothly?", axis_name(*axis)))? {
+            return failed(format!("the {} did not move smoothly", axis_name(*axis)));
+        }
+    }
+    passed(format!("{} stages found their home switches", axes.len()))
+}
+
+pub(super) fn homing_repeats(checkup: &mut Checkup<'_>) -> Found {
+    let client = checkup.client();
+    let mut said = Vec::new();
+    for axis in steppers(&client.hello().capabilities) {
+        let (min, max) = range(axis, &client.hello().limits);
+        client.move_to(axis, Nanometres(min + (max - min) / 20))?;
+        let shift = um(client.home(axis)?);
+        said.push(format!("{} {shift:+.3} um", axis_name(axis)));
+        if shift.abs() > REPEATS_UM {
+            return failed(format!(
+                "the home switch of the {} came {shift:+.3} um off; is it fixed well?",
+                axis_name(axis)
+            ));
+        }
+    }
+    passed(format!("second homing against the first: {}", said.join(", ")))
+}
+
+pub(super) fn full_speed(checkup: &mut Checkup<'_>) -> Found {
+    let client = checkup.client();
+    let mut said = Vec::new();
+    for axis in steppers(&client.hello().capabilities) {
+        let (min, max) = range(axis, &client.hello().limits);
+        let target = Nanometres(min + (max - min) / 2);
+        let moved = client.move_to(axis, target)?;
+        let error = um(Nanometres(moved.measured.0 - target.0));
+        said.push(format!("{} {error:+.3} um", axis_name(axis)));
+        if error.abs() > tolerance_um(axis) {
+            return failed(format!("the {} stands {error:+.3} um off", axis_name(axis)));
+        }
+    }
+    passed(format!("to the middle of the travel; off by {}", said.join(", ")))
+}
+
+/// A halt in mid-move: the alarm comes up, everything is refused, and it goes when it is cleared.
+pub(super) fn halt(checkup: &mut Checkup<'_>) -> Found {
+    let client = checkup.client();
+    let Some(axis) = steppers(&client.hello().capabilities).first().copied() else {
+        return passed_over("the rig has no stepper");
+    };
+    let (min, _) = range(axis, &client.hello().limits);
+    let work = client.start_move(axis, Nanometres(min))?;
+    client.halt()?;
+    match work.moved() {
+        Err(ClientError::Failed { alarm: Some(record), .. }) if record.alarm == Alarm::Halt => {}
+        Err(error) => return Err(error.into()),
+        Ok(_) => return failed("the move went on"),
+    }
+    if client.move_to(axis, Nanometres(min)).is_ok() {
+        return failed("the rig moved though the alarm was latched");
+    }
+    let number = client.status()?.alarm.map_or(0, |record| record.number);
+    client.clear_alarm(number)?;
+    let refused = client.move_to(axis, Nanometres(min));
+    if refused.is_ok() {
+        return failed("the rig moved though its position was lost");
+    }
+    client.home(axis)?;
+    passed("a halt stops a move, latches its alarm and makes the position lost; homing brings it back")
+}
+
+pub(super) fn piezo(checkup: &mut Checkup<'_>) -> Found {
+    if !checkup.client().hello().capabilities.sensor_fine {
+        return passed_over("the rig has no piezo");
+    }
+    match checkup.client().calibrate(Routine::Piezo)? {
+        Calibration::Piezo { gain_pm_per_code, hysteresis_ppm, creep_ppm_per_decade } => passed(format!(
+            "{gain_pm_per_code} pm a code, hysteresis {:.1} %, creep {:.2} % a decade",
+            f64::from(hysteresis_ppm) / 1e4,
+            f64::from(creep_ppm_per_decade) / 1e4
+        )),
+        other => failed(format!("the board measured something else: {other:?}")),
+    }
+}
+
+pub(super) fn toggle(checkup: &mut Checkup<'_>) -> Found {
+    let client = checkup.client();
+    if !client.hello().capabilities.sensor_fine {
+        return passed_over("the rig has no piezo");
+    }
+    let (min, max) = range(Axis::SensorFine, &client.hello().limits);
+    let mut worst = 0.0_f64;
+    for target in [min + 10_000, max - 10_000, min + 10_000, (min + max) / 2] {
+        let moved = client.move_to(Axis::SensorFine, Nanometres(target))?;
+        worst = worst.max(um(Nanometres(moved.measured.0 - target)).abs());
+    }
+    if worst > tolerance_um(Axis::SensorFine) {
+        return failed(format!("the piezo stands up to {worst:.3} um off"));
+    }
+    passed(format!("within {:.0} nm of where it was sent", worst * 1e3))
+}
+
+pub(super) fn strobe(checkup: &mut Checkup<'_>) -> Found {
+    let camera_settings = &checkup.settings.camera;
+    let EquippedRig { camera, rig } = &mut checkup.equipped;
+    let client = &rig.client;
+    if !client.hello().capabilities.strobe {
+        return passed_over("the rig measures no strobe");
+    }
+    let exposure = camera_settings.exposure;
+    let defaults = ShotDefaults { exposure, repeat: EXPOSURES, ..ShotDefaults::default() };
+    let (min, max) = range(Axis::SensorFine, &client.hello().limits);
+    let shot = defaults.shot(Axis::SensorFine, Nanometres((min + max) / 2));
+    let mut records: Vec<ShotRecord> = Vec::new();
+    let wait = camera_settings.image_wait;
+    expose(client, camera.as_mut(), &[shot], wait, |record, _| -> Result<(), CaptureError> {
+        records.push(record);
+        Ok(())
+    })?;
+    let off = |record: &ShotRecord| {
+        let Micros(asked) = record.exposure;
+        record.strobe_end.0.saturating_sub(record.strobe_start.0).abs_diff(u64::from(asked))
+    };
+    let latency = |record: &ShotRecord| record.strobe_start.0.saturating_sub(record.trigger.0);
+    let worst = records.iter().map(off).max().unwrap_or(0);
+    let latest = records.iter().map(latency).max().unwrap_or(0);
+    if worst > STROBE_US {
+        return failed(format!("a strobe was {worst} us longer or shorter than the exposure asked for"));
+    }
+    passed(format!(
+        "{} exposures with their images; strobe at most {latest} us after the trigger, {worst} us off in length",
+        records.len()
+    ))
+}

@@ -1,0 +1,86 @@
+//! What the board can tell while nothing moves.
+
+use std::time::{Duration, Instant};
+
+use farnear_capture::describe::{alarm_text, cause_name};
+use farnear_protocol::message::SettingKey;
+
+use super::{Checkup, Found, failed, passed, passed_over};
+
+/// Questions that are asked to judge the line.
+const QUESTIONS: u32 = 200;
+/// A real board answers within this.
+const ANSWER: Duration = Duration::from_millis(50);
+
+pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
+    let client = checkup.client();
+    let before = client.status()?.link;
+    let mut slowest = Duration::ZERO;
+    for _ in 0..QUESTIONS {
+        let begin = Instant::now();
+        client.status()?;
+        slowest = slowest.max(begin.elapsed());
+    }
+    let after = client.status()?.link;
+    let bad = after.bad_frames - before.bad_frames;
+    let repeated = after.repeated - before.repeated;
+    let said = format!(
+        "{QUESTIONS} questions, {bad} broken frames, {repeated} asked again, slowest answer {:.1} ms",
+        slowest.as_secs_f64() * 1e3
+    );
+    if bad > 0 || repeated > 0 || (slowest > ANSWER && !client.hello().emulated) {
+        return failed(format!("{said}: is the cable short and whole, is a hub in between?"));
+    }
+    passed(said)
+}
+
+pub(super) fn identity(checkup: &mut Checkup<'_>) -> Found {
+    let (client, hello) = (checkup.client(), checkup.client().hello());
+    let id: String = hello.unique_id.iter().map(|byte| format!("{byte:02x}")).collect();
+    let said = format!(
+        "{} with firmware {}, protocol {}, id {id}, boot {} after {}{}",
+        hello.board,
+        hello.firmware,
+        client.protocol(),
+        hello.boot,
+        cause_name(hello.reset_cause),
+        if hello.emulated { "; an emulated board" } else { "" }
+    );
+    match client.firmware_note() {
+        Some(note) => failed(format!("{said}; {note}")),
+        None => passed(said),
+    }
+}
+
+pub(super) fn alarms(checkup: &mut Checkup<'_>) -> Found {
+    let client = checkup.client();
+    let status = client.status()?;
+    if status.supply_low {
+        return failed("the supply is too low");
+    }
+    match status.alarm {
+        None => passed(format!("none is latched, {} are kept", client.alarms()?.len())),
+        Some(record) => failed(format!("alarm {} is latched: {}", record.number, alarm_text(record.alarm))),
+    }
+}
+
+/// A setting is changed, read back after a reset, and put back.
+pub(super) fn memory(checkup: &mut Checkup<'_>) -> Found {
+    if !checkup.client().hello().capabilities.memory {
+        return passed_over("the board has none: settings and alarms are lost without power");
+    }
+    let key = SettingKey::CameraReadoutUs;
+    let (old, boots) = (checkup.client().setting(key)?, checkup.client().counters()?.boots);
+    let other = if old.value < old.max { old.value + 1 } else { old.value - 1 };
+    checkup.client().set_setting(key, other)?;
+    checkup.equipped.rig.client.reboot()?;
+    let (kept, boots_now) = (checkup.client().setting(key)?.value, checkup.client().counters()?.boots);
+    checkup.client().set_setting(key, old.value)?;
+    if kept != other {
+        return failed(format!("{} was set to {other} and is {kept} after a reset", key.name()));
+    }
+    if boots_now != boots + 1 {
+        return failed(format!("the counter of boots went from {boots} to {boots_now} at one reset"));
+    }
+    passed(format!("a setting and the counters outlast a reset (boot {boots_now} of this board's life)"))
+}

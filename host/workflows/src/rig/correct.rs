@@ -1,0 +1,158 @@
+//! The board corrects a depth map, row by row over the link, and this computer checks its bits.
+
+use std::{path::PathBuf, time::Instant};
+
+use farnear_capture::board_correction::{decode, encode};
+use farnear_files::{map, staging};
+use ndarray::Array2;
+use serde::Serialize;
+
+use super::{Rig, RigAddress};
+use crate::{
+    context::Context,
+    correct::format_of,
+    correction_file,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
+
+/// What is corrected, with what, and where it goes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct BoardCorrectSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// The depth map in mm, `.npy` or float TIFF.
+    pub depth: PathBuf,
+    /// The file of the correction: clsf, clsf-blend or clsf-full.
+    pub correction: PathBuf,
+    /// Where the corrected map goes: `.npy` or `.tiff`.
+    pub out: PathBuf,
+    /// Whether the board keeps the correction in its memory.
+    pub store: bool,
+}
+
+/// What the correction did.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct BoardCorrectFigures {
+    /// Which correction.
+    pub method: String,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Mean change, mm; positive = farther.
+    pub mean_change_mm: f64,
+    /// Pixels whose bits differ from this computer's calculation.
+    pub different_pixels: usize,
+    /// By this computer's clock.
+    pub rows_per_second: f64,
+    /// The first of those pixels.
+    #[serde(skip)]
+    pub first_difference: Option<PixelDifference>,
+}
+
+/// A pixel of which board and computer make different depths.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PixelDifference {
+    /// From 0.
+    pub row: usize,
+    /// From 0.
+    pub column: usize,
+    /// The board's depth.
+    pub board_mm: f32,
+    /// This computer's depth.
+    pub host_mm: f32,
+}
+
+impl BoardCorrectFigures {
+    /// # Errors
+    /// [`WorkflowError::Differs`] where the board's depths are others than this computer's.
+    pub fn check(&self) -> Result<()> {
+        let Some(PixelDifference { row, column, board_mm, host_mm }) = self.first_difference else {
+            return Ok(());
+        };
+        Err(WorkflowError::Differs(format!(
+            "{} pixels, the first in row {row}, column {column}: {board_mm} against {host_mm} mm",
+            self.different_pixels
+        )))
+    }
+}
+
+/// Lets the board correct a map.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for a place with another ending; correction and map that cannot be read or do not belong
+/// together; the rig.
+pub fn correct(settings: &BoardCorrectSettings, context: &Context<'_>) -> Result<BoardCorrectFigures> {
+    let format = format_of(&settings.out)?;
+    let correction = correction_file::read(&settings.correction)?;
+    let depth = map::read(&settings.depth)?;
+    // What the board has to give; also finds out whether map and correction belong together.
+    let expected = correction.apply_as_board(depth.view())?;
+    let board = correction.for_board()?;
+    let rig = Rig::connect(&settings.rig, None, context)?;
+    rig.client.send_correction(&board)?;
+    if settings.store {
+        rig.client.store_correction()?;
+    }
+    let (height, width) = depth.dim();
+    let begin = Instant::now();
+    let codes = encode(depth.view(), board.scale);
+    let corrected = rig.client.correct_codes(codes.view(), &mut |row| {
+        if row % 60 == 0 || row == height {
+            context.say(&format!("{row} of {height} rows"));
+        }
+    })?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let corrected = decode(corrected.view(), board.scale);
+    staging::write_file(&settings.out, &format.encode(corrected.view())?)?;
+    context.say(&format!("wrote {}", settings.out.display()));
+    let (different_pixels, first_difference) = compare(&corrected, &expected);
+    Ok(BoardCorrectFigures {
+        method: correction.method().to_string(),
+        width,
+        height,
+        mean_change_mm: rounded(mean_change_mm(&depth, &corrected), 4),
+        different_pixels,
+        rows_per_second: rounded(height as f64 / seconds, 1),
+        first_difference,
+    })
+}
+
+/// How many pixels differ in their bits, and the first of them.
+fn compare(board: &Array2<f32>, host: &Array2<f32>) -> (usize, Option<PixelDifference>) {
+    let mut different =
+        board.indexed_iter().zip(host).filter(|((_, board), host)| board.to_bits() != host.to_bits()).map(
+            |(((row, column), board_mm), host_mm)| PixelDifference {
+                row,
+                column,
+                board_mm: *board_mm,
+                host_mm: *host_mm,
+            },
+        );
+    let first = different.next();
+    (usize::from(first.is_some()) + different.count(), first)
+}
+
+fn mean_change_mm(before: &Array2<f32>, after: &Array2<f32>) -> f64 {
+    let changes = before.iter().zip(after).map(|(a, b)| f64::from(*b) - f64::from(*a));
+    let known = changes.filter(|change| change.is_finite());
+    let (sum, count) = known.fold((0.0, 0.0), |(sum, count), change| (sum + change, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_is_one_of_bits() {
+        let host = ndarray::array![[1.0, f32::NAN], [3.0, 4.0]];
+        assert_eq!(compare(&host.clone(), &host), (0, None), "NaN is the same as itself here");
+        let board = ndarray::array![[1.0, f32::NAN], [3.5, -4.0]];
+        let (count, first) = compare(&board, &host);
+        assert_eq!(count, 2);
+        assert_eq!(first, Some(PixelDifference { row: 1, column: 0, board_mm: 3.5, host_mm: 3.0 }));
+        assert_eq!(mean_change_mm(&host, &board), (0.0 + 0.5 - 8.0) / 3.0);
+    }
+}

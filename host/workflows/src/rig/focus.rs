@@ -1,0 +1,161 @@
+//! Finding m1, the sensor distance of the best focus, and the working range that follows from it.
+
+use std::path::PathBuf;
+
+use farnear_capture::{
+    Client,
+    describe::um,
+    focus::{self, Focus, find_focus},
+    ready::{base_nm, ensure_homed},
+};
+use farnear_depth::{
+    focus_measure::FocusMeasure,
+    optics::{Optics, OpticsFile},
+};
+use farnear_protocol::{Nanometres, message::Axis};
+use serde::Serialize;
+
+use super::{RigAddress, camera::CameraSettings, motion::nanometres};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    optics::GivenOptics,
+};
+
+/// How focus is sought.
+#[derive(Clone, PartialEq, Debug)]
+pub struct FocusSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Its camera.
+    pub camera: CameraSettings,
+    /// The optics file; its far focus is where the search begins, unless told otherwise.
+    pub optics: PathBuf,
+    /// Begin at this sensor distance; without it, where the stage stands, or at the optics' far focus if it had to be homed.
+    pub start_mm: Option<f64>,
+    /// How far the focus may be from the start.
+    pub range_mm: f64,
+    /// What is maximised.
+    pub measure: FocusMeasure,
+    /// Part of the image that is looked at: column, row, width, height in pixels. All of it where none.
+    pub region: Option<[usize; 4]>,
+}
+
+/// The best focus, and the working range of optics whose far focus lies there.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct FocusFigures {
+    /// Where the target is sharpest.
+    pub m1_mm: f64,
+    /// The second sensor distance of a pair: m2 = m1 + 2 Fe Rmax (Li 2014, eqs. 4.3 and 4.4).
+    pub m2_mm: f64,
+    /// Far end of the working range: the target's distance.
+    pub far_mm: f64,
+    /// Near end of the working range.
+    pub near_mm: f64,
+    /// Offset of the normalised depth.
+    pub alpha0_mm: f64,
+    /// From m1 to m2.
+    pub sensor_travel_mm: f64,
+    /// Where the sensor's coarse axis stands.
+    pub coarse_um: f64,
+    /// Where the piezo stands.
+    pub fine_um: f64,
+    /// The board's time for the search.
+    pub board_ms: f64,
+    /// Places of the stepper that were looked at.
+    pub places: usize,
+    /// Images that were taken.
+    pub exposures: usize,
+}
+
+/// Finds the best focus of the target before the rig and leaves the sensor there.
+///
+/// # Errors
+/// Optics, parameters, camera, rig; [`WorkflowError::Focus`] where there is none.
+pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFigures> {
+    let given = GivenOptics::read(&settings.optics)?;
+    let optics = &given.optics;
+    if !(settings.range_mm > 0.0 && settings.range_mm.is_finite()) {
+        return Err(WorkflowError::parameter("range-mm", settings.range_mm, "expected a positive length"));
+    }
+    let mut rig = settings.camera.connect(&settings.rig, Some(given.for_emulation()), context)?;
+    let client = &rig.rig.client;
+    let was_homed = ensure_ready(client, context)?;
+    let default = (!was_homed).then_some(optics.working_range().sensor_far_mm);
+    if let Some(start_mm) = settings.start_mm.or(default) {
+        begin_at(client, start_mm, context)?;
+    }
+    let search = focus::FocusSettings {
+        measure: settings.measure,
+        range_mm: settings.range_mm,
+        exposure: settings.camera.exposure,
+        image_wait: settings.camera.image_wait,
+        region: settings.region,
+    };
+    let found = find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.say(what))?;
+    figures(given.optics, &found)
+}
+
+/// Homes what is not homed; gives whether nothing had to be.
+fn ensure_ready(client: &Client, context: &Context<'_>) -> Result<bool> {
+    let before = client.status()?.coarse.state;
+    ensure_homed(client, &mut |what| context.say(what))?;
+    Ok(before == client.status()?.coarse.state)
+}
+
+/// Brings the sensor to a distance from the lens, with the piezo in the middle of its range.
+fn begin_at(client: &Client, start_mm: f64, context: &Context<'_>) -> Result<()> {
+    let limits = client.hello().limits;
+    let middle = i64::from(limits.fine_min.0 + limits.fine_max.0) / 2;
+    let coarse_nm = start_mm * 1e6 - (base_nm(client, &client.status()?) + middle) as f64;
+    let coarse = nanometres("start-mm", coarse_nm / 1e3)?;
+    context.say(&format!("starting at a sensor distance of {start_mm:.4} mm"));
+    client.move_to(Axis::SensorCoarse, coarse)?;
+    client.move_to(Axis::SensorFine, Nanometres(middle as i32))?;
+    Ok(())
+}
+
+/// The figures of the optics with their far focus where the target was found to be.
+fn figures(optics: Optics, focus: &Focus) -> Result<FocusFigures> {
+    let far_mm = object_mm(optics.focal_length_mm(), focus.sensor_mm)?;
+    let mut file = OpticsFile::from(optics);
+    file.focus.far_mm = far_mm;
+    let range = file.check()?.working_range();
+    Ok(FocusFigures {
+        m1_mm: rounded(focus.sensor_mm, 6),
+        m2_mm: rounded(range.sensor_near_mm, 6),
+        far_mm: rounded(range.far_mm, 4),
+        near_mm: rounded(range.near_mm, 4),
+        alpha0_mm: rounded(range.alpha0_mm, 4),
+        sensor_travel_mm: rounded(range.sensor_travel_mm, 6),
+        coarse_um: um(focus.coarse),
+        fine_um: um(focus.fine),
+        board_ms: focus.board.as_secs_f64() * 1e3,
+        places: focus.places,
+        exposures: focus.exposures,
+    })
+}
+
+/// Where an object is whose image is sharp at this sensor distance, by the lens equation.
+fn object_mm(focal_length_mm: f64, sensor_mm: f64) -> Result<f64> {
+    let behind = sensor_mm - focal_length_mm;
+    if behind <= 0.0 {
+        return Err(WorkflowError::InsideFocalLength { sensor_mm, focal_length_mm });
+    }
+    Ok(focal_length_mm + focal_length_mm * focal_length_mm / behind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_object_of_a_sharp_image_follows_from_the_lens_equation() {
+        // 1/50 = 1/933 + 1/m1.
+        let sensor_mm = 1.0 / (1.0 / 50.0 - 1.0 / 933.0);
+        assert!((object_mm(50.0, sensor_mm).unwrap() - 933.0).abs() < 1e-9);
+        let error = object_mm(50.0, 49.9).unwrap_err();
+        assert!(matches!(error, WorkflowError::InsideFocalLength { .. }), "{error}");
+    }
+}

@@ -1,0 +1,137 @@
+//! Homing, moving, stopping.
+
+use farnear_capture::{
+    describe::um,
+    ready::{ensure_homed, steppers},
+    sequence,
+};
+use farnear_protocol::{Nanometres, message::Axis};
+use serde::Serialize;
+
+use super::{Rig, RigAddress};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// How far each encoder's old zero was from the new one.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+pub struct HomeFigures {
+    /// Of stage A's stepper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shift_um: Option<f64>,
+    /// Of the lens stage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens_shift_um: Option<f64>,
+}
+
+/// Where to go.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MoveSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Each axis with its position in micrometres; they move at the same time.
+    pub targets: Vec<(Axis, f64)>,
+    /// Whether to home first what is not homed.
+    pub home: bool,
+}
+
+/// Where an axis has come to.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MovedAxis {
+    /// Its name: coarse, fine, lens.
+    pub axis: &'static str,
+    /// Where it was sent.
+    pub asked_um: f64,
+    /// Where its encoder or gauge says it is.
+    pub measured_um: f64,
+}
+
+/// Where the axes have come to: of one the figures alone, of several a list.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[serde(untagged)]
+pub enum MoveFigures {
+    /// One axis was moved.
+    One(MovedAxis),
+    /// Several were.
+    All {
+        /// In the order of the targets.
+        moved: Vec<MovedAxis>,
+    },
+}
+
+/// A position in micrometres as the wire carries it. `name` is the parameter's.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] outside the wire's range.
+pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
+    sequence::nanometres(position_um).ok_or_else(|| {
+        let expected = "expected a position of -2147483 to 2147483 um";
+        WorkflowError::parameter(name, position_um, expected)
+    })
+}
+
+/// Homes these axes at the same time; all that have a home switch where none are named.
+///
+/// # Errors
+/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<HomeFigures> {
+    let rig = Rig::connect(rig, None, context)?;
+    let axes = if axes.is_empty() { steppers(&rig.client.hello().capabilities) } else { axes.to_vec() };
+    let started: Vec<_> =
+        axes.iter().map(|axis| Ok((*axis, rig.client.start_home(*axis)?))).collect::<Result<_>>()?;
+    let mut homed = HomeFigures::default();
+    for (axis, work) in started {
+        let shift = Some(um(work.homed()?));
+        match axis {
+            Axis::Lens => homed.lens_shift_um = shift,
+            Axis::SensorCoarse | Axis::SensorFine => homed.shift_um = shift,
+        }
+    }
+    Ok(homed)
+}
+
+/// Moves axes to absolute positions.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for what is no position, [`WorkflowError::Client`] also for one outside the limits.
+pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFigures> {
+    let targets: Vec<_> = settings
+        .targets
+        .iter()
+        .map(|(axis, to_um)| Ok((*axis, nanometres("to-um", *to_um)?)))
+        .collect::<Result<_>>()?;
+    let rig = Rig::connect(&settings.rig, None, context)?;
+    if settings.home {
+        ensure_homed(&rig.client, &mut |what| context.say(what))?;
+    }
+    let started: Vec<_> = targets
+        .into_iter()
+        .map(|(axis, target)| Ok((axis, rig.client.start_move(axis, target)?)))
+        .collect::<Result<_>>()?;
+    let mut moved = Vec::new();
+    for (axis, work) in started {
+        let end = work.moved()?;
+        moved.push(MovedAxis { axis: axis.name(), asked_um: um(end.asked), measured_um: um(end.measured) });
+    }
+    Ok(match <[MovedAxis; 1]>::try_from(moved) {
+        Ok([one]) => MoveFigures::One(one),
+        Err(moved) => MoveFigures::All { moved },
+    })
+}
+
+/// Stops all motion along the ramps and ends a running program; positions stay known.
+///
+/// # Errors
+/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+pub fn stop(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
+    Ok(Rig::connect(rig, None, context)?.client.stop()?)
+}
+
+/// Emergency stop: what moved has lost its position, and the alarm has to be cleared.
+///
+/// # Errors
+/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+pub fn halt(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
+    Ok(Rig::connect(rig, None, context)?.client.halt()?)
+}

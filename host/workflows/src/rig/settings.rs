@@ -1,0 +1,76 @@
+//! What the board keeps in its memory.
+
+use farnear_protocol::message::{Setting, SettingKey};
+use serde::Serialize;
+
+use super::{Rig, RigAddress};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// A setting, in the unit of its name.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct SettingFigures {
+    /// Its name.
+    pub key: &'static str,
+    /// What it is.
+    pub value: i32,
+    /// What it is on a new board.
+    pub default: i32,
+    /// Smallest value allowed.
+    pub min: i32,
+    /// Largest value allowed.
+    pub max: i32,
+}
+
+impl From<Setting> for SettingFigures {
+    fn from(setting: Setting) -> Self {
+        let Setting { key, value, default, min, max } = setting;
+        Self { key: key.name(), value, default, min, max }
+    }
+}
+
+/// All settings.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct AllSettings {
+    /// In the order of their numbers on the wire.
+    pub settings: Vec<SettingFigures>,
+}
+
+/// The setting of this name.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] with the names that there are.
+pub fn key(name: &str) -> Result<SettingKey> {
+    SettingKey::ALL.into_iter().find(|key| key.name() == name).ok_or_else(|| {
+        let names = SettingKey::ALL.map(SettingKey::name).join(", ");
+        WorkflowError::parameter("setting", name, format!("there is none of this name, there are {names}"))
+    })
+}
+
+/// Reads all settings.
+///
+/// # Errors
+/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+pub fn list(rig: &RigAddress, context: &Context<'_>) -> Result<AllSettings> {
+    let rig = Rig::connect(rig, None, context)?;
+    let settings = SettingKey::ALL.iter().map(|key| Ok(rig.client.setting(*key)?.into()));
+    Ok(AllSettings { settings: settings.collect::<Result<_>>()? })
+}
+
+/// Reads a setting.
+///
+/// # Errors
+/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
+pub fn get(rig: &RigAddress, key: SettingKey, context: &Context<'_>) -> Result<SettingFigures> {
+    Ok(Rig::connect(rig, None, context)?.client.setting(key)?.into())
+}
+
+/// Changes a setting, now and for later boots.
+///
+/// # Errors
+/// [`WorkflowError::Client`], also for a value outside the setting's range.
+pub fn set(rig: &RigAddress, key: SettingKey, value: i32, context: &Context<'_>) -> Result<SettingFigures> {
+    Ok(Rig::connect(rig, None, context)?.client.set_setting(key, value)?.into())
+}

@@ -1,0 +1,212 @@
+//! The series of flat targets that teaches a depth correction: a pair and its depth map at each distance, and the list of
+//! them.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use farnear_capture::record::{begin_folder, finish_folder};
+use farnear_depth::{
+    operators::Operators,
+    optics::Optics,
+    pipeline::{Settings, depth_from_pair},
+};
+use farnear_files::{map, staging};
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    RigAddress,
+    camera::{CameraSettings, EquippedRig},
+    pair,
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    operators,
+    optics::GivenOptics,
+};
+
+/// Name of the list in the series' folder.
+const LIST: &str = "PATTERNS.toml";
+/// Targets of a series where none are named.
+const USUAL_TARGETS: usize = 24;
+
+/// The series.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TargetSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Its camera.
+    pub camera: CameraSettings,
+    /// The optics file.
+    pub optics: PathBuf,
+    /// Distances of the target from the lens; where there are none, 24 through the working range.
+    pub distances_mm: Vec<f64>,
+    /// Whether somebody places the target and is asked to; else it moves by itself.
+    pub ask: bool,
+    /// Folder of the series.
+    pub out: PathBuf,
+}
+
+/// What there is to say of a series.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TargetFigures {
+    /// Targets in the list.
+    pub targets: usize,
+    /// Those that were captured now.
+    pub captured: usize,
+    /// Root mean square of the maps' error before any correction, mm; of those that were captured now.
+    pub rmse_mm: f64,
+    /// The list.
+    pub patterns: String,
+}
+
+/// The list, as corrections are learned from it.
+#[derive(Serialize, Deserialize, Default)]
+struct List {
+    #[serde(default)]
+    pattern: Vec<Entry>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Entry {
+    depth: PathBuf,
+    true_mm: f64,
+}
+
+/// Captures a flat target at each distance, computes the depth maps and lists them. A series that was broken off goes on
+/// where it stood when it is started again with the same folder. A real rig stays connected, an emulated one is started
+/// before each target.
+///
+/// # Errors
+/// Optics, distances, camera, folder, rig, in this order; [`WorkflowError::Unanswered`] where nobody places the target.
+pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {
+    let optics = GivenOptics::read(&settings.optics)?;
+    let operators = operators::find(None, &optics.optics)?;
+    let distances_mm = distances(&settings.distances_mm, &optics.optics)?;
+    let early = settings.camera.open_early(&settings.rig)?;
+    fs::create_dir_all(&settings.out)
+        .map_err(|source| WorkflowError::Folder { folder: settings.out.clone(), source })?;
+    let mut list = read_list(&settings.out.join(LIST))?;
+    let series = Series { settings, optics: &optics, operators: &operators, context };
+    let mut standing = match settings.rig.is_emulated() {
+        true => None,
+        false => Some(early.connect(&settings.rig, Some(optics.for_emulation()), context)?),
+    };
+    let (mut captured, mut error) = (0, MeanSquare::default());
+    for (number, true_mm) in distances_mm.iter().copied().enumerate() {
+        if list.pattern.iter().any(|entry| (entry.true_mm - true_mm).abs() < 1e-6) {
+            context.say(&format!("target {} at {true_mm} mm is there already", number + 1));
+            continue;
+        }
+        let name = format!("target-{true_mm:.3}");
+        let depth_mm = match &mut standing {
+            Some(rig) => {
+                series.place(number, distances_mm.len(), true_mm)?;
+                series.capture(rig, &name)?
+            }
+            None => series.capture(&mut series.emulated_before(true_mm)?, &name)?,
+        };
+        error.add(&depth_mm, true_mm);
+        captured += 1;
+        list.pattern.push(Entry { depth: Path::new(&name).join("depth.npy"), true_mm });
+        list.pattern.sort_by(|a, b| a.true_mm.total_cmp(&b.true_mm));
+        staging::write_file(&settings.out.join(LIST), toml::to_string(&list)?.as_bytes())?;
+        context.say(&format!("target {} of {} at {true_mm} mm is captured", number + 1, distances_mm.len()));
+    }
+    Ok(TargetFigures {
+        targets: list.pattern.len(),
+        captured,
+        rmse_mm: rounded(error.root(), 4),
+        patterns: settings.out.join(LIST).display().to_string(),
+    })
+}
+
+struct Series<'a> {
+    settings: &'a TargetSettings,
+    optics: &'a GivenOptics,
+    operators: &'a Operators,
+    context: &'a Context<'a>,
+}
+
+impl Series<'_> {
+    /// The emulated rig before a flat target.
+    fn emulated_before(&self, true_mm: f64) -> Result<EquippedRig> {
+        let address = self.settings.rig.with_scene(format!("plane:{true_mm}"))?;
+        self.settings.camera.connect(&address, Some(self.optics.for_emulation()), self.context)
+    }
+
+    /// Has the target placed.
+    fn place(&self, number: usize, count: usize, true_mm: f64) -> Result<()> {
+        let place = format!(
+            "place the flat target {true_mm} mm before the lens ({} of {count}), square to it",
+            number + 1
+        );
+        if !self.settings.ask {
+            self.context.say(&place);
+            return Ok(());
+        }
+        let question = format!("{place}, and press Enter: ");
+        self.context.questions.ask(&question, &self.context.cancel).map(|_| ())
+    }
+
+    /// Captures a pair and computes its depth, mm, into a folder of its own.
+    fn capture(&self, rig: &mut EquippedRig, name: &str) -> Result<Array2<f32>> {
+        let folder = begin_folder(&self.settings.out.join(name))?;
+        let (pair, record) = pair::take(rig, self.optics, &self.settings.camera, self.context)?;
+        let [far, near] = [&pair.far, &pair.near].map(|taken| taken.image.pixels.mapv(f32::from));
+        let (optics, settings) = (&self.optics.optics, Settings::default());
+        let depth = depth_from_pair(far.view(), near.view(), self.operators, optics, &settings)?;
+        for warning in &depth.warnings {
+            self.context.progress.warn(&warning.to_string());
+        }
+        folder.write("depth.npy", &map::npy(depth.depth_mm.view())?)?;
+        finish_folder(folder, &pair, &record)?;
+        Ok(depth.depth_mm)
+    }
+}
+
+/// The mean square of depth maps' errors, pixel by pixel.
+#[derive(Default)]
+struct MeanSquare {
+    sum: f64,
+    pixels: f64,
+}
+
+impl MeanSquare {
+    fn add(&mut self, depth_mm: &Array2<f32>, true_mm: f64) {
+        for value in depth_mm.iter().filter(|value| value.is_finite()) {
+            self.sum += (f64::from(*value) - true_mm).powi(2);
+            self.pixels += 1.0;
+        }
+    }
+
+    fn root(&self) -> f64 {
+        (self.sum / f64::max(self.pixels, 1.0)).sqrt()
+    }
+}
+
+fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
+    if let Some(bad) = asked_mm.iter().find(|mm| !(mm.is_finite() && **mm > optics.focal_length_mm())) {
+        let expected = format!("expected mm beyond the focal length of {} mm", optics.focal_length_mm());
+        return Err(WorkflowError::parameter("distances", bad, expected));
+    }
+    if !asked_mm.is_empty() {
+        return Ok(asked_mm.to_vec());
+    }
+    let range = optics.working_range();
+    let step = (range.far_mm - range.near_mm) / (USUAL_TARGETS - 1) as f64;
+    // To a tenth of a millimetre, which can be set on a rail.
+    Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, 1)).collect())
+}
+
+fn read_list(path: &Path) -> Result<List> {
+    match fs::read_to_string(path) {
+        Ok(text) => toml::from_str(&text).map_err(WorkflowError::file(path, "a list of targets")),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(List::default()),
+        Err(error) => Err(WorkflowError::read("the list of targets", path)(error)),
+    }
+}

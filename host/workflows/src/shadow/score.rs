@@ -1,0 +1,179 @@
+//! How much shadow was taken off masks, and how much of the subject with it, against a ground truth.
+//!
+//! Truth pictures are grey: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 not judged. Masks are set from 128 on.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
+
+use farnear_activity::shadow_score::{ShadowScore, Truth};
+use farnear_files::{
+    masks::{self, listed},
+    video::pictures,
+};
+use ndarray::{Array2, Zip};
+use serde::Serialize;
+
+use crate::{
+    context::Context,
+    error::{About, Result},
+    figures::rounded,
+};
+
+/// What is scored.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ScoreSettings {
+    /// Masks after the removal: a picture or a folder. Frames of two folders belong together by name, else by the number
+    /// that their names end in.
+    pub masks: PathBuf,
+    /// The truth: a picture or a folder.
+    pub truth: PathBuf,
+    /// Masks before the removal: then only pixels that were in them count as removed. Where the truth holds no shadow at
+    /// all, what these have beside the person counts as shadow.
+    pub before: Option<PathBuf>,
+}
+
+/// The figures, summed over all frames; without a value where there is nothing to count.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct ScoreFigures {
+    /// Share of the shadow that went.
+    pub removed_percent: Option<f64>,
+    /// Share of the person that went with it.
+    pub wrongly_removed_percent: Option<f64>,
+    /// Intersection over union of what is left and the person.
+    pub iou_percent: Option<f64>,
+    /// Frames.
+    pub frames: usize,
+    /// Pixels of shadow in the truth.
+    pub shadow_pixels: u64,
+    /// Pixels of the person in the truth.
+    pub subject_pixels: u64,
+}
+
+/// Why pictures cannot be scored.
+#[derive(Debug, thiserror::Error)]
+pub enum ScoreError {
+    /// Two masks for one frame.
+    #[error(
+        "{} and {} both end in number {number}: which belongs to the truth's frame {number}?", one.display(), other.display()
+    )]
+    Ambiguous {
+        /// A mask.
+        one: PathBuf,
+        /// Another.
+        other: PathBuf,
+        /// The number.
+        number: u64,
+    },
+    /// No mask for a frame of the truth.
+    #[error(
+        "{}: no mask for {}; masks need its name or a name that ends in its number", masks.display(), truth.display()
+    )]
+    NoMask {
+        /// Where masks were looked for.
+        masks: PathBuf,
+        /// The truth's frame.
+        truth: PathBuf,
+    },
+    /// A grey level that means nothing.
+    #[error(
+        "{}: level {level} at column {column}, row {row} has no meaning in a truth; use 0 background, 50 or 127 shadow, \
+         255 person, 85 or 170 not judged (and no lossy compression)", path.display()
+    )]
+    Level {
+        /// The truth's frame.
+        path: PathBuf,
+        /// The level.
+        level: u8,
+        /// Its place from the left.
+        column: usize,
+        /// Its place from the top.
+        row: usize,
+    },
+}
+
+/// Scores masks against the truth.
+///
+/// # Errors
+/// Where pictures cannot be read, do not belong together or differ in size, or the truth holds a level without a meaning.
+pub fn score(settings: &ScoreSettings, context: &Context<'_>) -> Result<ScoreFigures> {
+    let truths = listed(&settings.truth)?;
+    let masks = Partners::new(&settings.masks, truths.len())?;
+    let before = settings.before.as_deref().map(|path| Partners::new(path, truths.len())).transpose()?;
+    let mut labelled = ShadowScore::default();
+    // The same with shadow told by the masks before, for truths that hold none.
+    let mut told = ShadowScore::default();
+    for path in &truths {
+        context.cancel.check("scoring masks")?;
+        let truth = truth(path)?;
+        let after = masks.mask(path)?;
+        let before = before.as_ref().map(|before| before.mask(path)).transpose()?;
+        let view = before.as_ref().map(|mask| mask.view());
+        labelled.add(view, after.view(), truth.view()).about(|| format!("scoring {}", path.display()))?;
+        if let Some(before) = &before {
+            let told_truth = Zip::from(&truth).and(before).map_collect(|&truth, &before| match truth {
+                Truth::Background if before => Truth::Shadow,
+                other => other,
+            });
+            told.add(view, after.view(), told_truth.view())?;
+        }
+    }
+    let score = if labelled.shadow_pixels == 0 && before.is_some() { told } else { labelled };
+    let percent = |value: Option<f64>| value.map(|value| rounded(value, 3));
+    Ok(ScoreFigures {
+        removed_percent: percent(score.removed_percent()),
+        wrongly_removed_percent: percent(score.wrongly_removed_percent()),
+        iou_percent: percent(score.iou_percent()),
+        frames: truths.len(),
+        shadow_pixels: score.shadow_pixels,
+        subject_pixels: score.subject_pixels,
+    })
+}
+
+/// Masks to be found by the name of their truth.
+struct Partners {
+    path: PathBuf,
+    only: Option<PathBuf>,
+    by_name: HashMap<String, PathBuf>,
+    by_number: HashMap<u64, PathBuf>,
+}
+
+impl Partners {
+    fn new(path: &Path, truths: usize) -> Result<Self> {
+        let found = listed(path)?;
+        let only = (found.len() == 1 && truths == 1).then(|| found[0].clone());
+        let mut by_number = HashMap::new();
+        for mask in &found {
+            let Some(number) = trailing_number(&pictures::stem(mask)) else { continue };
+            if let Some(other) = by_number.insert(number, mask.clone()) {
+                return Err(ScoreError::Ambiguous { one: other, other: mask.clone(), number }.into());
+            }
+        }
+        let by_name = found.into_iter().map(|mask| (pictures::stem(&mask), mask)).collect();
+        Ok(Self { path: path.into(), only, by_name, by_number })
+    }
+
+    fn mask(&self, truth: &Path) -> Result<Array2<bool>> {
+        let name = pictures::stem(truth);
+        let by_number = || self.by_number.get(&trailing_number(&name)?);
+        let found = self.only.as_ref().or_else(|| self.by_name.get(&name)).or_else(by_number);
+        let none = || ScoreError::NoMask { masks: self.path.clone(), truth: truth.into() };
+        Ok(masks::read(found.ok_or_else(none)?)?)
+    }
+}
+
+/// The number that a name ends in.
+fn trailing_number(name: &str) -> Option<u64> {
+    let digits = name.bytes().rev().take_while(u8::is_ascii_digit).count();
+    name[name.len() - digits..].parse().ok()
+}
+
+fn truth(path: &Path) -> Result<Array2<Truth>> {
+    let levels = masks::grey(path)?;
+    let nameless = levels.indexed_iter().find(|&(_, &level)| Truth::from_grey(level).is_none());
+    if let Some(((row, column), &level)) = nameless {
+        return Err(ScoreError::Level { path: path.into(), level, column, row }.into());
+    }
+    Ok(levels.mapv(|level| Truth::from_grey(level).unwrap_or(Truth::Ignored)))
+}

@@ -1,0 +1,132 @@
+//! Masks of a person: from [`video`], from a [motion-capture recording](markers), from body joints of a public set
+//! ([`skeletons`]), of made people ([`synthetic`]). One file per source; [`performances`] is what the last two share.
+
+pub mod markers;
+pub mod performances;
+pub mod skeletons;
+pub mod synthetic;
+pub mod video;
+
+use std::{ops::RangeInclusive, path::PathBuf};
+
+use farnear_activity::{
+    background::Frame,
+    mask::{
+        Mask,
+        centre::{SIDE_PX, centred},
+    },
+    readers::{recording::RecordingError, skeletons::SkeletonError},
+    shadow_detectors::Method,
+    silhouette::template::TemplateError,
+};
+use farnear_files::video::Pixels;
+
+/// Views round a subject.
+pub(crate) const VIEWS: RangeInclusive<usize> = 1..=72;
+/// What a pixel may stand for, millimetres.
+pub(crate) const MM_PER_PX: RangeInclusive<f64> = 0.1..=1000.0;
+
+/// Why no silhouettes could be made.
+#[derive(Debug, thiserror::Error)]
+pub enum SilhouettesError {
+    /// A recording that cannot be read.
+    #[error("{}: {source}", path.display())]
+    Recording {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: RecordingError,
+    },
+    /// Joints that cannot be read.
+    #[error("{}: {source}", path.display())]
+    Skeletons {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: SkeletonError,
+    },
+    /// A template that cannot be read.
+    #[error("the template {name}: {source}")]
+    Template {
+        /// Its name or file.
+        name: String,
+        /// What is wrong.
+        source: TemplateError,
+    },
+    /// A template with other names than the recording's.
+    #[error("{}: {source}{}", path.display(), fitting(*.fits))]
+    Unfit {
+        /// The recording.
+        path: PathBuf,
+        /// What does not fit.
+        source: TemplateError,
+        /// A built-in template that does.
+        fits: Option<&'static str>,
+    },
+    /// A recording without a frame.
+    #[error("{}: the recording holds no frame", path.display())]
+    NoFrames {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A recording in which everything is hidden.
+    #[error("{}: no frame has a visible marker, so there is nothing to draw", path.display())]
+    NothingVisible {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Points too far apart for a picture.
+    #[error(
+        "{what} reaches from {low_mm:.0} to {high_mm:.0} mm, which is not a picture at {mm_per_px} mm per pixel; is the \
+         file's unit right?"
+    )]
+    TooLarge {
+        /// Whose points.
+        what: String,
+        /// The least of their coordinates in the picture.
+        low_mm: f64,
+        /// The greatest.
+        high_mm: f64,
+        /// Millimetres per pixel asked for.
+        mm_per_px: f64,
+    },
+    /// No performance was chosen.
+    #[error("there is no performance to draw")]
+    NoPerformance,
+    /// A detector that compares colours.
+    #[error("the shadow detector {} compares colours, but the video is grey", method.name())]
+    NeedsColour {
+        /// The detector.
+        method: Method,
+    },
+}
+
+fn fitting(template: Option<&str>) -> String {
+    template.map_or(String::new(), |name| format!("; the built-in template `{name}` fits it"))
+}
+
+impl SilhouettesError {
+    /// Points that fit in no picture.
+    fn too_large(what: &str, points_mm: &[[f64; 2]], mm_per_px: f64) -> Self {
+        let finite = || points_mm.iter().flatten().copied().filter(|v| v.is_finite());
+        Self::TooLarge {
+            what: what.into(),
+            low_mm: finite().reduce(f64::min).unwrap_or(0.0),
+            high_mm: finite().reduce(f64::max).unwrap_or(0.0),
+            mm_per_px,
+        }
+    }
+}
+
+/// A video frame as the background model takes it.
+pub(crate) fn frame_of(pixels: &Pixels) -> Frame<'_> {
+    match pixels {
+        Pixels::Grey(pixels) => Frame::Grey(pixels.view()),
+        Pixels::Rgb(pixels) => Frame::Rgb(pixels.view()),
+    }
+}
+
+/// The subject in 100x100 pixels; an empty mask stays empty.
+fn cut_out(mask: &Mask) -> Mask {
+    centred(mask.view(), SIDE_PX).unwrap_or_else(|| Mask::from_elem((SIDE_PX, SIDE_PX), false))
+}

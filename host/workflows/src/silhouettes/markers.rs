@@ -1,0 +1,234 @@
+//! Silhouettes of a motion-capture recording (markers or joints with names) from views all round.
+//!
+//! A template says which points make which part of the body; parts are filled and the gaps between them closed.
+
+mod drawing;
+mod missing;
+
+use std::{
+    collections::HashMap,
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use farnear_activity::{
+    readers::{
+        self,
+        recording::{Choices, Recording},
+    },
+    silhouette::{
+        capsule::Point3,
+        parts::Fill,
+        template::Template,
+        view::{View, views_round},
+    },
+};
+use farnear_files::staging::Staging;
+use serde::Serialize;
+
+use self::{drawing::Job, missing::MissingParts};
+use super::{MM_PER_PX, SilhouettesError, VIEWS};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    parameters::{at_least, within},
+};
+
+/// What is drawn, how, and where to.
+#[derive(Clone, Debug)]
+pub struct MarkersSettings {
+    /// The recording; its ending says what kind of file it is.
+    pub file: PathBuf,
+    /// The file's unit and upward axis, where they are known better than the file says or suggests.
+    pub choices: Choices,
+    /// A built-in template's name, or a TOML file.
+    pub template: String,
+    /// The new folder.
+    pub out: PathBuf,
+    /// Views at equal steps round the subject, 1 to 72.
+    pub views: usize,
+    /// Direction of the first view, degrees round the vertical.
+    pub first_view_deg: f64,
+    /// From how high the views look down, -90 to 90 degrees.
+    pub elevation_deg: f64,
+    /// What a pixel stands for, 0.1 to 1000 mm.
+    pub mm_per_px: f64,
+    /// Gaps at joints up to this width are closed, 0 to 1000 mm; without it 126 as in the thesis, or 40 where the template's
+    /// parts have a thickness, which fills joints by itself.
+    pub close_mm: Option<f64>,
+    /// How parts are filled.
+    pub fill: Fill,
+    /// Take every so-many-th frame.
+    pub every: usize,
+    /// Masks of 100x100 pixels with the subject centred, instead of full frames.
+    pub centred: bool,
+    /// Keep only so many silhouettes of all views, the least alike (Li 2014, eq. 7.3), at 100x100 pixels.
+    pub keep: Option<usize>,
+}
+
+impl MarkersSettings {
+    fn check(&self) -> Result<()> {
+        within("views", self.views, &VIEWS, "")?;
+        within("elevation", self.elevation_deg, &(-90.0..=90.0), "deg")?;
+        within("pixel size", self.mm_per_px, &MM_PER_PX, "mm")?;
+        if let Some(close_mm) = self.close_mm {
+            within("closed gap", close_mm, &(0.0..=1000.0), "mm")?;
+        }
+        at_least("kept silhouettes", self.keep.unwrap_or(1), 1, "pictures")?;
+        at_least("step between frames", self.every, 1, "frames")
+    }
+
+    fn views(&self) -> Vec<View> {
+        let mut views = views_round(self.views, self.elevation_deg);
+        views.iter_mut().for_each(|view| view.gamma_deg += self.first_view_deg);
+        views
+    }
+}
+
+/// What was drawn.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MarkersFigures {
+    /// Views.
+    pub views: usize,
+    /// Frames drawn of each.
+    pub frames: usize,
+    /// Masks that hold somebody.
+    pub silhouettes: usize,
+    /// Frames of which a part could not be drawn.
+    pub flagged_frames: usize,
+    /// Frames without a visible point.
+    pub empty_frames: usize,
+    /// Points of the recording.
+    pub markers: usize,
+    /// Share of all points in all frames that were hidden.
+    pub hidden_markers_percent: f64,
+    /// Time for all.
+    pub seconds: f64,
+    /// What was guessed about the recording.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
+/// `silhouettes.toml`: what was drawn, and one entry per doubtful frame.
+#[derive(Serialize)]
+struct Index<'a> {
+    template: &'a str,
+    rate_hz: f64,
+    mm_per_px: f64,
+    elevation_deg: f64,
+    view_directions_deg: Vec<f64>,
+    /// Parts of the template of which the recording has no marker at all.
+    parts_not_recorded: &'a [String],
+    /// What was guessed about the recording.
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    guessed: &'a [String],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    flagged: Vec<Flagged<'a>>,
+}
+
+#[derive(Serialize)]
+struct Flagged<'a> {
+    frame: &'a str,
+    /// `empty`, or `missing:PART` where all markers of a part were hidden.
+    flags: &'a [String],
+}
+
+/// Draws a recording: a folder `view1`, `view2`, ... of masks for every view, one picture per frame, all of a view on one
+/// canvas so that the subject moves in it as in a camera's picture; and `silhouettes.toml`.
+///
+/// # Errors
+/// Files that cannot be read or do not fit the template, a subject larger than a picture may be, masks that cannot be
+/// written; then the new folder is not there.
+pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<MarkersFigures> {
+    settings.check()?;
+    let start = Instant::now();
+    let template = template(&settings.template)?;
+    let recording = recording(&settings.file, settings.choices)?;
+    let shown = settings.file.display();
+    check_fit(&template, &recording, &settings.file)?;
+    let warnings: Vec<String> =
+        recording.remarks().into_iter().map(|remark| format!("{shown}: {remark}")).collect();
+    warnings.iter().for_each(|warning| context.progress.warn(warning));
+    let out = Staging::new_folder(&settings.out)?;
+    let numbers = || (0..recording.frames.len()).step_by(settings.every);
+    let frames: Vec<HashMap<&str, Point3>> = numbers().map(|n| recording.by_name(n)).collect();
+    let names: Vec<String> = numbers().map(|n| format!("frame_{:06}", n + 1)).collect();
+    if frames.iter().all(HashMap::is_empty) {
+        return Err(SilhouettesError::NothingVisible { path: settings.file.clone() }.into());
+    }
+    let missing = MissingParts::of(&template, &recording, &frames);
+    let views = settings.views();
+    let job = Job { settings, template: &template, frames: &frames, names: &names, context };
+    let silhouettes = match settings.keep {
+        Some(keep) => job.gallery(&views, keep, &out)?,
+        None => job.sequences(&views, &out)?,
+    };
+    for part in &missing.always {
+        context.say(&format!("{shown}: no marker of `{part}` was recorded; it is not drawn"));
+    }
+    let index = Index {
+        template: &template.name,
+        rate_hz: recording.rate_hz / settings.every as f64,
+        mm_per_px: settings.mm_per_px,
+        elevation_deg: settings.elevation_deg,
+        view_directions_deg: views.iter().map(|view| view.gamma_deg).collect(),
+        parts_not_recorded: &missing.always,
+        guessed: &warnings,
+        flagged: missing.flagged(&names),
+    };
+    out.write("silhouettes.toml", toml::to_string(&index)?.as_bytes())?;
+    out.finish()?;
+    context.say(&format!("wrote {}", settings.out.display()));
+    Ok(MarkersFigures {
+        views: views.len(),
+        frames: frames.len(),
+        silhouettes,
+        flagged_frames: index.flagged.len(),
+        empty_frames: frames.iter().filter(|frame| frame.is_empty()).count(),
+        markers: recording.names.len(),
+        hidden_markers_percent: rounded(hidden_percent(&recording), 2),
+        seconds: rounded(start.elapsed().as_secs_f64(), 3),
+        warnings: warnings.clone(),
+    })
+}
+
+/// Share of all points in all frames that were hidden, per cent.
+fn hidden_percent(recording: &Recording) -> f64 {
+    let all: usize = recording.frames.iter().map(Vec::len).sum();
+    let hidden = recording.frames.iter().flatten().filter(|point| point.is_none()).count();
+    100.0 * hidden as f64 / all.max(1) as f64
+}
+
+/// A built-in template, else one from a file.
+fn template(name: &str) -> Result<Template> {
+    let path = Path::new(name);
+    let wrong = |source| SilhouettesError::Template { name: name.into(), source };
+    if Template::names().any(|known| known == name) || !path.is_file() {
+        return Ok(Template::named(name).map_err(wrong)?);
+    }
+    let text = fs::read_to_string(path).map_err(WorkflowError::read("the template", path))?;
+    Ok(Template::parse(&text).map_err(wrong)?)
+}
+
+fn recording(path: &Path, choices: Choices) -> Result<Recording> {
+    let bytes = fs::read(path).map_err(WorkflowError::read("the recording", path))?;
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    let read = readers::read(&bytes, &ending, choices);
+    let recording = read.map_err(|source| SilhouettesError::Recording { path: path.into(), source })?;
+    if recording.frames.is_empty() {
+        return Err(SilhouettesError::NoFrames { path: path.into() }.into());
+    }
+    Ok(recording)
+}
+
+/// Refuses a template with other names than the recording's, and says which built-in one fits.
+fn check_fit(template: &Template, recording: &Recording, path: &Path) -> Result<()> {
+    let fits = |name: &&'static str| {
+        Template::named(name).is_ok_and(|template| template.check(&recording.names).is_ok())
+    };
+    template.check(&recording.names).map_err(|source| {
+        SilhouettesError::Unfit { path: path.into(), source, fits: Template::names().find(fits) }.into()
+    })
+}

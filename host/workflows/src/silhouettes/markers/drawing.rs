@@ -1,0 +1,123 @@
+//! Drawing the frames of a recording from a view.
+
+use std::collections::HashMap;
+
+use farnear_activity::{
+    mask::{
+        Mask,
+        centre::{SIDE_PX, centred},
+    },
+    silhouette::{
+        capsule::Point3,
+        parts,
+        redundant::remove_redundant,
+        template::Template,
+        view::{Canvas, View},
+    },
+};
+use farnear_files::{masks, staging::Staging};
+use rayon::prelude::*;
+
+use super::{
+    super::{SilhouettesError, cut_out},
+    MarkersSettings,
+};
+use crate::{context::Context, counter::Counter, error::Result};
+
+/// Pixels kept free round the subject.
+const MARGIN_PX: usize = 2;
+/// Gaps that are closed in the thesis, and where parts have a thickness.
+const CLOSED_MM: f64 = 126.0;
+const CLOSED_BETWEEN_THICK_PARTS_MM: f64 = 40.0;
+/// What is counted.
+const UNIT: &str = "masks";
+/// What is under way where the work is cancelled.
+const DURING: &str = "drawing silhouettes";
+
+/// What all views share.
+pub struct Job<'a> {
+    /// How it is drawn.
+    pub settings: &'a MarkersSettings,
+    /// The body's parts.
+    pub template: &'a Template,
+    /// What is visible in each frame that is drawn.
+    pub frames: &'a [HashMap<&'a str, Point3>],
+    /// The frames' names, by their numbers in the recording.
+    pub names: &'a [String],
+    /// Who watches.
+    pub context: &'a Context<'a>,
+}
+
+impl Job<'_> {
+    /// All frames of every view, a folder of masks each; gives how many masks hold somebody.
+    pub fn sequences(&self, views: &[View], out: &Staging) -> Result<usize> {
+        let counter = Counter::new(self.context, UNIT);
+        let drawn: Result<Vec<usize>> = views
+            .par_iter()
+            .enumerate()
+            .map(|(index, view)| self.sequence(view, &format!("view{}", index + 1), out, &counter))
+            .collect();
+        Ok(drawn?.iter().sum())
+    }
+
+    fn sequence(&self, view: &View, folder: &str, out: &Staging, counter: &Counter<'_>) -> Result<usize> {
+        let canvas = self.canvas(view)?;
+        out.make_folder(folder)?;
+        let mut silhouettes = 0;
+        for (frame, name) in self.frames.iter().zip(self.names) {
+            counter.check(DURING)?;
+            let mask = self.mask(frame, view, &canvas);
+            silhouettes += usize::from(mask.iter().any(|&set| set));
+            let mask = if self.settings.centred { cut_out(&mask) } else { mask };
+            out.write(&format!("{folder}/{name}.png"), &masks::png(&mask)?)?;
+            counter.one(Some(self.settings.views * self.frames.len()));
+        }
+        Ok(silhouettes)
+    }
+
+    /// The `keep` least alike silhouettes of all views, in one folder; gives how many there are.
+    pub fn gallery(&self, views: &[View], keep: usize, out: &Staging) -> Result<usize> {
+        let counter = Counter::new(self.context, UNIT);
+        let all: Result<Vec<Vec<(String, Mask)>>> = views
+            .par_iter()
+            .enumerate()
+            .map(|(index, view)| self.cut_outs(view, &format!("view{}", index + 1), &counter))
+            .collect();
+        let (names, pictures): (Vec<String>, Vec<Mask>) = all?.into_iter().flatten().unzip();
+        let kept = remove_redundant(&pictures, keep);
+        for &index in &kept {
+            out.write(&names[index], &masks::png(&pictures[index])?)?;
+        }
+        Ok(kept.len())
+    }
+
+    /// The silhouettes of a view, cut out, with names.
+    fn cut_outs(&self, view: &View, prefix: &str, counter: &Counter<'_>) -> Result<Vec<(String, Mask)>> {
+        let canvas = self.canvas(view)?;
+        let mut named = Vec::new();
+        for (frame, name) in self.frames.iter().zip(self.names) {
+            counter.check(DURING)?;
+            if let Some(mask) = centred(self.mask(frame, view, &canvas).view(), SIDE_PX) {
+                named.push((format!("{prefix}_{name}.png"), mask));
+            }
+            counter.one(Some(self.settings.views * self.frames.len()));
+        }
+        Ok(named)
+    }
+
+    /// Draws a frame of a view.
+    fn mask(&self, frame: &HashMap<&str, Point3>, view: &View, canvas: &Canvas) -> Mask {
+        let drawn = parts::draw(frame, self.template, view, canvas, self.settings.fill);
+        let thick = self.template.parts.iter().any(|part| part.thickness_mm > 0.0);
+        let usual_mm = if thick { CLOSED_BETWEEN_THICK_PARTS_MM } else { CLOSED_MM };
+        let gap_px = (self.settings.close_mm.unwrap_or(usual_mm) / self.settings.mm_per_px).round() as usize;
+        parts::close(&drawn.mask, gap_px)
+    }
+
+    fn canvas(&self, view: &View) -> Result<Canvas> {
+        let reach = parts::extent(self.frames, self.template, view);
+        let mm_per_px = self.settings.mm_per_px;
+        let canvas = Canvas::fitting(&reach, mm_per_px, MARGIN_PX);
+        Ok(canvas.ok_or_else(|| SilhouettesError::too_large("the recording", &reach, mm_per_px))?)
+    }
+}

@@ -1,0 +1,47 @@
+//! Parts of a template that cannot be drawn, because nothing of them was recorded or seen.
+
+use std::collections::HashMap;
+
+use farnear_activity::{
+    readers::recording::Recording,
+    silhouette::{capsule::Point3, template::Template},
+};
+
+use super::Flagged;
+
+/// Parts that cannot be drawn.
+pub struct MissingParts {
+    /// Names of parts of which the recording has no point at all.
+    pub always: Vec<String>,
+    /// What each frame is flagged with.
+    per_frame: Vec<Vec<String>>,
+}
+
+impl MissingParts {
+    /// Compares a template with what was recorded and with what is visible in every frame.
+    pub fn of(template: &Template, recording: &Recording, frames: &[HashMap<&str, Point3>]) -> Self {
+        let short = |name: &str| name.rsplit_once(':').map_or(name, |(_, short)| short).to_owned();
+        let recorded =
+            |marker: &String| recording.names.iter().any(|name| name == marker || short(name) == *marker);
+        let (drawn, never): (Vec<_>, Vec<_>) =
+            template.parts.iter().partition(|part| part.markers.iter().any(recorded));
+        let flags = |points: &HashMap<&str, Point3>| {
+            if points.is_empty() {
+                return vec!["empty".to_owned()];
+            }
+            let hidden =
+                drawn.iter().filter(|part| !part.markers.iter().any(|m| points.contains_key(m.as_str())));
+            hidden.map(|part| format!("missing:{}", part.name)).collect()
+        };
+        Self {
+            always: never.into_iter().map(|part| part.name.clone()).collect(),
+            per_frame: frames.iter().map(flags).collect(),
+        }
+    }
+
+    /// The doubtful ones among the same frames, by their names.
+    pub fn flagged<'a>(&'a self, names: &'a [String]) -> Vec<Flagged<'a>> {
+        let all = names.iter().zip(&self.per_frame);
+        all.filter(|(_, flags)| !flags.is_empty()).map(|(frame, flags)| Flagged { frame, flags }).collect()
+    }
+}

@@ -1,0 +1,157 @@
+//! Performances of bodies made of capsules, as masks and as samples to train on.
+
+use std::{
+    collections::{BTreeSet, HashMap},
+    path::PathBuf,
+    time::Instant,
+};
+
+use farnear_activity::silhouette::{
+    capsule::Capsule,
+    view::{Canvas, View, draw, extent, views_round},
+};
+use farnear_files::{masks, staging::Staging};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{MM_PER_PX, SilhouettesError, VIEWS};
+use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::within};
+
+/// Pixels kept free round a body.
+const MARGIN_PX: usize = 2;
+
+/// How bodies are drawn and where to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Drawing {
+    /// Views at equal steps round the subject, 1 to 72.
+    pub views: usize,
+    /// What a pixel stands for, 0.1 to 1000 mm.
+    pub mm_per_px: f64,
+    /// The new folder of masks and samples.toml.
+    pub out: PathBuf,
+}
+
+impl Drawing {
+    pub(super) fn check(&self) -> Result<()> {
+        within("views", self.views, &VIEWS, "")?;
+        within("pixel size", self.mm_per_px, &MM_PER_PX, "mm")
+    }
+}
+
+/// One performance.
+pub(super) struct Performance {
+    pub subject: String,
+    pub activity: String,
+    /// One body per frame.
+    pub bodies: Vec<Vec<Capsule>>,
+}
+
+/// What was drawn.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PerformancesFigures {
+    /// Performances.
+    pub performances: usize,
+    /// People.
+    pub subjects: usize,
+    /// Activities.
+    pub activities: usize,
+    /// Views of each performance.
+    pub views: usize,
+    /// Pictures.
+    pub masks: usize,
+    /// Time for all.
+    pub seconds: f64,
+}
+
+/// Draws all performances from views that begin at `first_view_deg`, a folder each with a folder per view, and lists them in
+/// `samples.toml`.
+pub(super) fn write(
+    performances: &[Performance],
+    first_view_deg: f64,
+    drawing: &Drawing,
+    context: &Context<'_>,
+) -> Result<PerformancesFigures> {
+    let start = Instant::now();
+    if performances.is_empty() {
+        return Err(SilhouettesError::NoPerformance.into());
+    }
+    let names = names(performances);
+    let out = Staging::new_folder(&drawing.out)?;
+    let mut views = views_round(drawing.views, 0.0);
+    views.iter_mut().for_each(|view| view.gamma_deg += first_view_deg);
+    let counter = Counter::new(context, "performances");
+    let drawn: Result<Vec<usize>> = performances
+        .par_iter()
+        .zip(&names)
+        .map(|(performance, name)| {
+            for (number, view) in (1..).zip(&views) {
+                counter.check("drawing performances")?;
+                draw_view(performance, name, number, view, drawing.mm_per_px, &out)?;
+            }
+            counter.one(Some(performances.len()));
+            Ok(performance.bodies.len() * views.len())
+        })
+        .collect();
+    let masks = drawn?.iter().sum();
+    out.write("samples.toml", samples(performances, &names, views.len()).as_bytes())?;
+    out.finish()?;
+    context.say(&format!("wrote {}", drawing.out.display()));
+    let distinct =
+        |of: fn(&Performance) -> &String| performances.iter().map(of).collect::<BTreeSet<_>>().len();
+    Ok(PerformancesFigures {
+        performances: performances.len(),
+        subjects: distinct(|performance| &performance.subject),
+        activities: distinct(|performance| &performance.activity),
+        views: views.len(),
+        masks,
+        seconds: rounded(start.elapsed().as_secs_f64(), 3),
+    })
+}
+
+/// Names of folders: subject, activity, and how often it was done by then.
+fn names(performances: &[Performance]) -> Vec<String> {
+    let mut counts: HashMap<(&str, &str), u32> = HashMap::new();
+    performances
+        .iter()
+        .map(|performance| {
+            let count = counts.entry((&performance.subject, &performance.activity)).or_default();
+            *count += 1;
+            format!("{}-{}-{count}", performance.subject, performance.activity.replace(' ', "-"))
+        })
+        .collect()
+}
+
+/// All frames of a performance from one view.
+fn draw_view(
+    performance: &Performance,
+    name: &str,
+    number: usize,
+    view: &View,
+    mm_per_px: f64,
+    out: &Staging,
+) -> Result<()> {
+    let folder = format!("{name}/view{number}");
+    out.make_folder(&folder)?;
+    let reach: Vec<_> = performance.bodies.iter().flat_map(|body| extent(body, view)).collect();
+    let canvas = Canvas::fitting(&reach, mm_per_px, MARGIN_PX)
+        .ok_or_else(|| SilhouettesError::too_large(name, &reach, mm_per_px))?;
+    for (frame, body) in (1..).zip(&performance.bodies) {
+        let mask = draw(body, view, &canvas);
+        out.write(&format!("{folder}/frame_{frame:06}.png"), &masks::png(&mask)?)?;
+    }
+    Ok(())
+}
+
+/// `samples.toml`.
+fn samples(performances: &[Performance], names: &[String], views: usize) -> String {
+    let mut samples = String::new();
+    for (Performance { subject, activity, .. }, name) in performances.iter().zip(names) {
+        for view in 1..=views {
+            samples += &format!(
+                "[[sample]]\nmasks = \"{name}/view{view}\"\nsubject = \"{subject}\"\nactivity = \"{activity}\"\n\
+                 view = {view}\nclip = \"{name}\"\n\n"
+            );
+        }
+    }
+    samples
+}

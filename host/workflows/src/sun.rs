@@ -1,0 +1,102 @@
+//! Where the sun stands for a place and a time.
+
+use std::str::FromStr;
+
+use chrono::{DateTime, Utc};
+use farnear_activity::sun::{self, Model, Place, SunError};
+use farnear_maths::{angle::BinaryAngle, sun as board};
+use serde::Serialize;
+
+use crate::{error::Result, figures::rounded};
+
+/// A place and a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// The place.
+    pub place: Place,
+    /// The time.
+    pub time: DateTime<Utc>,
+}
+
+/// Who computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Formula {
+    /// The host, in double precision.
+    Host(Model),
+    /// The code that runs on the board, in single precision.
+    Board,
+}
+
+/// A name that is no formula's.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0} (or board)")]
+pub struct UnknownFormula(SunError);
+
+impl FromStr for Formula {
+    type Err = UnknownFormula;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFormula> {
+        match text {
+            "board" => Ok(Self::Board),
+            other => other.parse().map(Self::Host).map_err(UnknownFormula),
+        }
+    }
+}
+
+/// Where the sun stands, without refraction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SunFigures {
+    /// Above the horizon.
+    pub elevation_deg: f64,
+    /// Clockwise from north.
+    pub azimuth_deg: f64,
+}
+
+/// Computes where the sun stands, to a millionth of a degree.
+///
+/// # Errors
+/// [`crate::WorkflowError::Sun`] where SPA refuses the time.
+pub fn position(moment: &Moment, formula: Formula) -> Result<SunFigures> {
+    let (elevation_deg, azimuth_deg) = match formula {
+        Formula::Host(model) => {
+            let sun = sun::position(moment.time, moment.place, model)?;
+            (sun.elevation_deg, sun.azimuth_deg)
+        }
+        Formula::Board => {
+            let sun = board::Sun::at(moment.time.timestamp(), &on_board(moment.place));
+            (f64::from(sun.elevation_deg()), f64::from(sun.azimuth_deg()))
+        }
+    };
+    Ok(SunFigures { elevation_deg: rounded(elevation_deg, 6), azimuth_deg: rounded(azimuth_deg, 6) })
+}
+
+/// A place as the board's code takes it.
+fn on_board(place: Place) -> board::Place {
+    let units = |degrees: f64| BinaryAngle::from_degrees_e7((degrees * 1e7).round() as i32);
+    let east_deg =
+        if place.longitude_deg > 180.0 { place.longitude_deg - 360.0 } else { place.longitude_deg };
+    board::Place { latitude: units(place.latitude_deg), longitude: units(east_deg) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_have_names() {
+        assert_eq!("board".parse(), Ok(Formula::Board));
+        assert_eq!("spa".parse(), Ok(Formula::Host(Model::Spa)));
+        let error = "noaa".parse::<Formula>().expect_err("no formula");
+        assert!(error.to_string().contains("`noaa`") && error.to_string().ends_with("(or board)"), "{error}");
+    }
+
+    #[test]
+    fn the_board_counts_longitudes_above_180_degrees_as_west() {
+        let time = sun::parse_time("2014-06-23T11:30:00Z").expect("a time");
+        let at = |longitude_deg| {
+            let moment = Moment { place: Place { latitude_deg: -54.8, longitude_deg }, time };
+            position(&moment, Formula::Board).expect("the board refuses no time")
+        };
+        assert_eq!(at(291.7), at(-68.3));
+    }
+}

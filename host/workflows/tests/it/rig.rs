@@ -1,0 +1,56 @@
+//! Rig workflows with a scripted board behind a port.
+
+mod cancelling;
+mod checklist;
+mod jobs;
+
+use std::{path::Path, sync::Mutex, time::Duration};
+
+use farnear_protocol::Micros;
+use farnear_workflows::{
+    Cancel, Context, Progress, Questions, Result,
+    rig::camera::{CameraAddress, CameraSettings},
+};
+
+/// A face that keeps what it is told, and answers nothing but Enter.
+#[derive(Default)]
+struct Face {
+    said: Mutex<Vec<String>>,
+}
+
+impl Face {
+    fn context(&self) -> Context<'_> {
+        Context { progress: self, questions: self, cancel: Cancel::default() }
+    }
+
+    fn heard(&self, phrase: &str) -> bool {
+        self.said.lock().unwrap().iter().any(|said| said.contains(phrase))
+    }
+}
+
+impl Progress for Face {
+    fn say(&self, what: &str) {
+        self.said.lock().unwrap().push(what.into());
+    }
+}
+
+impl Questions for Face {
+    fn ask(&self, question: &str, _: &Cancel) -> Result<String> {
+        self.say(question);
+        Ok("\n".into())
+    }
+}
+
+/// A camera that watches a folder, in which nothing appears unless a test puts it there.
+fn camera(folder: &Path) -> CameraSettings {
+    CameraSettings {
+        address: CameraAddress::Folder(folder.into()),
+        exposure: Micros(5_000),
+        image_wait: Duration::from_secs(30),
+    }
+}
+
+/// The optics of the rig in docs/, which the scripted board can reach.
+fn optics() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/rig.toml")
+}

@@ -1,0 +1,164 @@
+//! Whoever cancels a workflow, from whatever thread, stops the rig.
+
+use std::{
+    thread,
+    time::{Duration, Instant},
+};
+
+use farnear_depth::focus_measure::FocusMeasure;
+use farnear_protocol::message::{Axis, Routine};
+use farnear_scripted_board::{Faults, Peer, plug_in};
+use farnear_workflows::{
+    Context, Result, WorkflowError,
+    rig::{
+        RigAddress,
+        check::{self, CheckSettings},
+        focus::{self, FocusSettings},
+        mechanics,
+        motion::{self, MoveSettings},
+        pair::{self, PairSettings},
+        sequence::{self, Program, SequenceSettings},
+        targets::{self, TargetSettings},
+    },
+};
+
+use super::{Face, camera, optics};
+
+/// From the wish to the error. The board answers at once; a look at the wish comes every 50 to 200 ms.
+const AT_ONCE: Duration = Duration::from_secs(1);
+
+/// Starts a workflow with this board and cancels it from a second thread as soon as `under_way` is true of the board.
+fn cancelled(
+    faults: Faults,
+    under_way: impl Fn(&Peer) -> bool + Send + 'static,
+    workflow: impl FnOnce(RigAddress, &Context<'_>) -> Result<()>,
+) -> (WorkflowError, Peer) {
+    let (port, board) = plug_in(faults);
+    let face = Face::default();
+    let context = face.context();
+    let (cancel, watched) = (context.cancel.clone(), board.clone());
+    let canceller = thread::spawn(move || {
+        while !under_way(&watched) {
+            thread::sleep(Duration::from_millis(5));
+        }
+        cancel.cancel();
+        Instant::now()
+    });
+    let error = workflow(RigAddress::Port(port), &context).expect_err("it is cancelled");
+    let ended = Instant::now();
+    let wished = canceller.join().unwrap();
+    assert!(ended.duration_since(wished) < AT_ONCE, "{:?} after the wish", ended.duration_since(wished));
+    assert!(error.is_cancelled(), "{error}");
+    (error, board)
+}
+
+#[test]
+fn every_workflow_that_moves_stops_the_rig() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let out = || path.join("out");
+    type Job<'a> = Box<dyn FnOnce(RigAddress, &Context<'_>) -> Result<()> + 'a>;
+    let jobs: Vec<(&str, Job<'_>)> = vec![
+        ("home", Box::new(|rig, context| motion::home(&rig, &[], context).map(drop))),
+        (
+            "move",
+            Box::new(|rig, context| {
+                let settings = MoveSettings { rig, targets: vec![(Axis::SensorFine, 50.0)], home: false };
+                motion::move_to(&settings, context).map(drop)
+            }),
+        ),
+        ("mechanics", Box::new(|rig, context| mechanics::measure(&rig, Routine::Piezo, context).map(drop))),
+        (
+            "pair",
+            Box::new(|rig, context| {
+                let settings = PairSettings { rig, camera: camera(path), optics: optics(), out: out() };
+                pair::capture(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "sequence",
+            Box::new(|rig, context| {
+                let program =
+                    Program::Stack { axis: Axis::SensorFine, from_um: 20.0, to_um: 180.0, steps: 3 };
+                let (camera, out) = (camera(path), out());
+                let settings = SequenceSettings { rig, camera, program, runs: 1, optics: None, out };
+                sequence::run(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "focus",
+            Box::new(|rig, context| {
+                let settings = FocusSettings {
+                    rig,
+                    camera: camera(path),
+                    optics: optics(),
+                    start_mm: None,
+                    range_mm: 1.0,
+                    measure: FocusMeasure::Tenengrad,
+                    region: None,
+                };
+                focus::focus(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "targets",
+            Box::new(|rig, context| {
+                let (camera, distances_mm) = (camera(path), vec![900.0]);
+                let optics = optics();
+                let settings = TargetSettings { rig, camera, optics, distances_mm, ask: true, out: out() };
+                targets::capture(&settings, context).map(drop)
+            }),
+        ),
+    ];
+    for (name, job) in jobs {
+        let faults = Faults { never_ends: true, ..Faults::default() };
+        let (error, board) = cancelled(faults, |board| board.board().acts > 0, job);
+        assert!(board.board().stops > 0, "{name}: {error}");
+    }
+    let left: Vec<_> = path.read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["out"], "the series' own folder, which is begun before the rig moves");
+    assert_eq!(out().read_dir().unwrap().count(), 0);
+}
+
+#[test]
+fn a_camera_that_gives_nothing_is_waited_for_no_longer() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    // Homed, moved, both exposed: what is waited for is the first image.
+    let (error, board) = cancelled(
+        Faults::default(),
+        |board| board.board().triggers > 0,
+        |rig, context| {
+            let out = path.join("out");
+            let settings = PairSettings { rig, camera: camera(path), optics: optics(), out };
+            pair::capture(&settings, context).map(drop)
+        },
+    );
+    assert!(error.to_string().contains("waiting for the camera's image"), "{error}");
+    assert_eq!(board.board().stops, 1);
+    assert!(!path.join("out").exists());
+}
+
+#[test]
+fn hands_that_do_not_come_are_waited_for_no_longer() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let (port, board) = plug_in(Faults::default());
+    board.board().hello.capabilities.memory = false;
+    board.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().unwrap();
+    let face = Face::default();
+    let context = face.context();
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            while !face.heard("press the home switch") {
+                thread::sleep(Duration::from_millis(5));
+            }
+            context.cancel.cancel();
+        });
+        let rig = RigAddress::Port(port);
+        let settings = CheckSettings { rig, camera: camera(path), resting_only: false, hands: true };
+        let error = check::check(&settings, &context).unwrap_err();
+        assert!(matches!(&error, WorkflowError::Cancelled { .. }), "{error}");
+    });
+    assert_eq!(board.board().acts, 0);
+}

@@ -1,0 +1,99 @@
+//! The checklist as data: verdicts and details, and a person whose hands do what is said.
+
+use farnear_protocol::message::Alarm;
+use farnear_scripted_board::{Faults, Peer, plug_in};
+use farnear_workflows::{
+    Cancel, Context, Progress, Questions, Result, WorkflowError,
+    rig::{
+        RigAddress,
+        check::{self, CheckSettings, Checklist, Verdict},
+    },
+};
+
+use super::{Face, camera};
+
+/// A person beside the scripted board.
+struct Person {
+    board: Peer,
+    face: Face,
+}
+
+impl Progress for Person {
+    fn say(&self, what: &str) {
+        self.face.say(what);
+        let mut board = self.board.board();
+        let lens = what.contains("lens stage");
+        if what.contains("release it") {
+            (board.switches, board.lens_switches, board.emergency_stop) = ([false; 2], [false; 2], false);
+        } else if what.contains("press the emergency stop") {
+            board.emergency_stop = true;
+            board.raise(Alarm::EmergencyStop);
+        } else if what.contains("   press the") {
+            let pressed = if what.contains("home") { [true, false] } else { [false, true] };
+            *(if lens { &mut board.lens_switches } else { &mut board.switches }) = pressed;
+        } else if what.contains("turn the motor") {
+            let turned = if lens { &mut board.lens } else { &mut board.coarse };
+            turned.0 += 60_000;
+        }
+    }
+}
+
+impl Questions for Person {
+    fn ask(&self, question: &str, cancel: &Cancel) -> Result<String> {
+        self.face.ask(question, cancel)
+    }
+}
+
+fn go_through(board: Peer, port: String, hands: bool, resting_only: bool) -> (Checklist, Person) {
+    let images = tempfile::tempdir().unwrap();
+    board.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().unwrap();
+    let person = Person { board, face: Face::default() };
+    let context = Context { progress: &person, questions: &person, cancel: Cancel::default() };
+    let rig = RigAddress::Port(port);
+    let settings = CheckSettings { rig, camera: camera(images.path()), resting_only, hands };
+    let list = check::check(&settings, &context).unwrap();
+    (list, person)
+}
+
+fn verdict(list: &Checklist, step: &str) -> Verdict {
+    list.steps.iter().find(|outcome| outcome.step == step).unwrap().verdict
+}
+
+#[test]
+fn hands_press_turn_and_release_what_the_checklist_says() {
+    let (port, board) = plug_in(Faults::default());
+    board.board().hello.capabilities.memory = false;
+    let (list, person) = go_through(board, port, true, true);
+    assert_eq!((list.passed, list.failed, list.passed_over), (6, 0, 1), "{list:?}");
+    assert_eq!(verdict(&list, "memory"), Verdict::PassedOver);
+    assert_eq!(list.steps[4].detail, "4 switches open and close");
+    assert_eq!(list.steps[6].detail, "2 encoders count up on the way away from home");
+    assert!(list.check().is_ok());
+    assert!(person.face.heard("\n5. end switches by hand"));
+    assert!(person.face.heard("then press Enter: "), "the motors had to be disconnected");
+    assert_eq!(person.board.board().acts, 0, "nothing moves while the motors rest");
+}
+
+#[test]
+fn a_failure_ends_the_list_where_the_next_step_would_rest_on_it() {
+    let (port, board) = plug_in(Faults::default());
+    board.board().hello.capabilities.memory = false;
+    // The scripted board ends each move at once, so that a halt comes too late.
+    let (list, _) = go_through(board, port, false, false);
+    let last = list.steps.last().unwrap();
+    assert_eq!((last.step, last.verdict), ("halt and its alarm", Verdict::Failed), "{list:?}");
+    assert_eq!(list.failed, 1);
+    let Err(WorkflowError::StepsFailed { failed: 1, alarm: Some(1) }) = list.check() else {
+        panic!("{list:?}")
+    };
+}
+
+#[test]
+fn a_latched_alarm_is_told_and_nothing_goes_on() {
+    let (port, board) = plug_in(Faults::default());
+    board.board().raise(Alarm::SupplyLow);
+    let (list, _) = go_through(board, port, true, false);
+    assert_eq!(list.steps.len(), 3);
+    assert!(list.steps[2].detail.starts_with("alarm 1 is latched"), "{list:?}");
+    assert_eq!(list.alarm, Some(1));
+}

@@ -1,0 +1,99 @@
+//! What is done with the rig once it is connected, and what is refused before.
+
+use std::{thread, time::Duration};
+
+use farnear_protocol::message::{Axis, Routine, SettingKey};
+use farnear_scripted_board::{Faults, plug_in};
+use farnear_workflows::{
+    Context, WorkflowError,
+    rig::{
+        RigAddress, alarms, board,
+        log::{self, LogSettings},
+        mechanics::{self, MechanicsFigures},
+        motion::{self, MoveFigures, MoveSettings},
+        pair::{self, PairSettings},
+        settings,
+    },
+};
+
+use super::{Face, camera, optics};
+
+#[test]
+fn moves_home_first_where_asked_to_and_say_so() {
+    let (port, _board) = plug_in(Faults::default());
+    let face = Face::default();
+    let targets = vec![(Axis::SensorCoarse, 5_000.0), (Axis::Lens, 2_000.0)];
+    let settings = MoveSettings { rig: RigAddress::Port(port), targets, home: true };
+    let moved = motion::move_to(&settings, &face.context()).unwrap();
+    let MoveFigures::All { moved } = moved else { panic!("{moved:?}") };
+    assert_eq!((moved[0].axis, moved[0].measured_um), ("coarse", 5_000.375));
+    assert_eq!((moved[1].axis, moved[1].measured_um), ("lens", 2_000.125));
+    assert!(face.heard("homing the lens stage (its position is unknown)"));
+    assert!(face.heard("they speak the same protocol"), "the scripted board's firmware is another one");
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_the_port_is_looked_at() {
+    let rig = RigAddress::Port("/dev/farnear-no-such-port".into());
+    let context = Context::unattended();
+    let targets = vec![(Axis::SensorFine, f64::NAN)];
+    let error = motion::move_to(&MoveSettings { rig: rig.clone(), targets, home: false }, &context);
+    assert!(error.unwrap_err().is_usage());
+    let error = settings::key("speed").unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("datum_nm"), "{error}");
+    let error = settings::get(&rig, SettingKey::DatumNm, &context).unwrap_err();
+    assert!(matches!(error, WorkflowError::Client(_)), "{error}");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let camera = camera(&folder.path().join("absent"));
+    let error = pair::capture(&PairSettings { rig, camera, optics: optics(), out }, &context).unwrap_err();
+    assert!(matches!(error, WorkflowError::Camera(_)), "{error}");
+    assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+}
+
+#[test]
+fn the_board_is_asked_and_told() {
+    let (port, _board) = plug_in(Faults::default());
+    let (rig, face) = (RigAddress::Port(port), Face::default());
+    let context = face.context();
+    assert_eq!(settings::list(&rig, &context).unwrap().settings.len(), SettingKey::ALL.len());
+    let set = settings::set(&rig, SettingKey::CoarseBacklashNm, 4_000, &context).unwrap();
+    assert_eq!((set.key, set.value, set.default), ("coarse_backlash_nm", 4_000, 1_000));
+    let measured = mechanics::measure(&rig, Routine::Backlash { axis: Axis::Lens }, &context).unwrap();
+    let expected = MechanicsFigures::Backlash { axis: "lens", backlash_um: 4.0, spread_um: 0.25 };
+    assert_eq!(measured, expected);
+    motion::halt(&rig, &context).unwrap();
+    assert_eq!(alarms::alarms(&rig, None, &context).unwrap().latched, 1);
+    assert_eq!(alarms::alarms(&rig, Some(1), &context).unwrap().latched, 0);
+    assert!(face.heard("alarm 1 is cleared"));
+    let reset = board::reset(&rig, &context).unwrap();
+    assert_eq!((reset.boot_before, reset.boot), (7, 8));
+    assert_eq!(board::counters(&rig, &context).unwrap().homings, 2);
+}
+
+#[test]
+fn a_log_without_its_texts_is_given_as_bytes_until_it_is_cancelled() {
+    let (port, board) = plug_in(Faults::default());
+    // The scripted board's line moves when it is asked something, as an emulated board's time does.
+    board.board().hello.emulated = true;
+    let face = Face::default();
+    let context = face.context();
+    let settings = LogSettings { rig: RigAddress::Port(port), elf: None, seconds: None, reset: false };
+    let cancel = context.cancel.clone();
+    let teller = thread::spawn(move || {
+        while !cancel.is_cancelled() {
+            board.board().log(&[0xab, 1]);
+            thread::sleep(Duration::from_millis(20));
+        }
+    });
+    let mut lines = Vec::new();
+    let mut sink = |line: &str| {
+        lines.push(line.to_owned());
+        context.cancel.cancel();
+        Ok(())
+    };
+    let count = log::follow(&settings, &mut sink, &context).unwrap();
+    teller.join().unwrap();
+    assert_eq!((count, lines), (1, vec!["ab01".to_owned()]));
+    assert!(face.heard("1 lines"));
+}

@@ -1,0 +1,178 @@
+//! Work on people without a face: what is heard of it, and that nothing half-made stays where it is cancelled.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
+
+use farnear_activity::recognition::{classifier::Family, frames::Mode};
+use farnear_workflows::{
+    Cancel, Context, Nobody, Progress, Result, WorkflowError,
+    activity::{
+        evaluation::{self, EvaluationSettings, LearnFrom},
+        method::{Method, Pattern},
+        training::{self, TrainingSettings},
+    },
+    silhouettes::{
+        performances::Drawing,
+        synthetic::{self, SyntheticSettings},
+        video::{self, ShadowTreatment, VideoSettings},
+    },
+};
+
+/// Keeps what it hears, and may cancel at the first count of a unit.
+#[derive(Default)]
+struct Listener {
+    cancel: Cancel,
+    cancel_at: Option<&'static str>,
+    heard: Mutex<Vec<String>>,
+}
+
+impl Listener {
+    fn cancelling(unit: &'static str) -> Self {
+        Self { cancel_at: Some(unit), ..Self::default() }
+    }
+
+    fn context(&self) -> Context<'_> {
+        Context { progress: self, questions: &Nobody, cancel: self.cancel.clone() }
+    }
+
+    fn note(&self, what: String) {
+        self.heard.lock().expect("no listener panics").push(what);
+    }
+
+    fn heard(&self) -> Vec<String> {
+        self.heard.lock().expect("no listener panics").clone()
+    }
+}
+
+impl Progress for Listener {
+    fn say(&self, what: &str) {
+        self.note(what.into());
+    }
+
+    fn advance(&self, unit: &'static str, done: usize, total: Option<usize>) {
+        self.note(format!("{done}/{total:?} {unit}"));
+        if self.cancel_at == Some(unit) {
+            self.cancel.cancel();
+        }
+    }
+}
+
+/// Three people at two activities, small.
+fn people(out: PathBuf) -> SyntheticSettings {
+    SyntheticSettings {
+        subjects: 3,
+        activities: vec!["walk".into(), "dig".into()],
+        rate_hz: 4.0,
+        drawing: Drawing { views: 1, mm_per_px: 40.0, out },
+    }
+}
+
+fn training(samples: PathBuf, out: PathBuf) -> TrainingSettings {
+    let pattern = Pattern::Codebook { mode: Mode::OrderFree, classifier: Family::Svc };
+    TrainingSettings { samples, out, method: Method { pattern, search: true }, window: None, any_view: false }
+}
+
+#[track_caller]
+fn assert_cancelled<T: std::fmt::Debug>(result: Result<T>, folder: &Path) {
+    let error = result.expect_err("it was cancelled");
+    let cancelled = |error: &WorkflowError| matches!(error, WorkflowError::Cancelled { .. });
+    let about = matches!(&error, WorkflowError::About { source, .. } if cancelled(source));
+    assert!(about || cancelled(&error), "{error}");
+    let left: Vec<_> =
+        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn drawing_is_counted_and_leaves_nothing_where_it_is_cancelled() {
+    let root = tempfile::tempdir().expect("a folder");
+    let whole = Listener::default();
+    let figures = synthetic::draw(&people(root.path().join("people")), &whole.context()).expect("drawn");
+    assert_eq!((figures.performances, figures.subjects, figures.activities), (6, 3, 2));
+    let heard = whole.heard();
+    for done in 1..=6 {
+        assert_eq!(heard[done - 1], format!("{done}/Some(6) performances"));
+    }
+    assert!(heard[6].starts_with("wrote "), "{heard:?}");
+
+    let stopped = tempfile::tempdir().expect("a folder");
+    let listener = Listener::cancelling("performances");
+    let drawn = synthetic::draw(&people(stopped.path().join("people")), &listener.context());
+    assert_cancelled(drawn, stopped.path());
+    assert!(!listener.heard().iter().any(|what| what.starts_with("wrote")), "{:?}", listener.heard());
+}
+
+#[test]
+fn training_and_evaluation_are_counted_and_stop_in_the_middle() {
+    let root = tempfile::tempdir().expect("a folder");
+    let people = people(root.path().join("people"));
+    synthetic::draw(&people, &Context::unattended()).expect("drawn");
+    let samples = people.drawing.out.join("samples.toml");
+
+    let stopped = tempfile::tempdir().expect("a folder");
+    let listener = Listener::cancelling("spaces tried");
+    let settings = training(samples.clone(), stopped.path().join("model.fnm"));
+    assert_cancelled(training::train(&settings, &listener.context()), stopped.path());
+    let heard = listener.heard();
+    assert_eq!(heard.iter().filter(|what| what.ends_with("samples read")).count(), 6, "{heard:?}");
+    assert_eq!(heard.last().map(String::as_str), Some("1/None spaces tried"), "{heard:?}");
+
+    let evaluation = EvaluationSettings {
+        samples,
+        learn_from: LearnFrom::OtherSubjects,
+        method: Method { search: false, ..settings.method },
+        views: None,
+        out: Some(stopped.path().join("evaluation")),
+    };
+    let listener = Listener::cancelling("samples read");
+    assert_cancelled(evaluation::evaluate(&evaluation, &listener.context()), stopped.path());
+    let whole = Listener::default();
+    let figures = evaluation::evaluate(&evaluation, &whole.context()).expect("evaluated");
+    assert_eq!((figures.subjects, figures.clips, figures.answers), (3, 6, 6));
+    assert!(whole.heard().contains(&"3/Some(3) folds".into()), "{:?}", whole.heard());
+}
+
+#[test]
+fn a_video_is_not_begun_after_the_wish_to_stop() {
+    let root = tempfile::tempdir().expect("a folder");
+    let pictures = tempfile::tempdir().expect("a folder");
+    fs::write(pictures.path().join("a.pgm"), b"P5 2 2 255\n\x00\x00\x00\x00").expect("a picture");
+    let settings = VideoSettings {
+        video: pictures.path().into(),
+        out: root.path().join("masks"),
+        learn_first: false,
+        learning_frames: 0,
+        history_frames: 10,
+        shadow: ShadowTreatment::ByModel,
+        centred: false,
+        labels: Some(root.path().join("labels")),
+        grey: false,
+    };
+    let listener = Listener::default();
+    listener.cancel.cancel();
+    assert_cancelled(video::extract(&settings, &listener.context()), root.path());
+}
+
+#[test]
+fn parameters_that_cannot_be_are_refused_before_anything_is_done() {
+    let root = tempfile::tempdir().expect("a folder");
+    let settings = people(root.path().join("people"));
+    let drawing = |views, mm_per_px| Drawing { views, mm_per_px, ..settings.drawing.clone() };
+    for (wrong, expected) in [
+        (SyntheticSettings { subjects: 0, ..settings.clone() }, "subjects 0: expected 1 to 1000"),
+        (SyntheticSettings { rate_hz: 0.5, ..settings.clone() }, "frame rate 0.5: expected 1 to 240"),
+        (SyntheticSettings { drawing: drawing(73, 10.0), ..settings.clone() }, "views 73: expected 1 to 72"),
+        (SyntheticSettings { drawing: drawing(4, 0.0), ..settings.clone() }, "pixel size 0: expected 0.1"),
+        (
+            SyntheticSettings { activities: vec!["sing".into()], ..settings.clone() },
+            "activity sing: expected walk",
+        ),
+    ] {
+        let error = synthetic::draw(&wrong, &Context::unattended()).expect_err(expected);
+        assert!(error.is_usage() && error.to_string().starts_with(expected), "{error}");
+    }
+    assert_eq!(fs::read_dir(root.path()).expect("a folder").count(), 0);
+}

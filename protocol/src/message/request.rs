@@ -1,0 +1,166 @@
+//! What the host can ask: the table of requests.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use super::{Axis, Codes, CoefficientBits, CorrectionInfo, Routine, SettingKey, Shot, SunQuery};
+use crate::units::{Micros, Nanometres};
+
+/// What the host can ask. Each request carries an id; the board answers a repeated id with the remembered
+/// answer and does not act again.
+#[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+pub enum Request {
+    /// Who are you? Opens a session: the board forgets the request ids it remembers. The only request that may
+    /// carry boot number 0 ("I do not know yet"). Answer: [`super::Response::Hello`].
+    Hello,
+    /// How are you? Answer: [`super::Response::Status`].
+    Status,
+    /// Find the home switch of an axis and make it position 0. Answer: [`super::Response::Accepted`]; ends with
+    /// [`super::EventKind::Homed`] or [`super::EventKind::Failed`].
+    Home {
+        /// The axis; only axes with a home switch can be homed.
+        axis: Axis,
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
+    },
+    /// Go to an absolute position. Answer: [`super::Response::Accepted`]; ends with [`super::EventKind::MoveDone`] or
+    /// [`super::EventKind::Failed`]. Other axes may move at the same time.
+    Move {
+        /// The axis that moves.
+        axis: Axis,
+        /// Where to; outside the limits of [`super::Hello::limits`] it is refused, never clamped.
+        target: Nanometres,
+        /// How long the host may say nothing while this is under way, within [`super::Limits::silence_min`] and
+        /// [`super::Limits::silence_max`]. After half of it the board says [`super::EventKind::StillThere`]; any good frame answers
+        /// that. After all of it everything stops with [`super::Alarm::HostSilence`].
+        silence: Micros,
+    },
+    /// Stop all motion along the ramps and end a running program. Answer: [`super::Response::Accepted`], also when nothing moves; what
+    /// was running ends with [`super::EventKind::Failed`] and [`super::Failure::Stopped`].
+    Stop,
+    /// Put one shot into the exposure program, which then must be armed again. Refused while a program runs. Answer:
+    /// [`super::Response::Accepted`].
+    LoadShot {
+        /// Place in the program, from 0; at most [`super::Limits::shots_max`] - 1.
+        index: u8,
+        /// The shot.
+        shot: Shot,
+    },
+    /// Run the armed program: move, settle, trigger, time-stamp, each shot in turn. Answer: [`super::Response::Accepted`];
+    /// ends with [`super::EventKind::ProgramDone`] or [`super::EventKind::Failed`]. The program stays armed and may be run again.
+    RunProgram {
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
+    },
+    /// Send an event again (the host saw a gap in the event numbers). Answer: [`super::Response::Event`].
+    ReadEvent {
+        /// The event's number.
+        number: u32,
+    },
+    /// Stop everything, answer, then reset. The next boot has another boot number, so a retry is refused.
+    /// Answer: [`super::Response::Accepted`].
+    Reboot,
+    /// Emergency stop by the host: the last STEP pulse comes within a millisecond, and an axis that moved has lost its
+    /// position. Latches [`super::Alarm::Halt`]. Answer: [`super::Response::Accepted`].
+    Halt,
+    /// Check the shots 0 to `shots` - 1 as a program: all loaded, inside the limits, axes homed. Answer:
+    /// [`super::Response::Accepted`] and the program is armed.
+    ArmProgram {
+        /// How many of the loaded shots.
+        shots: u8,
+    },
+    /// Stand still after the exposure that is under way. Answer: [`super::Response::Accepted`]; [`super::EventKind::Paused`] follows.
+    PauseProgram,
+    /// Go on after a pause; the position is settled anew. Answer: [`super::Response::Accepted`].
+    ResumeProgram,
+    /// Measure the mechanics. Answer: [`super::Response::Accepted`]; ends with [`super::EventKind::Calibrated`] or
+    /// [`super::EventKind::Failed`].
+    Calibrate {
+        /// What.
+        routine: Routine,
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
+    },
+    /// Read a past alarm by its number (the last eight are kept). Answer: [`super::Response::Alarm`].
+    ReadAlarm {
+        /// Its number; 0 = the last.
+        number: u32,
+    },
+    /// Clear the latched alarm. Answer: [`super::Response::Accepted`], or [`super::RequestError::AlarmRemains`] while its cause does.
+    ClearAlarm {
+        /// Its number: only what was read can be cleared.
+        number: u32,
+    },
+    /// Read a setting. Answer: [`super::Response::Setting`].
+    ReadSetting {
+        /// Which.
+        key: SettingKey,
+    },
+    /// Change a setting, now and for later boots. Refused while anything moves. Answer: [`super::Response::Setting`].
+    WriteSetting {
+        /// Which.
+        key: SettingKey,
+        /// Its new value, in the unit of its name.
+        value: i32,
+    },
+    /// Read the counters of the board's life. Answer: [`super::Response::Counters`].
+    ReadCounters,
+    /// Where is the sun, and how does a subject's shadow lie? Answer: [`super::Response::Sun`].
+    Sun(SunQuery),
+    /// Begin an empty correction: coefficients come by [`Request::PutCoefficients`], or samples by
+    /// [`Request::FitSamples`]. Maths requests are refused with `Busy` while a stepper moves. Answer:
+    /// [`super::Response::Accepted`].
+    OpenCorrection(CorrectionInfo),
+    /// Take the stored correction as the open one. Answer: [`super::Response::Correction`].
+    LoadCorrection,
+    /// Keep the open correction without power. Answer: [`super::Response::Accepted`].
+    StoreCorrection,
+    /// Set some coefficients of the open correction. Answer: [`super::Response::Accepted`].
+    PutCoefficients {
+        /// Number of the first.
+        first: u8,
+        /// Their Q2.29 bits.
+        bits: CoefficientBits,
+    },
+    /// Read some coefficients of the open correction. Answer: [`super::Response::Coefficients`].
+    GetCoefficients {
+        /// Number of the first.
+        first: u8,
+        /// How many, at most [`super::COEFFICIENTS_MAX`].
+        count: u8,
+    },
+    /// Add pixels of a flat target to the fit of the open correction. Answer: [`super::Response::Accepted`].
+    FitSamples {
+        /// Row of the depth map.
+        row: u16,
+        /// Column of the first pixel.
+        first: u16,
+        /// From one pixel to the next.
+        step: u16,
+        /// Code of the target's true depth.
+        truth: i16,
+        /// Codes of the depths.
+        codes: Codes,
+    },
+    /// Solve the fit; its coefficients become those of the open correction. Answer: [`super::Response::Accepted`].
+    SolveFit,
+    /// Put pixels into the row buffer. Answer: [`super::Response::Accepted`].
+    PutRow {
+        /// Column of the first.
+        first: u16,
+        /// Codes of the depths.
+        codes: Codes,
+    },
+    /// Correct the row buffer as this row of the map. Answer: [`super::Response::Accepted`].
+    CorrectRow {
+        /// Row of the depth map.
+        row: u16,
+    },
+    /// Read pixels from the row buffer. Answer: [`super::Response::Row`].
+    GetRow {
+        /// Column of the first.
+        first: u16,
+        /// How many, at most [`super::CODES_MAX`].
+        count: u8,
+    },
+}
