@@ -6,7 +6,7 @@
 //! (foliage), and three moving discs, so that pixels have one to five components as in real video. Where the
 //! highway sequence of ChangeDetection.net is at hand its frames, doubled to 640x480, are timed too.
 
-use std::{fs, hint::black_box, path::Path, time::Instant};
+use std::{fs, hint::black_box, time::Instant};
 
 use farnear_activity::{
     background::{BackgroundModel, Frame, Settings},
@@ -71,7 +71,7 @@ fn sequence() -> Vec<Array3<u8>> {
 }
 
 fn highway() -> Option<Vec<Array3<u8>>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/highway/input");
+    let folder = farnear_test_data::path("highway/input");
     let mut paths: Vec<_> = fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).collect();
     paths.sort();
     let frames = paths.iter().take(FRAMES).map(|path| {

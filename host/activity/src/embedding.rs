@@ -26,9 +26,9 @@ pub enum EmbeddingError {
     /// Fewer samples than needed.
     #[error("{found} samples are too few: {needed} are needed")]
     TooFewSamples {
-        /// Samples given.
+        /// Rows of the matrix.
         found: usize,
-        /// Samples needed.
+        /// Rows that the layout needs at least.
         needed: usize,
     },
     /// A value is not a number.
@@ -42,7 +42,7 @@ pub enum EmbeddingError {
     Disconnected {
         /// The samples of each part, largest part first.
         components: Vec<Vec<usize>>,
-        /// What was asked for.
+        /// The neighbourhood that was asked for, in words.
         neighbours: String,
     },
     /// Fewer dimensions carry anything than were asked for.
@@ -50,7 +50,7 @@ pub enum EmbeddingError {
         "only {found} eigenvalues are positive, {asked} dimensions were asked for: ask for at most {found}"
     )]
     TooFewDimensions {
-        /// Positive eigenvalues.
+        /// Eigenvalues above nought.
         found: usize,
         /// Dimensions asked for.
         asked: usize,
@@ -66,11 +66,11 @@ pub enum EmbeddingError {
     /// Shapes that do not belong together.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// Which array.
+        /// The array or the dimension of it that is off.
         what: &'static str,
-        /// Expected length.
+        /// Its length where things fit.
         expected: usize,
-        /// Found length.
+        /// Its length here.
         found: usize,
     },
 }

@@ -103,7 +103,7 @@ impl Detector {
 /// A name that is none of the five.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no shadow detector; choose chromaticity, physical, geometry, small-region-texture or large-region-texture"
+    "`{0}` is not a shadow detector; choose chromaticity, physical, geometry, small-region-texture or large-region-texture"
 )]
 pub struct UnknownMethod(pub String);
 

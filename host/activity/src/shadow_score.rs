@@ -46,7 +46,7 @@ impl Truth {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the {what} is {}x{} pixels but the ground truth is {}x{}; they must be the same frame", .found.1, .found.0, .expected.1, .expected.0)]
 pub struct ShapeError {
-    /// Which array is off.
+    /// The array whose shape differs.
     pub what: &'static str,
     /// Its shape (height, width).
     pub found: (usize, usize),

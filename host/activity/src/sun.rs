@@ -60,7 +60,7 @@ impl FromStr for Model {
 /// Elevation and azimuth of the sun (UT1 - UTC, below 0.9 s or 0.004 deg, is neglected).
 ///
 /// # Errors
-/// A place that is none.
+/// A latitude or longitude out of range, an instant that SPA does not cover.
 pub fn position(time: DateTime<Utc>, place: Place, model: Model) -> Result<SunPosition, SunError> {
     let place = Place::new(place.latitude_deg, place.longitude_deg)?;
     if model == Model::Spa {

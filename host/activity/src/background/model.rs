@@ -43,7 +43,7 @@ pub enum Label {
     Background,
     /// A darker copy of the background (only with [`Settings::shadow`]).
     Shadow,
-    /// Neither.
+    /// Neither: something that is not part of the scene.
     Foreground,
 }
 
@@ -64,7 +64,7 @@ pub enum BackgroundError {
     /// Neither grey nor RGB.
     #[error("background model: {channels} channels per pixel; give 1 (grey) or 3 (red, green, blue)")]
     Channels {
-        /// Channels given.
+        /// Channels per pixel that were given.
         channels: usize,
     },
     /// A frame that is not like the first.
@@ -76,11 +76,11 @@ pub enum BackgroundError {
     Changed {
         /// (height, width) of this frame.
         found: (usize, usize),
-        /// Its channels.
+        /// Channels of this frame.
         found_channels: usize,
         /// (height, width) of the first frame.
         expected: (usize, usize),
-        /// Its channels.
+        /// Channels of the first frame.
         expected_channels: usize,
     },
 }

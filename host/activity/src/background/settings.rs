@@ -108,9 +108,9 @@ impl Default for Settings {
 pub struct SettingsError {
     /// The setting's name.
     pub name: &'static str,
-    /// Its value.
+    /// The value that was given.
     pub value: f32,
-    /// What it must be.
+    /// The values that it may have.
     pub must: &'static str,
 }
 

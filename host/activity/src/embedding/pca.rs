@@ -6,7 +6,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 /// Mean and leading principal directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pca {
-    /// Mean sample.
+    /// Mean of the training samples, taken off before projecting.
     pub mean: Array1<f32>,
     /// One row per direction, unit length.
     pub directions: Array2<f32>,

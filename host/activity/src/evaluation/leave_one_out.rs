@@ -17,7 +17,7 @@ use crate::recognition::watch::{Unwatched, Watch};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// What came out.
+/// Right and wrong answers over all left-out subjects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Every view by itself, all views' answers counted together.
@@ -33,13 +33,13 @@ pub struct Outcome {
 pub struct Choice {
     /// Who was left out.
     pub left_out: Vec<String>,
-    /// For which views.
+    /// Whether views were recognised one by one or together.
     pub views: Views,
-    /// The space.
+    /// How frames were embedded and clips became patterns.
     pub space: SpaceSettings,
     /// Sharpness of the codebook's soft assignments.
     pub sharpness: f32,
-    /// Classifier.
+    /// The classifier and its parameter.
     pub classifier: ClassifierKind,
     /// Accuracy over the inner folds, 0 to 1.
     pub inner_accuracy: Option<f64>,
@@ -60,14 +60,14 @@ pub enum EvaluationError {
     /// Leaving one out needs two.
     #[error("leave-one-subject-out needs at least 3 subjects, the samples have {0}")]
     Subjects(usize),
-    /// Views differ.
+    /// A clip was seen from another number of views than the first.
     #[error(
         "clip {clip} has {found} views, the first has {expected}: fused views need the same in all clips"
     )]
     Views {
         /// Index of the clip.
         clip: usize,
-        /// Its views.
+        /// Views of that clip.
         found: usize,
         /// Views of the first clip.
         expected: usize,

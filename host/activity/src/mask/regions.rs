@@ -20,7 +20,7 @@ pub enum Connectivity {
 /// Neighbouring set pixels of one row; half open columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// Row.
+    /// Row of the run.
     pub row: usize,
     /// First column.
     pub start: usize,
@@ -35,7 +35,7 @@ pub struct Region {
     pub runs: Vec<Run>,
     /// How many they are.
     pub area: usize,
-    /// What they span.
+    /// The smallest box that holds them.
     pub bounds: BoundingBox,
 }
 

@@ -20,7 +20,7 @@ pub enum Flag {
     Empty,
     /// More than one person is; the mask holds one of them.
     SeveralPeople {
-        /// How many.
+        /// Number of regions of a person's size.
         count: usize,
     },
     /// The subject reaches the picture's edge: part of it may be outside.
@@ -47,7 +47,7 @@ impl fmt::Display for Flag {
 }
 
 impl Flag {
-    /// Whether the frame's mask is no silhouette of one person and must not be used as one.
+    /// Whether the frame's mask is not a silhouette of one person and must not be used as one.
     #[must_use]
     pub fn spoils(self) -> bool {
         !matches!(self, Self::CutByEdge)

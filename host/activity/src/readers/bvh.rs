@@ -27,11 +27,8 @@ pub const READER: Reader = Reader {
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let motion = parse::parse(text(bytes)?)?;
     let kinematics = Kinematics::new(&motion);
-    let frames = motion
-        .frames
-        .iter()
-        .map(|frame| kinematics.places(frame).into_iter().map(Some).collect())
-        .collect();
+    let frames =
+        motion.frames.iter().map(|frame| kinematics.places(frame).into_iter().map(Some).collect()).collect();
     let rate_hz = 1.0 / motion.frame_time_s;
     Ok(Found {
         unit: guess::unit(&motion.joints),

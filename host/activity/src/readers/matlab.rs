@@ -46,7 +46,7 @@ pub enum MatlabError {
     Invalid {
         /// What was being read.
         what: &'static str,
-        /// Its value.
+        /// The value that stands there.
         value: u64,
         /// Offset in the (decompressed) element.
         at: usize,

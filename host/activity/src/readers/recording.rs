@@ -246,7 +246,7 @@ pub enum RecordingError {
     /// Not a file of this kind.
     #[error("not a {kind} file: {reason}")]
     Kind {
-        /// Kind expected.
+        /// The format that was expected.
         kind: &'static str,
         /// What the file has in place of what such a file has.
         reason: String,
@@ -258,9 +258,9 @@ pub enum RecordingError {
         kind: &'static str,
         /// What was being read.
         what: &'static str,
-        /// Bytes needed.
+        /// Bytes up to the end of what was being read.
         needed: usize,
-        /// Bytes there.
+        /// Bytes of the file.
         found: usize,
     },
     /// A line that cannot be read.
@@ -272,7 +272,9 @@ pub enum RecordingError {
         reason: String,
     },
     /// An unknown unit.
-    #[error("unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres")]
+    #[error(
+        "unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres"
+    )]
     Unit(String),
 }
 

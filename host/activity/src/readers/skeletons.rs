@@ -115,11 +115,11 @@ pub const FLORENCE_ACTIVITIES: [&str; 9] =
 /// One performance of one activity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkeletonClip {
-    /// First index of the cell array.
+    /// Its number, the first index of the cell array.
     pub activity: usize,
-    /// Second index.
+    /// Number of the person, the second index.
     pub subject: usize,
-    /// Third index.
+    /// Which of the person's performances, the third index.
     pub repetition: usize,
     /// Joints of every frame.
     pub frames: Vec<Vec<Point3>>,
@@ -139,15 +139,15 @@ pub enum SkeletonError {
         "clip (activity {activity}, subject {subject}, repetition {repetition}) is {found:?}, expected [3, {joints}, frames]"
     )]
     Form {
-        /// First index.
+        /// First index of the cell.
         activity: usize,
-        /// Second index.
+        /// Second index of the cell.
         subject: usize,
-        /// Third index.
+        /// Third index of the cell.
         repetition: usize,
-        /// Its dimensions.
+        /// Dimensions of the array in the cell.
         found: Vec<usize>,
-        /// Joints of the layout.
+        /// Joints that the layout has.
         joints: usize,
     },
 }

@@ -35,8 +35,10 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     };
     let number = |key: &str| {
         let text = value(key)?;
-        text.parse::<f64>()
-            .map_err(|_| RecordingError::Line { line: 3, reason: format!("{key} = `{text}` is not a number") })
+        text.parse::<f64>().map_err(|_| RecordingError::Line {
+            line: 3,
+            reason: format!("{key} = `{text}` is not a number"),
+        })
     };
     let unit = Unit::named(value("Units")?)?;
     let (rate_hz, count) = (number("DataRate")?, number("NumMarkers")?);
@@ -94,8 +96,8 @@ pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, Rec
     let mut point = [0.0; 3];
     for (value, cell) in point.iter_mut().zip(cells) {
         let parsed = cell.parse::<f64>();
-        *value = parsed
-            .map_err(|_| RecordingError::Line { line, reason: format!("`{cell}` is not a number") })?;
+        *value =
+            parsed.map_err(|_| RecordingError::Line { line, reason: format!("`{cell}` is not a number") })?;
     }
     Ok(Some(point))
 }

@@ -55,7 +55,7 @@ pub struct Chosen {
     pub space: Space,
     /// Sharpness of the codebook's soft assignments.
     pub sharpness: f32,
-    /// Classifier.
+    /// The classifier and its parameter.
     pub classifier: ClassifierKind,
     /// Accuracy over the inner folds, 0 to 1; `None` where there was nothing to choose from.
     pub inner_accuracy: Option<f64>,

@@ -117,7 +117,8 @@ impl Codebook {
         let segments = segments(mode);
         let mut pattern = Array1::zeros(size * segments.len());
         for (k, &(part, of)) in segments.iter().enumerate() {
-            let (from, to) = (part * assignments.nrows() / of, ((part + 1) * assignments.nrows()).div_ceil(of));
+            let (from, to) =
+                (part * assignments.nrows() / of, ((part + 1) * assignments.nrows()).div_ceil(of));
             let mut out = pattern.slice_mut(s![k * size..(k + 1) * size]);
             for assigned in assignments.slice(s![from..to.min(assignments.nrows()), ..]).rows() {
                 out += &assigned;

@@ -99,7 +99,7 @@ pub fn segments(windows: &[Stretch]) -> Vec<Segment> {
 /// A part of a recording with one answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
-    /// First frame.
+    /// First frame, counted from 0.
     pub from: usize,
     /// One past the last frame.
     pub to: usize,
@@ -112,7 +112,7 @@ pub struct Segment {
 /// What was recognised in a stretch of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
-    /// First frame.
+    /// First frame, counted from 0.
     pub from: usize,
     /// One past the last frame.
     pub to: usize,

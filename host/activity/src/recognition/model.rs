@@ -48,7 +48,7 @@ pub struct Recogniser {
     pub views: usize,
     /// The learned space.
     pub space: Space,
-    /// The classifier.
+    /// The classifier, trained on the patterns.
     pub classifier: Classifier,
     /// Squared distance to the nearest training pattern beyond which a clip is unknown.
     pub far: f32,
@@ -58,7 +58,7 @@ pub struct Recogniser {
     pub typical_frames: usize,
 }
 
-/// What was recognised.
+/// An activity, and how sure that is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// The activity, `None` = unknown: too far from all training data, or nothing to see.
@@ -78,17 +78,17 @@ pub enum ModelError {
     /// Not a model.
     #[error("not a farnear activity model: {0}")]
     NotAModel(&'static str),
-    /// Another version.
+    /// Made by another version of the program.
     #[error("the model has {what} version {found}, this program reads {expected}: train it again")]
     Version {
-        /// Which version.
+        /// The part of the file that has versions: format or descriptor.
         what: &'static str,
         /// In the file.
         found: u32,
-        /// Expected.
+        /// Read by this program.
         expected: u32,
     },
-    /// Damaged.
+    /// Some of the body's bytes have changed.
     #[error("the model is damaged: checksum {found:#010x}, expected {expected:#010x}")]
     Checksum {
         /// Of the body.
@@ -144,7 +144,12 @@ impl Recogniser {
         }
         if views.iter().all(|view| view.frames() == 0) {
             let probabilities = self.activities.iter().map(|a| (a.clone(), 0.0)).collect();
-            return Ok(Answer { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY });
+            return Ok(Answer {
+                activity: None,
+                confidence: 0.0,
+                probabilities,
+                outlier_score: f32::INFINITY,
+            });
         }
         // A model of cut-out silhouettes looks at shapes only, also in full frames.
         let shapes: Vec<Track>;

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub enum Layout {
     /// Isomap with at least this many neighbours: doubled until the graph holds together.
     Isomap(usize),
-    /// Principal components.
+    /// Principal components (PCA), which need no neighbours.
     Pca,
 }
 
@@ -97,7 +97,7 @@ impl SpaceSettings {
 pub enum Map {
     /// By radial basis functions on the gallery.
     Rbf(Rbf),
-    /// By projection.
+    /// By projection on the principal components.
     Pca(Pca),
 }
 

@@ -44,12 +44,12 @@ pub struct Camera {
     pub pitch_deg: f64,
     /// Focal length; far subjects make it the image distance v as well.
     pub focal_length_mm: f64,
-    /// Pixel pitch.
+    /// Distance of neighbouring pixels on the sensor, micrometres.
     pub pixel_um: f64,
-    /// Image width.
+    /// Columns of the image.
     #[serde(default = "default_width")]
     pub width_px: usize,
-    /// Image height.
+    /// Rows of the image.
     #[serde(default = "default_height")]
     pub height_px: usize,
     /// Where the optical axis meets the image; the middle unless given.
@@ -146,11 +146,11 @@ pub enum CameraError {
     /// A number outside its range.
     #[error("camera file: {name} = {value} is not {expected}")]
     Range {
-        /// The key.
+        /// The key in the file.
         name: &'static str,
-        /// Its value.
+        /// The value that stands there.
         value: f64,
-        /// What it should be.
+        /// The values that it may have.
         expected: &'static str,
     },
 }

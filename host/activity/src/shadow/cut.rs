@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use std::str::FromStr;
 
-/// Which cutter.
+/// A way to cut, by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
@@ -40,7 +40,7 @@ impl FromStr for Method {
     }
 }
 
-/// What a cut did.
+/// How a silhouette was cut, and how far the result can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CutReport {
     /// Angle of the cut that was made, radians (thesis' beta).

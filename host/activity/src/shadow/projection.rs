@@ -20,7 +20,7 @@ pub enum ShadowError {
         "the sun stands at {elevation_deg:.2} deg: no usable shadow below {LOWEST_SUN_DEG} deg; check time, latitude and longitude"
     )]
     SunTooLow {
-        /// Elevation found.
+        /// The sun's elevation, degrees.
         elevation_deg: f64,
     },
     /// The mask holds nothing.
@@ -43,7 +43,7 @@ pub enum ShadowError {
     /// The subject does not stand before the camera.
     #[error("the subject's distance of {distance_m} m is not one that the camera can see")]
     Distance {
-        /// Distance found.
+        /// The distance that was given, metres.
         distance_m: f64,
     },
 }
@@ -55,7 +55,7 @@ pub struct GroundShadow {
     pub rx_m: f64,
     /// Along the viewing direction (positive = away from the camera), metres.
     pub ry_m: f64,
-    /// Length, metres.
+    /// From the feet to the tip of the head's shadow, metres.
     pub length_m: f64,
 }
 
@@ -66,7 +66,7 @@ pub struct Subject {
     pub distance_m: f64,
     /// Offset X0 to the right of the optical axis.
     pub offset_m: f64,
-    /// Stature H.
+    /// Stature H of (8.14), metres.
     pub height_m: f64,
 }
 

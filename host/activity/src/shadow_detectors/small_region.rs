@@ -5,7 +5,7 @@
 //! Gabor functions (two wavelengths, four orientations, even and odd), both divided by their local mean so that
 //! the gain drops out. Where the projections' squared distance, averaged over a small region and less what camera noise
 //! brings, is small beside the background's own squared length, the region is shadow. Windows are weighted by the
-//! Gabor functions' own Gaussian, and only foreground pixels count: a shadow's edge is no texture.
+//! Gabor functions' own Gaussian, and only foreground pixels count: a shadow's edge is not texture.
 //!
 //! Cost: window area times 16 functions, twice, per candidate: about 2600 multiplications.
 

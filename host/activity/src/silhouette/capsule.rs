@@ -15,7 +15,7 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// A capsule.
+    /// From the ends of its axis and its radius.
     pub fn new(from: Point3, to: Point3, radius_mm: f64) -> Self {
         Self { from, to, radius_mm }
     }

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// Its name.
+    /// Its name, by which flags and errors call it.
     pub name: String,
     /// Markers on it.
     pub markers: Vec<String>,
@@ -29,9 +29,9 @@ pub struct Part {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Template {
-    /// Its name.
+    /// Its name, for errors.
     pub name: String,
-    /// The parts.
+    /// The parts, drawn one over the other.
     #[serde(rename = "part")]
     pub parts: Vec<Part>,
 }
@@ -48,9 +48,9 @@ pub enum TemplateError {
     /// A part that cannot be drawn.
     #[error("template: part `{part}` {reason}")]
     Part {
-        /// The part.
+        /// Name of the part.
         part: String,
-        /// What is wrong.
+        /// What keeps it from being drawn.
         reason: String,
     },
     /// The recording lacks markers.
@@ -62,7 +62,7 @@ pub enum TemplateError {
         missing: Vec<String>,
         /// Markers in the template.
         of: usize,
-        /// The template.
+        /// Name of the template.
         template: String,
         /// Some markers of the recording.
         present: Vec<String>,

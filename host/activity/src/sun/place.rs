@@ -17,12 +17,12 @@ pub enum SunError {
     /// The text is not an RFC 3339 time.
     #[error("`{text}` is not an RFC 3339 time such as 2014-06-23T11:30:00Z: {reason}")]
     Time {
-        /// What was given.
+        /// The text that was given.
         text: String,
         /// The parser's reason.
         reason: String,
     },
-    /// SPA refused.
+    /// SPA is not defined for the instant or the place.
     #[error("SPA: {0}")]
     Spa(String),
 }

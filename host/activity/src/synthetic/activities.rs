@@ -17,7 +17,7 @@ use rayon::prelude::*;
 pub const ACTIVITIES: [&str; 10] =
     ["walk", "drop", "crouch", "peer", "mobile", "place", "bag", "shoot", "gun", "dig"];
 
-/// What somebody is like.
+/// A person's build and habits.
 #[derive(Clone, Copy, Debug)]
 struct Person {
     build: Build,
@@ -27,7 +27,7 @@ struct Person {
     left_handed: bool,
 }
 
-/// What is carried.
+/// A thing in the hands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Prop {
     None,
@@ -138,8 +138,30 @@ fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
     let moving = matches!(stretch.kind, Kind::Walk { .. } | Kind::Circle { .. });
     let mut pose =
         if moving { walking(phase, person.stride) } else { Pose { lean_deg: 3.0, ..Pose::default() } };
-    let (main, other) = if person.left_handed { (0, 1) } else { (1, 0) };
-    match stretch.prop {
+    let hands = if person.left_handed { (0, 1) } else { (1, 0) };
+    carry(&mut pose, stretch.prop, hands);
+    match stretch.kind {
+        Kind::Walk { phone: true } | Kind::Circle { phone: true } => {
+            pose.arms[hands.0] = Arm { shoulder_deg: 35.0, spread_deg: 25.0, elbow_deg: 140.0 };
+            pose.nod_deg = 6.0;
+        }
+        Kind::Walk { phone: false } | Kind::Circle { phone: false } => {}
+        Kind::Reach { depth } => reach(&mut pose, swell(t, 0.45) * depth * person.depth, hands),
+        Kind::Crouch => crouch(&mut pose, swell(t, 0.3) * person.depth, hands),
+        Kind::PeerOver => peer_over(&mut pose, swell(t, 0.35)),
+        Kind::Aim => aim(&mut pose, swell(t, 0.2), t, hands),
+        Kind::Dig => dig(&mut pose, 0.5 - 0.5 * (std::f64::consts::TAU * t).cos(), person.depth, hands),
+        Kind::DropBag => drop_bag(&mut pose, swell(t, 0.4), hands),
+    }
+    pose
+}
+
+/// Which arm does it and which helps.
+type Hands = (usize, usize);
+
+/// The arms as the prop asks.
+fn carry(pose: &mut Pose, prop: Prop, (main, other): Hands) {
+    match prop {
         Prop::Bag => pose.arms[main] = Arm { shoulder_deg: 8.0, spread_deg: 14.0, elbow_deg: 12.0 },
         Prop::Spade => {
             pose.arms[main] = Arm { shoulder_deg: 15.0, spread_deg: 8.0, elbow_deg: 55.0 };
@@ -151,71 +173,60 @@ fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
         }
         Prop::ShortGun | Prop::None => {}
     }
-    let deep = person.depth;
-    match stretch.kind {
-        Kind::Walk { phone } | Kind::Circle { phone } => {
-            if phone {
-                pose.arms[main] = Arm { shoulder_deg: 35.0, spread_deg: 25.0, elbow_deg: 140.0 };
-                pose.nod_deg = 6.0;
-            }
-        }
-        Kind::Reach { depth } => {
-            let s = swell(t, 0.45) * depth * deep;
-            pose.lean_deg += 85.0 * s;
-            for leg in &mut pose.legs {
-                leg.hip_deg = 25.0 * s;
-                leg.knee_deg = 50.0 * s;
-            }
-            pose.arms[main].shoulder_deg += 90.0 * s;
-        }
-        Kind::Crouch => {
-            let s = swell(t, 0.3) * deep;
-            pose.lean_deg += 35.0 * s;
-            for leg in &mut pose.legs {
-                leg.hip_deg = 100.0 * s;
-                leg.knee_deg = 135.0 * s;
-                leg.spread_deg = 8.0 * s;
-            }
-            pose.arms[main] = Arm { shoulder_deg: 60.0 * s, spread_deg: 8.0, elbow_deg: 20.0 };
-            pose.arms[other] = Arm { shoulder_deg: 45.0 * s, spread_deg: 8.0, elbow_deg: 30.0 };
-        }
-        Kind::PeerOver => {
-            let s = swell(t, 0.35);
-            pose.lean_deg = 3.0 + 8.0 * s;
-            pose.nod_deg = -10.0 * s;
-            pose.arms = [Arm { shoulder_deg: 150.0 * s, spread_deg: 12.0, elbow_deg: 35.0 * s }; 2];
-        }
-        Kind::Aim => {
-            let s = swell(t, 0.2);
-            // Three shots kick the arm.
-            let kick = if s > 0.9 { 8.0 * (18.0 * t).sin().max(0.0) } else { 0.0 };
-            pose.arms[main] = Arm { shoulder_deg: 88.0 * s + kick, spread_deg: 4.0, elbow_deg: 6.0 };
-            pose.arms[other] = Arm { shoulder_deg: 80.0 * s, spread_deg: -8.0, elbow_deg: 25.0 * s };
-            for (side, leg) in pose.legs.iter_mut().enumerate() {
-                leg.hip_deg = s * if side == main { -8.0 } else { 14.0 };
-                leg.knee_deg = 10.0 * s;
-            }
-        }
-        Kind::Dig => {
-            let s = 0.5 - 0.5 * (std::f64::consts::TAU * t).cos();
-            pose.lean_deg = 25.0 + 40.0 * s * deep;
-            pose.legs[main].hip_deg = -15.0;
-            pose.legs[other].hip_deg = 28.0;
-            for leg in &mut pose.legs {
-                leg.knee_deg = 18.0 + 14.0 * s;
-            }
-            pose.arms[main] =
-                Arm { shoulder_deg: 55.0 - 15.0 * s, spread_deg: 8.0, elbow_deg: 45.0 - 20.0 * s };
-            pose.arms[other] = Arm { shoulder_deg: 70.0 + 10.0 * s, spread_deg: 4.0, elbow_deg: 12.0 };
-        }
-        Kind::DropBag => {
-            let s = swell(t, 0.4);
-            pose.lean_deg += 12.0 * s;
-            pose.arms[main] = Arm { shoulder_deg: 8.0 + 95.0 * s, spread_deg: 12.0, elbow_deg: 25.0 * s };
-            pose.arms[other] = Arm { shoulder_deg: 60.0 * s, spread_deg: 8.0, elbow_deg: 35.0 * s };
-        }
+}
+
+fn reach(pose: &mut Pose, s: f64, (main, _): Hands) {
+    pose.lean_deg += 85.0 * s;
+    for leg in &mut pose.legs {
+        leg.hip_deg = 25.0 * s;
+        leg.knee_deg = 50.0 * s;
     }
-    pose
+    pose.arms[main].shoulder_deg += 90.0 * s;
+}
+
+fn crouch(pose: &mut Pose, s: f64, (main, other): Hands) {
+    pose.lean_deg += 35.0 * s;
+    for leg in &mut pose.legs {
+        leg.hip_deg = 100.0 * s;
+        leg.knee_deg = 135.0 * s;
+        leg.spread_deg = 8.0 * s;
+    }
+    pose.arms[main] = Arm { shoulder_deg: 60.0 * s, spread_deg: 8.0, elbow_deg: 20.0 };
+    pose.arms[other] = Arm { shoulder_deg: 45.0 * s, spread_deg: 8.0, elbow_deg: 30.0 };
+}
+
+fn peer_over(pose: &mut Pose, s: f64) {
+    pose.lean_deg = 3.0 + 8.0 * s;
+    pose.nod_deg = -10.0 * s;
+    pose.arms = [Arm { shoulder_deg: 150.0 * s, spread_deg: 12.0, elbow_deg: 35.0 * s }; 2];
+}
+
+fn aim(pose: &mut Pose, s: f64, t: f64, (main, other): Hands) {
+    // Three shots kick the arm.
+    let kick = if s > 0.9 { 8.0 * (18.0 * t).sin().max(0.0) } else { 0.0 };
+    pose.arms[main] = Arm { shoulder_deg: 88.0 * s + kick, spread_deg: 4.0, elbow_deg: 6.0 };
+    pose.arms[other] = Arm { shoulder_deg: 80.0 * s, spread_deg: -8.0, elbow_deg: 25.0 * s };
+    for (side, leg) in pose.legs.iter_mut().enumerate() {
+        leg.hip_deg = s * if side == main { -8.0 } else { 14.0 };
+        leg.knee_deg = 10.0 * s;
+    }
+}
+
+fn dig(pose: &mut Pose, s: f64, deep: f64, (main, other): Hands) {
+    pose.lean_deg = 25.0 + 40.0 * s * deep;
+    pose.legs[main].hip_deg = -15.0;
+    pose.legs[other].hip_deg = 28.0;
+    for leg in &mut pose.legs {
+        leg.knee_deg = 18.0 + 14.0 * s;
+    }
+    pose.arms[main] = Arm { shoulder_deg: 55.0 - 15.0 * s, spread_deg: 8.0, elbow_deg: 45.0 - 20.0 * s };
+    pose.arms[other] = Arm { shoulder_deg: 70.0 + 10.0 * s, spread_deg: 4.0, elbow_deg: 12.0 };
+}
+
+fn drop_bag(pose: &mut Pose, s: f64, (main, other): Hands) {
+    pose.lean_deg += 12.0 * s;
+    pose.arms[main] = Arm { shoulder_deg: 8.0 + 95.0 * s, spread_deg: 12.0, elbow_deg: 25.0 * s };
+    pose.arms[other] = Arm { shoulder_deg: 60.0 * s, spread_deg: 8.0, elbow_deg: 35.0 * s };
 }
 
 /// The prop's capsules at a moment; a dropped bag is gone once the arm has let go.

@@ -27,9 +27,9 @@ use crate::page::Page;
 
 /// Frames per second of the set's video.
 const VIDEO_HZ: f64 = 25.0;
-/// Fewer frames in a row are no passage.
+/// Fewer frames in a row are not a passage.
 const LEAST_FRAMES: usize = 20;
-/// Fewer pixels are no person.
+/// Fewer pixels are not a person.
 const LEAST_PX: usize = 200;
 /// Synthetic people that teach, and views of each.
 const TEACHERS: [usize; 2] = [8, 8];
@@ -150,7 +150,8 @@ fn row(name: &str, mode: Mode, passages: &[Passage]) -> Result<Vec<String>> {
             (0..frames).map(|n| passage.masks[(n as f64 * step) as usize].clone()).collect();
         let track = Track::from_masks(&masks, Scaling::default(), true);
         let answer = recogniser.recognise(&[track]).with_context(|| passage.person.clone())?;
-        let best = answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |best| best.0.as_str());
+        let best =
+            answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |best| best.0.as_str());
         walk += usize::from(best == "walk");
         walk_or_bag += usize::from(matches!(best, "walk" | "bag"));
         unknown += usize::from(answer.activity.is_none());

@@ -23,7 +23,7 @@ impl Data {
     /// The text of a file, where it is there.
     pub fn text(&self, name: &str) -> Result<Option<String>> {
         self.bytes(name)?
-            .map(|bytes| String::from_utf8(bytes).with_context(|| format!("{name} is no text")))
+            .map(|bytes| String::from_utf8(bytes).with_context(|| format!("{name} is not text")))
             .transpose()
     }
 }

@@ -36,30 +36,15 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let rows: Vec<usize> = (0..GALLERY).map(|i| (2 * i + 1) * all.nrows() / (2 * GALLERY)).collect();
     let gallery = all.select(Axis(0), &rows);
 
-    let whole = isomap(gallery.view(), Neighbourhood::Nearest(NEIGHBOURS), DIMENSIONS)?;
-    let principal = Pca::fit(gallery.view(), DIMENSIONS)?.transform(gallery.view())?;
-    let straight = distances(gallery.view());
-    let isomap_curve = residuals(whole.coordinates.view(), &whole.geodesics);
-    let pca_curve = residuals(principal.view(), &straight);
-    let pca_paths = residuals(principal.view(), &whole.geodesics);
-    let landmarks = LANDMARKS
+    let layouts = layouts(gallery.view())?;
+    // Landmarks only stand in the table: their curves lie on one another.
+    let curves: Vec<Curve> = layouts[..layouts.len() - LANDMARKS.len()]
         .iter()
-        .map(|&count| {
-            let found =
-                landmark_isomap(gallery.view(), Neighbourhood::Nearest(NEIGHBOURS), count, DIMENSIONS)?;
-            Ok((count, residuals(found.coordinates.view(), &whole.geodesics)))
+        .map(|(name, values)| Curve {
+            name: name.clone(),
+            points: values.iter().enumerate().map(|(k, value)| (k as f64 + 1.0, *value)).collect(),
         })
-        .collect::<Result<Vec<_>>>()?;
-
-    let curve = |name: &str, values: &[f64]| Curve {
-        name: name.into(),
-        points: values.iter().enumerate().map(|(k, value)| (k as f64 + 1.0, *value)).collect(),
-    };
-    let curves = [
-        curve("Isomap, path lengths", &isomap_curve),
-        curve("PCA, straight distances", &pca_curve),
-        curve("PCA, path lengths", &pca_paths),
-    ];
+        .collect();
     let png = chart::lines("Residual variance", "dimensions", "1 - R2", &curves)?;
     page.picture(
         "activity-residual-variance.png",
@@ -67,23 +52,32 @@ pub fn measure(page: &mut Page) -> Result<()> {
         "Residual variance over dimensions for Isomap and PCA",
     )?;
     let shown = [0, 1, 2, 3, 5, 9];
-    let cells = |values: &[f64]| shown.map(|k| format!("{:.4}", values[k])).to_vec();
-    let mut rows: Vec<Vec<String>> = [
-        ("Isomap, path lengths".to_owned(), &isomap_curve),
-        ("PCA, straight distances".to_owned(), &pca_curve),
-        ("PCA, path lengths".to_owned(), &pca_paths),
-    ]
-    .into_iter()
-    .map(|(name, values)| std::iter::once(name).chain(cells(values)).collect())
-    .collect();
-    for (count, values) in &landmarks {
-        let name = format!("landmark Isomap, {count} landmarks, path lengths");
-        rows.push(std::iter::once(name).chain(cells(values)).collect());
-    }
+    let row = |(name, values): &(String, Vec<f64>)| {
+        std::iter::once(name.clone()).chain(shown.map(|k| format!("{:.4}", values[k]))).collect()
+    };
+    let rows: Vec<Vec<String>> = layouts.iter().map(row).collect();
     let head: Vec<String> =
         std::iter::once("layout".to_owned()).chain(shown.map(|k| format!("{} dim.", k + 1))).collect();
     page.table(1, &head, &rows);
     Ok(())
+}
+
+/// The layouts' names and residual variances over dimensions, those by landmarks last.
+fn layouts(gallery: ArrayView2<f32>) -> Result<Vec<(String, Vec<f64>)>> {
+    let whole = isomap(gallery, Neighbourhood::Nearest(NEIGHBOURS), DIMENSIONS)?;
+    let principal = Pca::fit(gallery, DIMENSIONS)?.transform(gallery)?;
+    let paths = &whole.geodesics;
+    let mut found = vec![
+        ("Isomap, path lengths".to_owned(), residuals(whole.coordinates.view(), paths)),
+        ("PCA, straight distances".to_owned(), residuals(principal.view(), &distances(gallery))),
+        ("PCA, path lengths".to_owned(), residuals(principal.view(), paths)),
+    ];
+    for count in LANDMARKS {
+        let laid_out = landmark_isomap(gallery, Neighbourhood::Nearest(NEIGHBOURS), count, DIMENSIONS)?;
+        let name = format!("landmark Isomap, {count} landmarks, path lengths");
+        found.push((name, residuals(laid_out.coordinates.view(), paths)));
+    }
+    Ok(found)
 }
 
 /// Straight distances of all rows.

@@ -59,9 +59,10 @@ impl Method {
         let weights = [Sweep::BoxWeight(vec![1.0, 3.0, 6.0, 12.0]), Sweep::Residuals(vec![0, 32])];
         let experiment = match self.kind {
             Kind::Thesis => Experiment::thesis(),
-            Kind::Neighbours(mode) => {
-                Experiment { sweeps: weights.to_vec(), ..Experiment::searched(mode).with_classifier(Family::Knn) }
-            }
+            Kind::Neighbours(mode) => Experiment {
+                sweeps: weights.to_vec(),
+                ..Experiment::searched(mode).with_classifier(Family::Knn)
+            },
             Kind::Vectors(mode) => {
                 let more = [
                     Sweep::MotionWeight(vec![0.5, 1.0, 2.0]),

@@ -55,7 +55,8 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     ));
     let mut rows = Vec::new();
     for (name, kind) in KINDS.into_iter().take(1) {
-        let scores = Method::ALL.par_iter().map(|&method| detected(kind, method)).collect::<Result<Vec<_>>>()?;
+        let scores =
+            Method::ALL.par_iter().map(|&method| detected(kind, method)).collect::<Result<Vec<_>>>()?;
         for (method, score) in Method::ALL.iter().zip(&scores) {
             rows.push(row(name, &format!("`{}`", method.name()), score));
         }

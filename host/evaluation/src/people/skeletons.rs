@@ -3,8 +3,8 @@
 use farnear_activity::{
     embedding::descriptor::Scaling,
     readers::skeletons::{
-        FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, SkeletonError, UTKINECT_ACTIVITIES,
-        dress, read_cells,
+        FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, SkeletonError,
+        UTKINECT_ACTIVITIES, dress, read_cells,
     },
     recognition::clip::{Clip, Track},
     silhouette::{capsule::Capsule, view::views_round},
@@ -44,7 +44,10 @@ fn from_skeletons(
                 activity: activities
                     .get(clip.activity)
                     .map_or_else(|| clip.activity.to_string(), |a| (*a).to_owned()),
-                views: views_round(views, 0.0).iter().map(|view| Track::from_bodies(&bodies, view, scaling)).collect(),
+                views: views_round(views, 0.0)
+                    .iter()
+                    .map(|view| Track::from_bodies(&bodies, view, scaling))
+                    .collect(),
             }
         })
         .collect()

@@ -138,7 +138,8 @@ pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
     let (value, along) =
         axes.fold((Up::Y, upward[1]), |best, next| if next.1 > best.1 { next } else { best });
     let part = if length > 0.0 { along / length } else { 0.0 };
-    let reason = format!("for {:.0} % of the way from the feet to the head {what} lie along it", 100.0 * part);
+    let reason =
+        format!("for {:.0} % of the way from the feet to the head {what} lie along it", 100.0 * part);
     Known { value, source: Source::Guess { reason, sure: part >= UPRIGHT } }
 }
 
@@ -182,11 +183,8 @@ mod tests {
 
     #[test]
     fn up_is_the_axis_that_the_head_lies_above_the_feet_along() {
-        let turns: [(fn(Point3) -> Point3, Up); 3] = [
-            (|p| p, Up::Y),
-            (|[x, y, z]| [x, -z, y], Up::Z),
-            (|[x, y, z]| [y, z, x], Up::X),
-        ];
+        let turns: [(fn(Point3) -> Point3, Up); 3] =
+            [(|p| p, Up::Y), (|[x, y, z]| [x, -z, y], Up::Z), (|[x, y, z]| [y, z, x], Up::X)];
         for (turned, expected) in turns {
             let motion = body(1.0, turned, STILL);
             let found = up(&motion, &Kinematics::new(&motion));
@@ -201,7 +199,10 @@ mod tests {
         let found = up(&motion, &Kinematics::new(&motion));
         // The leg's own joint is 4 up; the foot hangs 5 below that.
         assert_eq!(found.value, Up::Y);
-        assert!(matches!(&found.source, Source::Guess { reason, .. } if reason.contains("over the frames")), "{found:?}");
+        assert!(
+            matches!(&found.source, Source::Guess { reason, .. } if reason.contains("over the frames")),
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -87,13 +87,16 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     let mut lines = Lines::after(&cursor);
     let most_points = POINTS_PER_BYTE.saturating_mul(text.len());
     let (line, promised) = lines.value("Frames")?;
-    let promised: usize = promised.parse().map_err(|_| {
-        wrong(line, format!("found `{}`, expected the number of frames", short(promised)))
-    })?;
+    let promised: usize = promised
+        .parse()
+        .map_err(|_| wrong(line, format!("found `{}`, expected the number of frames", short(promised))))?;
     let (line, time) = lines.value("Frame Time")?;
     let frame_time_s = number(time, line, "the seconds from frame to frame")?;
     if frame_time_s <= 0.0 {
-        return Err(wrong(line, format!("found a frame time of {frame_time_s} s, expected more than nought")));
+        return Err(wrong(
+            line,
+            format!("found a frame time of {frame_time_s} s, expected more than nought"),
+        ));
     }
     let frames = lines.frames(promised, channels, most_points / joints.len().max(1))?;
     Ok(Motion { joints, frame_time_s, frames })
@@ -149,7 +152,10 @@ fn hierarchy(cursor: &mut Cursor) -> Result<Vec<Joint>, RecordingError> {
                 let name = short(&joints[*joint].name).to_owned();
                 return Err(wrong(
                     line,
-                    format!("found {}, expected {offset}{channels}JOINT, End Site{end} of `{name}`", shown(word)),
+                    format!(
+                        "found {}, expected {offset}{channels}JOINT, End Site{end} of `{name}`",
+                        shown(word)
+                    ),
                 ));
             }
             None => {
@@ -239,9 +245,13 @@ impl<'a> Cursor<'a> {
     fn channels(&mut self) -> Result<Vec<Channel>, RecordingError> {
         let count = self.word();
         let most = CHANNELS.len();
-        let count: usize = count.and_then(|word| word.parse().ok()).filter(|n| *n <= most).ok_or_else(|| {
-            wrong(self.line, format!("found {}, expected the number of channels, 0 to {most}", shown(count)))
-        })?;
+        let count: usize =
+            count.and_then(|word| word.parse().ok()).filter(|n| *n <= most).ok_or_else(|| {
+                wrong(
+                    self.line,
+                    format!("found {}, expected the number of channels, 0 to {most}", shown(count)),
+                )
+            })?;
         let mut channels: Vec<Channel> = Vec::with_capacity(count);
         for _ in 0..count {
             let word = self.word();
@@ -303,16 +313,22 @@ impl<'a> Lines<'a> {
         most: usize,
     ) -> Result<Vec<Vec<f64>>, RecordingError> {
         if channels == 0 {
-            return Err(wrong(self.last, "the hierarchy has no CHANNELS, expected at least the root's".into()));
+            return Err(wrong(
+                self.last,
+                "the hierarchy has no CHANNELS, expected at least the root's".into(),
+            ));
         }
         let mut frames: Vec<Vec<f64>> = Vec::new();
         while let Some((line, text)) = self.lines.next() {
             if frames.len() == promised {
-                let reason = format!("found `{}`, expected no more than the {promised} promised frames", short(text));
+                let reason =
+                    format!("found `{}`, expected no more than the {promised} promised frames", short(text));
                 return Err(wrong(line, reason));
             }
             if frames.len() == most {
-                let reason = format!("found {channels} channels for so many joints that hardly one moves, expected a body");
+                let reason = format!(
+                    "found {channels} channels for so many joints that hardly one moves, expected a body"
+                );
                 return Err(wrong(line, reason));
             }
             let values: Result<Vec<f64>, RecordingError> =
@@ -325,7 +341,8 @@ impl<'a> Lines<'a> {
             frames.push(values);
         }
         if frames.len() < promised {
-            let reason = format!("found the end of the file after {} frames, expected {promised}", frames.len());
+            let reason =
+                format!("found the end of the file after {} frames, expected {promised}", frames.len());
             return Err(wrong(self.last, reason));
         }
         Ok(frames)
@@ -369,7 +386,11 @@ mod tests {
         refused("ROOT Bip01 Hips", "ROOT", "line 2: found nothing, expected the root's name");
         refused("ROOT", "JOINT", "line 2: found `JOINT`, expected ROOT");
         refused("\n{", "\n(", "line 3: found `(`, expected `{`");
-        refused("OFFSET 0 0 0", "OFFSET 0 0", "line 5: found `CHANNELS`, expected a number: OFFSET has three");
+        refused(
+            "OFFSET 0 0 0",
+            "OFFSET 0 0",
+            "line 5: found `CHANNELS`, expected a number: OFFSET has three",
+        );
         refused("CHANNELS 4", "CHANNELS 7", "line 5: found `7`, expected the number of channels, 0 to 6");
         refused(
             "CHANNELS 4",
@@ -383,7 +404,11 @@ mod tests {
              Yrotation, Zrotation",
         );
         refused("OFFSET 0 -4 0.5\n", "\n", "line 10: found `}`, expected OFFSET, JOINT, End Site of `m:Leg`");
-        refused("  }\n}\n", "  }\n", "line 11: found `MOTION`, expected JOINT, End Site or `}` of `Bip01 Hips`");
+        refused(
+            "  }\n}\n",
+            "  }\n",
+            "line 11: found `MOTION`, expected JOINT, End Site or `}` of `Bip01 Hips`",
+        );
         refused("MOTION", "", "line 13: found `Frames:`, expected ROOT or MOTION");
         refused("Frames: 2", "Frames: two", "line 13: found `two`, expected the number of frames");
         refused("Frame Time: .025", "Time: 1", "line 14: found `Time: 1`, expected `Frame Time:`");
@@ -391,7 +416,11 @@ mod tests {
         refused("1 2 3 4 5", "1 2 3 4", "line 15: found 4 values, expected 5, one per channel");
         refused("1 2 3 4 5", "1 2 x 4 5", "line 15: found `x`, expected a number: a channel's value");
         refused("1 2 3 4 5", "1 2 NaN 4 5", "line 15: found `NaN`, expected a number: a channel's value");
-        refused("Frames: 2", "Frames: 1", "line 17: found `6 7 8 9 1e1`, expected no more than the 1 promised frames");
+        refused(
+            "Frames: 2",
+            "Frames: 1",
+            "line 17: found `6 7 8 9 1e1`, expected no more than the 1 promised frames",
+        );
         refused("Frames: 2", "Frames: 3", "line 17: found the end of the file after 2 frames, expected 3");
     }
 

@@ -15,12 +15,8 @@ pub trait Method: Sized {
     fn described(parameter: Self::Parameter) -> String;
 
     /// Trains on patterns (N x P) with labels below `classes`.
-    fn train(
-        patterns: ArrayView2<f32>,
-        labels: &[usize],
-        classes: usize,
-        parameter: Self::Parameter,
-    ) -> Self;
+    fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, parameter: Self::Parameter)
+    -> Self;
 
     /// Probability of every class for a pattern, adding up to 1.
     fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32>;

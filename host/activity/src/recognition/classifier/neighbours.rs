@@ -74,7 +74,8 @@ mod tests {
     #[test]
     fn the_majority_of_the_nearest_wins_and_ties_go_to_the_nearer() {
         let rows = array![[0.0_f32], [1.0], [1.2], [5.0]];
-        let by = |k| Neighbours::train(rows.view(), &[0, 1, 1, 0], 2, k).probabilities(array![0.4_f32].view());
+        let by =
+            |k| Neighbours::train(rows.view(), &[0, 1, 1, 0], 2, k).probabilities(array![0.4_f32].view());
         let (two, three) = (by(2), by(3));
         assert!(three[1] > three[0] && two[0] > two[1], "{three:?} {two:?}");
     }

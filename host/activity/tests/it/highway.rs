@@ -1,4 +1,4 @@
-//! The background model and the shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al. 2012), where it is at hand.
+//! The background model and the shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al. 2012).
 //!
 //! The figures to agree with are those of OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with its default
 //! settings (the same as ours), fed with the same frames in order and scored in the same way: label 255 against
@@ -6,10 +6,7 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests: data that cannot be read must stop the test
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf, sync::OnceLock};
 
 use farnear_activity::{
     background::{BackgroundModel, Frame, Label, Settings},
@@ -19,31 +16,31 @@ use farnear_activity::{
 use image::{DynamicImage, GrayImage};
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
-fn data() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/highway");
-    if path.is_dir() {
-        Some(path)
-    } else {
-        println!("skipped: no shared data");
-        None
-    }
+/// A frame of the sequence.
+struct Shot {
+    picture: DynamicImage,
+    /// From frame 470 on.
+    truth: Option<GrayImage>,
 }
 
-/// Frame numbers and pictures, in order.
-fn frames(data: &Path) -> Vec<(u32, DynamicImage)> {
-    let mut paths: Vec<_> =
-        fs::read_dir(data.join("input")).unwrap().map(|entry| entry.unwrap().path()).collect();
-    paths.sort();
-    paths
-        .iter()
-        .map(|path| {
-            (path.file_stem().unwrap().to_str().unwrap()[2..].parse().unwrap(), image::open(path).unwrap())
-        })
-        .collect()
-}
-
-fn truth(data: &Path, number: u32) -> GrayImage {
-    image::open(data.join(format!("groundtruth/gt{number:06}.png"))).unwrap().to_luma8()
+/// The frames in order, read once for all tests.
+fn shots() -> &'static [Shot] {
+    static SHOTS: OnceLock<Vec<Shot>> = OnceLock::new();
+    SHOTS.get_or_init(|| {
+        let data = farnear_test_data::path("highway");
+        let listed = fs::read_dir(data.join("input")).unwrap();
+        let mut paths: Vec<_> = listed.map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        let shot = |path: &PathBuf| {
+            let number: u32 = path.file_stem().unwrap().to_str().unwrap()[2..].parse().unwrap();
+            let truth = data.join(format!("groundtruth/gt{number:06}.png"));
+            Shot {
+                picture: image::open(path).unwrap(),
+                truth: (number >= 470).then(|| image::open(truth).unwrap().to_luma8()),
+            }
+        };
+        paths.iter().map(shot).collect()
+    })
 }
 
 #[derive(Default)]
@@ -59,11 +56,10 @@ impl Counts {
     }
 }
 
-fn f1(colour: bool, settings: Settings) -> Option<f64> {
-    let data = data()?;
+fn f1(colour: bool, settings: Settings) -> f64 {
     let mut model: Option<BackgroundModel> = None;
     let mut counts = Counts::default();
-    for (number, picture) in frames(&data) {
+    for Shot { picture, truth } in shots() {
         let size = (picture.height() as usize, picture.width() as usize);
         let (rgb, grey) = (picture.to_rgb8(), picture.to_luma8());
         let frame = if colour {
@@ -73,10 +69,8 @@ fn f1(colour: bool, settings: Settings) -> Option<f64> {
         };
         let model = model.get_or_insert_with(|| BackgroundModel::like(frame, settings.clone()).unwrap());
         let labels = model.apply(frame).unwrap();
-        if number < 470 {
-            continue;
-        }
-        for (truth, label) in truth(&data, number).pixels().zip(&labels) {
+        let Some(truth) = truth else { continue };
+        for (truth, label) in truth.pixels().zip(&labels) {
             match (truth.0[0], *label == Label::Foreground) {
                 (85 | 170, _) => {}
                 (255, true) => counts.hit += 1,
@@ -94,7 +88,7 @@ fn f1(colour: bool, settings: Settings) -> Option<f64> {
         counts.missed,
         counts.f1()
     );
-    Some(counts.f1())
+    counts.f1()
 }
 
 /// Within 0.02 of OpenCV's F1.
@@ -104,27 +98,30 @@ fn agrees(colour: bool, shadow: bool, opencv: f64) {
     if !shadow {
         settings.shadow = None;
     }
-    if let Some(f1) = f1(colour, settings) {
-        assert!((f1 - opencv).abs() <= 0.02, "F1 {f1:.4}, OpenCV {opencv:.4}");
-    }
+    let f1 = f1(colour, settings);
+    assert!((f1 - opencv).abs() <= 0.02, "F1 {f1:.4}, OpenCV {opencv:.4}");
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn colour_with_shadow_agrees_with_opencv() {
     agrees(true, true, 0.2155);
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn colour_without_shadow_agrees_with_opencv() {
     agrees(true, false, 0.2037);
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn grey_with_shadow_agrees_with_opencv() {
     agrees(false, true, 0.1317);
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn grey_without_shadow_agrees_with_opencv() {
     agrees(false, false, 0.1715);
 }
@@ -132,23 +129,20 @@ fn grey_without_shadow_agrees_with_opencv() {
 /// Detection and discrimination rates (Sanin et al. 2012) of the five detectors on the background model's foreground.
 /// Where the frames at hand have no pixel labelled shadow, only the discrimination rate can be given.
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn detectors_keep_most_of_what_moves() {
-    let Some(data) = data() else { return };
     let mut detectors = Method::ALL.map(|method| (method, Detector::new(method), ShadowScore::default()));
     let mut model: Option<BackgroundModel> = None;
-    for (number, picture) in frames(&data) {
+    for Shot { picture, truth } in shots() {
         let size = (picture.height() as usize, picture.width() as usize);
         let rgb = picture.to_rgb8();
         let pixels = ArrayView3::from_shape((size.0, size.1, 3), rgb.as_raw()).unwrap();
         let settings = Settings { shadow: None, ..Settings::default() };
         let model = model.get_or_insert_with(|| BackgroundModel::like(Frame::Rgb(pixels), settings).unwrap());
         let foreground = model.apply(Frame::Rgb(pixels)).unwrap().mapv(|label| label == Label::Foreground);
-        if number < 470 {
-            continue;
-        }
+        let Some(truth) = truth else { continue };
         let background = model.background();
         let images = Images::new(pixels, background.view(), foreground.view()).unwrap();
-        let truth = truth(&data, number);
         let truth =
             Array2::from_shape_vec(size, truth.pixels().map(|p| Truth::from_grey(p.0[0]).unwrap()).collect());
         let truth = truth.unwrap();

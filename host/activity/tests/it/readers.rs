@@ -1,26 +1,27 @@
 //! Readers on real recordings, and on the same recordings damaged in seeded ways.
 
+use crate::cases;
 use farnear_activity::mask::area;
-use farnear_activity::readers::{c3d, csv, matlab, skeletons, trc};
-use farnear_activity::silhouette::markers::{Fill, close, draw, extent};
+use farnear_activity::readers::recording::{Choices, Recording, RecordingError};
+use farnear_activity::readers::{self, c3d, csv, matlab, skeletons, trc};
+use farnear_activity::silhouette::parts::{Fill, close, draw, extent};
 use farnear_activity::silhouette::template::Template;
 use farnear_activity::silhouette::view::{Canvas, views_round};
 use proptest::prelude::*;
-use std::path::PathBuf;
 
-fn shared(name: &str) -> Option<Vec<u8>> {
-    let found =
-        std::fs::read(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name)).ok();
-    if found.is_none() {
-        println!("skipped: no shared data");
-    }
-    found
+fn shared(name: &str) -> Vec<u8> {
+    std::fs::read(farnear_test_data::path(name)).expect("the file is among the data")
+}
+
+fn read(bytes: &[u8], ending: &str) -> Result<Recording, RecordingError> {
+    readers::read(bytes, ending, Choices::default())
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
-    let Some(bytes) = shared("mocap/cmu_02_05.c3d") else { return };
-    let recording = c3d::read(&bytes).expect("a C3D file");
+    let recording = read(&shared("mocap/cmu_02_05.c3d"), "c3d").expect("a C3D file");
+    assert!(recording.remarks().is_empty(), "unit and axes are the file's and the format's");
     println!(
         "{} markers, {} frames, {} Hz: {:?}",
         recording.names.len(),
@@ -45,14 +46,12 @@ fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn other_c3d_and_trc_recordings_are_read() {
-    if let Some(bytes) = shared("mocap/nick_freeform_001.c3d") {
-        let recording = c3d::read(&bytes).expect("a C3D file");
-        assert!(recording.frames.len() > 10 && !recording.names.is_empty());
-    }
+    let recording = read(&shared("mocap/nick_freeform_001.c3d"), "c3d").expect("a C3D file");
+    assert!(recording.frames.len() > 10 && !recording.names.is_empty());
     for name in ["walking1", "DJ1", "squats1"] {
-        let Some(bytes) = shared(&format!("mocap/{name}.trc")) else { return };
-        let recording = trc::read(&String::from_utf8_lossy(&bytes), true).expect("a TRC file");
+        let recording = read(&shared(&format!("mocap/{name}.trc")), "trc").expect("a TRC file");
         assert_eq!(recording.names.len(), 51);
         assert!(recording.frames.len() > 100);
         let first = recording.by_name(0)["C7"];
@@ -63,47 +62,40 @@ fn other_c3d_and_trc_recordings_are_read() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn skeleton_sets_hold_what_they_should() {
-    if let Some(bytes) = shared("skeletons/UTKinect_Skeletons.mat") {
-        let clips = skeletons::read_cells(&bytes, &skeletons::KINECT_20).expect("a MAT-file");
-        assert_eq!(clips.len(), 199);
-        assert_eq!(clips[0].frames.len(), 44);
-        assert!(skeletons::read_cells(&bytes, &skeletons::FLORENCE_15).is_err());
-    }
-    if let Some(bytes) = shared("skeletons/Florence_3D_Action_Skeletons.mat") {
-        let clips = skeletons::read_cells(&bytes, &skeletons::FLORENCE_15).expect("a MAT-file");
-        assert_eq!(clips.len(), 215);
-    }
+    let bytes = shared("skeletons/UTKinect_Skeletons.mat");
+    let clips = skeletons::read_cells(&bytes, &skeletons::KINECT_20).expect("a MAT-file");
+    assert_eq!(clips.len(), 199);
+    assert_eq!(clips[0].frames.len(), 44);
+    assert!(skeletons::read_cells(&bytes, &skeletons::FLORENCE_15).is_err());
+    let bytes = shared("skeletons/Florence_3D_Action_Skeletons.mat");
+    let clips = skeletons::read_cells(&bytes, &skeletons::FLORENCE_15).expect("a MAT-file");
+    assert_eq!(clips.len(), 215);
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn truncated_recordings_are_errors_not_panics() {
-    if let Some(bytes) = shared("mocap/cmu_02_05.c3d") {
-        for cut in [0, 1, 2, 100, 511, 512, 600, 2000, 5000, bytes.len() / 2, bytes.len() - 600] {
-            assert!(c3d::read(&bytes[..cut]).is_err(), "cut at {cut}");
-        }
+    let bytes = shared("mocap/cmu_02_05.c3d");
+    for cut in [0, 1, 2, 100, 511, 512, 600, 2000, 5000, bytes.len() / 2, bytes.len() - 600] {
+        assert!(c3d::read(&bytes[..cut]).is_err(), "cut at {cut}");
     }
-    if let Some(bytes) = shared("mocap/walking1.trc") {
-        let text = String::from_utf8_lossy(&bytes);
-        assert!(trc::read(&text[..40], true).is_err());
-        assert!(
-            trc::read(&text.replacen("\tm\t", "\tfurlong\t", 1), true)
-                .expect_err("unit")
-                .to_string()
-                .contains("furlong")
-        );
-    }
+    let bytes = shared("mocap/walking1.trc");
+    assert!(trc::read(&bytes[..40]).is_err());
+    let furlongs = String::from_utf8_lossy(&bytes).replacen("\tm\t", "\tfurlong\t", 1);
+    let error = trc::read(furlongs.as_bytes()).expect_err("unit");
+    assert!(error.to_string().contains("furlong"), "{error}");
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn damaged_recordings_never_panic() {
-    let (Some(motion), Some(joints)) =
-        (shared("mocap/nick_freeform_001.c3d"), shared("skeletons/Florence_3D_Action_Skeletons.mat"))
-    else {
-        return;
-    };
     // The header and parameter blocks decide everything: damage is aimed there.
-    let motion = motion[..motion.len().min(60_000)].to_vec();
+    let mut motion = shared("mocap/nick_freeform_001.c3d");
+    motion.truncate(60_000);
+    let mut joints = shared("skeletons/Florence_3D_Action_Skeletons.mat");
+    joints.truncate(4000);
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
         cases: cases(300),
         failure_persistence: None,
@@ -112,17 +104,17 @@ fn damaged_recordings_never_panic() {
     let damage = proptest::collection::vec((0_usize..6000, any::<u8>()), 1..12);
     runner
         .run(&damage, |places| {
-            for source in [&motion, &joints] {
-                let mut bytes = source.clone();
+            let damaged = |source: &[u8]| {
+                let mut bytes = source.to_vec();
                 for &(at, value) in &places {
                     let at = at % bytes.len();
                     bytes[at] = value;
                 }
-                let _ = c3d::read(&bytes);
-                if source.len() == joints.len() {
-                    let _ = matlab::read(&bytes[..4000.min(bytes.len())]);
-                }
-            }
+                bytes
+            };
+            let _ = c3d::read(&damaged(&motion));
+            let _ = c3d::read(&damaged(&joints));
+            let _ = matlab::read(&damaged(&joints));
             Ok(())
         })
         .expect("no panic");
@@ -139,8 +131,10 @@ proptest! {
             keyed[1] = 0x50;
         }
         let _ = c3d::read(&keyed);
-        let _ = csv::read(&text);
-        let _ = trc::read(&format!("PathFileType\t4\nDataRate\tNumMarkers\tUnits\n100\t1\tmm\nFrame#\tTime\tA\n\n{text}"), false);
+        let _ = csv::read(text.as_bytes());
+        let headed =
+            format!("PathFileType\t4\nDataRate\tNumMarkers\tUnits\n100\t1\tmm\nFrame#\tTime\tA\n\n{text}");
+        let _ = trc::read(headed.as_bytes());
     }
 }
 
@@ -152,11 +146,6 @@ fn unknown_markers_are_named() {
         .expect_err("no such suit");
     assert!(error.to_string().contains("LFHD") && error.to_string().contains("plug-in-gait"), "{error}");
     assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
-}
-
-/// Cases of a property: few in every test run, as many as asked for when fuzzing.
-fn cases(usual: u32) -> u32 {
-    std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
 /// A whole small C3D file: one marker, two frames of floating-point data, its label and unit.
@@ -188,7 +177,7 @@ fn small_c3d() -> Vec<u8> {
 
 #[test]
 fn a_small_c3d_file_is_read_as_written() {
-    let read = c3d::read(&small_c3d()).expect("a C3D file");
+    let read = read(&small_c3d(), "C3D").expect("a C3D file");
     assert_eq!((read.names, read.rate_hz), (vec!["LASI".to_owned()], 100.0));
     assert_eq!(read.frames, vec![vec![Some([1.0, 2.0, 3.0])], vec![None]]);
 }
@@ -214,9 +203,7 @@ proptest! {
         let bytes = damaged(&small_c3d());
         let _ = c3d::read(&bytes);
         let _ = c3d::read(&bytes[..cut.index(bytes.len())]);
-        let text = String::from_utf8_lossy(&damaged(TRC.as_bytes())).into_owned();
-        let _ = trc::read(&text, true);
-        let text = String::from_utf8_lossy(&damaged(CSV.as_bytes())).into_owned();
-        let _ = csv::read(&text);
+        let _ = trc::read(&damaged(TRC.as_bytes()));
+        let _ = csv::read(&damaged(CSV.as_bytes()));
     }
 }

@@ -2,7 +2,6 @@
 
 use chrono::{DateTime, TimeDelta, Utc};
 use farnear_activity::sun::{Model, Place, parse_time, position};
-use std::path::PathBuf;
 
 /// Refraction as SPA adds it (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
 fn refraction_deg(elevation_deg: f64) -> f64 {
@@ -16,12 +15,10 @@ fn turn_deg(a: f64, b: f64) -> f64 {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn psa_agrees_with_nrel_values_from_1910_to_2210() {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sun/spa_c_reference.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: no shared data");
-        return;
-    };
+    let path = farnear_test_data::path("sun/spa_c_reference.csv");
+    let text = std::fs::read_to_string(path).expect("NREL's values");
     let (mut compared, mut worst) = (0, [0.0_f64; 2]);
     for line in text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty()) {
         let fields: Vec<&str> = line.split(',').collect();
