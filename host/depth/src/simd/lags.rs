@@ -20,6 +20,7 @@ dispatch! {
 
 #[inline(always)]
 fn lagged_generic<L: Lanes>(
+    _: L::Has,
     upper: &[f32],
     lower: &[f32],
     lags: &[Lag],
