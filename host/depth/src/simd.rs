@@ -7,67 +7,50 @@
 //! because a vector may read past the last useful column.
 //!
 //! Rounding differs between the variants in the last bits only (fused or separate multiply-add).
+#![allow(unsafe_code)] // std::arch intrinsics and unchecked loads; each block states why it is sound.
 #![allow(clippy::needless_range_loop)] // Indexed loops on purpose: see `Lanes` on closures.
 
-mod confidence;
 mod convolve;
-mod input;
 mod lags;
-#[allow(unsafe_code)] // std::arch intrinsics, behind types that prove the processor has them.
 mod lanes;
 mod median;
 mod peak;
-mod plane;
-mod solve;
-mod window_sums;
+mod rows;
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use confidence::confidence_row;
 pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
-pub(crate) use input::{Extremes, extremes, normalise_row};
 pub(crate) use lags::{Lag, lagged_products};
 pub(crate) use median::median_row;
-pub(crate) use plane::Plane;
-pub(crate) use solve::CubicRow;
-pub(crate) use window_sums::{SEVEN_BLOCK, WindowRow, vertical_sums, vertical_sums_of_seven};
+pub(crate) use rows::{
+    CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
+    vertical_sums_of_seven,
+};
 
 /// Calls the generic function for the backend inside a function that has the backend's instructions enabled, so that
-/// the whole loop is inlined and compiled with them. Its first argument is the proof that the processor has them.
+/// the whole loop is inlined and compiled with them.
 macro_rules! dispatch {
     ($(#[$attribute:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
         $(#[$attribute])*
-        #[allow(unsafe_code)] // Each call states why it is sound.
         pub(crate) fn $name(backend: crate::simd::Backend, $($argument: $type),*) $(-> $result)? {
-            use crate::simd::lanes;
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f")]
-            fn avx512(has: lanes::HasAvx512, $($argument: $type),*) $(-> $result)? {
-                $generic::<lanes::Avx512>(has, $($argument),*)
+            fn avx512($($argument: $type),*) $(-> $result)? {
+                $generic::<crate::simd::lanes::Avx512>($($argument),*)
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma")]
-            fn avx2(has: lanes::HasAvx2, $($argument: $type),*) $(-> $result)? {
-                $generic::<lanes::Avx2>(has, $($argument),*)
+            fn avx2($($argument: $type),*) $(-> $result)? {
+                $generic::<crate::simd::lanes::Avx2>($($argument),*)
             }
-            #[cfg(target_arch = "x86_64")]
-            match backend {
-                crate::simd::Backend::Avx512 => {
-                    if let Some(has) = lanes::HasAvx512::detect() {
-                        // SAFETY: the processor has the instructions, as `has` proves.
-                        return unsafe { avx512(has, $($argument),*) };
-                    }
-                }
-                crate::simd::Backend::Avx2 => {
-                    if let Some(has) = lanes::HasAvx2::detect() {
-                        // SAFETY: as above.
-                        return unsafe { avx2(has, $($argument),*) };
-                    }
-                }
-                crate::simd::Backend::Portable => {}
+            match backend.checked() {
+                // SAFETY: `checked` falls back to portable code unless the processor has the instructions.
+                #[cfg(target_arch = "x86_64")]
+                crate::simd::Backend::Avx512 => unsafe { avx512($($argument),*) },
+                #[cfg(target_arch = "x86_64")]
+                crate::simd::Backend::Avx2 => unsafe { avx2($($argument),*) },
+                _ => $generic::<crate::simd::lanes::Portable>($($argument),*),
             }
-            let _ = backend;
-            $generic::<lanes::Portable>((), $($argument),*)
         }
     };
 }
@@ -100,12 +83,75 @@ impl Backend {
     pub fn is_available(self) -> bool {
         match self {
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => lanes::HasAvx512::detect().is_some(),
+            Self::Avx512 => is_x86_feature_detected!("avx512f"),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => lanes::HasAvx2::detect().is_some(),
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx512 | Self::Avx2 => false,
             Self::Portable => true,
         }
+    }
+
+    /// Itself where the processor has it, else portable code. Detection is cached by the standard library.
+    fn checked(self) -> Self {
+        if self.is_available() { self } else { Self::Portable }
+    }
+}
+
+/// A block of rows with a common, vector-aligned stride.
+#[derive(Debug, Clone)]
+pub(crate) struct Plane {
+    storage: Vec<Line>,
+    stride: usize,
+    rows: usize,
+}
+
+/// A cache line of 16 numbers: gives the rows their alignment.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+struct Line([f32; 16]);
+
+impl Plane {
+    /// Numbers beyond the asked width that may be read and written in each row.
+    pub const PADDING: usize = 80;
+
+    /// Zeros of `rows` x `width`.
+    pub fn new(rows: usize, width: usize) -> Self {
+        let stride = (width + Self::PADDING).next_multiple_of(16);
+        Self { storage: vec![Line([0.0; 16]); rows * stride / 16], stride, rows }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Numbers in a row, padding included.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// All rows after each other.
+    pub fn all(&self) -> &[f32] {
+        // SAFETY: `Line` is a transparent-in-effect array of 16 f32 without padding (size 64, alignment 64), and the
+        // vector holds exactly rows * stride numbers.
+        unsafe { std::slice::from_raw_parts(self.storage.as_ptr().cast(), self.rows * self.stride) }
+    }
+
+    /// All rows after each other, to write.
+    pub fn all_mut(&mut self) -> &mut [f32] {
+        // SAFETY: as in `all`; the borrow is exclusive.
+        unsafe { std::slice::from_raw_parts_mut(self.storage.as_mut_ptr().cast(), self.rows * self.stride) }
+    }
+
+    /// A row with its padding.
+    pub fn row(&self, y: usize) -> &[f32] {
+        &self.all()[y * self.stride..(y + 1) * self.stride]
+    }
+
+    /// A row with its padding, to write.
+    pub fn row_mut(&mut self, y: usize) -> &mut [f32] {
+        let stride = self.stride;
+        &mut self.all_mut()[y * stride..(y + 1) * stride]
     }
 }

@@ -6,12 +6,12 @@
 //! registers; between blocks the unfinished ones wait in `pending`, so nothing is computed twice. For 7x7 that is 16
 //! multiply-adds and 10 additions per pixel instead of 49 multiply-adds: the cost of a rank-2 separable kernel, but exact.
 
-use super::lanes::{Lanes, numbers as wide};
+use super::lanes::Lanes;
 use super::{Plane, dispatch};
 use crate::kernel::{Kernel, LARGEST_SIZE, free_coefficients, with_size};
 
 /// A kernel's free coefficients, ready for the loop, and the rows that wait for more input.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Taps {
     size: usize,
     octant: Vec<f32>,
@@ -66,63 +66,71 @@ pub(crate) fn convolve(
 }
 
 #[inline(always)]
-fn by_size<L: Lanes>(
-    has: L::Has,
-    taps: &mut Taps,
-    input: &[&[f32]],
-    output: &mut [&mut [f32]],
-    width: usize,
-) {
+fn by_size<L: Lanes>(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) {
     assert!(input.len() <= MAX_ROWS && output.len() == input.len() && taps.pending.rows() + 1 == taps.size);
-    with_size!(taps.size, SIZE => walk::<L, SIZE, { SIZE / 2 + 1 }>(has, taps, input, output, width))
+    // Vectors start at multiples of N below `width`.
+    let vectors = width.next_multiple_of(L::N);
+    assert!(input.iter().all(|row| width + READ_BEYOND <= row.len() && vectors - L::N + 32 <= row.len()));
+    assert!(output.iter().all(|row| vectors <= row.len()) && vectors <= taps.pending.stride());
+    with_size!(taps.size, SIZE => walk::<L, SIZE, { SIZE / 2 + 1 }>(taps, input, output, width))
 }
 
 /// `SIZE` is the kernel's side, `FOLDED = SIZE / 2 + 1`.
 #[inline(always)]
 fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
-    has: L::Has,
     taps: &mut Taps,
     input: &[&[f32]],
     output: &mut [&mut [f32]],
     width: usize,
 ) {
     let r = FOLDED - 1;
+    assert!(taps.octant.len() == FOLDED * (FOLDED + 1) / 2);
     // Splatting from the octant lets equal coefficients share a register.
-    let mut octant = [L::splat(has, 0.0); free_coefficients(LARGEST_SIZE)];
-    for i in 0..free_coefficients(SIZE) {
-        octant[i] = L::splat(has, taps.octant[i]);
+    let mut octant = [L::splat(0.0); free_coefficients(LARGEST_SIZE)];
+    for i in 0..FOLDED * (FOLDED + 1) / 2 {
+        octant[i] = L::splat(taps.octant[i]);
     }
-    let stride = taps.pending.stride();
-    let pending = taps.pending.all_mut();
+    let pending_stride = taps.pending.stride();
+    let mut rows = [(std::ptr::null::<f32>(), std::ptr::null_mut::<f32>()); MAX_ROWS];
+    for y in 0..input.len() {
+        rows[y] = (input[y].as_ptr(), output[y].as_mut_ptr());
+    }
+    let rows = &rows[..input.len()];
+    let pending_base = taps.pending.all_mut().as_mut_ptr();
     for x in (0..width).step_by(L::N) {
-        // The first output row that is not finished comes first. A row of input is added to all of them, which at
-        // the same time moves them up; two arrays, because a shift within one would keep it out of registers.
-        let mut sums = [L::splat(has, 0.0); SIZE];
-        for i in 0..SIZE - 1 {
-            sums[i] = L::load(has, &pending[i * stride + x..]);
-        }
-        for y in 0..input.len() {
-            let columns: [L; SIZE] = L::taps(has, wide(&input[y][x..]));
-            let mut folded = [columns[r]; FOLDED];
-            for i in 1..FOLDED {
-                folded[i] = columns[r - i].add(columns[r + i]);
+        // SAFETY: x is a multiple of N below the width, and `by_size` asserted that from there on 32 numbers lie in each row
+        // of input and N in each row of output and of `pending`, which has SIZE - 1 rows.
+        unsafe {
+            let pending = pending_base.add(x);
+            // The first output row that is not finished comes first. A row of input is added to all of them, which at
+            // the same time moves them up; two arrays, because a shift within one would keep it out of registers.
+            let mut sums = [L::splat(0.0); SIZE];
+            for i in 0..SIZE - 1 {
+                sums[i] = L::load(pending.add(i * pending_stride));
             }
-            let mut products = [columns[r]; FOLDED];
-            for dy in 0..FOLDED {
-                products[dy] = octant[index(dy, 0)].mul(folded[0]);
-                for dx in 1..FOLDED {
-                    products[dy] = octant[index(dy, dx)].mul_add(folded[dx], products[dy]);
+            for (from, to) in rows {
+                let columns: [L; SIZE] = L::taps(from.add(x));
+                let mut folded = [columns[r]; FOLDED];
+                for i in 1..FOLDED {
+                    folded[i] = columns[r - i].add(columns[r + i]);
                 }
+                let mut products = [columns[r]; FOLDED];
+                for dy in 0..FOLDED {
+                    products[dy] = octant[index(dy, 0)].mul(folded[0]);
+                    for dx in 1..FOLDED {
+                        products[dy] = octant[index(dy, dx)].mul_add(folded[dx], products[dy]);
+                    }
+                }
+                sums[0].add(products[r]).store(to.add(x));
+                let mut moved = [L::splat(0.0); SIZE];
+                for i in 1..SIZE {
+                    moved[i - 1] = sums[i].add(products[i.abs_diff(r)]);
+                }
+                sums = moved;
             }
-            sums[0].add(products[r]).store(&mut output[y][x..]);
-            let mut moved = [L::splat(has, 0.0); SIZE];
-            for i in 1..SIZE {
-                moved[i - 1] = sums[i].add(products[i.abs_diff(r)]);
+            for i in 0..SIZE - 1 {
+                sums[i].store(pending.add(i * pending_stride));
             }
-            sums = moved;
-        }
-        for i in 0..SIZE - 1 {
-            sums[i].store(&mut pending[i * stride + x..]);
         }
     }
 }

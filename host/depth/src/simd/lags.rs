@@ -20,7 +20,6 @@ dispatch! {
 
 #[inline(always)]
 fn lagged_generic<L: Lanes>(
-    _: L::Has,
     upper: &[f32],
     lower: &[f32],
     lags: &[Lag],

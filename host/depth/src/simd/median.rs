@@ -21,23 +21,25 @@ dispatch! {
 
 #[inline(always)]
 fn median_generic<L: Lanes>(
-    has: L::Has,
     rows: &[&[f32]],
     sorted: &mut Plane,
     depth_of: DepthOfAlpha,
     output: &mut [f32],
     width: usize,
 ) {
+    assert!(rows.iter().chain([&&*output]).all(|row| width + Plane::PADDING <= row.len()));
+    assert!(sorted.rows() >= rows.len() && width + Plane::PADDING <= sorted.stride());
     match rows.len() {
         1 => {
-            let to_depth = ToDepth::<L>::new(has, depth_of);
+            let to_depth = ToDepth::<L>::new(depth_of);
             for x in (0..width).step_by(L::N) {
-                to_depth.of(L::load(has, &rows[0][x..])).store(&mut output[x..]);
+                // SAFETY: x < width, and width + PADDING numbers are in each row.
+                unsafe { to_depth.of(L::load(rows[0].as_ptr().add(x))).store(output.as_mut_ptr().add(x)) };
             }
         }
-        3 => medians::<L, 3>(has, rows, sorted, depth_of, output, width),
-        5 => medians::<L, 5>(has, rows, sorted, depth_of, output, width),
-        7 => medians::<L, 7>(has, rows, sorted, depth_of, output, width),
+        3 => medians::<L, 3>(rows, sorted, depth_of, output, width),
+        5 => medians::<L, 5>(rows, sorted, depth_of, output, width),
+        7 => medians::<L, 7>(rows, sorted, depth_of, output, width),
         // `check` lets no other window through.
         n => unreachable!("median window {n}"),
     }
@@ -45,7 +47,6 @@ fn median_generic<L: Lanes>(
 
 #[inline(always)]
 fn medians<L: Lanes, const SIDE: usize>(
-    has: L::Has,
     rows: &[&[f32]],
     sorted: &mut Plane,
     depth_of: DepthOfAlpha,
@@ -53,49 +54,61 @@ fn medians<L: Lanes, const SIDE: usize>(
     width: usize,
 ) {
     let stride = sorted.stride();
-    let sorted = sorted.all_mut();
+    let base = sorted.all_mut().as_mut_ptr();
     // Windows reach SIDE - 1 columns beyond the width, and vectors are loaded in pairs.
     for x in (0..width + 2 * L::N).step_by(L::N) {
-        let mut column = [L::splat(has, 0.0); SIDE];
-        for i in 0..SIDE {
-            column[i] = L::load(has, &rows[i][x..]);
-        }
-        sort(&mut column);
-        for i in 0..SIDE {
-            column[i].store(&mut sorted[i * stride + x..]);
+        let mut column = [L::splat(0.0); SIDE];
+        // SAFETY: x < width + 2 N, so N numbers at x end before width + 3 N <= width + 48 < width + PADDING, which is in
+        // each row (`median_generic`).
+        unsafe {
+            for i in 0..SIDE {
+                column[i] = L::load(rows[i].as_ptr().add(x));
+            }
+            sort(&mut column);
+            for i in 0..SIDE {
+                column[i].store(base.add(i * stride + x));
+            }
         }
     }
-    let to_depth = ToDepth::<L>::new(has, depth_of);
+    let to_depth = ToDepth::<L>::new(depth_of);
     for x in (0..width).step_by(L::N) {
-        let mut ranks = [[L::splat(has, 0.0); SIDE]; SIDE];
-        for i in 0..SIDE {
-            ranks[i] = neighbours(has, &sorted[i * stride + x..]);
+        let mut ranks = [[L::splat(0.0); SIDE]; SIDE];
+        // SAFETY: x < width, so 2 N numbers at x end within what was written above; the output is as long.
+        unsafe {
+            for i in 0..SIDE {
+                ranks[i] = neighbours(base.add(i * stride + x));
+            }
+            to_depth.of(median_of_sorted(&ranks)).store(output.as_mut_ptr().add(x));
         }
-        to_depth.of(median_of_sorted(has, &ranks)).store(&mut output[x..]);
     }
 }
 
-/// The vectors that start at the first, second, ... number; at most seven.
+/// The vectors that start at `p`, `p + 1`, ...
+///
+/// # Safety
+/// `2 N` numbers must be readable at `p`.
 #[inline(always)]
-fn neighbours<L: Lanes, const COUNT: usize>(has: L::Has, from: &[f32]) -> [L; COUNT] {
-    let [here, next] = [L::load(has, from), L::load(has, &from[L::N..])];
-    let mut all = [here; COUNT];
-    for i in 1..COUNT {
-        all[i] = match i {
-            1 => L::beside::<1>(has, from, here, next),
-            2 => L::beside::<2>(has, from, here, next),
-            3 => L::beside::<3>(has, from, here, next),
-            4 => L::beside::<4>(has, from, here, next),
-            5 => L::beside::<5>(has, from, here, next),
-            _ => L::beside::<6>(has, from, here, next),
-        };
+unsafe fn neighbours<L: Lanes, const COUNT: usize>(p: *const f32) -> [L; COUNT] {
+    // SAFETY: the caller's promise; COUNT is at most 7.
+    unsafe {
+        let [here, next] = [L::load(p), L::load(p.add(L::N))];
+        let mut all = [here; COUNT];
+        for i in 1..COUNT {
+            all[i] = match i {
+                1 => L::beside::<1>(p, here, next),
+                2 => L::beside::<2>(p, here, next),
+                3 => L::beside::<3>(p, here, next),
+                4 => L::beside::<4>(p, here, next),
+                5 => L::beside::<5>(p, here, next),
+                _ => L::beside::<6>(p, here, next),
+            };
+        }
+        all
     }
-    all
 }
 
 /// Alpha to mm, the constants in registers.
-struct ToDepth<L: Lanes> {
-    has: L::Has,
+struct ToDepth<L> {
     linearisation: [L; 4],
     focal: L,
     squared: L,
@@ -105,16 +118,15 @@ struct ToDepth<L: Lanes> {
 
 impl<L: Lanes> ToDepth<L> {
     #[inline(always)]
-    fn new(has: L::Has, depth_of: DepthOfAlpha) -> Self {
+    fn new(depth_of: DepthOfAlpha) -> Self {
         let [c1, c3, c5, c7] = depth_of.linearisation();
         let [focal, squared, offset, slope] = depth_of.coefficients();
         Self {
-            has,
-            linearisation: [L::splat(has, c1), L::splat(has, c3), L::splat(has, c5), L::splat(has, c7)],
-            focal: L::splat(has, focal),
-            squared: L::splat(has, squared),
-            offset: L::splat(has, offset),
-            slope: L::splat(has, slope),
+            linearisation: [L::splat(c1), L::splat(c3), L::splat(c5), L::splat(c7)],
+            focal: L::splat(focal),
+            squared: L::splat(squared),
+            offset: L::splat(offset),
+            slope: L::splat(slope),
         }
     }
 
@@ -124,7 +136,7 @@ impl<L: Lanes> ToDepth<L> {
         let [c1, c3, c5, c7] = self.linearisation;
         let factor = c7.mul_add(square, c5).mul_add(square, c3).mul_add(square, c1);
         let divisor = self.slope.mul_add(alpha.mul(factor), self.offset);
-        self.squared.mul_add(divisor.reciprocal(self.has), self.focal)
+        self.squared.mul_add(divisor.reciprocal(), self.focal)
     }
 }
 
@@ -195,9 +207,9 @@ macro_rules! forget {
 }
 /// Median of a window whose columns are sorted; `ranks[i]` are the columns' values of rank `i`.
 #[inline(always)]
-fn median_of_sorted<L: Lanes, const SIDE: usize>(has: L::Has, ranks: &[[L; SIDE]; SIDE]) -> L {
-    let mut kept = [L::splat(has, 0.0); 16];
-    let mut rest = [L::splat(has, 0.0); 16];
+fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L {
+    let mut kept = [L::splat(0.0); 16];
+    let mut rest = [L::splat(0.0); 16];
     match SIDE {
         3 => {
             let low = ranks[0][0].max(ranks[0][1]).max(ranks[0][2]);
@@ -356,12 +368,12 @@ mod tests {
             ((state >> 40) % 50) as f32
         };
         for _ in 0..2_000 {
-            let mut ranks = [[Portable::splat((), 0.0); SIDE]; SIDE];
+            let mut ranks = [[Portable::splat(0.0); SIDE]; SIDE];
             let mut all = Vec::new();
             for x in 0..SIDE {
                 let mut column: [f32; SIDE] = std::array::from_fn(|_| random());
                 all.extend(column);
-                let mut sorted = column.map(|value| Portable::splat((), value));
+                let mut sorted = column.map(Portable::splat);
                 sort(&mut sorted);
                 column.sort_by(f32::total_cmp);
                 for i in 0..SIDE {
@@ -370,7 +382,7 @@ mod tests {
                 }
             }
             all.sort_by(f32::total_cmp);
-            assert_eq!(median_of_sorted((), &ranks).to_array()[0], all[all.len() / 2]);
+            assert_eq!(median_of_sorted(&ranks).to_array()[0], all[all.len() / 2]);
         }
     }
 

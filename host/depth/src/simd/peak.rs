@@ -24,8 +24,8 @@ dispatch! {
 }
 
 #[inline(always)]
-fn chains_generic<L: Lanes>(has: L::Has, rounds: u32, factor: f32, summand: f32) -> u64 {
-    let [factor, summand] = [L::splat(has, factor), L::splat(has, summand)];
+fn chains_generic<L: Lanes>(rounds: u32, factor: f32, summand: f32) -> u64 {
+    let [factor, summand] = [L::splat(factor), L::splat(summand)];
     let mut sums = [summand; SUMS];
     for i in 1..SUMS {
         // Different ones, or the compiler would compute a single chain.
