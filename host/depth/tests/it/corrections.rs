@@ -109,6 +109,7 @@ fn held_out_depths_come_out_flat() {
         (Method::Cdc, CdcSettings::default(), 0.66),
         (Method::Cdc, raw_patterns, 0.85),
         (Method::ClsfFull, CdcSettings::default(), 0.66),
+        (Method::Spline, CdcSettings::default(), 0.66),
     ] {
         let correction = fit(method, &series.patterns(), &settings).unwrap();
         let rmse = series.rmse_mm(|map| correction.apply(map.view()).unwrap());
@@ -169,7 +170,7 @@ fn the_board_agrees_to_five_micrometres() {
             }
         }
     }
-    for method in [Method::Cdc, Method::TwoStep] {
+    for method in Method::ALL.into_iter().filter(|method| method.board_form().is_none()) {
         let correction = fit(method, &series.patterns(), &CdcSettings::default()).unwrap();
         let error = correction.apply_as_board(series.maps[0].1.view()).unwrap_err();
         assert_eq!(error, CorrectionError::NotOnBoard(method));

@@ -1,9 +1,8 @@
 //! Every family, design, kernel size, blur and PSF gives usable operators, and they survive being stored.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
-mod common;
-
-use common::{Texture, rig};
+use crate::common::{Texture, rig};
+use farnear_depth::kernel::LARGEST_SIZE;
 use farnear_depth::metrics::{CompareSettings, compare};
 use farnear_depth::operators::{Design, DesignError, Family, Operators, Request, design};
 use farnear_depth::optics::{Optics, OpticsFile};
@@ -66,6 +65,7 @@ fn other_sizes_blurs_and_exponents_measure_depth_too() {
         ("gaussian:k=0.4578", 2.703, 5, 0.02),
         ("gaussian:k=0.4578", 2.703, 9, 0.005),
         ("gaussian:k=0.4578", 2.703, 11, 0.005),
+        ("gaussian:k=0.4578", 2.703, 13, 0.005),
         ("pillbox", 1.5, 7, 0.01),
         ("pillbox", 4.0, 9, 0.01),
         ("gaussian:k=0.6", 2.0, 7, 0.01),
@@ -107,7 +107,10 @@ fn kernels_have_the_responses_of_their_roles() {
 
 #[test]
 fn operators_survive_storage_and_bad_files_are_refused() {
-    let operators = Operators::for_optics(&rig("generalised:p=1.8,k=0.4802")).unwrap();
+    let optics = rig("generalised:p=1.8,k=0.4802");
+    let largest = design(&Request { kernel_size: LARGEST_SIZE, ..Request::for_optics(&optics) }).unwrap();
+    assert_eq!(toml::from_str::<Operators>(&toml::to_string(&largest).unwrap()).unwrap(), largest);
+    let operators = Operators::for_optics(&optics).unwrap();
     let text = toml::to_string(&operators).unwrap();
     let read: Operators = toml::from_str(&text).unwrap();
     assert_eq!(read, operators);
@@ -118,7 +121,7 @@ fn operators_survive_storage_and_bad_files_are_refused() {
     assert!(refused("format = 1", "format = 2").contains("operators of format 2"));
     assert!(refused("kernel_size = 7", "kernel_size = 9").contains("share one size"));
     assert!(refused("family = \"ggro\"", "family = \"gro\"").contains("made for the gaussian PSF"));
-    assert!(refused("k = 0.4802", "k = -1.0").contains("blur constant"));
+    assert!(refused("k = 0.4802", "k = -1.0").contains("PSF parameter k = -1"));
     assert!(refused("family = \"ggro\"", "family = \"ggro\"\ncolour = 1").contains("unknown field"));
 }
 

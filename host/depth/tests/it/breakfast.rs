@@ -1,4 +1,5 @@
 //! The pair that Watanabe & Nayar took, where it is present.
+#![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use std::path::Path;
 
@@ -24,12 +25,9 @@ fn median_and_sd(region: ndarray::ArrayView2<f32>) -> [f64; 2] {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn breakfast_has_the_reference_depths() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/breakfast");
-    if !folder.exists() {
-        println!("skipped: no shared data");
-        return;
-    }
+    let folder = farnear_test_data::path("breakfast");
     let text = std::fs::read_to_string(folder.join("optics.toml")).unwrap();
     let optics = toml::from_str::<OpticsFile>(&text).unwrap().check().unwrap();
     let operators = Operators::for_optics(&optics).unwrap();

@@ -1,9 +1,7 @@
 //! PSF calibration and focus measures on images from the renderer, which shares no formula with this crate.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
-mod common;
-
-use common::rig;
+use crate::common::rig;
 use farnear_depth::calibrate::{
     CalibrationError, CapturedPair, FlatTarget, Model, fit_psf, measure_patterns,
 };

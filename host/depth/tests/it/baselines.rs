@@ -1,9 +1,7 @@
 //! Baselines on planes rendered in the Fourier domain, and on input that they must refuse or mark.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
-mod common;
-
-use common::{Texture, eight_bit, rig};
+use crate::common::{Texture, eight_bit, rig};
 use farnear_depth::baselines::{BaselineError, Favaro, FavaroSettings, Method, depth_from_pair};
 use farnear_depth::fill::FILLED_CONFIDENCE;
 use farnear_depth::optics::Optics;

@@ -1,9 +1,7 @@
 //! Predicted against measured standard deviation over repeated noisy images of textured planes.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
-mod common;
-
-use common::{Texture, eight_bit, rig};
+use crate::common::{Texture, eight_bit, rig};
 use farnear_depth::operators::Operators;
 use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};

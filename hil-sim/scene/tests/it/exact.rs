@@ -6,15 +6,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
-mod ray_caster;
-
+use crate::ray_caster::{RayCaster, radial_quantiles, scene_blur};
 use farnear_scene::{
     Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Picture, Psf, Renderer, Scene, Texture,
 };
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use ray_caster::{RayCaster, radial_quantiles, scene_blur};
 
 fn thesis_lens() -> Lens {
     let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
-mod common;
-
-use common::{Texture, eight_bit, rig};
+use crate::common::{Texture, eight_bit, rig};
 use farnear_depth::operators::{Operators, Request, design};
 use farnear_depth::optics::Optics;
 use farnear_depth::pipeline::{DepthMap, RunError, Settings, Warning, depth_from_pair};

@@ -1,0 +1,12 @@
+//! Behaviour of the crate through its public face, in one program, because each would be linked on its own.
+
+mod baselines;
+mod breakfast;
+mod calibrate;
+mod common;
+mod corrections;
+mod designs;
+mod input;
+mod optics_files;
+mod planes;
+mod uncertainty;
