@@ -37,7 +37,7 @@ pub struct Arguments {
     moment: MomentArguments,
     /// psa (PSA+, within 0.01 deg of NREL's SPA), almanac (two sines), thesis (Li 2014, a degree off), spa (NREL's own), or
     /// board (the rig's single-precision answer, bit for bit).
-    #[arg(long, default_value = "psa", value_parser = str::parse::<Formula>)]
+    #[arg(long, default_value = "psa")]
     model: Formula,
     /// Print figures as JSON.
     #[arg(long)]

@@ -17,6 +17,8 @@ use serde::Serialize;
 use super::{MM_PER_PX, SilhouettesError, VIEWS};
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::within};
 
+/// What is under way where the work is cancelled.
+const DURING: &str = "drawing performances";
 /// Pixels kept free round a body.
 const MARGIN_PX: usize = 2;
 
@@ -85,7 +87,7 @@ pub(super) fn write(
         .zip(&names)
         .map(|(performance, name)| {
             for (number, view) in (1..).zip(&views) {
-                counter.check("drawing performances")?;
+                counter.check(DURING)?;
                 draw_view(performance, name, number, view, drawing.mm_per_px, &out)?;
             }
             counter.one(Some(performances.len()));
@@ -93,6 +95,8 @@ pub(super) fn write(
         })
         .collect();
     let masks = drawn?.iter().sum();
+    // Where there are more threads than performances, all had begun before the wish to stop.
+    counter.check(DURING)?;
     out.write("samples.toml", samples(performances, &names, views.len()).as_bytes())?;
     out.finish()?;
     context.say(&format!("wrote {}", drawing.out.display()));

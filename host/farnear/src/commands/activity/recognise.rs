@@ -49,8 +49,9 @@ enum Kind {
 /// Models and frames that cannot be read or do not belong together.
 pub fn run(arguments: Arguments) -> Result<()> {
     let model = Model::read(&arguments.model)?;
-    let views = arguments.views.into_iter().map(|path| Ok(View { kind: kind(&path, arguments.kind)?, path }));
-    let settings = RecognitionSettings { views: views.collect::<Result<_>>()?, window: arguments.window };
+    let view = |path: PathBuf| -> Result<View> { Ok(View { kind: kind(&path, arguments.kind)?, path }) };
+    let views = arguments.views.into_iter().map(view).collect::<Result<Vec<View>>>()?;
+    let settings = RecognitionSettings { views, window: arguments.window };
     let context = terminal::context()?;
     let mut work = Recognition::begin(&model, &settings)?;
     while let Some(answer) = work.next(&context)? {
