@@ -9,7 +9,7 @@ use farnear_capture::{
 };
 use farnear_protocol::{
     Micros, Nanometres, Settle,
-    message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord},
+    message::{Alarm, Axis, Calibration, Limits, Routine, SettingKey, ShotRecord, StepperKeys},
 };
 
 use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
