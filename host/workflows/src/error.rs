@@ -281,7 +281,10 @@ impl WorkflowError {
             | Self::Focus(FocusSearchError::Capture(CaptureError::Board(ClientError::Interrupted {
                 ..
             })))
-            | Self::BoardCorrection(BoardCorrectionError::Interrupted { .. }) => true,
+            | Self::BoardCorrection(
+                BoardCorrectionError::Interrupted { .. }
+                | BoardCorrectionError::Board(ClientError::Interrupted { .. }),
+            ) => true,
             Self::About { source, .. } => source.is_cancelled(),
             _ => false,
         }

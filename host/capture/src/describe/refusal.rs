@@ -7,7 +7,7 @@ use farnear_protocol::{
 
 use super::{alarm_text, axis_name, program_name, state_name, um};
 
-/// Why the board refused.
+/// Why the board refused. Long because it is one table: a line for each reason.
 pub fn refusal_text(error: &RequestError) -> String {
     match error {
         RequestError::Version { min, current } => format!("it speaks protocol {min} to {current}"),

@@ -27,6 +27,14 @@ use super::{Face, camera, optics};
 /// From the wish to the error. The board answers at once; a look at the wish comes every 50 to 200 ms.
 const AT_ONCE: Duration = Duration::from_secs(1);
 
+/// Waits, but not for ever: a workflow that ended before its time shall fail the test and not hang it.
+fn wait_until(reached: impl Fn() -> bool) {
+    let until = Instant::now() + Duration::from_secs(60);
+    while !reached() && Instant::now() < until {
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
 /// Starts a workflow with this board and cancels it from a second thread as soon as `under_way` is true of the board.
 fn cancelled(
     faults: Faults,
@@ -38,9 +46,7 @@ fn cancelled(
     let context = face.context();
     let (cancel, watched) = (context.cancel.clone(), board.clone());
     let canceller = thread::spawn(move || {
-        while !under_way(&watched) {
-            thread::sleep(Duration::from_millis(5));
-        }
+        wait_until(|| under_way(&watched));
         cancel.cancel();
         Instant::now()
     });
@@ -150,9 +156,7 @@ fn hands_that_do_not_come_are_waited_for_no_longer() {
     let context = face.context();
     thread::scope(|scope| {
         scope.spawn(|| {
-            while !face.heard("press the home switch") {
-                thread::sleep(Duration::from_millis(5));
-            }
+            wait_until(|| face.heard("press the home switch"));
             context.cancel.cancel();
         });
         let rig = RigAddress::Port(port);

@@ -87,7 +87,7 @@ fn a_log_without_its_texts_is_given_as_bytes_until_it_is_cancelled() {
         }
     });
     let mut lines = Vec::new();
-    let mut sink = |line: &str| {
+    let mut sink = |line: &str| -> std::io::Result<()> {
         lines.push(line.to_owned());
         context.cancel.cancel();
         Ok(())
