@@ -12,7 +12,7 @@ use farnear_depth::{
     optics::Optics,
     pipeline::{Settings, depth_from_pair},
 };
-use farnear_files::{map, staging};
+use farnear_files::{npy, staging};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -163,7 +163,7 @@ impl Series<'_> {
         for warning in &depth.warnings {
             self.context.progress.warn(&warning.to_string());
         }
-        folder.write("depth.npy", &map::npy(depth.depth_mm.view())?)?;
+        folder.write("depth.npy", &npy::write(depth.depth_mm.view()))?;
         finish_folder(folder, &pair, &record)?;
         Ok(depth.depth_mm)
     }
