@@ -1,6 +1,6 @@
 //! Applying a correction to a depth map in a file.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use farnear_files::{
     map::{self, Format},
@@ -43,7 +43,7 @@ pub struct CorrectFigures {
 ///
 /// # Errors
 /// [`WorkflowError::Parameter`] for another ending.
-pub fn format_of(out: &std::path::Path) -> Result<Format> {
+pub fn format_of(out: &Path) -> Result<Format> {
     let expected = "depth maps are written as .npy or .tiff";
     Format::of(out).ok_or_else(|| WorkflowError::parameter("out", out.display(), expected))
 }

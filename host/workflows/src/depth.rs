@@ -192,3 +192,87 @@ fn median(map: &Array2<f32>) -> f64 {
     let middle = finite.len() / 2;
     f64::from(*finite.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use farnear_files::image_file::encode_png;
+
+    use super::*;
+    use crate::context::{Cancel, Nobody, Progress};
+
+    const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
+                          [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
+
+    /// A pair whose names contradict its order, so that a warning stands between computing and writing.
+    fn settings(folder: &Path) -> DepthSettings {
+        fs::write(folder.join("optics.toml"), OPTICS).unwrap();
+        for (name, factor) in [("near.png", 7919), ("far.png", 104_729)] {
+            let pixels = Array2::from_shape_fn((48, 64), |(y, x)| ((y * 31 + x * 17) * factor % 251) as u16);
+            fs::write(folder.join(name), encode_png(pixels.view(), 8).unwrap()).unwrap();
+        }
+        DepthSettings {
+            far: folder.join("near.png"),
+            near: folder.join("far.png"),
+            optics: None,
+            operators: None,
+            method: Method::default(),
+            computation: Settings::default(),
+            correction: None,
+            uncertainty: None,
+            write: Outputs::default(),
+            out: None,
+        }
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// Cancels as soon as anything is said.
+    struct Impatient(Cancel);
+
+    impl Progress for Impatient {
+        fn say(&self, _: &str) {
+            self.0.cancel();
+        }
+    }
+
+    #[test]
+    fn a_cancelled_map_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = settings(folder.path());
+        let before = names(folder.path());
+        let early = Context::unattended();
+        early.cancel.cancel();
+        let late = Cancel::default();
+        let impatient = Impatient(late.clone());
+        let late = Context { progress: &impatient, questions: &Nobody, cancel: late };
+        for (context, stage) in [(&early, "reading the pair"), (&late, "writing the results")] {
+            let error = compute(&settings, context).unwrap_err();
+            assert!(matches!(&error, WorkflowError::Cancelled { during } if during == stage), "{error}");
+            assert_eq!(names(folder.path()), before, "{stage}");
+        }
+        compute(&settings, &Context::unattended()).unwrap();
+        assert!(folder.path().join("depth/depth.toml").exists());
+    }
+
+    #[test]
+    fn what_a_method_has_no_use_for_is_bad_usage() {
+        let folder = tempfile::tempdir().unwrap();
+        let other = Method::Baseline(farnear_depth::baselines::Method::Subbarao);
+        let settings = DepthSettings { method: other, ..settings(folder.path()) };
+        for settings in [
+            DepthSettings { operators: Some("gro".into()), ..settings.clone() },
+            DepthSettings { uncertainty: Some(CameraNoise::Estimated), ..settings },
+        ] {
+            let error = compute(&settings, &Context::unattended()).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+        }
+    }
+}

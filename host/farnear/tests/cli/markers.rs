@@ -1,6 +1,6 @@
 //! `farnear silhouettes markers` on a made CSV suit, on a made BVH skeleton and, where they are at hand, on real recordings.
 
-use std::{fs, path::PathBuf};
+use std::fs;
 
 use image::GrayImage;
 
