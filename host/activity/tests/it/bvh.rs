@@ -10,39 +10,40 @@ use farnear_activity::silhouette::view::{Canvas, views_round};
 use proptest::prelude::*;
 use std::fmt::Write;
 
+/// The walker's joints below the hips: name, depth in the tree, offset; the tree in the order of the file. `-` closes a chain with an end site.
+const TREE: [(&str, usize, [f64; 3]); 27] = [
+    ("LHipJoint", 1, [0.0, 0.0, 0.0]),
+    ("LeftUpLeg", 2, [1.7, -1.7, 0.4]),
+    ("LeftLeg", 3, [0.0, -7.5, 0.0]),
+    ("LeftFoot", 4, [0.0, -7.4, 0.0]),
+    ("LeftToeBase", 5, [0.0, -0.8, 2.3]),
+    ("-", 6, [0.0, 0.0, 1.2]),
+    ("RHipJoint", 1, [0.0, 0.0, 0.0]),
+    ("RightUpLeg", 2, [-1.7, -1.7, 0.4]),
+    ("RightLeg", 3, [0.0, -7.5, 0.0]),
+    ("RightFoot", 4, [0.0, -7.4, 0.0]),
+    ("RightToeBase", 5, [0.0, -0.8, 2.3]),
+    ("-", 6, [0.0, 0.0, 1.2]),
+    ("LowerBack", 1, [0.0, 0.0, 0.0]),
+    ("Spine", 2, [0.0, 2.1, -0.1]),
+    ("Spine1", 3, [0.0, 2.1, -0.1]),
+    ("Neck", 4, [0.0, 0.0, 0.0]),
+    ("Neck1", 5, [0.0, 1.6, 0.2]),
+    ("Head", 6, [0.0, 1.6, -0.1]),
+    ("-", 7, [0.0, 1.7, 0.0]),
+    ("LeftArm", 4, [3.4, 0.8, -0.2]),
+    ("LeftForeArm", 5, [5.0, 0.0, 0.0]),
+    ("LeftHand", 6, [4.5, 0.0, 0.0]),
+    ("-", 7, [1.5, 0.0, 0.0]),
+    ("RightArm", 4, [-3.4, 0.8, -0.2]),
+    ("RightForeArm", 5, [-5.0, 0.0, 0.0]),
+    ("RightHand", 6, [-4.5, 0.0, 0.0]),
+    ("-", 7, [-1.5, 0.0, 0.0]),
+];
+
 /// A person of some 1.65 m in units of the CMU library (56.444 mm) with the joints of its BVH conversions, walking towards +z.
 /// Left is +x. Angles are in the library's order, Z, Y, X; a limb swings about x, forward is negative.
 fn walk(frames: usize) -> String {
-    /// Joint, parent's depth, offset; the tree in the order of the file. `-` closes a chain with an end site.
-    const TREE: [(&str, usize, [f64; 3]); 27] = [
-        ("LHipJoint", 1, [0.0, 0.0, 0.0]),
-        ("LeftUpLeg", 2, [1.7, -1.7, 0.4]),
-        ("LeftLeg", 3, [0.0, -7.5, 0.0]),
-        ("LeftFoot", 4, [0.0, -7.4, 0.0]),
-        ("LeftToeBase", 5, [0.0, -0.8, 2.3]),
-        ("-", 6, [0.0, 0.0, 1.2]),
-        ("RHipJoint", 1, [0.0, 0.0, 0.0]),
-        ("RightUpLeg", 2, [-1.7, -1.7, 0.4]),
-        ("RightLeg", 3, [0.0, -7.5, 0.0]),
-        ("RightFoot", 4, [0.0, -7.4, 0.0]),
-        ("RightToeBase", 5, [0.0, -0.8, 2.3]),
-        ("-", 6, [0.0, 0.0, 1.2]),
-        ("LowerBack", 1, [0.0, 0.0, 0.0]),
-        ("Spine", 2, [0.0, 2.1, -0.1]),
-        ("Spine1", 3, [0.0, 2.1, -0.1]),
-        ("Neck", 4, [0.0, 0.0, 0.0]),
-        ("Neck1", 5, [0.0, 1.6, 0.2]),
-        ("Head", 6, [0.0, 1.6, -0.1]),
-        ("-", 7, [0.0, 1.7, 0.0]),
-        ("LeftArm", 4, [3.4, 0.8, -0.2]),
-        ("LeftForeArm", 5, [5.0, 0.0, 0.0]),
-        ("LeftHand", 6, [4.5, 0.0, 0.0]),
-        ("-", 7, [1.5, 0.0, 0.0]),
-        ("RightArm", 4, [-3.4, 0.8, -0.2]),
-        ("RightForeArm", 5, [-5.0, 0.0, 0.0]),
-        ("RightHand", 6, [-4.5, 0.0, 0.0]),
-        ("-", 7, [-1.5, 0.0, 0.0]),
-    ];
     let mut text = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation \
                     Xrotation \n"
         .to_owned();

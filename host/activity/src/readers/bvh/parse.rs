@@ -102,7 +102,8 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     Ok(Motion { joints, frame_time_s, frames })
 }
 
-/// The joints up to and with the word MOTION.
+/// The joints up to and with the word MOTION. One loop over the words with an arm for each, and the errors beside them: in parts
+/// the brackets' bookkeeping would be everywhere.
 fn hierarchy(cursor: &mut Cursor) -> Result<Vec<Joint>, RecordingError> {
     let mut joints: Vec<Joint> = Vec::new();
     // The joints whose brackets are open, and whether each has had its OFFSET.
