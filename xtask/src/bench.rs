@@ -278,7 +278,7 @@ fn page_of(tables: &str) -> String {
          allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n\
          `fma_peak` is a loop of independent multiply-adds in registers: what one core can do. The 7x7 convolution is counted \
          twice: with 49 multiply-adds per pixel, as its definition says, and with what is executed: the kernels are eight-fold \
-         symmetric, so 12 multiply-adds, 4 products and 10 sums suffice ([`convolve.rs`](../host/depth/src/pipeline/simd/convolve.rs)). \
+         symmetric, so 12 multiply-adds, 4 products and 10 sums suffice ([`convolve.rs`](../host/depth/src/simd/convolve.rs)). \
          It can therefore exceed the peak. Executed multiply-adds and sums have units of their own on many processors, so a share \
          below 100 % need not mean that the core waits.\n\n{tables}"
     )
