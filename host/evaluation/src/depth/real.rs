@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use farnear_capture::image_file::read_grey;
+use farnear_files::image_file::read_grey;
 use farnear_depth::{
     operators::Operators,
     optics::{Optics, OpticsFile},
