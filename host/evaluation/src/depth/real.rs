@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use farnear_files::image_file::read_grey;
 use farnear_depth::{
     operators::Operators,
     optics::{Optics, OpticsFile},
     pipeline::{Settings, depth_from_pair},
 };
+use farnear_files::image_file::read_grey;
 use ndarray::{Array2, ArrayView2, s};
 
 use crate::{

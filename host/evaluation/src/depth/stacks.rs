@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use farnear_activity::readers::matlab::{self, Array};
-use farnear_files::image_file::read_grey;
 use farnear_depth::{
     operators::Operators,
     pipeline::{Settings, depth_from_pair},
 };
+use farnear_files::image_file::read_grey;
 use ndarray::{Array2, ShapeBuilder, Zip};
 use rayon::prelude::*;
 

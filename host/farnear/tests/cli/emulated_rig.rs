@@ -45,7 +45,11 @@ fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
     fails(&mut on_the_rig(&beyond), 1, &["refused", "500.000 um", "5.000 to 195.000 um"]);
     let below = ["move", "--axis", "fine", "--to-um", "-1"];
     fails(&mut on_the_rig(&below), 1, &["-1.000 um", "5.000 to 195.000 um"]);
-    fails(&mut on_the_rig(&["move", "--axis", "fine", "--to-um", "1e9"]), 2, &["1000000000", "expected a position"]);
+    fails(
+        &mut on_the_rig(&["move", "--axis", "fine", "--to-um", "1e9"]),
+        2,
+        &["1000000000", "expected a position"],
+    );
     succeeds(&mut on_the_rig(&["stop"]));
 }
 
