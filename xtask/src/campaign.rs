@@ -1,4 +1,4 @@
-//! The long tests on the emulated board: those of `hil-sim/board/tests` with more of everything, once per seed.
+//! The long tests on the emulated board: those of `hil-sim/board/tests/it` with more of everything, once per seed.
 
 use anyhow::Result;
 
@@ -29,10 +29,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = firmware::build()?;
     for seed in 1..=arguments.seeds {
         step(&format!("campaign, seed {seed}"));
-        let tests = ["--test", "steps", "--test", "accuracy", "--test", "memory", "--test", "fuzz"];
-        let mut command = cargo(["test", "--locked", "--package", "farnear-sim"].iter().chain(&tests));
+        let mut command = cargo(["test", "--locked", "--package", "farnear-sim", "--test", "it"]);
         command
-            .args(["--", "--nocapture", "--test-threads", "2"])
+            .args(["--", "steps::", "accuracy::", "memory::", "fuzz::", "--nocapture", "--test-threads", "2"])
             .env("FARNEAR_FIRMWARE", &elf)
             .env("FARNEAR_CAMPAIGN", "1")
             .env("FARNEAR_SEED", seed.to_string())

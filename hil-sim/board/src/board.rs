@@ -70,6 +70,10 @@ pub const TIM8: usize = 1;
 /// The volatile memory of the chip: where it begins and how long it is. SRAM1 to 3, and the core's own.
 pub const RAM: [(u64, u64); 2] = [(0x2000_0000, 192 << 10), (0x1000_0000, 64 << 10)];
 
+/// Below the SRAM, down to the option bytes, the chip has nothing, and its bus answers every access with an error (RM0090,
+/// section 2.3). The emulator would drop it silently; a stack that overflows ends there.
+pub const NOTHING: std::ops::Range<u64> = 0x1fff_c010..0x2000_0000;
+
 /// A chip on SPI3 or SPI4.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SpiChip {

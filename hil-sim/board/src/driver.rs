@@ -11,7 +11,7 @@ use rigless::{
 
 use crate::{
     access::{RigAccess, forget},
-    board::RigBoard,
+    board::{NOTHING, RigBoard},
     chips::{SharedPlant, with_plant},
     command::{Command, Outlets},
     config::RigConfig,
@@ -266,6 +266,11 @@ impl Driver {
 impl emulator::Driver<RigBoard> for Driver {
     fn on_settled(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, settled: Settled) {
         let at = match settled {
+            Settled::Access { access, .. } if NOTHING.contains(&access.address) => {
+                // The emulator fails one access only, so the next one is to fail again.
+                session.fail_next(NOTHING.start, NOTHING.end);
+                return;
+            }
             Settled::Access { access, .. } if SPI4.contains(&access.address) => {
                 let chip = &mut session.board_mut().chip;
                 if chip.memory().is_some_and(MemoryChip::take_failure) {

@@ -19,7 +19,7 @@ use rigless::{
 
 use crate::{
     access::RigAccess,
-    board::RigBoard,
+    board::{NOTHING, RigBoard},
     camera::Camera,
     chips::SharedPlant,
     command::{Command, Outlets},
@@ -164,7 +164,8 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
     let trace = config.trace.as_deref().map(Trace::create).transpose()?;
     let (commands, receiver) = mpsc::channel();
     let driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);
-    let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
+    let mut session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
+    session.fail_next(NOTHING.start, NOTHING.end);
 
     let thread = std::thread::Builder::new()
         .name("emulator".into())

@@ -11,7 +11,8 @@ use super::retained::{Last, leave};
 const STACK_LOWEST: u32 = 0x2000_0000;
 const STACK_MARGIN: u32 = 128;
 /// Below the stack, down to the option bytes, there is nothing (RM0090, section 2.3), so the bus answers every access
-/// with an error: 16 KiB, more than the largest frame of this program, so that none steps over it.
+/// with an error. These 16 KiB are more than any frame of the running program (10 KiB); the one of the start (29 KiB) is
+/// made once, on an empty stack.
 const NOTHING: core::ops::Range<u32> = 0x1fff_c010..STACK_LOWEST;
 /// Words of a stacked exception frame before the program counter.
 const FRAME_PC: u32 = 6;

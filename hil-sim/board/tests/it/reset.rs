@@ -127,3 +127,14 @@ fn a_stack_overflow_is_told_and_reaches_no_variable() {
     // PUSH {R0-R7, LR}, again and again.
     astray(&[0xb5ff, 0xe7fd], Alarm::StackOverflow);
 }
+
+#[test]
+fn a_stack_overflow_by_a_large_frame_is_told() {
+    // SUB SP, #508 sixteen times, STR R0, [SP], again and again: 8 KiB at once.
+    const CODE: [u16; 18] = {
+        let mut code = [0xb0ff; 18];
+        (code[16], code[17]) = (0x9000, 0xe7ed);
+        code
+    };
+    astray(&CODE, Alarm::StackOverflow);
+}
