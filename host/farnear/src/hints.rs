@@ -47,7 +47,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             Some("`farnear shadow remove --help` shows what stands in it".into())
         }
         WorkflowError::Silhouettes(SilhouettesError::TooLarge { .. }) => {
-            Some("a larger --mm-per-px makes the picture smaller".into())
+            Some("--units names a recording's unit, a larger --mm-per-px makes the picture smaller".into())
         }
         WorkflowError::Samples(error) => of_samples(error).map(Into::into),
         _ => None,

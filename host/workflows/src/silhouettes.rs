@@ -77,8 +77,8 @@ pub enum SilhouettesError {
     },
     /// Points too far apart for a picture.
     #[error(
-        "{what} reaches from {low_mm:.0} to {high_mm:.0} mm, which is not a picture at {mm_per_px} mm per pixel; is the \
-         file's unit right?"
+        "{what} reaches from {low_mm:.0} to {high_mm:.0} mm, which is not a picture at {mm_per_px} mm per pixel; the \
+         unit may be wrong"
     )]
     TooLarge {
         /// Whose points.
