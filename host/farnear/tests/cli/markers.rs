@@ -144,7 +144,12 @@ fn skeleton() -> String {
         chain(&joints, [x.signum(), 0.0, 0.0])
     };
     let trunk = chain(
-        &[("Spine", [0.0, 2.0, 0.0]), ("Neck", [0.0, 7.0, 0.0]), ("Head", [0.0, 2.0, 0.0])],
+        &[
+            ("Spine", [0.0, 2.0, 0.0]),
+            ("Spine1", [0.0, 3.0, 0.0]),
+            ("Neck", [0.0, 4.0, 0.0]),
+            ("Head", [0.0, 2.0, 0.0]),
+        ],
         [0.0, 3.0, 0.0],
     );
     let body = [leg("Left", 1.5), leg("Right", -1.5), arm("Left", 3.0), arm("Right", -3.0), trunk].concat();
@@ -163,11 +168,10 @@ fn skeleton() -> String {
 fn a_skeleton_of_joints_is_drawn_and_what_was_guessed_is_said() {
     let folder = Folder::new();
     let (file, out) = (folder.file("walk.bvh", skeleton()), folder.text("masks"));
-    let arguments =
-        ["silhouettes", "markers", &file, "--template", "bvh", "--views", "2", "--first-view-deg", "0"];
+    let arguments = ["silhouettes", "markers", &file, "--template", "bvh", "--views", "4"];
     let (figures, said) = succeeds(farnear(&arguments).args(["--mm-per-px", "10", "--out", &out, "--json"]));
     let figures: serde_json::Value = serde_json::from_str(&figures).expect("JSON");
-    assert_eq!((number(&figures, "silhouettes"), number(&figures, "flagged_frames")), (6.0, 0.0));
+    assert_eq!((number(&figures, "silhouettes"), number(&figures, "flagged_frames")), (12.0, 0.0));
     for phrase in
         ["warning: ", "walk.bvh: lengths are taken as units of 56.444 mm", "y is taken as up", "--units"]
     {
