@@ -3,7 +3,7 @@
 use crate::bench::{Bench, fine_shot};
 use farnear_protocol::{Nanometres, message::Axis};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Scene, standard};
-use farnear_sim::{imager::Imager, rig::RigConfig};
+use farnear_sim::{config::RigConfig, imager::Imager};
 
 /// Homes, moves, exposes a pair; gives everything that came out: trace, events, pictures.
 fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
