@@ -320,7 +320,7 @@ impl<'a> Lines<'a> {
             ));
         }
         let mut frames: Vec<Vec<f64>> = Vec::new();
-        while let Some((line, text)) = self.lines.next() {
+        for (line, text) in self.lines.by_ref() {
             if frames.len() == promised {
                 let reason =
                     format!("found `{}`, expected no more than the {promised} promised frames", short(text));
