@@ -88,8 +88,8 @@ fn maps_that_are_none_are_named() {
     let integers = folder.text("pair/far.png");
     for (map, phrases) in [
         (&empty, ["empty.npy", "is empty"]),
-        (&cut, ["cut.npy", "is no map"]),
-        (&head, ["head.npy", "is no map"]),
+        (&cut, ["cut.npy", "is not a map"]),
+        (&head, ["head.npy", "is not a map"]),
         (&integers, ["far.png", "8-bit integers, not mm"]),
         (&folder.text("absent.npy"), ["absent.npy", "No such file"]),
         (&folder.text("pair"), ["pair", "Is a directory"]),

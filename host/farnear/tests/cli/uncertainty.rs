@@ -45,7 +45,7 @@ fn what_has_no_deviation_says_so() {
     render(&folder, "slant", "pair");
     let [far, near, map] = ["pair/far.png", "pair/near.png", "map"].map(|name| folder.text(name));
     let pair = ["depth", &far, &near, "--out", &map];
-    fails(farnear(&pair).args(["--uncertainty", "--method", "subbarao"]), 2, &["--uncertainty", "subbarao"]);
+    fails(farnear(&pair).args(["--uncertainty", "--method", "subbarao"]), 2, &["uncertainty", "subbarao"]);
     fails(farnear(&pair).arg("--uncertainty=camera:full_well_e=20000"), 2, &["read_noise_e", "both needed"]);
     succeeds(&mut farnear(&pair));
     assert!(!folder.path("map/uncertainty.npy").exists());

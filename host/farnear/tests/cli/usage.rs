@@ -237,7 +237,7 @@ fn operators_are_named_or_read_or_refused() {
         ("watanabe:linear", ["watanabe", "pillbox"]),
         ("absent.toml", ["absent.toml", "gro:linear"]),
         (&empty, ["empty.toml", "is empty"]),
-        (rig_optics(), ["rig.toml", "holds no operators"]),
+        (rig_optics(), ["rig.toml", "does not hold saved operators"]),
     ] {
         fails(&mut depth(operators, "new"), 1, &phrases);
     }
