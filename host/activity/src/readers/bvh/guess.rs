@@ -183,7 +183,8 @@ mod tests {
 
     #[test]
     fn up_is_the_axis_that_the_head_lies_above_the_feet_along() {
-        let turns: [(fn(Point3) -> Point3, Up); 3] =
+        type Turn = fn(Point3) -> Point3;
+        let turns: [(Turn, Up); 3] =
             [(|p| p, Up::Y), (|[x, y, z]| [x, -z, y], Up::Z), (|[x, y, z]| [y, z, x], Up::X)];
         for (turned, expected) in turns {
             let motion = body(1.0, turned, STILL);
