@@ -58,7 +58,7 @@ pub struct Parts {
 impl Nucleo {
     /// Sets everything up: the drivers are off, the trigger is low, the watchdog sleeps. Fails where the serial port cannot
     /// be set up. As long as the board has pins: a table, which shorter functions would only tear apart.
-    pub fn new(p: Peripherals) -> Result<Parts, ConfigError> {
+    pub fn set_up(p: Peripherals) -> Result<Parts, ConfigError> {
         let emulated = Input::new(p.PD15, Pull::Down).is_high();
         let (link, sender) = link::open(p.USART3, p.PD8, p.PD9)?;
         let coarse =

@@ -100,7 +100,7 @@ async fn main(spawner: Spawner) {
     let peripherals = clock::start();
     count_cycles();
     tell_of(last);
-    let Parts { mut board, sender, led, emulated } = match Nucleo::new(peripherals) {
+    let Parts { mut board, sender, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,
         Err(fault) => {
             // Nobody can be told; the log is all there is.
