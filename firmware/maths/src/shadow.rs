@@ -12,7 +12,7 @@
 //!
 //! The standard deviation is first order ([`Shadow::deviation`]); where the shadow's end comes near the camera, or
 //! `eta` near the fold of the mirror, that fails, and the result says so. Cost: 950 instructions on a Cortex-M4F, sun
-//! included, and 1,400 for the deviation.
+//! included, and 1,160 for the deviation.
 
 mod deviation;
 
@@ -58,7 +58,7 @@ pub enum Error {
     },
     /// A length that must be positive and finite is not.
     Senseless {
-        /// Which.
+        /// The name of the length that cannot be.
         what: &'static str,
         /// Its value, m.
         value_m: f32,

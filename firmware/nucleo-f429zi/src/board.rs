@@ -113,7 +113,7 @@ impl Board for Nucleo {
     }
 
     fn emergency_stop(&mut self) -> bool {
-        // Both, for a look forgets what was before it.
+        // Both are read: reading the flag clears it.
         let [coarse, lens] = [self.coarse.stepper.emergency_stop(), self.lens.stepper.emergency_stop()];
         coarse || lens
     }

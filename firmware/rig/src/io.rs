@@ -200,7 +200,7 @@ pub struct MotorOutputs {
 pub struct MemoryWrite {
     /// Where; address and length stay below [`MEMORY_BYTES`].
     pub address: u16,
-    /// What.
+    /// The bytes that are written there.
     pub bytes: Vec<u8, MEMORY_CHUNK>,
 }
 

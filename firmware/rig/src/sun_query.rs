@@ -3,7 +3,7 @@
 //! The only place that knows what those integers mean: the board answers with it, and the host calls it to hold its own
 //! answer beside the board's, bit by bit (`docs/decisions/0009-sun-query.md`).
 //!
-//! Cost: 550 instructions for the sun, 250 for its angles, 400 for the shadow, 1,400 for its deviation.
+//! Cost: 550 instructions for the sun, 250 for its angles, 400 for the shadow, 1,160 for its deviation.
 
 use farnear_maths::angle::BinaryAngle;
 use farnear_maths::shadow::{Deviations, Error, Geometry, Reliability, Shadow};

@@ -102,7 +102,7 @@ impl<'de> Deserialize<'de> for Kind {
 pub struct Happening {
     /// When, in milliseconds of virtual time after power-on.
     pub after_ms: u64,
-    /// What.
+    /// The kind of thing that happens.
     pub what: Kind,
     /// The stage concerned, if one is.
     #[serde(default = "sensor")]

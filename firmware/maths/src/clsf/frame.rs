@@ -35,7 +35,7 @@ impl Frame {
         self.width
     }
 
-    /// Rows.
+    /// Height of the frame in pixels.
     pub fn height(self) -> u16 {
         self.height
     }
@@ -162,7 +162,7 @@ pub enum Error {
     FrameSize {
         /// Columns.
         width: u16,
-        /// Rows.
+        /// Height that was asked for, in pixels.
         height: u16,
     },
     /// The samples do not determine the terms.
