@@ -15,6 +15,7 @@ mod instructions;
 mod run;
 mod sizes;
 mod test;
+mod test_programs;
 mod thumb;
 
 use std::process::ExitCode;
@@ -34,7 +35,7 @@ enum Job {
     /// Build everything, capture a pair on the emulated rig, compute its depth, write out/demo/.
     Demo,
     /// Everything CI runs: format, lints, firmware build and budgets, host tests, tests on the emulated board.
-    Test,
+    Test(test::Arguments),
     /// Build the firmware and lay its ELF beside the host programs.
     Firmware,
     /// The firmware's flash and static RAM against their budgets, and the instructions of its routines against
@@ -63,7 +64,7 @@ enum Job {
 fn main() -> ExitCode {
     let result = match Arguments::parse().job {
         Job::Demo => demo::run(),
-        Job::Test => test::run(),
+        Job::Test(arguments) => test::run(&arguments),
         Job::Firmware => firmware::build().map(|elf| println!("{}", elf.display())),
         Job::Sizes { write } => firmware::build().and_then(|elf| {
             sizes::check(&elf)?;

@@ -1,22 +1,26 @@
 //! Everything CI runs, in the order in which a mistake shows soonest.
 
-use std::{
-    io::{BufRead, BufReader},
-    process::Stdio,
-    time::Instant,
-};
+use std::{process::Stdio, time::Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 
 use crate::{
     firmware, instructions,
-    run::{cargo, finish, step, target_folder},
-    sizes,
+    run::{cargo, finish, step},
+    sizes, test_programs,
     thumb::Way,
 };
 
+/// What `cargo xtask test` can be told.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Run the test programs too that are unchanged since they passed.
+    #[arg(long)]
+    all: bool,
+}
+
 /// Runs all checks; ends with one line that sums up the tests.
-pub fn run() -> Result<()> {
+pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     step("format");
     finish(cargo(["fmt", "--all", "--check"]).stdout(Stdio::null()))?;
@@ -44,67 +48,17 @@ pub fn run() -> Result<()> {
     )?;
 
     step("tests on the host and on the emulated board");
-    let total = tests(&elf)?;
+    let total = test_programs::run(&elf, arguments.all)?;
     eprintln!("\nall of it took {} s", start.elapsed().as_secs());
+    if total.unchanged > 0 {
+        eprintln!(
+            "{} of the passed were not run again: nothing they depend on has changed (--all runs them)",
+            total.unchanged
+        );
+    }
     println!("{} passed, {} failed, {} skipped", total.passed, total.failed, total.ignored);
-    if total.failed > 0 || !total.ended_well {
+    if !total.well {
         bail!("tests failed");
     }
     Ok(())
-}
-
-#[derive(Default)]
-struct Total {
-    passed: u32,
-    failed: u32,
-    ignored: u32,
-    ended_well: bool,
-}
-
-fn tests(elf: &std::path::Path) -> Result<Total> {
-    let mut child = cargo(["test", "--workspace", "--locked", "--no-fail-fast"])
-        .env("FARNEAR_FIRMWARE", elf)
-        .env("FARNEAR_REQUIRE_SIM", "1")
-        .env("CARGO_TARGET_DIR", target_folder())
-        .stdout(Stdio::piped())
-        .spawn()
-        .context("cannot start cargo test")?;
-    let mut total = Total::default();
-    let stdout = child.stdout.take().context("cargo test has no output")?;
-    for line in BufReader::new(stdout).lines() {
-        let line = line.context("cargo test's output is no text")?;
-        println!("{line}");
-        if let Some(counts) = line.strip_prefix("test result: ") {
-            total.passed += count(counts, "passed");
-            total.failed += count(counts, "failed");
-            total.ignored += count(counts, "ignored");
-        }
-    }
-    total.ended_well = child.wait().context("cargo test was lost")?.success();
-    Ok(total)
-}
-
-/// The number before `word` in "ok. 12 passed; 0 failed; ...".
-fn count(counts: &str, word: &str) -> u32 {
-    let mut words = counts.split([' ', ';']).filter(|part| !part.is_empty());
-    let mut before = "";
-    words
-        .find_map(|part| {
-            let found = part == word;
-            let number = found.then(|| before.parse().ok()).flatten();
-            before = part;
-            number
-        })
-        .unwrap_or(0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::count;
-
-    #[test]
-    fn reads_the_test_runners_summary() {
-        let line = "ok. 12 passed; 3 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s";
-        assert_eq!([count(line, "passed"), count(line, "failed"), count(line, "ignored")], [12, 3, 1]);
-    }
 }

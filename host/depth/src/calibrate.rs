@@ -28,7 +28,7 @@ use crate::optics::Optics;
 use crate::pipeline::{RunError, Settings, depth_from_pair};
 use crate::psf::Psf;
 
-pub(crate) use spectra::{SpectrumError, transform};
+pub(crate) use spectra::SpectrumError;
 
 /// Closer to the middle of the range than this both images are blurred alike and say nothing of the PSF.
 const LEAST_ALPHA: f64 = 0.2;

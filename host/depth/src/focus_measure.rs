@@ -17,10 +17,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use ndarray::{Array2, ArrayView2};
-use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use crate::calibrate::transform;
+use crate::fourier::{Complex64, transform};
 
 /// Smallest side of an image that can be judged.
 const SMALLEST_PX: usize = 8;

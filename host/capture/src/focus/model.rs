@@ -8,8 +8,8 @@
 //!
 //! Cost: one FFT of the image binned by two, and 30 operations a pixel.
 
-use ndarray::{Array2, s};
-use rustfft::{FftPlanner, num_complex::Complex32};
+use farnear_depth::fourier::{Complex64, transform};
+use ndarray::Array2;
 
 /// Images are binned by this first: what is sought lies below a quarter of the sampling rate.
 const BIN: usize = 2;
@@ -51,7 +51,7 @@ impl Spectrum {
         for ((row, column), value) in binned.indexed_iter_mut() {
             *value = (*value - mean) * window(row, height) * window(column, width);
         }
-        let spectrum = transform(&binned);
+        let spectrum = transform(binned.mapv(|value| Complex64::new(f64::from(value), 0.0)));
         let (mut power, mut count) = ([0.0; RINGS], [0.0; RINGS]);
         let signed = |at: usize, length: usize| (if at > length / 2 { length - at } else { at }) as f64;
         for ((row, column), value) in spectrum.indexed_iter() {
@@ -59,7 +59,7 @@ impl Spectrum {
             // 0.5 cycles a pixel is the highest frequency along an axis.
             let ring = (2.0 * x.hypot(y) * RINGS as f64) as usize;
             if ring < RINGS {
-                power[ring] += f64::from(value.norm_sqr());
+                power[ring] += value.norm_sqr();
                 count[ring] += 1.0;
             }
         }
@@ -70,26 +70,6 @@ impl Spectrum {
     fn noise(&self) -> f64 {
         self.power[RINGS - NOISE_RINGS..].iter().sum::<f64>() / NOISE_RINGS as f64
     }
-}
-
-fn transform(image: &Array2<f32>) -> Array2<Complex32> {
-    let (height, width) = image.dim();
-    let mut planner = FftPlanner::new();
-    let mut rows = image.mapv(|value| Complex32::new(value, 0.0));
-    let along = planner.plan_fft_forward(width);
-    for mut row in rows.outer_iter_mut() {
-        if let Some(row) = row.as_slice_mut() {
-            along.process(row);
-        }
-    }
-    let mut columns = rows.t().as_standard_layout().into_owned();
-    let down = planner.plan_fft_forward(height);
-    for mut column in columns.outer_iter_mut() {
-        if let Some(column) = column.as_slice_mut() {
-            down.process(column);
-        }
-    }
-    columns.slice(s![.., ..]).t().to_owned()
 }
 
 /// The place of the best focus, nm; `None` where the images hold nothing but noise, or were taken at one place.

@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use ndarray::{Array2, ArrayView2};
-use rustfft::{FftPlanner, num_complex::Complex64};
+
+use crate::fourier::{Complex64, transform};
 
 /// Smallest side that has enough frequencies.
 const SMALLEST_PX: usize = 32;
@@ -37,23 +38,6 @@ pub enum SpectrumError {
     /// No texture.
     #[error("it is constant or dark: there is no texture to compare")]
     Constant,
-}
-
-/// Two-dimensional discrete Fourier transform, not normalised.
-pub(crate) fn transform(image: Array2<Complex64>) -> Array2<Complex64> {
-    let mut planner = FftPlanner::new();
-    let mut rows = |image: Array2<Complex64>| {
-        let fft = planner.plan_fft_forward(image.ncols());
-        let mut image = image.as_standard_layout().into_owned();
-        for mut row in image.outer_iter_mut() {
-            if let Some(row) = row.as_slice_mut() {
-                fft.process(row);
-            }
-        }
-        image.reversed_axes()
-    };
-    let columns = rows(image);
-    rows(columns)
 }
 
 /// The spectrum of an image divided by its mean, the mean taken off, under a Hann window.

@@ -4,11 +4,10 @@ use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use ndarray::Array2;
-use rustfft::num_complex::Complex64;
 
 use super::{FavaroSettings, VECTOR, fill};
 use crate::baselines::BaselineError;
-use crate::calibrate::transform;
+use crate::fourier::{Complex64, transform};
 use crate::optics::Optics;
 use crate::psf::Otf;
 

@@ -1,0 +1,223 @@
+//! The workspace's test programs: built by one call of cargo, run one after the other, and not run again while nothing they
+//! depend on has changed since they passed. The emulated board's tests take minutes, and most changes do not reach them.
+
+use std::{
+    collections::hash_map::DefaultHasher,
+    fs,
+    hash::{Hash, Hasher},
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+
+use crate::run::{ROOT, cargo, output, step, target_folder};
+
+/// Packages whose tests run the programs or the firmware; those of the others depend on their own code and files alone.
+const RUN_PROGRAMS: [&str; 2] = ["farnear", "farnear-sim"];
+/// The package whose tests look at the whole repository.
+const SEES_EVERYTHING: &str = "xtask";
+/// Where the real data are looked for, from the repository's root; see `tools/test-data`.
+const REAL_DATA: &str = "../shared/data";
+
+/// What came of all tests.
+#[derive(Default)]
+pub struct Total {
+    pub passed: u32,
+    pub failed: u32,
+    pub ignored: u32,
+    /// Of the passed, those that were not run again.
+    pub unchanged: u32,
+    /// Whether every program ended well.
+    pub well: bool,
+}
+
+/// A test program.
+struct Program {
+    package: String,
+    name: String,
+    executable: PathBuf,
+    /// The package's, where cargo runs it.
+    folder: PathBuf,
+}
+
+/// Builds and runs them, those that are unchanged since they passed only where `all` are wanted.
+pub fn run(elf: &Path, all: bool) -> Result<Total> {
+    let (tests, programs) = build(elf)?;
+    let mut total = Total { well: true, ..Total::default() };
+    let passed = target_folder().join("passed-tests");
+    fs::create_dir_all(&passed).with_context(|| format!("cannot create {}", passed.display()))?;
+    for test in &tests {
+        let stamp = passed.join(test.executable.file_name().unwrap_or(test.name.as_ref()));
+        // Without git nobody knows which files there are: then every program runs.
+        let depends_on = dependencies(test, &programs, elf).ok().filter(|_| test.package != SEES_EVERYTHING);
+        let before = fs::read_to_string(&stamp).ok().filter(|_| !all);
+        if let (Some(depends_on), Some(before)) = (&depends_on, before)
+            && let Some(result) = before.strip_prefix(depends_on)
+        {
+            println!("\n{} ({}): unchanged since it passed", test.package, test.name);
+            total.add(result);
+            total.unchanged += count(result, "passed");
+            continue;
+        }
+        println!("\n{} ({})", test.package, test.name);
+        let mut command = Command::new(&test.executable);
+        command.current_dir(&test.folder).env("CARGO_MANIFEST_DIR", &test.folder);
+        let result = watch(environment(&mut command, elf), &mut total)?;
+        if let (Some(depends_on), Some(result)) = (depends_on, result) {
+            fs::write(&stamp, depends_on + &result)
+                .with_context(|| format!("cannot write {}", stamp.display()))?;
+        }
+    }
+    println!("\nexamples in the documentation");
+    let mut examples = cargo(["test", "--workspace", "--locked", "--doc"]);
+    watch(environment(&mut examples, elf), &mut total)?;
+    Ok(total)
+}
+
+fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
+    command
+        .env("FARNEAR_FIRMWARE", elf)
+        .env("FARNEAR_REQUIRE_SIM", "1")
+        .env("CARGO_TARGET_DIR", target_folder())
+}
+
+/// Compiles everything; gives the test programs, and the programs that some of them run.
+fn build(elf: &Path) -> Result<(Vec<Program>, Vec<PathBuf>)> {
+    let mut command =
+        cargo(["test", "--workspace", "--locked", "--no-run", "--message-format", "json-render-diagnostics"]);
+    let text = output(environment(&mut command, elf))?;
+    step("running them");
+    let (mut tests, mut programs) = (Vec::new(), Vec::new());
+    for line in text.lines() {
+        let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
+        let Some(executable) = message["executable"].as_str().map(PathBuf::from) else { continue };
+        if message["profile"]["test"] == true {
+            let manifest = Path::new(message["manifest_path"].as_str().unwrap_or_default());
+            let folder = manifest.parent().context("a test program without a package")?.to_owned();
+            let package = fs::read_to_string(manifest)?
+                .lines()
+                .find_map(|line| Some(line.strip_prefix("name = \"")?.trim_end_matches('"').to_owned()))
+                .context("a package without a name")?;
+            let name = message["target"]["name"].as_str().unwrap_or_default().to_owned();
+            tests.push(Program { package, name, executable, folder });
+        } else {
+            programs.push(executable);
+        }
+    }
+    if tests.is_empty() {
+        bail!("cargo built no test program");
+    }
+    tests.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
+    Ok((tests, programs))
+}
+
+/// A text that changes with anything the program's result can depend on.
+fn dependencies(test: &Program, programs: &[PathBuf], elf: &Path) -> Result<String> {
+    let mut hasher = DefaultHasher::new();
+    hash_file(&test.executable, &mut hasher)?;
+    if RUN_PROGRAMS.contains(&test.package.as_str()) {
+        for program in programs.iter().map(PathBuf::as_path).chain([elf]) {
+            hash_file(program, &mut hasher)?;
+        }
+    }
+    let mut files = files(&test.folder)?;
+    files.extend(self::files(&ROOT.join("examples"))?);
+    for file in files.iter().filter(|file| !file.ends_with(".rs") && ROOT.join(file).is_file()) {
+        file.hash(&mut hasher);
+        hash_file(&ROOT.join(file), &mut hasher)?;
+    }
+    let mut given: Vec<_> = std::env::vars()
+        .filter(|(name, _)| name.starts_with("FARNEAR_") || name.starts_with("PROPTEST_"))
+        .collect();
+    given.sort();
+    given.hash(&mut hasher);
+    listing(&ROOT.join(REAL_DATA), &mut hasher);
+    Ok(format!("{:016x} ", hasher.finish()))
+}
+
+/// What git knows, or would take, below a folder.
+fn files(folder: &Path) -> Result<Vec<String>> {
+    let mut git = Command::new("git");
+    git.args(["ls-files", "--cached", "--others", "--exclude-standard", "--full-name", "--"]).arg(folder);
+    Ok(output(git.current_dir(&*ROOT))?.lines().map(str::to_owned).collect())
+}
+
+fn hash_file(path: &Path, hasher: &mut DefaultHasher) -> Result<()> {
+    let mut file = fs::File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let mut block = vec![0; 1 << 20];
+    loop {
+        let length = file.read(&mut block).with_context(|| format!("cannot read {}", path.display()))?;
+        if length == 0 {
+            return Ok(());
+        }
+        hasher.write(&block[..length]);
+    }
+}
+
+/// Names, lengths and times of the files below a folder that may be missing.
+fn listing(folder: &Path, hasher: &mut DefaultHasher) {
+    let mut entries: Vec<_> = fs::read_dir(folder).into_iter().flatten().flatten().collect();
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        entry.file_name().hash(hasher);
+        match entry.metadata() {
+            Ok(about) if about.is_dir() => listing(&entry.path(), hasher),
+            Ok(about) => (about.len(), about.modified().ok()).hash(hasher),
+            Err(_) => {}
+        }
+    }
+}
+
+/// Runs tests to their end, shows and adds what they say; gives the summary if all passed.
+fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>> {
+    let mut child = command.stdout(Stdio::piped()).spawn().context("cannot start a test program")?;
+    let stdout = child.stdout.take().context("a test program has no output")?;
+    let mut result = None;
+    for line in BufReader::new(stdout).lines() {
+        let line = line.context("a test program's output is no text")?;
+        println!("{line}");
+        if let Some(counts) = line.strip_prefix("test result: ") {
+            total.add(counts);
+            result = Some(counts.to_owned());
+        }
+    }
+    let well = child.wait().context("a test program was lost")?.success();
+    total.well &= well;
+    Ok(result.filter(|_| well))
+}
+
+impl Total {
+    fn add(&mut self, counts: &str) {
+        self.passed += count(counts, "passed");
+        self.failed += count(counts, "failed");
+        self.ignored += count(counts, "ignored");
+    }
+}
+
+/// The number before `word` in "ok. 12 passed; 0 failed; ...".
+fn count(counts: &str, word: &str) -> u32 {
+    let mut words = counts.split([' ', ';']).filter(|part| !part.is_empty());
+    let mut before = "";
+    words
+        .find_map(|part| {
+            let found = part == word;
+            let number = found.then(|| before.parse().ok()).flatten();
+            before = part;
+            number
+        })
+        .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::count;
+
+    #[test]
+    fn reads_the_test_runners_summary() {
+        let line = "ok. 12 passed; 3 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.01s";
+        assert_eq!([count(line, "passed"), count(line, "failed"), count(line, "ignored")], [12, 3, 1]);
+    }
+}
