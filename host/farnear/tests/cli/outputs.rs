@@ -101,3 +101,29 @@ fn calibration() {
     }
     .is_held();
 }
+
+#[test]
+fn people() {
+    const CAMERA: &str = "[camera]\nheight_m = 0.8\nazimuth_deg = 140.0\npitch_deg = 0.0\nfocal_length_mm = 1.0\n\
+                          pixel_um = 6.0\nwidth_px = 180\nheight_px = 79\n";
+    const THREE: &str = "--subjects 3 --activities walk,crouch,dig --views 2 --rate-hz 6 --mm-per-px 25";
+    Story {
+        name: "people",
+        files: &[("camera.toml", CAMERA)],
+        before: &[&format!("silhouettes synthetic {THREE} --out people")],
+        commands: &[
+            "silhouettes synthetic --subjects 1 --activities walk --views 1 --rate-hz 2 --mm-per-px 25 --out one --json",
+            "activity train people/samples.toml --out model.fnm --any-view --no-search --json",
+            "activity train people/samples.toml --out ordered.fnm --mode ordered --classifier knn --no-search",
+            "activity recognise people/p02-crouch-1/view2 --model model.fnm --json",
+            "activity recognise people/p01-dig-1/view1 people/p01-dig-1/view2 --model ordered.fnm",
+            "activity evaluate people/samples.toml --leave-one-subject-out --no-search --out evaluation --json",
+            "activity evaluate people/samples.toml --leave-one-subject-out --no-search --views each --epl thesis",
+            "shadow remove one/p00-walk-1/view1 --camera camera.toml --lat 52.38 --lon -1.56 \
+             --time 2014-06-23T11:30:00Z --out cut --json",
+            "sun --lat 52.38 --lon -1.56 --time 2014-06-23T11:30:00Z",
+            "sun --lat 52.38 --lon -1.56 --time 2014-06-23T11:30:00Z --model thesis --json",
+        ],
+    }
+    .is_held();
+}

@@ -11,7 +11,7 @@ use crate::common::{Folder, farnear, rig_optics};
 /// What `SMALL` stands for in a command: a picture that is quickly rendered.
 const SMALL: &str = "--optics rig.toml --width 96 --height 72";
 /// Figures that no two runs share.
-const TIMES: [&str; 3] = ["seconds", "seconds_per_frame", "rows_per_second"];
+const TIMES: [&str; 4] = ["seconds", "seconds_per_frame", "cut_ms_per_frame", "rows_per_second"];
 /// How far numbers of text may lie apart between kinds of processors, relative and absolute.
 const TEXT_TOLERANCE: [f64; 2] = [2e-3, 2e-3];
 
