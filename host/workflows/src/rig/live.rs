@@ -1,7 +1,9 @@
 //! The live image: a program that is repeated where the piezo stands, frame after frame, until somebody wishes it to end.
 //!
-//! Nothing moves but the piezo, which is held where it is. Cost on the line: one program of [`REPEATS`] exposures, and an event
-//! for each of them.
+//! Nothing moves but the piezo, which is held where it is. A program takes as many exposures as come within a quarter of a second, so
+//! that a fast camera costs little on the line, and a slow one has no queue of old images when something else is wanted.
+
+use std::time::{Duration, Instant};
 
 use farnear_capture::{camera::Image, expose::expose, sequence::ShotDefaults};
 use farnear_protocol::message::{Axis, Shot, ShotRecord};
@@ -12,8 +14,10 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Exposures of one program: enough that arming it costs nothing, few enough that a setting somebody else changed is soon seen.
-const REPEATS: u16 = 100;
+/// About how long a program lasts.
+const PROGRAM: Duration = Duration::from_millis(250);
+/// Most exposures of a program.
+const REPEATS_MAX: u16 = 100;
 
 /// What is looked at.
 #[derive(Clone, PartialEq, Debug)]
@@ -35,14 +39,17 @@ pub fn watch(
 ) -> Result<()> {
     let mut equipped = settings.camera.connect(&settings.rig, None, context)?;
     let (client, camera) = (&equipped.rig.client, equipped.camera.as_mut());
+    let mut repeats = 1;
     loop {
         context.cancel.check("watching the live image")?;
-        let shot = [held(client.status()?.fine.asked.0, client, settings)];
+        let begin = Instant::now();
+        let shot = [Shot { repeat: repeats, ..held(client.status()?.fine.asked.0, client, settings) }];
         expose(client, camera, &shot, settings.camera.image_wait, |record, image| {
             context.cancel.check("watching the live image")?;
             on_frame(record, image)
         })
         .map_err(|error: WorkflowError| error)?;
+        repeats = next(repeats, begin.elapsed());
     }
 }
 
@@ -50,7 +57,26 @@ pub fn watch(
 fn held(fine_nm: i32, client: &farnear_capture::Client, settings: &LiveSettings) -> Shot {
     let limits = client.hello().limits;
     let target = farnear_protocol::Nanometres(fine_nm.clamp(limits.fine_min.0, limits.fine_max.0));
-    let defaults =
-        ShotDefaults { exposure: settings.camera.exposure, repeat: REPEATS, ..ShotDefaults::default() };
+    let defaults = ShotDefaults { exposure: settings.camera.exposure, ..ShotDefaults::default() };
     defaults.shot(Axis::SensorFine, target)
+}
+
+/// How many exposures the next program takes, where the last one took `repeats` in `took`.
+fn next(repeats: u16, took: Duration) -> u16 {
+    let each_s = took.as_secs_f64() / f64::from(repeats.max(1));
+    (PROGRAM.as_secs_f64() / each_s.max(1e-3)).clamp(1.0, f64::from(REPEATS_MAX)) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_camera_is_asked_for_one_image_at_a_time() {
+        assert_eq!(next(1, Duration::from_secs(3)), 1);
+        assert_eq!(next(100, Duration::from_secs(50)), 1);
+        assert_eq!(next(1, Duration::from_millis(25)), 10);
+        assert_eq!(next(10, Duration::from_millis(100)), 25);
+        assert_eq!(next(1, Duration::ZERO), 100);
+    }
 }
