@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 
 use crate::{
-    firmware, instructions,
+    browser, firmware, instructions,
     run::{cargo, finish, step, target_folder},
     sizes,
     thumb::Way,
@@ -44,7 +44,13 @@ pub fn run() -> Result<()> {
     )?;
 
     step("tests on the host and on the emulated board");
-    let total = tests(&elf)?;
+    let mut total = tests(&elf)?;
+    step("the page in a browser");
+    let page = browser::run()?;
+    total.passed += page.passed;
+    total.failed += page.failed;
+    total.ignored += page.skipped;
+    total.ended_well &= page.ended_well;
     eprintln!("\nall of it took {} s", start.elapsed().as_secs());
     println!("{} passed, {} failed, {} skipped", total.passed, total.failed, total.ignored);
     if total.failed > 0 || !total.ended_well {

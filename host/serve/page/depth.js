@@ -147,7 +147,7 @@ export function make(host, remember) {
   async function turn() {
     const { show: begin, sorry } = await import("./mesh.js");
     try {
-      show.mesh ??= await bytes(`/api/captures/${show.name}/files/mesh.ply`);
+      show.mesh ??= await bytes(`/api/captures/${show.name}/mesh.ply`);
       if (show.layer !== "surface" || !show.mesh) return;
       turning?.();
       turning = begin(surface, show.mesh);

@@ -14,14 +14,14 @@ export function make(host) {
   const model = choice(MODELS, "gaussian", () => later());
   const wrong = h("p", { class: "bad", role: "alert" });
   const drawing = h("div", { class: "drawing" });
-  const results = h("div", {});
+  const results = h("div", { class: "columns" });
   const place = h("div", {});
   const plot = new Plot(place, { label: "blur radius in both images over the depth", x: "depth, mm", y: "blur, px", height: 190, names: ["far-focused image", "near-focused image"] });
   const use = button("Use these optics", () => save(), { class: "primary" });
   const using = h("p", { class: "dim" });
   const p = field("Exponent p", inputs.p);
   host.append(h("div", { class: "split" },
-    h("div", { class: "stage scroll" }, panel("Drawn to scale", drawing), panel("Blur over the working range", place,
+    h("div", { class: "stage scroll" }, panel("Drawn to scale", drawing), panel("What follows", results), panel("Blur over the working range", place,
       h("p", { class: "legend" }, h("span", { class: "key a" }), "far-focused image ", h("span", { class: "key b" }), "near-focused image"))),
     h("div", { class: "side" },
       panel("Lens and sensor", field("Focal length", inputs.focal, "mm"), field("Aperture", inputs.aperture, "mm"), field("Pixel", inputs.pixel, "µm")),
@@ -29,7 +29,7 @@ export function make(host) {
       panel("Micrometer", field("m1, far", inputs.m1, "mm"), field("m2, near", inputs.m2, "mm"),
         h("p", { class: "dim" }, "Of a rig that is turned by hand. With m1 alone, m2 follows; with both, the largest blur.")),
       panel("Point spread function", field("Model", model), field("Blur constant k", inputs.k), p),
-      panel("What follows", wrong, results, use, using))));
+      h("div", { class: "panel" }, wrong, use, using))));
 
   let waiting = 0;
   const later = () => { clearTimeout(waiting); waiting = setTimeout(calculate, 120); };
@@ -135,6 +135,6 @@ function toScale({ range, aperture_mm: aperture, optics }) {
     text(at(range.near_mm) + 4, middle + 58, `${number(range.near_mm, 1)} mm`, "start"),
     text(lens, middle + tall / 2 + 24, `⌀ ${number(aperture, 1)} mm`),
     text(sensor(sensors[0]), middle - 38, number(sensors[0], 4), "end"), text(sensor(sensors[1]), middle + 46, number(sensors[1], 4), "end"),
-    text(10, 182, "object side, 1 : " + number(1 / perMm, 1) + " mm per unit", "start", "faint"),
-    text(width - 10, 182, `sensor side, ${number(zoom, 0)} times larger`, "end", "faint"));
+    text(10, 182, "object distances to scale", "start", "faint"),
+    text(width - 10, 182, `sensor travel ${number(zoom / perMm, 0)} times enlarged`, "end", "faint"));
 }

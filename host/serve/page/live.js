@@ -90,7 +90,7 @@ export function make(host) {
       data[at] = codes[at] ? codes[at] : NaN;
       fade[at] = confidence[at] / 255;
     }
-    depth.show(paint({ width, height, data }, [65535, 1], "viridis", fade));
+    depth.show(paint({ width, height, data }, [1, 65535], "viridis", fade));
     image.show(shade(new Uint8Array(pixels, 3 * count, count), width, height, false, false));
     status.textContent = `${number(header.rate_hz, 1)} maps/s · ${number(header.latency_ms, 0)} ms from image to map · ${number(low_mm, 0)} to ${number(high_mm, 0)} mm`;
   });

@@ -51,7 +51,7 @@ export function figuresOf(found) {
     ["fill rate", `${number(100 * found.fill_rate, 2)} %`],
     ["mean", number(found.mean_mm, 3, "mm")], ["standard deviation", number(found.standard_deviation_mm, 3, "mm")],
     ["predicted deviation", number(found.predicted_deviation_mm, 3, "mm")],
-    found.range_mm && ["range", `${number(found.range_mm[0], 1)} to ${number(found.range_mm[1], 1)} mm`],
+    found.range_mm && ["range, mm", `${number(found.range_mm[0], 1)} to ${number(found.range_mm[1], 1)}`],
     plane && ["plane: RMS", number(plane.rms_mm, 3, "mm")], plane && ["plane: peak to valley", number(plane.peak_to_valley_mm, 2, "mm")],
     plane && ["plane: tilt", `${number(plane.tilt_deg, 2)}°`],
   ]);

@@ -41,9 +41,17 @@ export function show(host, buffer, shade = "depth") {
   const watch = new ResizeObserver(size);
   watch.observe(host);
   size();
+  // Without a graphics card a frame takes long: then as much time is left to the rest of the page.
+  let next = 0;
+  const pixel = new Uint8Array(4);
+  const gl = renderer.getContext();
   renderer.setAnimationLoop(() => {
+    if (performance.now() < next) return;
+    const begin = performance.now();
     controls.update();
     renderer.render(scene, camera);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits until it is drawn
+    next = performance.now() + (performance.now() - begin);
   });
   host.dataset.triangles = geometry.index.count / 3;
   return () => {

@@ -12,6 +12,8 @@ export class Plot {
     host.setAttribute("aria-label", label);
     this.data = [[], ...names.map(() => [])];
     new ResizeObserver(() => this.size()).observe(host);
+    addEventListener("restyle", () => this.restyle());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.restyle());
   }
 
   size() {
@@ -22,8 +24,8 @@ export class Plot {
 
   make() {
     const { x, y, height, names, band } = this.options;
-    const [ink, dim, line] = [colour("ink"), colour("dim"), colour("line")];
-    const axis = (label, size) => ({ stroke: dim, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, label: label || undefined, labelSize: label ? 16 : 0, size, font: "11px system-ui", labelFont: "11px system-ui" });
+    const [dim, line] = [colour("dim"), colour("line")];
+    const axis = (label, size) => ({ stroke: dim, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, label: label || undefined, labelSize: label ? 16 : 0, size, font: "11px system-ui", labelFont: "11px system-ui", values: (_, ticks) => ticks.map((tick) => String(Number(tick.toPrecision(5)))) });
     this.plot?.destroy();
     this.plot = new uPlot({
       width: this.host.clientWidth, height,
@@ -31,9 +33,8 @@ export class Plot {
       cursor: { drag: { x: false, y: false } },
       scales: { x: { time: false } },
       axes: [axis(x, x ? 44 : 28), axis(y, 54)],
-      series: [{}, ...names.map((name, at) => ({ label: name, stroke: at ? colour("accent-weak") : colour("accent"), width: at ? 1 : 1.5, spanGaps: false, points: { show: false } }))],
+      series: [{}, ...names.map((name, at) => ({ label: name, stroke: !at ? colour("accent") : band ? "transparent" : colour("accent-weak"), width: at ? 1 : 1.5, spanGaps: false, points: { show: false }, pxAlign: 0 }))],
       bands: band ? [{ series: [2, 3], fill: colour("band") }] : [],
-      hooks: { draw: [() => ink] },
     }, this.data, this.host);
   }
 

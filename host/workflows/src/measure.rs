@@ -4,6 +4,7 @@
 //! positions beside the optical axis in mm.
 
 mod difference;
+mod mesh;
 mod plane;
 mod profile;
 mod region;
@@ -15,6 +16,7 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 pub use difference::{DifferenceFigures, difference};
+pub use mesh::mesh;
 pub use plane::{Plane, fit};
 pub use profile::{ProfileFigures, ProfilePoint, profile};
 pub use region::{RegionFigures, region};

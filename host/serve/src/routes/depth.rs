@@ -28,6 +28,9 @@ use crate::{
     view::Begun,
 };
 
+/// Most points of a surface that a page turns: 4 MB, and some ten frames a second without a graphics card.
+const MESH_PIXELS: usize = 100_000;
+
 /// How depth is computed; what is not named is as `farnear depth` has it.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -99,6 +102,12 @@ pub fn routes(api: Api) -> Api {
         region,
     )
     .post::<Line, Figures, _, _>("/api/captures/{capture}/profile", For::All, "Depths along a line.", profile)
+    .get_bytes(
+        "/api/captures/{capture}/mesh.ply",
+        "The surface as a mesh, as fine as a browser turns it easily.",
+        "application/octet-stream",
+        mesh,
+    )
     .get::<Figures, _, _>(
         "/api/captures/{capture}/difference/{other}",
         "Figures of the other capture's depth minus this one's.",
@@ -215,5 +224,11 @@ async fn difference_map(
         Ok(npy::write(measure::difference(&first?, &second?)?.0.view()))
     })
     .await?;
+    Ok(bytes.into_response())
+}
+
+async fn mesh(State(app): Shared, Path(name): Path<String>) -> Result<Response, Failure> {
+    let folder = sessions::folder_of(&app.session, &name)?;
+    let bytes = aside(move || Ok(measure::mesh(&folder, MESH_PIXELS)?)).await?;
     Ok(bytes.into_response())
 }
