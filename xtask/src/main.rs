@@ -4,6 +4,7 @@
 
 mod bench;
 mod boards;
+mod browser;
 mod campaign;
 mod demo;
 mod evaluate;

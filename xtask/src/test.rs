@@ -5,7 +5,7 @@ use std::{process::Stdio, time::Instant};
 use anyhow::{Result, bail};
 
 use crate::{
-    firmware, instructions,
+    browser, firmware, instructions,
     run::{cargo, finish, step},
     sizes, test_programs,
     thumb::Way,
@@ -48,7 +48,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     )?;
 
     step("tests on the host and on the emulated board");
-    let total = test_programs::run(&elf, arguments.all)?;
+    let mut total = test_programs::run(&elf, arguments.all)?;
+    step("the page in a browser");
+    let page = browser::run()?;
+    total.passed += page.passed;
+    total.failed += page.failed;
+    total.ignored += page.skipped;
+    total.well &= page.ended_well;
     eprintln!("\nall of it took {} s", start.elapsed().as_secs());
     if total.unchanged > 0 {
         eprintln!(

@@ -47,6 +47,9 @@ enum Command {
     Shadow(commands::shadow::Arguments),
     Silhouettes(commands::silhouettes::Arguments),
     Activity(commands::activity::Arguments),
+    Measure(commands::measure::Arguments),
+    Report(commands::report::Arguments),
+    Serve(commands::serve::Arguments),
     Completions(commands::completions::Arguments),
 }
 
@@ -64,6 +67,9 @@ fn main() -> ExitCode {
         Command::Shadow(arguments) => commands::shadow::run(arguments),
         Command::Silhouettes(arguments) => commands::silhouettes::run(arguments),
         Command::Activity(arguments) => commands::activity::run(arguments),
+        Command::Measure(arguments) => commands::measure::run(arguments),
+        Command::Report(arguments) => commands::report::run(arguments),
+        Command::Serve(arguments) => commands::serve::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
     };
     match result {

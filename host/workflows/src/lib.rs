@@ -8,6 +8,8 @@
 //! - [`rig`]: connecting, and all that a rig does; [`simulator`]: starting the emulated one.
 //! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
+//! - [`measure`]: figures of a map: a region with its plane, a profile, a difference; [`picture`]: figures of an image;
+//!   [`lens_table`]: the working range as it is typed; [`sessions`], [`report`]: captures that were kept, and a page about one.
 //! - [`calibrate`]: learning the point spread function and corrections.
 //! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
 //!   [`sun`] stands; [`activity`]: what the person does.
@@ -63,12 +65,17 @@ mod counter;
 pub mod depth;
 pub mod error;
 pub mod figures;
+pub mod lens_table;
+pub mod measure;
 mod operator_cache;
 pub mod operator_plot;
 pub mod operators;
 pub mod optics;
 mod parameters;
+pub mod picture;
+pub mod report;
 pub mod rig;
+pub mod sessions;
 pub mod shadow;
 pub mod silhouettes;
 pub mod simulator;

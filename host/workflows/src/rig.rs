@@ -4,6 +4,8 @@
 //! - [`camera`]: a rig with its camera; [`pair`], [`sequence`], [`focus`], [`targets`]: what is done with both.
 //! - [`mechanics`], [`correction_fit`], [`correct`], [`sun`]: what the board measures and calculates.
 //! - [`check`]: the bring-up checklist.
+//! - [`open`]: a rig that is held open between jobs; [`live`], [`live_depth`]: images and depth as they come; [`series`]: pair after pair;
+//!   [`goto`]: to the far or the near focus; [`quality`]: how good depth is.
 
 pub mod alarms;
 pub mod board;
@@ -12,17 +14,23 @@ pub mod check;
 pub mod correct;
 pub mod correction_fit;
 pub mod focus;
+pub mod goto;
 pub mod info;
+pub mod live;
+pub mod live_depth;
 pub mod log;
 pub mod mechanics;
 pub mod motion;
+pub mod open;
 pub mod pair;
+pub mod quality;
 pub mod sequence;
+pub mod series;
 pub mod settings;
 pub mod sun;
 pub mod targets;
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use farnear_capture::Client;
 use farnear_depth::psf::Psf;
@@ -32,6 +40,7 @@ use crate::{
     error::{Result, WorkflowError},
     simulator::{Scenery, Simulator},
 };
+use open::OpenRig;
 
 /// Where a rig is.
 #[derive(Clone, PartialEq, Debug)]
@@ -40,6 +49,8 @@ pub enum RigAddress {
     Port(String),
     /// Emulated: `farnear-sim` is started for it, and ends with it.
     Emulated(Scenery),
+    /// Connected already, by whoever holds it open.
+    Open(OpenRig),
 }
 
 impl RigAddress {
@@ -58,6 +69,10 @@ impl RigAddress {
             Self::Port(port) => {
                 Err(WorkflowError::parameter("scene", scene, format!("{port} has a world of its own")))
             }
+            Self::Open(open) => {
+                let reason = format!("{} runs already, before a scene of its own", open.name());
+                Err(WorkflowError::parameter("scene", scene, reason))
+            }
         }
     }
 }
@@ -67,7 +82,7 @@ pub struct Rig {
     /// The way to the board.
     pub client: Client,
     /// The emulated rig that was started for this, and what it was asked to be.
-    pub emulation: Option<(Simulator, Scenery)>,
+    pub emulation: Option<(Arc<Simulator>, Scenery)>,
 }
 
 impl Rig {
@@ -82,9 +97,10 @@ impl Rig {
     ) -> Result<Self> {
         let (mut client, emulation) = match address {
             RigAddress::Port(port) => (Client::open(port)?, None),
+            RigAddress::Open(open) => return Ok(open.connect(context)),
             RigAddress::Emulated(scenery) => {
                 let simulator = Simulator::start(scenery, optics, context)?;
-                (Client::open_emulated(simulator.port())?, Some((simulator, scenery.clone())))
+                (Client::open_emulated(simulator.port())?, Some((Arc::new(simulator), scenery.clone())))
             }
         };
         client.interrupt_by(context.cancel.flag());

@@ -89,6 +89,14 @@ impl CameraSettings {
     pub fn open_early(&self, rig: &RigAddress) -> Result<EarlyCamera> {
         let camera: Option<Box<dyn Camera>> = match (&self.address, rig) {
             (CameraAddress::Emulated, RigAddress::Emulated(_)) => None,
+            (CameraAddress::Emulated, RigAddress::Open(open)) if open.is_emulated() => None,
+            (CameraAddress::Emulated, RigAddress::Open(open)) => {
+                return Err(WorkflowError::parameter(
+                    "camera",
+                    "sim",
+                    format!("{OF_THE_EMULATED_RIG}; {} needs HOST:PORT or folder:DIR", open.name()),
+                ));
+            }
             (CameraAddress::Emulated, RigAddress::Port(port)) => {
                 return Err(WorkflowError::parameter(
                     "camera",

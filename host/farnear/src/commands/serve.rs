@@ -1,0 +1,110 @@
+//! `farnear serve`: the page.
+
+use std::{net::SocketAddr, path::PathBuf, time::Duration};
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use farnear_protocol::Micros;
+use farnear_serve::{Listen, ServeSettings, Token, serve};
+use farnear_workflows::{
+    rig::{RigAddress, camera::CameraSettings},
+    simulator::Scenery,
+};
+
+use crate::{report::Usage, terminal};
+
+/// The port that is tried where none is named.
+const PORT: u16 = 8080;
+
+/// Serve the page: the rig in a browser. Only this computer can reach it, unless --listen says otherwise.
+#[derive(Args)]
+#[command(after_help = "Example: farnear serve --rig sim --open\n\
+                        \x20        farnear serve --rig /dev/ttyACM0 --camera folder:shots/ --session captures/")]
+pub struct Arguments {
+    /// Serial port of the board; or sim, to start the emulated rig. Without it the page shows captures.
+    #[arg(long, value_name = "PORT|sim")]
+    rig: Option<String>,
+    /// Camera: sim (with --rig sim), HOST:PORT of a farnear-sim, or folder:DIR where images appear.
+    #[arg(long, value_name = "CAMERA", default_value = "sim")]
+    camera: String,
+    /// Scene before the emulated camera: plane:MM, staircase, slant, cone or sphere [default: staircase].
+    #[arg(long, value_parser = scene)]
+    scene: Option<String>,
+    /// Folder of captures; made where it is missing.
+    #[arg(long, value_name = "DIR", default_value = "farnear-session")]
+    session: PathBuf,
+    /// The optics file to begin with [default: that of the session, else the 50 mm lens].
+    #[arg(long, value_name = "FILE")]
+    optics: Option<PathBuf>,
+    /// Port of the page; 0 = any that is free.
+    #[arg(long, default_value_t = PORT)]
+    port: u16,
+    /// Listen at this address for the network too; asks for --token-file.
+    #[arg(long, value_name = "ADDRESS:PORT", requires = "token_file", conflicts_with = "port")]
+    listen: Option<SocketAddr>,
+    /// File with the token that a browser must know.
+    #[arg(long, value_name = "FILE", alias = "token", requires = "listen")]
+    token_file: Option<PathBuf>,
+    /// A name of this computer in the network's DNS; may be repeated.
+    #[arg(long, value_name = "NAME", requires = "listen")]
+    name: Vec<String>,
+    /// Open the page in the browser.
+    #[arg(long)]
+    open: bool,
+}
+
+fn scene(text: &str) -> Result<String, <farnear_scene::Scene as std::str::FromStr>::Err> {
+    text.parse::<farnear_scene::Scene>().map(|_| text.to_owned())
+}
+
+/// Runs the command, until Ctrl-C.
+pub fn run(arguments: Arguments) -> Result<()> {
+    let rig = match arguments.rig.as_deref() {
+        // People watch it, so it keeps their time.
+        Some("sim") => {
+            Some(RigAddress::Emulated(Scenery { scene: arguments.scene, paced: true, ..Scenery::default() }))
+        }
+        _ if arguments.scene.is_some() => bail!(Usage("--scene goes with --rig sim only".into())),
+        Some(port) => Some(RigAddress::Port(port.into())),
+        None => None,
+    };
+    let listen = match (arguments.listen, arguments.token_file) {
+        (Some(address), Some(file)) => {
+            Listen::Network { address, token: Token::read(&file)?, names: arguments.name }
+        }
+        _ => Listen::Loopback { port: arguments.port },
+    };
+    let settings = ServeSettings {
+        rig,
+        camera: CameraSettings {
+            address: arguments.camera.parse()?,
+            exposure: Micros(5_000),
+            image_wait: Duration::from_secs(30),
+        },
+        session: arguments.session,
+        optics: arguments.optics,
+        listen,
+    };
+    let context = terminal::context()?;
+    serve(settings, &context, |address| {
+        println!("{address}");
+        eprintln!("the page is at {address}; Ctrl-C ends it and stops what moves");
+        if arguments.open
+            && let Err(error) = open(address)
+        {
+            eprintln!("warning: {error:#}");
+        }
+    })?;
+    Ok(())
+}
+
+/// Opens the page by what the desktop has for that.
+fn open(address: &str) -> Result<()> {
+    let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    std::process::Command::new(program)
+        .arg(address)
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .map(drop)
+        .with_context(|| format!("cannot open a browser by {program}; open {address} yourself"))
+}

@@ -1,0 +1,64 @@
+// Capturing: a pair, a series, a still, a stack; and depth at once where that is wished.
+import { act, drives, ended, on, store } from "./link.js";
+import { h, button, choice, field, panel } from "./ui.js";
+import { key } from "./keys.js";
+
+let warnings = null;
+let go = () => {};
+
+/** Told by the page: opens the depth of a capture. */
+export function whenCaptured(open) {
+  go = open;
+}
+
+/** What makes the image that is seen now unfit for depth. */
+export function warn(found) {
+  if (warnings) {
+    warnings.replaceChildren(...found.map((text) => h("li", {}, text)));
+    warnings.hidden = !found.length;
+  }
+}
+
+/** The panel. */
+export function make() {
+  const depth = h("input", { type: "checkbox", checked: true });
+  const amount = h("input", { type: "number", value: 10, min: 1, max: 500, "aria-label": "Pairs of the series" });
+  const axis = choice([["fine", "Piezo"], ["coarse", "Coarse"], ["lens", "Lens"]], "fine", () => {}, { "aria-label": "Axis of the stack" });
+  const [from, to, steps] = [["From", 20], ["To", 180], ["Images", 17]].map(([text, value]) => field(text, h("input", { type: "number", value, step: "any" }), text === "Images" ? "" : "µm"));
+  const value = (place) => Number(place.querySelector("input").value);
+  warnings = h("ul", { class: "warnings", hidden: true, "aria-label": "Before you capture" });
+  const pair = button("Capture pair", () => take({ kind: "pair" }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
+  const all = [
+    pair,
+    button("Series", () => take({ kind: "series", pairs: Math.round(Number(amount.value)) }, false), { "data-capture": "" }),
+    button("Still", () => take({ kind: "still" }, false), { "data-capture": "", title: "One image where the sensor stands" }),
+    button("Stack", () => take({ kind: "stack", axis: axis.value, from_um: value(from), to_um: value(to), steps: value(steps) }, false), { "data-capture": "" }),
+  ];
+  on("state", (state) => {
+    const able = drives() && state.rig.phase === "ready" && state.job?.phase !== "running";
+    for (const control of all) control.disabled = !able;
+  });
+  key("c", "Capture a pair", () => !pair.disabled && pair.click());
+  return panel("Capture", warnings, h("div", { class: "capture" }, pair, h("label", { class: "check" }, depth, "compute depth")),
+    h("details", {}, h("summary", {}, "Series, still, stack"),
+      h("div", { class: "row" }, all[1], amount, h("span", { class: "unit" }, "pairs")),
+      h("div", { class: "row" }, all[2], h("span", { class: "dim" }, "at the present focus")),
+      h("div", { class: "row" }, all[3], axis), h("div", { class: "three" }, from, to, steps)));
+}
+
+async function take(wish, depth) {
+  const begun = await act("/api/captures", wish);
+  if (!begun) return;
+  const job = await ended("job", begun.job);
+  if (job.phase !== "done" || !depth) return;
+  const [name] = begun.names;
+  const computing = await act(`/api/captures/${name}/depth`, {});
+  if (!computing) return;
+  const computed = await ended("computation", computing.job);
+  if (computed.phase === "done") go(name);
+}
+
+/** Whether a job is under way. */
+export function busy() {
+  return store.state?.job?.phase === "running";
+}

@@ -1,0 +1,217 @@
+// Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two of them beside a wipe.
+import { act, bytes, ended, get, on, store } from "./link.js";
+import { h, button, choice, field, number, panel, notice } from "./ui.js";
+import { Viewer } from "./viewer.js";
+import { bars } from "./plot.js";
+import { NAMES, bar, paint, range } from "./maps.js";
+import { parse } from "./npy.js";
+import * as measure from "./measure.js";
+
+const LAYERS = [["depth", "Depth"], ["confidence", "Confidence"], ["deviation", "Deviation"], ["far", "Far image"], ["near", "Near image"], ["surface", "3-D"]];
+const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "uncertainty.npy", far: "far.png", near: "near.png" };
+const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "" };
+const METHODS = [["ro", "Rational operators"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
+
+/** Makes the view. `open(name)` shows a capture. */
+export function make(host, remember) {
+  const viewer = new Viewer("Depth map");
+  const surface = h("div", { class: "surface", hidden: true });
+  const side = measure.make();
+  const show = { name: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, capture: null };
+  const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
+  const layers = h("div", { class: "group", role: "group", "aria-label": "What is shown" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
+  const tools = h("div", { class: "group", role: "group", "aria-label": "Tool" }, [["pan", "Probe"], ["line", "Profile"], ["region", "Region"]].map(([name, text]) => button(text, () => use(name), { "data-tool": name })));
+  const legend = h("canvas", { class: "legend-bar", role: "img" });
+  const [low, high] = [h("span", {}), h("span", {})];
+  const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "distribution of the values" });
+  const empty = h("p", { class: "empty" }, "No depth yet. Capture a pair in Live, or compute one here.");
+  const other = h("select", { "aria-label": "Compare with", onchange: (event) => { show.other = event.target.value; refresh(); } });
+  const wipe = h("input", { type: "range", min: 0, max: 100, value: 50, "aria-label": "Wipe", oninput: () => { viewer.wipe = wipe.value / 100; viewer.draw(); } });
+  const against = h("div", {});
+  const settings = compute(() => show.name, () => open(show.name, true));
+
+  host.append(h("div", { class: "split" },
+    h("div", { class: "stage" },
+      h("div", { class: "toolbar" }, captures, layers, tools),
+      h("div", { class: "viewers" }, viewer.element, surface, empty),
+      h("div", { class: "legend" }, low, legend, high, choice(NAMES, "viridis", (name) => { show.colours = name; refresh(); }, { "aria-label": "Colours" }))),
+    h("div", { class: "side" }, side.elements, panel("Distribution", histogram),
+      panel("Compare", field("With", other), field("Wipe", wipe), against), settings,
+      panel("Files", links(() => show.name)))));
+
+  viewer.onprobe = (at) => side.under(show.maps, at);
+  viewer.onshape = (kind, from, to) => show.name && show.capture?.has_depth && side.shape(show.name, kind, from, to);
+
+  const use = (tool) => {
+    viewer.use(tool);
+    for (const control of tools.children) control.setAttribute("aria-pressed", control.dataset.tool === tool);
+  };
+  use("pan");
+
+  let turning = null;
+  const pick = (layer) => {
+    show.layer = layer;
+    refresh();
+  };
+
+  async function list() {
+    const found = (await get("/api/captures")).captures.filter((capture) => capture.kind === "pair");
+    captures.replaceChildren(...found.map((capture) => h("option", { value: capture.name, selected: capture.name === show.name }, capture.name + (capture.has_depth ? "" : " (no depth)"))));
+    const present = show.other;
+    const option = (value, text) => h("option", { value, selected: value === present }, text);
+    const own = found.find((capture) => capture.name === show.name);
+    other.replaceChildren(option("", "nothing"),
+      ...LAYERS.slice(0, 5).map(([name, text]) => option(`layer:${name}`, text)),
+      ...(own?.variants ?? []).map((name) => option(`variant:${name}`, `this, by ${name}`)),
+      ...found.filter((capture) => capture.has_depth && capture.name !== show.name).flatMap((capture) => [option(`depth:${capture.name}`, `depth of ${capture.name}`), option(`difference:${capture.name}`, `difference to ${capture.name}`)]));
+    if (!show.name && found.length) open(found.at(-1).name);
+    return found;
+  }
+
+  async function open(name, again = false) {
+    if (!name || (name === show.name && !again)) return;
+    const loading = ++show.loading;
+    show.name = name;
+    remember(name);
+    try {
+      const { capture } = await get(`/api/captures/${name}`);
+      const names = Object.keys(FILES).filter((layer) => capture.files.includes(FILES[layer]));
+      const loaded = await Promise.all(names.map((layer) => load(`/api/captures/${name}/files/${FILES[layer]}`)));
+      if (loading !== show.loading) return;
+      show.capture = capture;
+      show.maps = Object.fromEntries(names.map((layer, at) => [layer, loaded[at]]));
+      show.mesh = null;
+      viewer.shape = null;
+      if (!show.maps[show.layer] && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
+      await list();
+      await refresh();
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  }
+
+  async function refresh() {
+    const { layer, maps } = show;
+    empty.hidden = Boolean(maps.far || maps.depth);
+    for (const control of layers.children) {
+      control.setAttribute("aria-pressed", control.dataset.layer === layer);
+      control.disabled = control.dataset.layer === "surface" ? !maps.depth : !maps[control.dataset.layer];
+    }
+    const solid = layer === "surface" && maps.depth;
+    surface.hidden = !solid;
+    viewer.element.hidden = Boolean(solid);
+    if (solid) return turn();
+    turning?.();
+    turning = null;
+    const map = maps[layer];
+    if (!map) return;
+    const ends = limits(layer, map);
+    const picture = paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
+    viewer.wipe = wipe.value / 100;
+    viewer.show(picture, await beside(ends));
+    viewer.canvas.dataset.layer = layer;
+    bar(legend, colours(layer), ends, UNITS[layer]);
+    const decimals = layer === "confidence" ? 1 : 2;
+    low.textContent = number(ends[0], decimals, UNITS[layer]);
+    high.textContent = number(ends[1], decimals, UNITS[layer]);
+    bars(histogram, counts(map, ends));
+  }
+
+  const colours = (layer) => (layer === "far" || layer === "near" ? "grey" : show.colours);
+  const limits = (layer, map) => (layer === "confidence" ? [0, 1] : layer === "far" || layer === "near" ? [0, 255] : layer === "deviation" ? [0, range(map, 0.03)[1]] : range(map));
+
+  /** What is right of the wipe. */
+  async function beside(ends) {
+    against.replaceChildren();
+    const [kind, name] = show.other.split(":");
+    if (!name) return null;
+    if (kind === "layer") {
+      const map = show.maps[name];
+      return map ? paint(map, limits(name, map), colours(name)) : null;
+    }
+    if (kind === "variant") return paint(await load(`/api/captures/${show.name}/variants/${name}/depth.npy`), ends, show.colours);
+    if (kind === "depth") return paint(await load(`/api/captures/${name}/files/depth.npy`), ends, show.colours);
+    try {
+      const path = `/api/captures/${show.name}/difference/${name}`;
+      const { figures } = await get(path);
+      const map = await load(`${path}/map.npy`);
+      const most = Math.max(...range(map, 0.02).map(Math.abs));
+      against.replaceChildren(h("p", { class: "dim" }, `mean ${number(figures.mean_mm, 3)}, SD ${number(figures.standard_deviation_mm, 3)}, RMS ${number(figures.rms_mm, 3)} mm; blue to red = ∓${number(most, 1)} mm`));
+      return paint(map, [-most, most], "difference");
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+      return null;
+    }
+  }
+
+  async function turn() {
+    const { show: begin, sorry } = await import("./mesh.js");
+    try {
+      show.mesh ??= await bytes(`/api/captures/${show.name}/mesh.ply`);
+      if (show.layer !== "surface" || !show.mesh) return;
+      turning?.();
+      turning = begin(surface, show.mesh);
+    } catch (error) {
+      sorry(surface, error);
+    }
+  }
+
+  let seen = -1;
+  on("state", (state) => {
+    if (state.captures === seen || host.hidden) return;
+    seen = state.captures;
+    list().catch(() => {});
+  });
+  return {
+    open,
+    shown: (name) => {
+      seen = store.state?.captures ?? -1;
+      list().then(() => name && open(name)).catch(() => {});
+      viewer.draw();
+    },
+  };
+}
+
+/** A map or an image as numbers. */
+async function load(path) {
+  const buffer = await bytes(path);
+  if (!buffer) throw new Error(`${path.split("/").at(-1)} is not there any more`);
+  if (path.endsWith(".npy")) return parse(buffer);
+  const picture = await createImageBitmap(new Blob([buffer]));
+  const canvas = h("canvas", { width: picture.width, height: picture.height });
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  context.drawImage(picture, 0, 0);
+  const { data } = context.getImageData(0, 0, picture.width, picture.height);
+  return { width: picture.width, height: picture.height, data: Float32Array.from({ length: data.length / 4 }, (_, at) => data[4 * at]) };
+}
+
+function counts({ data }, [low, high]) {
+  const bins = new Array(96).fill(0);
+  const scale = bins.length / (high - low || 1);
+  for (const value of data) if (value >= low && value <= high) bins[Math.min(bins.length - 1, Math.floor((value - low) * scale))]++;
+  return bins;
+}
+
+/** The panel that computes depth anew, beside the capture's own map or in its place. */
+function compute(name, done) {
+  const method = choice(METHODS, "ro", () => {});
+  const smooth = h("input", { type: "number", value: 7, min: 1, max: 63, step: 2 });
+  const median = choice([["1", "none"], ["3", "3 × 3"], ["5", "5 × 5"], ["7", "7 × 7"]], "3", () => {});
+  const filled = h("input", { type: "checkbox" });
+  const keep = h("input", { type: "checkbox" });
+  const start = async () => {
+    if (!name()) return;
+    const wish = { method: method.value, smooth_px: Number(smooth.value), median_px: Number(median.value), fill: filled.checked };
+    if (keep.checked) wish.variant = `${method.value}-${smooth.value}-${median.value}${filled.checked ? "-filled" : ""}`;
+    const begun = await act(`/api/captures/${name()}/depth`, wish);
+    if (begun && (await ended("computation", begun.job)).phase === "done") done();
+  };
+  return panel("Compute", field("Method", method), field("Smoothing", smooth, "px"), field("Median", median),
+    h("label", { class: "check" }, filled, "fill low texture"), h("label", { class: "check" }, keep, "keep beside, to compare"),
+    button("Compute depth", start));
+}
+
+function links(name) {
+  const go = (path) => () => name() && window.open(`/api/captures/${name()}/${path}`, "_blank", "noopener");
+  return h("div", { class: "buttons" }, button("Report", go("report.html")), button("ZIP", go("zip")));
+}

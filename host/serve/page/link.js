@@ -1,0 +1,114 @@
+// The way to the rig's program: one socket that tells, and requests that ask. Everything the page does goes through here.
+import { notice } from "./ui.js";
+
+/** What is known: the state as it was told last, and the own seat. */
+export const store = { state: null, seat: null, connected: false };
+
+const listeners = new Map();
+let socket = null;
+let wait = 250;
+
+/** Listens to `state`, `image`, `depth` or `link`; gives what ends it. */
+export function on(event, listener) {
+  if (!listeners.has(event)) listeners.set(event, new Set());
+  listeners.get(event).add(listener);
+  return () => listeners.get(event).delete(listener);
+}
+
+function emit(event, ...values) {
+  for (const listener of listeners.get(event) ?? []) listener(...values);
+}
+
+/** Whether this browser drives. */
+export function drives() {
+  return store.connected && store.state?.seats.driver === store.seat?.seat;
+}
+
+/** Opens the socket, and opens it again whenever it breaks. */
+export function open() {
+  socket = new WebSocket(`ws://${location.host}/api/socket`);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({ data }) => (typeof data === "string" ? told(JSON.parse(data)) : pictured(data));
+  socket.onclose = () => {
+    store.connected = false;
+    store.seat = null;
+    emit("link");
+    setTimeout(open, wait);
+    wait = Math.min(2 * wait, 4000);
+  };
+}
+
+function told(message) {
+  if (message.type === "hello") {
+    store.seat = message.hello;
+    store.connected = true;
+    wait = 250;
+    emit("link");
+  } else if (message.type === "state") {
+    const before = store.state;
+    store.state = message.state;
+    emit("state", store.state, before);
+  } else if (message.type === "error") notice(message.error, "error");
+}
+
+function pictured(data) {
+  if (data.byteLength < 4) return;
+  const length = new DataView(data).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+  emit(header.type, header, data.slice(4 + length));
+}
+
+/** Asks for something; throws what went wrong, with `hint`. */
+export async function call(method, path, body) {
+  const headers = { "x-farnear-seat": store.seat?.secret ?? "" };
+  if (body !== undefined) headers["content-type"] = "application/json";
+  let answer;
+  try {
+    answer = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+  } catch {
+    throw new Error("farnear does not answer; does it still run?");
+  }
+  const given = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint, status: answer.status });
+  return given;
+}
+
+export const get = (path) => call("GET", path);
+export const put = (path, body) => call("PUT", path, body);
+
+/** Does something and tells what went wrong; gives the answer, or null. */
+export async function act(path, body = {}, method = "POST") {
+  try {
+    return await call(method, path, body);
+  } catch (error) {
+    notice(error.message, "error", error.hint);
+    return null;
+  }
+}
+
+/** Stops the rig by the shortest way. */
+export function stop() {
+  if (socket?.readyState === WebSocket.OPEN) socket.send('{"type":"stop"}');
+  else act("/api/stop");
+}
+
+/** Bytes of a file; null where there is none. */
+export async function bytes(path) {
+  const answer = await fetch(path);
+  return answer.ok ? answer.arrayBuffer() : null;
+}
+
+/** Waits for the end of a job. `lane` is `job` (on the rig) or `computation`. */
+export function ended(lane, id) {
+  return new Promise((done) => {
+    const look = (state) => {
+      const job = state?.[lane];
+      if (job && (job.id > id || (job.id === id && job.phase !== "running"))) {
+        off();
+        done(job);
+      }
+    };
+    const off = on("state", look);
+    look(store.state);
+  });
+}

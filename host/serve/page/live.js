@@ -1,0 +1,122 @@
+// The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
+import { act, drives, on, store } from "./link.js";
+import { h, button, choice, field, number, panel, rows } from "./ui.js";
+import { Viewer } from "./viewer.js";
+import { Plot, bars } from "./plot.js";
+import { paint } from "./maps.js";
+import { key } from "./keys.js";
+import * as capture from "./capture.js";
+
+const MEASURES = [["modified-laplacian", "Modified Laplacian"], ["tenengrad", "Tenengrad"], ["fft-sum", "FFT sum (Li 2014)"]];
+const REMEMBERED = 300;
+/** Difference of neighbours, of 255, from which an edge counts as sharp. */
+const SHARP = 26;
+
+/** Makes the view; gives what is called when it is shown. */
+export function make(host) {
+  const image = new Viewer("Live image");
+  const depth = new Viewer("Live depth");
+  const [saturation, peaking] = [check("Saturation", true), check("Focus peaking", false)];
+  const focus = h("output", { class: "big" }, "–");
+  const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "histogram of brightness" });
+  const figures = h("div", {});
+  const warnings = h("ul", { class: "warnings", "aria-live": "polite" });
+  const status = h("p", { class: "status" });
+  const place = h("div", {});
+  const plot = new Plot(place, { label: "focus value over the last frames", height: 110, names: ["focus"] });
+  const values = [];
+  let best = 0;
+  const off = button("Live image", () => mode("image"), { "aria-pressed": "false", title: "L" });
+  const deep = button("Live depth", () => mode("depth"), { "aria-pressed": "false", title: "Pair after pair by the piezo" });
+  const exposure = h("input", { type: "number", min: 1, max: 1000000, step: 100, inputmode: "numeric" });
+  exposure.addEventListener("change", () => act("/api/live", { exposure_us: Math.round(Number(exposure.value)) }));
+  const measure = choice(MEASURES, MEASURES[0][0], (name) => { values.length = 0; best = 0; act("/api/live", { measure: name }); });
+  const forget = button("Reset", () => { values.length = 0; best = 0; }, { title: "Forgets the largest value" });
+
+  host.append(h("div", { class: "split" },
+    h("div", { class: "stage" },
+      h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), saturation.label, peaking.label,
+        h("span", { class: "grow" }), status),
+      h("div", { class: "viewers" }, image.element, depth.element)),
+    h("div", { class: "side" },
+      capture.make(),
+      panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
+      panel("Exposure", field("Exposure", exposure, "µs"), histogram, figures, warnings))));
+  depth.element.hidden = true;
+  key("l", "Live image on or off", () => mode("image"));
+
+  const mode = (wanted) => act("/api/live", { mode: store.state?.live.mode === wanted ? "off" : wanted });
+
+  on("state", (state) => {
+    const { live, rig } = state;
+    off.setAttribute("aria-pressed", live.mode === "image");
+    deep.setAttribute("aria-pressed", live.mode === "depth");
+    for (const control of [off, deep, exposure, measure]) control.disabled = !drives() || rig.phase !== "ready";
+    if (document.activeElement !== exposure) exposure.value = live.exposure_us;
+    measure.value = live.measure;
+    depth.element.hidden = live.mode !== "depth";
+    const moving = state.job?.phase === "running";
+    if (rig.phase !== "ready") status.textContent = "";
+    else if (live.error) status.textContent = live.error;
+    else if (live.mode === "off") status.textContent = "live is off";
+    else if (moving) status.textContent = "held while the rig works";
+  });
+
+  on("image", (header, pixels) => {
+    if (host.hidden) return;
+    const found = header.figures;
+    image.show(shade(new Uint8Array(pixels), found.width, found.height, saturation.box.checked, peaking.box.checked));
+    status.textContent = `${number(header.rate_hz, 1)} frames/s`;
+    values.push(found.focus ?? null);
+    if (values.length > REMEMBERED) values.shift();
+    best = Math.max(best, found.focus ?? 0);
+    focus.replaceChildren(found.focus == null ? "–" : `${found.focus.toPrecision(4)}`, h("small", {}, best ? ` ${number((100 * (found.focus ?? 0)) / best, 0)} % of the largest` : ""));
+    plot.set([values.map((_, at) => at - values.length + 1), values]);
+    bars(histogram, found.histogram, (at) => at === 255);
+    figures.replaceChildren(rows([["mean", `${number(100 * found.mean, 1)} %`], ["saturated", `${number(100 * found.saturated_fraction, 2)} %`], ["contrast", number(found.contrast, 3)]]));
+    warnings.replaceChildren(...found.warnings.map((text) => h("li", {}, text)));
+    capture.warn(found.warnings);
+  });
+
+  on("depth", (header, pixels) => {
+    if (host.hidden) return;
+    const { width, height, low_mm, high_mm } = header;
+    const count = width * height;
+    const codes = new Uint16Array(pixels.slice(0, 2 * count));
+    const confidence = new Uint8Array(pixels, 2 * count, count);
+    const data = new Float32Array(count);
+    const fade = new Float32Array(count);
+    for (let at = 0; at < count; at++) {
+      data[at] = codes[at] ? codes[at] : NaN;
+      fade[at] = confidence[at] / 255;
+    }
+    depth.show(paint({ width, height, data }, [1, 65535], "viridis", fade));
+    image.show(shade(new Uint8Array(pixels, 3 * count, count), width, height, false, false));
+    status.textContent = `${number(header.rate_hz, 1)} maps/s · ${number(header.latency_ms, 0)} ms from image to map · ${number(low_mm, 0)} to ${number(high_mm, 0)} mm`;
+  });
+  return { shown: () => { image.draw(); plot.size(); } };
+}
+
+function check(text, checked) {
+  const box = h("input", { type: "checkbox", checked });
+  return { box, label: h("label", { class: "check" }, box, text) };
+}
+
+/** Grey pixels as a picture; what is saturated red, sharp edges orange. */
+function shade(pixels, width, height, saturation, peaking) {
+  const image = new ImageData(width, height);
+  const words = new Uint32Array(image.data.buffer);
+  for (let at = 0; at < pixels.length; at++) {
+    const grey = pixels[at];
+    words[at] = saturation && grey === 255 ? 0xff3030e8 : 0xff000000 | (grey << 16) | (grey << 8) | grey;
+  }
+  if (peaking) {
+    for (let row = 1; row < height; row++) {
+      for (let at = row * width + 1; at < (row + 1) * width; at++) {
+        const edge = Math.abs(pixels[at] - pixels[at - 1]) + Math.abs(pixels[at] - pixels[at - width]);
+        if (edge > SHARP) words[at] = 0xff20a5ff;
+      }
+    }
+  }
+  return image;
+}

@@ -1,0 +1,170 @@
+// The page: views, the way to the rig, who drives, alarms, the job under way.
+import { act, drives, on, open, stop, store } from "./link.js";
+import { h, ask, button, notice } from "./ui.js";
+import { help, key, listen } from "./keys.js";
+import * as rig from "./rig.js";
+import * as live from "./live.js";
+import * as depth from "./depth.js";
+import * as lens from "./lens.js";
+import * as sessions from "./sessions.js";
+import * as quality from "./quality.js";
+import * as log from "./log.js";
+import { whenCaptured } from "./capture.js";
+
+const $ = (id) => document.getElementById(id);
+const views = new Map();
+let current = null;
+
+function theme(next) {
+  const wanted = next ?? localStorage.getItem("farnear-theme") ?? "";
+  if (wanted) document.documentElement.dataset.theme = wanted;
+  else delete document.documentElement.dataset.theme;
+}
+
+function turnTheme() {
+  const dark = document.documentElement.dataset.theme ? document.documentElement.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  const next = dark ? "light" : "dark";
+  localStorage.setItem("farnear-theme", next);
+  theme(next);
+  dispatchEvent(new Event("restyle"));
+}
+
+function addView(name, title, make) {
+  const host = h("section", { class: "view", id: `view-${name}`, role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: true });
+  const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `view-${name}`, "aria-selected": "false", onclick: () => go(name) }, title);
+  $("view").append(host);
+  $("tabs").append(tab);
+  views.set(name, { host, tab, parts: make(host) });
+  const number = views.size;
+  key(String(number), title, () => go(name));
+}
+
+/** Shows a view; the address remembers it, with the capture that is open. */
+function go(name, detail) {
+  const view = views.get(name) ?? views.get("live");
+  for (const [other, { host, tab }] of views) {
+    host.hidden = views.get(other) !== view;
+    tab.setAttribute("aria-selected", !host.hidden);
+    tab.tabIndex = host.hidden ? -1 : 0;
+    if (!host.hidden) current = other;
+  }
+  history.replaceState(null, "", `#${current}${detail ? `/${detail}` : ""}`);
+  view.parts?.shown?.(detail);
+}
+
+function tabKeys(event) {
+  const names = [...views.keys()];
+  const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+  if (!step) return;
+  event.preventDefault();
+  go(names[(names.indexOf(current) + step + names.length) % names.length]);
+  views.get(current).tab.focus();
+}
+
+function showLink() {
+  const link = $("link");
+  const phase = !store.connected ? "lost" : store.state?.rig.phase ?? "connecting";
+  link.dataset.phase = phase;
+  const words = { ready: "connected", connecting: "connecting", lost: store.connected ? "rig lost" : "no connection", absent: "no rig" };
+  link.textContent = words[phase];
+}
+
+function showSeats(state) {
+  const who = $("who");
+  const { driver, asking, count } = state.seats;
+  const watchers = count > 1 ? ` · ${count} browsers` : "";
+  if (drives()) who.replaceChildren(`you drive${watchers}`);
+  else if (!store.seat) who.replaceChildren("");
+  else {
+    const waits = asking === store.seat.seat;
+    who.replaceChildren(h("span", {}, driver ? "another browser drives" : "nobody drives"),
+      button(waits ? "asked …" : "Ask for controls", () => act("/api/seat/ask"), { disabled: waits, class: "quiet" }));
+  }
+}
+
+let asked = null;
+async function handOver(state) {
+  const { asking } = state.seats;
+  if (!drives() || asking == null || asking === asked) {
+    if (asking == null) asked = null;
+    return;
+  }
+  asked = asking;
+  const given = await ask("Another browser asks for the controls.", { yes: "Give", no: "Keep" });
+  act("/api/seat/answer", { give: given !== null });
+}
+
+function showAlarm({ rig: { info } }) {
+  const alarm = $("alarm");
+  const words = info?.alarm ? [h("strong", {}, `Alarm ${info.alarm}`), h("span", {}, info.alarm_text), button("Clear", () => act("/api/rig/alarms/clear", { number: info.alarm }), { disabled: !drives() })]
+    : info?.emergency_stop ? [h("strong", {}, "Emergency stop is pressed"), h("span", {}, "Release it to go on.")] : null;
+  const text = words?.map((part) => part.textContent).join(" ") + drives();
+  if (alarm.dataset.text === text) return;
+  alarm.dataset.text = text;
+  alarm.hidden = !words;
+  alarm.replaceChildren(...(words ?? []));
+}
+
+function showJob(state, before) {
+  const place = $("job");
+  const running = [state.job, state.computation].filter((job) => job?.phase === "running");
+  place.hidden = !running.length;
+  const line = (job) => {
+    const part = job.progress?.total ? job.progress.done / job.progress.total : null;
+    const bar = h("progress", part == null ? {} : { value: part, max: 1 });
+    bar.setAttribute("aria-label", job.title);
+    const cancel = job === state.computation ? button("Cancel", () => act("/api/cancel")) : button("Stop", stop, { class: "stop small" });
+    return h("div", { class: "job-line" }, h("strong", {}, job.title), h("span", { class: "said" }, job.said ?? ""), bar, cancel);
+  };
+  place.replaceChildren(...running.map(line));
+  for (const lane of ["job", "computation"]) ended(state[lane], before?.[lane]);
+}
+
+function ended(job, before) {
+  if (!job || job.phase === "running" || !before || before.id !== job.id || before.phase === job.phase) return;
+  if (job.phase === "failed") notice(`${job.title}: ${job.error}`, "error", job.hint);
+  else if (job.phase === "stopped") notice(`${job.title}: stopped`);
+  else for (const warning of job.warnings) notice(warning, "warning");
+}
+
+let question = null;
+async function showQuestion(state) {
+  if (state.question === question) return;
+  question = state.question;
+  if (!question || !drives()) return;
+  const answer = await ask(question, { text: true, yes: "Answer", no: "Give up" });
+  if (answer === null) stop();
+  else act("/api/answer", { text: answer });
+}
+
+function begin() {
+  theme();
+  rig.mount($("rig"));
+  addView("live", "Live", live.make);
+  addView("depth", "Depth", (host) => depth.make(host, (name) => current === "depth" && history.replaceState(null, "", `#depth/${name}`)));
+  addView("optics", "Optics", lens.make);
+  addView("captures", "Captures", (host) => sessions.make(host, (name) => go("depth", name)));
+  addView("quality", "Quality", quality.make);
+  addView("log", "Log", log.make);
+  $("tabs").addEventListener("keydown", tabKeys);
+  $("stop").addEventListener("click", stop);
+  $("theme").addEventListener("click", turnTheme);
+  key("t", "Light or dark", turnTheme);
+  whenCaptured((name) => { go("depth", name); views.get("depth").parts.open(name, true); });
+  on("link", () => { showLink(); if (store.state) showSeats(store.state); });
+  on("state", (state, before) => {
+    showLink();
+    showSeats(state);
+    showAlarm(state);
+    showJob(state, before);
+    handOver(state);
+    showQuestion(state);
+  });
+  listen();
+  open();
+  const [name, detail] = location.hash.slice(1).split("/");
+  go(name || "live", detail);
+}
+
+begin();
+export { help };

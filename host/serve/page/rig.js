@@ -1,0 +1,100 @@
+// The rig: how it is, and moving it. Always in reach.
+import { act, call, drives, get, on, store } from "./link.js";
+import { h, button, choice, notice, number, rows } from "./ui.js";
+import { draw } from "./stages.js";
+import { key } from "./keys.js";
+
+const STEPS = [[0.1, "0.1"], [1, "1"], [10, "10"], [100, "100"], [1000, "1000"]];
+let range = null;
+
+/** Fills the panel on the left. */
+export function mount(host) {
+  const stages = h("div", { class: "stages" });
+  const phase = h("div", { class: "phase" });
+  const axes = h("div", { class: "axes" }, axis("coarse", "Coarse", 100), axis("fine", "Piezo", 1), axis("lens", "Lens", 100));
+  const whole = h("div", { class: "buttons" },
+    button("Home", () => act("/api/rig/home", { axes: [] }), { title: "Homes all stages (H)", "data-needs": "drive" }),
+    button("Far focus", () => act("/api/rig/goto", { focus: "far" }), { title: "F", "data-needs": "drive" }),
+    button("Near focus", () => act("/api/rig/goto", { focus: "near" }), { title: "N", "data-needs": "drive" }),
+    button("Find focus", () => act("/api/rig/focus", {}), { title: "Searches for the sharpest image", "data-needs": "drive" }));
+  const more = h("details", {}, h("summary", {}, "More"), h("div", { class: "details" }));
+  host.append(h("h2", { class: "visually-hidden" }, "Rig"), phase, stages, whole, axes, more);
+
+  const show = (state) => {
+    const { rig } = state;
+    phase.replaceChildren(...phaseWords(rig));
+    if (rig.info) draw(stages, rig.info, range);
+    stages.hidden = !rig.info;
+    if (more.open) more.lastElementChild.replaceChildren(details(rig));
+    const able = drives() && rig.phase === "ready";
+    for (const control of host.querySelectorAll("[data-needs=drive]")) control.disabled = !able;
+  };
+  on("state", (state, before) => {
+    if (!before || state.optics !== before.optics) measure().then(() => store.state && show(store.state));
+    show(state);
+  });
+  more.addEventListener("toggle", () => store.state && show(store.state));
+  key("h", "Home all stages", () => act("/api/rig/home", { axes: [] }));
+  key("f", "Go to the far focus", () => act("/api/rig/goto", { focus: "far" }));
+  key("n", "Go to the near focus", () => act("/api/rig/goto", { focus: "near" }));
+  key("[", "Piezo one step towards the lens", () => step("fine", -1));
+  key("]", "Piezo one step away from the lens", () => step("fine", 1));
+}
+
+/** The working range of the optics in use. */
+async function measure() {
+  try {
+    const { optics } = await get("/api/optics");
+    range = (await call("POST", "/api/optics/calculate", { optics })).figures.range;
+  } catch (error) {
+    notice(error.message, "error", error.hint);
+  }
+}
+
+function phaseWords(rig) {
+  const again = button("Connect again", () => act("/api/rig/connect"), { "data-needs": "seat" });
+  if (rig.phase === "absent") return [h("p", { class: "dim" }, "No rig: captures only. Start farnear serve with --rig sim or a port to drive one.")];
+  if (rig.phase === "connecting") return [h("p", {}, `Connecting to ${rig.name} …`)];
+  if (rig.phase === "lost") return [h("p", { class: "bad" }, rig.error ?? "The rig does not answer."), again];
+  return [h("p", { class: "rig-name" }, rig.name, rig.emulated ? h("span", { class: "badge", title: "No hardware is involved" }, "emulated") : null)];
+}
+
+const chosen = { coarse: 100, fine: 1, lens: 100 };
+
+function axis(name, label, usual) {
+  chosen[name] = usual;
+  const input = h("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": `${label}: go to, in µm`, placeholder: "µm" });
+  const go = () => {
+    const to_um = Number(input.value);
+    if (input.value === "" || !Number.isFinite(to_um)) return notice("Type a position in µm.", "error");
+    return act("/api/rig/move", { targets: [{ axis: name, to_um }] });
+  };
+  input.addEventListener("keydown", (event) => { if (event.key === "Enter") go(); });
+  return h("div", { class: "axis" }, h("span", { class: "axis-name" }, label), input,
+    button("Go", go, { "data-needs": "drive", "aria-label": `${label}: go` }),
+    button("−", () => step(name, -1), { "data-needs": "drive", "aria-label": `${label}: a step towards the lens` }),
+    choice(STEPS, usual, (value) => { chosen[name] = Number(value); }, { "aria-label": `${label}: step in µm`, title: "Step in µm" }),
+    button("+", () => step(name, 1), { "data-needs": "drive", "aria-label": `${label}: a step away from the lens` }));
+}
+
+function step(name, sign) {
+  const info = store.state?.rig.info;
+  if (!info) return;
+  const to_um = Number((info[name].asked_um + sign * chosen[name]).toFixed(3));
+  act("/api/rig/move", { targets: [{ axis: name, to_um }] });
+}
+
+function details({ info }) {
+  if (!info) return h("p", {}, "–");
+  const yes = (value) => (value ? "yes" : "no");
+  return h("div", {}, rows([
+    ["board", `${info.board}, firmware ${info.firmware}`], ["protocol", info.protocol], ["boot", `${info.boot}, ${info.reset_cause}`],
+    ["datum", number(info.datum_mm, 3, "mm")], ["program", info.program],
+    ["home switch", yes(info.home_switch)], ["far switch", yes(info.far_switch)],
+    ["emergency stop", info.emergency_stop ? "pressed" : "released"], ["supply", info.supply_low ? "low" : "good"],
+    ["bad frames", info.link_bad_frames],
+  ]), h("div", { class: "buttons" },
+    button("Bring-up checklist", () => act("/api/rig/check"), { disabled: !drives() }),
+    button("Reset the board", () => act("/api/rig/reset"), { disabled: !drives() }),
+    button("Emergency stop", () => act("/api/halt"), { class: "danger" })));
+}

@@ -1,0 +1,68 @@
+// The captures of the session: what they show, what was noted, and what can be taken along.
+import { act, get, on, store } from "./link.js";
+import { h, button, notice, number } from "./ui.js";
+
+/** Makes the view. `open(name)` shows a capture's depth. */
+export function make(host, open) {
+  const search = h("input", { type: "search", placeholder: "Words of optics, scene, note …", "aria-label": "Search captures" });
+  const count = h("span", { class: "dim" });
+  const list = h("ul", { class: "captures" });
+  host.append(h("div", { class: "toolbar" }, search, count), list);
+  let waiting = 0;
+  search.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(refresh, 200); });
+
+  async function refresh() {
+    try {
+      const { captures } = await get(`/api/captures?search=${encodeURIComponent(search.value)}`);
+      count.textContent = captures.length === 1 ? "1 capture" : `${captures.length} captures`;
+      list.replaceChildren(...captures.reverse().map((capture) => card(capture, open)));
+      if (!captures.length) list.append(h("li", { class: "empty" }, search.value ? "Nothing holds all of these words." : "Nothing captured yet."));
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  }
+  let seen = -1;
+  on("state", (state) => {
+    if (state.captures === seen || host.hidden || host.contains(document.activeElement)) return;
+    seen = state.captures;
+    refresh();
+  });
+  return { shown: () => { seen = store.state?.captures ?? -1; refresh(); } };
+}
+
+function card(capture, open) {
+  const file = capture.has_depth ? "view.png" : capture.images[0];
+  const path = `/api/captures/${capture.name}`;
+  const focus = capture.optics?.focus;
+  const facts = [capture.kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time];
+  return h("li", { class: "capture-card" },
+    h("button", { type: "button", class: "thumbnail", onclick: () => open(capture.name), "aria-label": `Open ${capture.name}` },
+      capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/files/${file}`, alt: "", loading: "lazy" })),
+    h("div", { class: "capture-words" }, h("h3", {}, capture.name), h("p", { class: "dim" }, capture.broken ?? facts.filter(Boolean).join(" · ")),
+      stars(capture), note(capture)),
+    h("div", { class: "buttons" }, h("a", { class: "button", href: `${path}/report.html`, target: "_blank", rel: "noopener" }, "Report"),
+      h("a", { class: "button", href: `${path}/zip`, download: `${capture.name}.zip` }, "ZIP")));
+}
+
+function stars(capture) {
+  const row = h("div", { class: "stars", role: "group", "aria-label": `Rating of ${capture.name}` });
+  const fill = () => [...row.children].forEach((star, at) => star.setAttribute("aria-pressed", at < capture.note.rating));
+  for (let rating = 1; rating <= 5; rating++) {
+    row.append(button("★", () => {
+      capture.note.rating = capture.note.rating === rating ? 0 : rating;
+      fill();
+      save(capture);
+    }, { "aria-label": `${rating} of 5` }));
+  }
+  fill();
+  return row;
+}
+
+function note(capture) {
+  const text = h("textarea", { rows: 1, placeholder: "Note", "aria-label": `Note about ${capture.name}` });
+  text.value = capture.note.text;
+  text.addEventListener("change", () => { capture.note.text = text.value; save(capture); });
+  return text;
+}
+
+const save = (capture) => act(`/api/captures/${capture.name}/note`, capture.note, "PUT");

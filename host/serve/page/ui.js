@@ -1,0 +1,88 @@
+// Small helpers to build the page: elements, numbers with units, notices.
+
+/** An HTML element: attributes, `on…` listeners and children. */
+export function h(tag, attributes = {}, ...children) {
+  return fill(document.createElement(tag), attributes, children);
+}
+
+/** An SVG element. */
+export function s(tag, attributes = {}, ...children) {
+  return fill(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+}
+
+function fill(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name === "style") Object.assign(element.style, value);
+    else if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value != null) element.setAttribute(name, value);
+  }
+  element.append(...children.flat().filter((child) => child != null && child !== false));
+  return element;
+}
+
+/** A number with so many decimals, a proper minus, and its unit. */
+export function number(value, decimals = 0, unit = "") {
+  if (value == null || !Number.isFinite(value)) return "–";
+  const text = value.toFixed(decimals).replace("-", "−");
+  return unit ? `${text} ${unit}` : text;
+}
+
+/** A labelled control. */
+export function field(label, control, unit) {
+  const id = control.id || `field-${++fields}`;
+  control.id = id;
+  return h("div", { class: "field" }, h("label", { for: id }, label), control, unit ? h("span", { class: "unit" }, unit) : null);
+}
+let fields = 0;
+
+/** A choice of values with their words. */
+export function choice(values, chosen, onchange, attributes = {}) {
+  const options = values.map(([value, text]) => h("option", { value, selected: value === chosen }, text));
+  return h("select", { ...attributes, onchange: (event) => onchange(event.target.value) }, options);
+}
+
+/** A panel with a heading. */
+export function panel(title, ...children) {
+  return h("section", { class: "panel" }, h("h2", {}, title), ...children);
+}
+
+/** A button. */
+export function button(text, onclick, attributes = {}) {
+  return h("button", { type: "button", onclick, ...attributes }, text);
+}
+
+/** Rows of a name and a value. */
+export function rows(pairs) {
+  return h("dl", { class: "rows" }, pairs.filter(Boolean).map(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]).flat());
+}
+
+/** Tells something that goes away by itself; an error stays until it is closed. */
+export function notice(text, kind = "info", hint) {
+  const place = document.getElementById("notices");
+  const close = () => box.remove();
+  const box = h("div", { class: `notice ${kind}` }, h("p", {}, text), hint ? h("p", { class: "dim" }, hint) : null,
+    button("×", close, { "aria-label": "Close", class: "quiet" }));
+  for (const old of [...place.children].slice(0, -2)) old.remove();
+  place.append(box);
+  if (kind !== "error") setTimeout(close, 5000);
+}
+
+/** A value of a colour of the style sheet, as it is now. */
+export function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+}
+
+/** Asks for a text; null where the person gave up. */
+export function ask(question, { text = false, yes = "Continue", no = "Cancel" } = {}) {
+  return new Promise((done) => {
+    const input = h("input", { type: "text", "aria-label": "Answer", hidden: !text });
+    const dialog = h("dialog", { class: "dialog", "aria-label": "Question", oncancel: () => finish(null) },
+      h("p", {}, question), input,
+      h("div", { class: "actions" }, button(no, () => finish(null)), button(yes, () => finish(input.value), { class: "primary" })));
+    const finish = (answer) => { dialog.remove(); done(answer); };
+    input.addEventListener("keydown", (event) => { if (event.key === "Enter") finish(input.value); });
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}

@@ -1,0 +1,185 @@
+//! The table of routes, and the OpenAPI document that follows from it: a route that is not described cannot be added.
+
+use std::sync::Arc;
+
+use axum::{
+    Router,
+    handler::Handler,
+    routing::{MethodRouter, get, post, put},
+};
+use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
+use serde_json::{Map, Value, json};
+
+use crate::{app::App, failure::Failure};
+
+/// Where a request's answer lies in the document.
+const SCHEMAS: &str = "/components/schemas";
+/// The header that carries a seat's secret.
+pub const SEAT_HEADER: &str = "x-farnear-seat";
+
+/// Routes, and what the document says of them.
+pub struct Api {
+    router: Router<Arc<App>>,
+    paths: Map<String, Value>,
+    generator: SchemaGenerator,
+}
+
+/// Who may ask for a route.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum For {
+    /// Everybody who may talk to this program.
+    All,
+    /// The one that drives.
+    Driver,
+    /// Whoever has a seat.
+    Seated,
+}
+
+impl Default for Api {
+    fn default() -> Self {
+        let settings = SchemaSettings::draft2020_12().with(|settings| {
+            settings.definitions_path = SCHEMAS.into();
+            settings.meta_schema = None;
+        });
+        Self { router: Router::new(), paths: Map::new(), generator: settings.into_generator() }
+    }
+}
+
+impl Api {
+    /// A route that reads, and answers in JSON.
+    pub fn get<R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
+        mut self,
+        path: &str,
+        about: &str,
+        handler: H,
+    ) -> Self {
+        let responses = responses(self.json_of::<R>());
+        self.add(path, "get", get(handler), json!({ "summary": about, "responses": responses }))
+    }
+
+    /// A route that reads, and answers with something else: a file, a page, a socket.
+    pub fn get_bytes<H: Handler<T, Arc<App>>, T: 'static>(
+        self,
+        path: &str,
+        about: &str,
+        media: &str,
+        handler: H,
+    ) -> Self {
+        let responses = responses(json!({ media: {} }));
+        self.add(path, "get", get(handler), json!({ "summary": about, "responses": responses }))
+    }
+
+    /// A route that does something.
+    pub fn post<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
+        self,
+        path: &str,
+        who: For,
+        about: &str,
+        handler: H,
+    ) -> Self {
+        self.changing::<B, R>(path, "post", who, about, post(handler))
+    }
+
+    /// A route that replaces something.
+    pub fn put<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
+        self,
+        path: &str,
+        who: For,
+        about: &str,
+        handler: H,
+    ) -> Self {
+        self.changing::<B, R>(path, "put", who, about, put(handler))
+    }
+
+    fn changing<B: JsonSchema, R: JsonSchema>(
+        mut self,
+        path: &str,
+        method: &str,
+        who: For,
+        about: &str,
+        route: MethodRouter<Arc<App>>,
+    ) -> Self {
+        let (body, answer) = (self.json_of::<B>(), self.json_of::<R>());
+        let mut operation = json!({
+            "summary": about,
+            "requestBody": { "required": true, "content": body },
+            "responses": responses(answer),
+        });
+        if who != For::All {
+            operation["parameters"] = json!([{
+                "name": SEAT_HEADER,
+                "in": "header",
+                "required": true,
+                "description": match who {
+                    For::Driver => "Secret of the seat that drives.",
+                    _ => "Secret of a seat, from the first message on the socket.",
+                },
+                "schema": { "type": "string" },
+            }]);
+        }
+        self.add(path, method, route, operation)
+    }
+
+    /// A query parameter of the route that was added last under `path`.
+    pub fn query(mut self, path: &str, name: &str, about: &str) -> Self {
+        let parameter =
+            json!({ "name": name, "in": "query", "description": about, "schema": { "type": "string" } });
+        if let Some(operation) = self.paths.get_mut(path).and_then(|path| path.get_mut("get")) {
+            match operation.get_mut("parameters").and_then(Value::as_array_mut) {
+                Some(parameters) => parameters.push(parameter),
+                None => operation["parameters"] = json!([parameter]),
+            }
+        }
+        self
+    }
+
+    fn json_of<T: JsonSchema>(&mut self) -> Value {
+        json!({ "application/json": { "schema": self.generator.subschema_for::<T>() } })
+    }
+
+    fn add(mut self, path: &str, method: &str, route: MethodRouter<Arc<App>>, mut operation: Value) -> Self {
+        let name = path.trim_matches('/').replace(['/', '.', '-'], "_").replace(['{', '}'], "");
+        operation["operationId"] = json!(format!("{method}_{name}"));
+        let in_path = path.split('/').filter_map(|part| part.strip_prefix('{')?.strip_suffix('}'));
+        for name in in_path {
+            let parameter =
+                json!({ "name": name, "in": "path", "required": true, "schema": { "type": "string" } });
+            match operation.get_mut("parameters").and_then(Value::as_array_mut) {
+                Some(parameters) => parameters.push(parameter),
+                None => operation["parameters"] = json!([parameter]),
+            }
+        }
+        let entry = self.paths.entry(path).or_insert_with(|| json!({}));
+        entry[method] = operation;
+        self.router = self.router.route(path, route);
+        self
+    }
+
+    /// The routes, and the document.
+    pub fn finish(mut self) -> (Router<Arc<App>>, Value) {
+        let _ = self.generator.subschema_for::<Failure>();
+        let schemas = self.generator.take_definitions(true);
+        let document = json!({
+            "openapi": "3.1.0",
+            "info": {
+                "title": "farnear",
+                "version": env!("CARGO_PKG_VERSION"),
+                "description": "The interface of the farnear page. Lengths carry their unit in the name.",
+                "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" },
+            },
+            "servers": [{ "url": "/" }],
+            "paths": self.paths,
+            "components": { "schemas": schemas },
+        });
+        (self.router, document)
+    }
+}
+
+/// What a route answers, and how it fails.
+fn responses(answer: Value) -> Value {
+    let failed = json!({ "application/json": { "schema": { "$ref": "#/components/schemas/Failure" } } });
+    json!({
+        "200": { "description": "Done.", "content": answer },
+        "default": { "description": "Why not.", "content": failed },
+    })
+}

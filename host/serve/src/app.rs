@@ -1,0 +1,326 @@
+//! What all requests share: settings, rig, jobs, seats, log, and the state that every browser is told.
+
+use std::{
+    collections::VecDeque,
+    fs,
+    path::PathBuf,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use axum::body::Bytes;
+use farnear_depth::focus_measure::FocusMeasure;
+use farnear_files::staging::write_file;
+use farnear_protocol::Micros;
+use farnear_workflows::{
+    Cancel, WorkflowError,
+    optics::GivenOptics,
+    rig::{RigAddress, camera::CameraSettings, open::OpenRig},
+};
+use tokio::sync::watch;
+
+use crate::{
+    guard::Guard,
+    lane::{Lane, Task},
+    seats::Seats,
+    server::ServeSettings,
+    view::{LiveMode, LiveState, Phase, RigState, SeatsState, State},
+};
+
+/// Lines of the log that are kept.
+const LOG_MAX: usize = 1000;
+/// The 50 mm lens of Li 2014, for a session that has no optics yet.
+const USUAL_OPTICS: &str = include_str!("optics.toml");
+
+/// What all requests share.
+pub struct App {
+    /// Who may talk to this program.
+    pub guard: Guard,
+    /// The folder of captures.
+    pub session: PathBuf,
+    /// The rig's address, where there is one.
+    pub address: Option<RigAddress>,
+    /// The connection, while there is one.
+    rig: Mutex<Option<OpenRig>>,
+    camera: CameraSettings,
+    /// Jobs on the rig.
+    pub rig_lane: Lane,
+    /// Computations.
+    pub computing: Lane,
+    seats: Mutex<Seats>,
+    state: Mutex<State>,
+    told: watch::Sender<Arc<str>>,
+    /// The newest live picture, as it is sent.
+    pub pictures: watch::Sender<Bytes>,
+    live: Mutex<Live>,
+    log: Mutex<VecDeque<String>>,
+    /// The answer to a question, until the job has taken it.
+    pub answer: Mutex<Option<String>>,
+    ending: watch::Sender<bool>,
+    /// Whether the rig is to be connected to.
+    reconnect: AtomicBool,
+}
+
+/// What is to be seen live.
+#[derive(Clone, Debug)]
+pub struct Live {
+    /// What.
+    pub mode: LiveMode,
+    /// Length of an exposure.
+    pub exposure: Micros,
+    /// What the focus is measured by.
+    pub measure: FocusMeasure,
+    /// Ends what is seen now.
+    pub cancel: Cancel,
+}
+
+/// The value, also where a thread that held it has panicked: each change leaves it whole.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl App {
+    /// With nothing under way. Makes the session's folder and its optics where they are missing.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Folder`], [`WorkflowError::Staging`], and optics that are none.
+    pub fn new(settings: ServeSettings, guard: Guard) -> Result<Arc<Self>, WorkflowError> {
+        let ServeSettings { rig, camera, session, optics, .. } = settings;
+        fs::create_dir_all(&session)
+            .map_err(|source| WorkflowError::Folder { folder: session.clone(), source })?;
+        let own = session.join("optics.toml");
+        if let Some(given) = optics {
+            let given = GivenOptics::read(&given)?;
+            write_file(&own, toml::to_string(&given.table)?.as_bytes())?;
+        } else if !own.exists() {
+            write_file(&own, USUAL_OPTICS.as_bytes())?;
+        }
+        GivenOptics::read(&own)?;
+        let live = Live {
+            mode: LiveMode::Image,
+            exposure: camera.exposure,
+            measure: FocusMeasure::ModifiedLaplacian,
+            cancel: Cancel::default(),
+        };
+        let state = beginning(rig.as_ref(), &live);
+        Ok(Arc::new(Self {
+            guard,
+            session,
+            reconnect: AtomicBool::new(rig.is_some()),
+            address: rig,
+            rig: Mutex::default(),
+            camera,
+            rig_lane: Lane::default(),
+            computing: Lane::default(),
+            seats: Mutex::default(),
+            told: watch::Sender::new(Arc::from("")),
+            pictures: watch::Sender::new(Bytes::new()),
+            state: Mutex::new(state),
+            live: Mutex::new(live),
+            log: Mutex::default(),
+            answer: Mutex::default(),
+            ending: watch::Sender::new(false),
+        }))
+    }
+
+    /// The optics file of the session.
+    pub fn optics_file(&self) -> PathBuf {
+        self.session.join("optics.toml")
+    }
+
+    /// The camera, with the exposure that is set.
+    pub fn camera(&self) -> CameraSettings {
+        CameraSettings { exposure: self.live().exposure, ..self.camera.clone() }
+    }
+
+    /// The rig, where it is connected.
+    pub fn rig(&self) -> Option<OpenRig> {
+        lock(&self.rig).clone()
+    }
+
+    /// The rig is connected, or is not any more.
+    pub fn set_rig(&self, rig: Option<OpenRig>) {
+        *lock(&self.rig) = rig;
+    }
+
+    /// Asks for the rig to be connected to (again).
+    pub fn ask_to_connect(&self) {
+        self.reconnect.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether that was asked since the last look.
+    pub fn asked_to_connect(&self) -> bool {
+        self.reconnect.swap(false, Ordering::Relaxed)
+    }
+
+    /// What is to be seen live.
+    pub fn live(&self) -> Live {
+        lock(&self.live).clone()
+    }
+
+    /// Changes what is to be seen live; what is seen now ends.
+    pub fn set_live(&self, change: impl FnOnce(&mut Live)) {
+        let mut live = lock(&self.live);
+        change(&mut live);
+        live.cancel.cancel();
+        live.cancel = Cancel::default();
+        let Live { mode, exposure, measure, .. } = live.clone();
+        drop(live);
+        self.change(|state| state.live = LiveState { mode, exposure_us: exposure.0, measure, error: None });
+    }
+
+    /// Ends what is seen now, so that a job begins; it goes on after the job.
+    pub fn interrupt_live(&self) {
+        let mut live = lock(&self.live);
+        live.cancel.cancel();
+        live.cancel = Cancel::default();
+    }
+
+    /// Changes the state and tells it to every browser.
+    pub fn change(&self, change: impl FnOnce(&mut State)) {
+        let mut state = lock(&self.state);
+        let before = state.clone();
+        change(&mut state);
+        if *state != before {
+            self.tell(&state);
+        }
+    }
+
+    fn tell(&self, state: &State) {
+        // A state of plain values always has a JSON form.
+        if let Ok(text) = serde_json::to_string(state) {
+            self.told.send_replace(text.into());
+        }
+    }
+
+    /// The state as it is now.
+    pub fn state(&self) -> State {
+        lock(&self.state).clone()
+    }
+
+    /// Follows the state, as JSON. The first value is there at once.
+    pub fn follow(&self) -> watch::Receiver<Arc<str>> {
+        let state = lock(&self.state);
+        if self.told.borrow().is_empty() {
+            self.tell(&state);
+        }
+        let mut receiver = self.told.subscribe();
+        receiver.mark_changed();
+        receiver
+    }
+
+    /// Works with the seats, and tells what came of it.
+    pub fn with_seats<T>(&self, work: impl FnOnce(&mut Seats) -> T) -> T {
+        let mut seats = lock(&self.seats);
+        let given = work(&mut seats);
+        let (driver, asking, count) = (seats.driver(), seats.asking(), seats.count());
+        drop(seats);
+        self.change(|state| state.seats = SeatsState { driver, asking, count });
+        given
+    }
+
+    /// A line for the log.
+    pub fn note(&self, line: impl Into<String>) {
+        let mut log = lock(&self.log);
+        if log.len() == LOG_MAX {
+            log.pop_front();
+        }
+        log.push_back(line.into());
+        drop(log);
+        self.change(|state| state.log += 1);
+    }
+
+    /// The log, the oldest line first.
+    pub fn log(&self) -> Vec<String> {
+        lock(&self.log).iter().cloned().collect()
+    }
+
+    /// Ends jobs and live depth, and stops the rig; does not wait for any of them.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Client`] where the board does not answer: what the jobs hold is ended all the same.
+    pub fn stop(&self) -> Result<(), WorkflowError> {
+        self.rig_lane.cancel();
+        // Depth moves the piezo; an image does not.
+        self.set_live(|live| {
+            if live.mode == LiveMode::Depth {
+                live.mode = LiveMode::Off;
+            }
+        });
+        match self.rig() {
+            Some(rig) => rig.stop(),
+            None => Ok(()),
+        }
+    }
+
+    /// At the end of the program: nothing moves, nothing is computed.
+    pub fn stop_everything(&self) {
+        self.end();
+        self.computing.cancel();
+        self.set_live(|live| live.mode = LiveMode::Off);
+        let _ = self.stop(); // the board has its deadline
+    }
+
+    /// Everything that waits for the end may go.
+    pub fn end(&self) {
+        self.ending.send_replace(true);
+    }
+
+    /// Whether the program ends.
+    pub fn is_ending(&self) -> bool {
+        *self.ending.borrow()
+    }
+
+    /// Waits until the program ends.
+    pub async fn ended(&self) {
+        let mut ending = self.ending.subscribe();
+        let _ = ending.wait_for(|ending| *ending).await; // a sender that is gone has ended too
+    }
+
+    /// Begins a job on the rig.
+    ///
+    /// # Errors
+    /// What is under way, in words.
+    pub fn begin_on_rig(&self, task: Task) -> Result<u64, String> {
+        let begun = self.rig_lane.begin(task, |job| self.change(|state| state.job = Some(job)));
+        if begun.is_ok() {
+            self.interrupt_live();
+        }
+        begun
+    }
+
+    /// Begins a computation.
+    ///
+    /// # Errors
+    /// What is under way, in words.
+    pub fn begin_computing(&self, task: Task) -> Result<u64, String> {
+        self.computing.begin(task, |job| self.change(|state| state.computation = Some(job)))
+    }
+}
+
+fn beginning(address: Option<&RigAddress>, live: &Live) -> State {
+    State {
+        rig: RigState {
+            phase: if address.is_some() { Phase::Connecting } else { Phase::Absent },
+            name: match address {
+                Some(RigAddress::Port(port)) => Some(port.clone()),
+                Some(RigAddress::Emulated(_)) => Some("the emulated rig".into()),
+                Some(RigAddress::Open(open)) => Some(open.name().into()),
+                None => None,
+            },
+            emulated: address.is_some_and(RigAddress::is_emulated),
+            error: None,
+            info: None,
+        },
+        job: None,
+        computation: None,
+        live: LiveState { mode: live.mode, exposure_us: live.exposure.0, measure: live.measure, error: None },
+        seats: SeatsState { driver: None, asking: None, count: 0 },
+        question: None,
+        captures: 0,
+        optics: 0,
+        log: 0,
+    }
+}

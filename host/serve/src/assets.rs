@@ -1,0 +1,91 @@
+//! The page: plain files, embedded, served as they are.
+
+use axum::{
+    extract::Path,
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+
+use crate::failure::Failure;
+
+/// A file of the page.
+struct Asset {
+    path: &'static str,
+    media: &'static str,
+    bytes: &'static [u8],
+}
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const JS: &str = "text/javascript; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+const TEXT: &str = "text/plain; charset=utf-8";
+
+macro_rules! assets {
+    ($($media:ident $path:literal,)*) => {
+        &[$(Asset { path: $path, media: $media, bytes: include_bytes!(concat!("../page/", $path)) }),*]
+    };
+}
+
+/// All of them: a new file is a line here.
+#[rustfmt::skip]
+const ASSETS: &[Asset] = assets![
+    HTML "index.html", HTML "login.html",
+    CSS "style.css", CSS "vendor/uplot.css",
+    SVG "icon.svg",
+    JS "main.js", JS "link.js", JS "ui.js", JS "keys.js", JS "login.js",
+    JS "rig.js", JS "stages.js", JS "live.js", JS "plot.js", JS "viewer.js",
+    JS "lens.js", JS "capture.js", JS "depth.js", JS "measure.js", JS "maps.js", JS "npy.js", JS "mesh.js",
+    JS "sessions.js", JS "log.js", JS "quality.js",
+    JS "vendor/three.js", JS "vendor/uplot.js",
+    TEXT "vendor/LICENSES.txt",
+];
+
+/// The page.
+pub async fn page() -> Response {
+    of("index.html", StatusCode::OK)
+}
+
+/// Where a token is typed.
+pub fn login_page() -> Response {
+    of("login.html", StatusCode::UNAUTHORIZED)
+}
+
+/// A file of the page.
+pub async fn asset(Path(path): Path<String>) -> Response {
+    of(&path, StatusCode::OK)
+}
+
+fn of(path: &str, status: StatusCode) -> Response {
+    match ASSETS.iter().find(|asset| asset.path == path) {
+        // Not kept: another version of this program may serve the next page at this address.
+        Some(asset) => {
+            let headers = [(header::CONTENT_TYPE, asset.media), (header::CACHE_CONTROL, "no-cache")];
+            (status, headers, asset.bytes).into_response()
+        }
+        None => Failure::missing("such page").into_response(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a browser loads in all stays below what a slow line bears.
+    #[test]
+    fn the_page_is_small() {
+        let bytes: usize = ASSETS.iter().map(|asset| asset.bytes.len()).sum();
+        assert!(bytes <= 1_500_000, "{bytes} bytes");
+    }
+
+    #[test]
+    fn every_module_that_is_imported_is_served() {
+        for asset in ASSETS.iter().filter(|asset| asset.media == JS && !asset.path.starts_with("vendor/")) {
+            let text = std::str::from_utf8(asset.bytes).unwrap();
+            let names = text.split("\"./").skip(1).filter_map(|rest| rest.split('"').next());
+            for name in names.filter(|name| name.ends_with(".js")) {
+                assert!(ASSETS.iter().any(|other| other.path == name), "{} imports {name}", asset.path);
+            }
+        }
+    }
+}

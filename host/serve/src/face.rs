@@ -1,0 +1,67 @@
+//! The page as the face of a workflow: what it says goes into the state, what it asks waits there for an answer.
+
+use std::time::Duration;
+
+use farnear_workflows::{Cancel, Progress, Questions, WorkflowError};
+
+use crate::{
+    app::{App, lock},
+    lane::Place,
+    view::JobProgress,
+};
+
+/// From one look for an answer to the next.
+const LOOK: Duration = Duration::from_millis(50);
+/// Warnings that are kept of one job.
+const WARNINGS: usize = 20;
+
+/// The face of one lane's job.
+pub struct Face<'a> {
+    /// Where the state is.
+    pub app: &'a App,
+    /// Where the job stands in it.
+    pub place: Place,
+}
+
+impl Progress for Face<'_> {
+    fn say(&self, what: &str) {
+        self.app.note(what);
+        self.app.change(|state| {
+            if let Some(job) = (self.place)(state) {
+                job.said = Some(what.into());
+            }
+        });
+    }
+
+    fn warn(&self, what: &str) {
+        self.app.note(format!("warning: {what}"));
+        self.app.change(|state| {
+            if let Some(job) = (self.place)(state).as_mut().filter(|job| job.warnings.len() < WARNINGS) {
+                job.warnings.push(what.into());
+            }
+        });
+    }
+
+    fn advance(&self, unit: &'static str, done: usize, total: Option<usize>) {
+        self.app.change(|state| {
+            if let Some(job) = (self.place)(state) {
+                job.progress = Some(JobProgress { unit: unit.into(), done, total });
+            }
+        });
+    }
+}
+
+impl Questions for Face<'_> {
+    fn ask(&self, question: &str, cancel: &Cancel) -> Result<String, WorkflowError> {
+        *lock(&self.app.answer) = None;
+        self.app.change(|state| state.question = Some(question.trim().into()));
+        loop {
+            if let Some(answer) = lock(&self.app.answer).take() {
+                self.app.change(|state| state.question = None);
+                return Ok(answer);
+            }
+            cancel.check("waiting for an answer")?;
+            std::thread::sleep(LOOK);
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Who may talk to this program: by default this computer's own browser, else whoever has the token.
+//!
+//! A page from elsewhere that a browser shows can send requests to loopback too; so the names in `Host` and `Origin` are looked
+//! at. A name from the public DNS could be made to lead here, and is refused unless it was allowed.
+
+use std::{
+    fmt, fs,
+    net::{IpAddr, Ipv4Addr, SocketAddr},
+    path::{Path, PathBuf},
+};
+
+use axum::http::{HeaderMap, header};
+use subtle::ConstantTimeEq;
+
+/// Shortest token: 16 characters of hexadecimal are 64 bits.
+const SHORTEST: usize = 16;
+/// Longest token.
+const LONGEST: usize = 256;
+/// The cookie that carries the token.
+const COOKIE: &str = "farnear-token";
+
+/// Where to listen.
+#[derive(Debug)]
+pub enum Listen {
+    /// This computer only; port 0 = any that is free.
+    Loopback {
+        /// The port.
+        port: u16,
+    },
+    /// The network too.
+    Network {
+        /// The address.
+        address: SocketAddr,
+        /// What everybody has to know.
+        token: Token,
+        /// Names under which this computer is known, beside its addresses.
+        names: Vec<String>,
+    },
+}
+
+impl Listen {
+    /// The address to bind to.
+    pub fn address(&self) -> SocketAddr {
+        match self {
+            Self::Loopback { port } => (Ipv4Addr::LOCALHOST, *port).into(),
+            Self::Network { address, .. } => *address,
+        }
+    }
+}
+
+/// A secret that is compared in constant time and never shown.
+pub struct Token(String);
+
+impl fmt::Debug for Token {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Token(...)")
+    }
+}
+
+/// A file that holds no token.
+#[derive(Debug, thiserror::Error)]
+pub enum TokenError {
+    /// It cannot be read.
+    #[error("cannot read the token file {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It holds something else.
+    #[error(
+        "{} holds no token: expected one line of {SHORTEST} to {LONGEST} letters and digits, e.g. from `openssl rand -hex 16`",
+        path.display()
+    )]
+    Content {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Token {
+    /// Reads a token.
+    ///
+    /// # Errors
+    /// [`TokenError`].
+    pub fn read(path: &Path) -> Result<Self, TokenError> {
+        let text =
+            fs::read_to_string(path).map_err(|source| TokenError::Read { path: path.into(), source })?;
+        Self::new(text.trim()).ok_or_else(|| TokenError::Content { path: path.into() })
+    }
+
+    /// A token of letters and digits; `None` for any other text, or a short one.
+    pub fn new(text: &str) -> Option<Self> {
+        let fits =
+            (SHORTEST..=LONGEST).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_alphanumeric());
+        fits.then(|| Self(text.into()))
+    }
+
+    /// Whether this is the token; takes as long for any wrong one of its length.
+    pub fn is(&self, text: &str) -> bool {
+        self.0.as_bytes().ct_eq(text.as_bytes()).into()
+    }
+}
+
+/// What is asked of every request.
+#[derive(Debug, Default)]
+pub struct Guard {
+    token: Option<Token>,
+    names: Vec<String>,
+}
+
+/// Why a request is refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum Refused {
+    /// It was sent to a name that is not this computer's.
+    #[error("this computer is not known by that name; use its address, or allow the name with --name")]
+    Host,
+    /// A page from elsewhere sent it.
+    #[error("a page from elsewhere may not talk to the rig")]
+    Origin,
+    /// The token is missing or wrong.
+    #[error("the token is missing or wrong")]
+    Token,
+}
+
+impl Guard {
+    /// As it follows from where is listened.
+    pub fn new(listen: &Listen) -> Self {
+        match listen {
+            Listen::Loopback { .. } => Self::default(),
+            Listen::Network { token, names, .. } => {
+                Self { token: Some(Token(token.0.clone())), names: names.clone() }
+            }
+        }
+    }
+
+    /// Checks where a request was sent to and where from.
+    ///
+    /// # Errors
+    /// [`Refused::Host`], [`Refused::Origin`].
+    pub fn check_names(&self, headers: &HeaderMap) -> Result<(), Refused> {
+        let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
+        let host = text(header::HOST).ok_or(Refused::Host)?;
+        if !self.is_ours(host) {
+            return Err(Refused::Host);
+        }
+        match text(header::ORIGIN) {
+            Some(origin) if origin.strip_prefix("http://") != Some(host) => Err(Refused::Origin),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks the token, where there is one: in a cookie or as a bearer's.
+    ///
+    /// # Errors
+    /// [`Refused::Token`].
+    pub fn check_token(&self, headers: &HeaderMap) -> Result<(), Refused> {
+        let Some(token) = &self.token else { return Ok(()) };
+        let text = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
+        let bearer = text(header::AUTHORIZATION).filter_map(|value| value.strip_prefix("Bearer "));
+        let cookies = text(header::COOKIE).flat_map(|value| value.split(';'));
+        let cookie = cookies.filter_map(|pair| pair.trim().strip_prefix(COOKIE)?.strip_prefix('='));
+        if bearer.chain(cookie).any(|given| token.is(given)) { Ok(()) } else { Err(Refused::Token) }
+    }
+
+    /// The cookie for who typed the token; `None` for another text.
+    pub fn cookie(&self, typed: &str) -> Option<String> {
+        let known = self.token.as_ref().is_some_and(|token| token.is(typed));
+        known.then(|| format!("{COOKIE}={typed}; HttpOnly; SameSite=Strict; Path=/"))
+    }
+
+    /// Whether this host, with or without a port, is this computer.
+    fn is_ours(&self, host: &str) -> bool {
+        let name = match host.rsplit_once(':') {
+            Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) && !name.ends_with(':') => name,
+            _ => host,
+        };
+        let bare = name.trim_start_matches('[').trim_end_matches(']');
+        let address = bare.parse::<IpAddr>().ok();
+        if name == "localhost" || address.is_some_and(|address| address.is_loopback()) {
+            return true;
+        }
+        // Beyond loopback: an address cannot be taken by somebody else's name, nor can a name without a dot.
+        let local = !name.contains('.') || name.ends_with(".local");
+        self.token.is_some()
+            && (address.is_some()
+                || (local && !name.is_empty())
+                || self.names.iter().any(|known| known == name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECRET: &str = "0123456789abcdef0123";
+
+    fn headers(pairs: &[(&'static str, &str)]) -> HeaderMap {
+        pairs.iter().map(|(name, value)| (name.parse().unwrap(), value.parse().unwrap())).collect()
+    }
+
+    fn network() -> Guard {
+        let names = vec!["rig.lab.example".into()];
+        Guard { token: Token::new(SECRET), names }
+    }
+
+    #[test]
+    fn loopback_answers_to_loopback_names_only() {
+        let guard = Guard::default();
+        let asked = |host: &str| guard.check_names(&headers(&[("host", host)]));
+        for host in ["localhost", "localhost:8080", "127.0.0.1:8080", "[::1]:8080", "[::1]"] {
+            assert_eq!(asked(host), Ok(()), "{host}");
+        }
+        for host in [
+            "evil.example:8080",
+            "192.168.0.7",
+            "rig",
+            "",
+            "localhost.evil.example",
+            "127.0.0.1.evil.example",
+        ] {
+            assert_eq!(asked(host), Err(Refused::Host), "{host}");
+        }
+        assert_eq!(guard.check_names(&HeaderMap::new()), Err(Refused::Host));
+    }
+
+    #[test]
+    fn the_network_answers_to_addresses_local_names_and_allowed_ones() {
+        let guard = network();
+        let asked = |host: &str| guard.check_names(&headers(&[("host", host)]));
+        for host in
+            ["192.168.0.7:8080", "[fe80::1]:8080", "rig:8080", "rig.local", "rig.lab.example:80", "localhost"]
+        {
+            assert_eq!(asked(host), Ok(()), "{host}");
+        }
+        for host in ["evil.example", "", "rig.lab.example.evil.example"] {
+            assert_eq!(asked(host), Err(Refused::Host), "{host}");
+        }
+    }
+
+    #[test]
+    fn pages_from_elsewhere_are_refused() {
+        let guard = Guard::default();
+        let asked =
+            |origin: &str| guard.check_names(&headers(&[("host", "localhost:1"), ("origin", origin)]));
+        assert_eq!(asked("http://localhost:1"), Ok(()));
+        for origin in
+            ["http://localhost:2", "https://localhost:1", "null", "http://evil.example", "localhost:1"]
+        {
+            assert_eq!(asked(origin), Err(Refused::Origin), "{origin}");
+        }
+    }
+
+    #[test]
+    fn the_token_comes_as_cookie_or_bearer() {
+        let guard = network();
+        let asked = |name, value: &str| guard.check_token(&headers(&[(name, value)]));
+        assert_eq!(asked("authorization", &format!("Bearer {SECRET}")), Ok(()));
+        assert_eq!(asked("cookie", &format!("a=b; farnear-token={SECRET}")), Ok(()));
+        for (name, value) in [
+            ("authorization", SECRET),
+            ("cookie", "farnear-token="),
+            ("cookie", "farnear-token=0123"),
+            ("accept", SECRET),
+        ] {
+            assert_eq!(asked(name, value), Err(Refused::Token), "{name}: {value}");
+        }
+        assert_eq!(Guard::default().check_token(&HeaderMap::new()), Ok(()));
+        assert!(guard.cookie(SECRET).is_some_and(|cookie| cookie.contains("HttpOnly")));
+        assert_eq!(guard.cookie("0123456789abcdef0124"), None);
+    }
+
+    #[test]
+    fn tokens_are_long_and_plain() {
+        for text in ["", "short", "0123456789abcde\n", "0123456789abcdef; Path=/", &"x".repeat(300)] {
+            assert!(Token::new(text).is_none(), "{text:?}");
+        }
+        assert!(!format!("{:?}", network()).contains(SECRET));
+    }
+}

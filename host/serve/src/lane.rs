@@ -1,0 +1,206 @@
+//! Jobs one after the other: one lane on the rig, one beside it that computes. A lane takes a job or says what is under way; it
+//! keeps no queue, so nothing moves later than somebody expects.
+
+use std::{
+    io,
+    sync::{
+        Arc, Mutex,
+        mpsc::{Receiver, RecvTimeoutError, Sender, channel},
+    },
+    thread::{Builder, JoinHandle},
+    time::Duration,
+};
+
+use farnear_workflows::{Cancel, Context, WorkflowError};
+use serde_json::Value;
+
+use crate::{
+    app::{App, lock},
+    face::Face,
+    failure, live,
+    view::{Job, JobPhase, LiveMode, State},
+};
+
+/// From one look at the end of the program to the next.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Gives the figures of a job.
+pub type Work = Box<dyn FnOnce(&App, &Context<'_>) -> Result<Value, WorkflowError> + Send>;
+
+/// A job that can begin.
+pub struct Task {
+    /// What kind: `home`, `move`, `pair`, ...
+    pub kind: &'static str,
+    /// In words.
+    pub title: String,
+    /// What is done.
+    pub work: Work,
+}
+
+/// One job at a time.
+#[derive(Default)]
+pub struct Lane {
+    inner: Mutex<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    sender: Option<Sender<Begun>>,
+    running: Option<(String, Cancel)>,
+    last: u64,
+}
+
+/// A job on its way to the lane's thread.
+pub struct Begun {
+    job: Job,
+    cancel: Cancel,
+    work: Work,
+}
+
+/// The threads of both lanes.
+pub struct Lanes(Vec<JoinHandle<()>>);
+
+impl Lanes {
+    /// Waits until both have ended.
+    pub fn join(self) {
+        for thread in self.0 {
+            let _ = thread.join(); // a job that panicked has said so on stderr
+        }
+    }
+}
+
+impl Lane {
+    /// Begins a job and gives its number.
+    ///
+    /// # Errors
+    /// What is under way, in words.
+    pub fn begin(&self, task: Task, told: impl FnOnce(Job)) -> Result<u64, String> {
+        let mut inner = lock(&self.inner);
+        if let Some((title, _)) = &inner.running {
+            return Err(title.clone());
+        }
+        inner.last += 1;
+        let job = Job {
+            id: inner.last,
+            kind: task.kind.into(),
+            title: task.title.clone(),
+            phase: JobPhase::Running,
+            said: None,
+            warnings: Vec::new(),
+            progress: None,
+            result: None,
+            error: None,
+            hint: None,
+        };
+        let cancel = Cancel::default();
+        let begun = Begun { job: job.clone(), cancel: cancel.clone(), work: task.work };
+        told(job.clone()); // before the thread can say anything about it
+        let sent = inner.sender.as_ref().is_some_and(|sender| sender.send(begun).is_ok());
+        if !sent {
+            return Err("the program ends".into());
+        }
+        inner.running = Some((task.title, cancel));
+        Ok(job.id)
+    }
+
+    /// Wishes the job that is under way to end.
+    pub fn cancel(&self) {
+        if let Some((_, cancel)) = &lock(&self.inner).running {
+            cancel.cancel();
+        }
+    }
+
+    /// Whether a job is under way.
+    pub fn is_busy(&self) -> bool {
+        lock(&self.inner).running.is_some()
+    }
+
+    fn open(&self) -> Receiver<Begun> {
+        let (sender, receiver) = channel();
+        lock(&self.inner).sender = Some(sender);
+        receiver
+    }
+
+    fn free(&self) {
+        lock(&self.inner).running = None;
+    }
+}
+
+/// Starts the thread of each lane. They end with the program.
+///
+/// # Errors
+/// Where the system starts no threads.
+pub fn start(app: &Arc<App>) -> io::Result<Lanes> {
+    let (on_rig, computing) = (app.rig_lane.open(), app.computing.open());
+    let (rig, computer) = (Arc::clone(app), Arc::clone(app));
+    let threads = [
+        Builder::new().name("rig jobs".into()).spawn(move || run_rig(&rig, &on_rig))?,
+        Builder::new().name("computing".into()).spawn(move || run_computing(&computer, &computing))?,
+    ];
+    Ok(Lanes(threads.into()))
+}
+
+/// Jobs on the rig, and what is seen live between them.
+fn run_rig(app: &App, jobs: &Receiver<Begun>) {
+    loop {
+        let seen = app.live().mode != LiveMode::Off && app.rig().is_some() && app.state().seats.count > 0;
+        let begun = if seen && !app.is_ending() {
+            match jobs.try_recv() {
+                Ok(begun) => Some(begun),
+                Err(_) => {
+                    live::look(app);
+                    None
+                }
+            }
+        } else {
+            match jobs.recv_timeout(LOOK) {
+                Ok(begun) => Some(begun),
+                Err(RecvTimeoutError::Timeout) if !app.is_ending() => None,
+                Err(_) => return,
+            }
+        };
+        if let Some(begun) = begun {
+            run(app, begun, &app.rig_lane, |state| &mut state.job);
+        }
+    }
+}
+
+fn run_computing(app: &App, jobs: &Receiver<Begun>) {
+    loop {
+        match jobs.recv_timeout(LOOK) {
+            Ok(begun) => run(app, begun, &app.computing, |state| &mut state.computation),
+            Err(RecvTimeoutError::Timeout) if !app.is_ending() => {}
+            Err(_) => return,
+        }
+    }
+}
+
+/// Where a lane's job stands in the state.
+pub type Place = fn(&mut State) -> &mut Option<Job>;
+
+fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
+    let Begun { job, cancel, work } = begun;
+    app.note(job.title.clone());
+    let face = Face { app, place };
+    let context = Context { progress: &face, questions: &face, cancel };
+    let ended = work(app, &context);
+    lane.free();
+    if let Err(error) = &ended {
+        app.note(format!("{}: {error}", job.title));
+    }
+    app.change(|state| {
+        state.question = None;
+        let Some(job) = place(state) else { return };
+        match ended {
+            Ok(result) => {
+                job.phase = JobPhase::Done;
+                job.result = Some(result);
+            }
+            Err(error) => {
+                job.phase = if error.is_cancelled() { JobPhase::Stopped } else { JobPhase::Failed };
+                job.hint = failure::hint(&error).map(Into::into);
+                job.error = Some(error.to_string());
+            }
+        }
+    });
+}

@@ -1,0 +1,127 @@
+//! Images and depth as they come, between jobs.
+
+use std::{cell::RefCell, time::Instant};
+
+use farnear_capture::camera::Image;
+use farnear_depth::pipeline::Settings;
+use farnear_protocol::message::ShotRecord;
+use farnear_workflows::{
+    Context, Nobody, Result, WorkflowError, optics, picture,
+    rig::{
+        RigAddress,
+        live::{self, LiveSettings},
+        live_depth::{self, LiveDepth, LiveDepthSettings},
+    },
+};
+use serde_json::json;
+
+use crate::{
+    app::{App, Live},
+    picture_message::{depth_codes, eight_bits, message},
+    view::LiveMode,
+};
+
+/// Weight of the newest frame in the shown rate.
+const NEWEST: f64 = 0.15;
+
+/// Looks until something else is wanted. What goes wrong is told, and nothing is looked at until somebody wants it again.
+pub fn look(app: &App) {
+    let live = app.live();
+    let Some(rig) = app.rig() else { return };
+    let context = Context { progress: &Nobody, questions: &Nobody, cancel: live.cancel.clone() };
+    let rate = Rate::default();
+    let ended = match live.mode {
+        LiveMode::Off => return,
+        LiveMode::Image => {
+            let settings = LiveSettings { rig: RigAddress::Open(rig), camera: app.camera() };
+            live::watch(&settings, &context, |record, image| {
+                app.pictures.send_replace(image_message(&record, &image, &live, rate.next()));
+                enough(app)
+            })
+        }
+        LiveMode::Depth => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
+    };
+    match ended {
+        Err(error) if !error.is_cancelled() && !app.is_ending() => {
+            app.note(format!("live: {error}"));
+            app.set_live(|live| live.mode = LiveMode::Off);
+            app.change(|state| state.live.error = Some(error.to_string()));
+        }
+        _ => {}
+    }
+}
+
+/// Nobody looks any more.
+fn enough(app: &App) -> Result<()> {
+    if app.is_ending() || app.state().seats.count == 0 {
+        return Err(WorkflowError::Cancelled { during: "watching".into() });
+    }
+    Ok(())
+}
+
+fn image_message(record: &ShotRecord, image: &Image, live: &Live, rate_hz: f64) -> axum::body::Bytes {
+    let figures = picture::figures(image, live.measure);
+    let header = json!({
+        "type": "image",
+        "figures": figures,
+        "measure": live.measure.name(),
+        "rate_hz": rate_hz,
+        "trigger": record.trigger_number,
+        "fine_um": f64::from(record.fine.0) / 1e3,
+        "coarse_um": f64::from(record.coarse.0) / 1e3,
+    });
+    message(&header, &eight_bits(image))
+}
+
+fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate) -> Result<()> {
+    let range = optics::read(&app.optics_file())?.working_range();
+    let settings = LiveDepthSettings {
+        rig,
+        camera: app.camera(),
+        optics: app.optics_file(),
+        computation: Settings::default(),
+    };
+    // A little beyond the range on both sides: what lies just outside is still told apart.
+    let margin = 0.25 * (range.far_mm - range.near_mm);
+    let ends = [(range.near_mm - margin) as f32, (range.far_mm + margin) as f32];
+    live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
+        let (height, width) = depth.map.depth_mm.dim();
+        let header = json!({
+            "type": "depth",
+            "width": width,
+            "height": height,
+            "low_mm": ends[0],
+            "high_mm": ends[1],
+            "rate_hz": rate.next(),
+            "pair_ms": depth.pair_ms,
+            "latency_ms": depth.latency_ms,
+            "low_texture_fraction": depth.map.low_texture_fraction,
+        });
+        let mut pixels = depth_codes(&depth.map.depth_mm, ends);
+        pixels.extend(depth.map.confidence.iter().map(|value| (value * 255.0) as u8));
+        pixels.extend(eight_bits(depth.far));
+        app.pictures.send_replace(message(&header, &pixels));
+        enough(app)
+    })
+}
+
+/// Frames a second, smoothed.
+#[derive(Default)]
+struct Rate(RefCell<Option<(Instant, f64)>>);
+
+impl Rate {
+    /// Another frame; gives the rate with it.
+    fn next(&self) -> f64 {
+        let now = Instant::now();
+        let mut last = self.0.borrow_mut();
+        let rate = match *last {
+            Some((before, rate)) => {
+                let newest = 1.0 / now.duration_since(before).as_secs_f64().max(1e-4);
+                if rate == 0.0 { newest } else { rate + NEWEST * (newest - rate) }
+            }
+            None => 0.0,
+        };
+        *last = Some((now, rate));
+        (rate * 10.0).round() / 10.0
+    }
+}

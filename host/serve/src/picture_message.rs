@@ -1,0 +1,70 @@
+//! A picture as it goes over the socket: the length of a JSON header (u32, little-endian), the header, and the pixels.
+
+use axum::body::Bytes;
+use farnear_capture::camera::Image;
+use ndarray::Array2;
+use serde::Serialize;
+
+/// Codes of depth that are left when 0 means that there is none.
+const CODES: f32 = 65_534.0;
+
+/// Puts header and pixels together; an empty message where the header has no JSON form, which plain values always have.
+pub fn message(header: &impl Serialize, pixels: &[u8]) -> Bytes {
+    let header = serde_json::to_vec(header).unwrap_or_default();
+    let mut bytes = Vec::with_capacity(4 + header.len() + pixels.len());
+    bytes.extend((header.len() as u32).to_le_bytes());
+    bytes.extend(&header);
+    bytes.extend(pixels);
+    bytes.into()
+}
+
+/// The upper eight bits of each pixel, row by row.
+pub fn eight_bits(image: &Image) -> Vec<u8> {
+    let (bits, pixels) = (image.bits, image.pixels.iter());
+    if bits >= 8 {
+        pixels.map(|code| (code >> (bits - 8)).min(255) as u8).collect()
+    } else {
+        pixels.map(|code| (code << (8 - bits)).min(255) as u8).collect()
+    }
+}
+
+/// Depths as 16-bit codes between these ends, little-endian; 0 = no value. Finer than a thousandth of a mm over 50 mm.
+pub fn depth_codes(depth_mm: &Array2<f32>, [low, high]: [f32; 2]) -> Vec<u8> {
+    let scale = CODES / (high - low).max(f32::MIN_POSITIVE);
+    depth_mm.iter().flat_map(|depth| code(*depth, low, scale).to_le_bytes()).collect()
+}
+
+fn code(depth: f32, low: f32, scale: f32) -> u16 {
+    if depth.is_finite() { ((depth - low) * scale).clamp(0.0, CODES).round() as u16 + 1 } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::*;
+
+    #[test]
+    fn a_message_says_how_long_its_header_is() {
+        let bytes = message(&serde_json::json!({"width": 2}), &[7, 8]);
+        assert_eq!(&bytes[..4], &11u32.to_le_bytes());
+        assert_eq!(&bytes[4..15], b"{\"width\":2}");
+        assert_eq!(&bytes[15..], &[7, 8]);
+    }
+
+    #[test]
+    fn pixels_keep_their_upper_bits() {
+        let image = |bits, code| Image { pixels: array![[code]], bits };
+        assert_eq!(eight_bits(&image(8, 200)), [200]);
+        assert_eq!(eight_bits(&image(12, 0xabc)), [0xab]);
+        assert_eq!(eight_bits(&image(4, 0xf)), [0xf0]);
+    }
+
+    #[test]
+    fn depths_span_the_codes_and_none_is_zero() {
+        let bytes =
+            depth_codes(&array![[900.0, 950.0, 1000.0, f32::NAN, 2000.0, f32::INFINITY]], [900.0, 1000.0]);
+        let codes: Vec<u16> = bytes.chunks(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+        assert_eq!(codes, [1, 32768, 65535, 0, 65535, 0]);
+    }
+}

@@ -1,0 +1,109 @@
+//! How the rig is: connects to it, and asks ten times a second while somebody looks.
+
+use std::{
+    io,
+    sync::Arc,
+    thread::{Builder, JoinHandle},
+    time::Duration,
+};
+
+use farnear_workflows::{
+    Cancel, Context, Nobody, Progress, WorkflowError,
+    optics::GivenOptics,
+    rig::{RigAddress, info, open::OpenRig},
+};
+
+use crate::{app::App, view::Phase};
+
+/// From one question to the next while somebody looks.
+const OFTEN: Duration = Duration::from_millis(100);
+/// While nobody does.
+const SELDOM: Duration = Duration::from_secs(1);
+/// From one look at the end of the program to the next.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Starts the thread; it ends with the program.
+///
+/// # Errors
+/// Where the system starts no threads.
+pub fn start(app: &Arc<App>) -> io::Result<JoinHandle<()>> {
+    let app = Arc::clone(app);
+    Builder::new().name("rig watch".into()).spawn(move || run(&app))
+}
+
+fn run(app: &App) {
+    while !app.is_ending() {
+        if app.asked_to_connect() {
+            connect(app);
+        }
+        if let Some(rig) = app.rig() {
+            ask(app, &rig);
+        }
+        let pause = if app.state().seats.count > 0 { OFTEN } else { SELDOM };
+        let mut left = pause;
+        while !left.is_zero() && !app.is_ending() {
+            std::thread::sleep(left.min(LOOK));
+            left = left.saturating_sub(LOOK);
+        }
+    }
+}
+
+/// What connecting says goes into the log.
+struct ToLog<'a>(&'a App);
+
+impl Progress for ToLog<'_> {
+    fn say(&self, what: &str) {
+        self.0.note(what);
+    }
+}
+
+fn connect(app: &App) {
+    let Some(address) = &app.address else { return };
+    app.change(|state| {
+        state.rig.phase = Phase::Connecting;
+        state.rig.error = None;
+    });
+    app.set_rig(None);
+    let context = Context { progress: &ToLog(app), questions: &Nobody, cancel: Cancel::default() };
+    let opened =
+        GivenOptics::read(&app.optics_file()).and_then(|optics| OpenRig::open(address, &optics, &context));
+    match opened {
+        Ok(rig) => app.set_rig(Some(rig)),
+        Err(error) => lost(app, &error),
+    }
+}
+
+fn lost(app: &App, error: &WorkflowError) {
+    let text = error.to_string();
+    if app.state().rig.error.as_ref() != Some(&text) {
+        app.note(format!("rig: {text}"));
+    }
+    app.change(|state| {
+        state.rig.phase = Phase::Lost;
+        state.rig.error = Some(text);
+    });
+}
+
+fn ask(app: &App, rig: &OpenRig) {
+    match info::info(&RigAddress::Open(rig.clone()), &Context::unattended()) {
+        Ok(figures) => {
+            let mut info = serde_json::to_value(&figures).unwrap_or_default();
+            if let Some(fields) = info.as_object_mut() {
+                fields.remove("link_frames"); // every question counts itself
+            }
+            app.change(|state| {
+                state.rig.phase = Phase::Ready;
+                state.rig.error = None;
+                state.rig.emulated = figures.emulated;
+                state.rig.info = Some(info);
+            });
+        }
+        Err(error) => {
+            lost(app, &error);
+            // A board that was reset or unplugged is met anew; where it stands is known by nobody then.
+            if rig.reopen().is_ok() {
+                app.note("rig: it answers again; home it before it moves");
+            }
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Capturing, and what was captured.
+
+use axum::{
+    Json,
+    extract::{Path, Query, State},
+    http::{HeaderMap, StatusCode},
+};
+use farnear_protocol::message::Axis;
+use farnear_workflows::{
+    Context,
+    rig::{
+        RigAddress,
+        pair::{self, PairSettings},
+        sequence::{self, Program, SequenceSettings},
+        series::{self, SeriesSettings},
+    },
+    sessions::{self, Note},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Body, Shared, aside, driver};
+use crate::{
+    api::{Api, For},
+    app::App,
+    failure::Failure,
+    lane::Task,
+    routes::rig::{begin, connected, figures},
+    view::{AxisName, Begun, DONE, Done},
+};
+
+/// Most images of a stack.
+const STACK_MAX: usize = 500;
+
+/// What to capture.
+#[derive(Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum Wish {
+    /// A far- and a near-focused image.
+    Pair {
+        /// The new capture's name; the next free number without one.
+        #[serde(default)]
+        name: Option<String>,
+    },
+    /// Pair after pair.
+    Series {
+        /// How many.
+        pairs: usize,
+    },
+    /// One image where the sensor stands.
+    Still {},
+    /// A focus stack.
+    Stack {
+        /// The axis that goes through it.
+        axis: AxisName,
+        /// First position.
+        from_um: f64,
+        /// Last position.
+        to_um: f64,
+        /// Images.
+        steps: usize,
+    },
+}
+
+/// That a capture was begun.
+#[derive(Serialize, JsonSchema)]
+pub struct Capturing {
+    /// The job's number.
+    pub job: u64,
+    /// The names of the captures to come.
+    pub names: Vec<String>,
+}
+
+/// The captures of the session.
+#[derive(Serialize, JsonSchema)]
+pub struct Captures {
+    /// Each with name, kind, images, files, optics, note.
+    pub captures: Vec<Value>,
+}
+
+/// A capture.
+#[derive(Serialize, JsonSchema)]
+pub struct OneCapture {
+    /// Name, kind, images, files, optics, note.
+    pub capture: Value,
+}
+
+/// What is searched for.
+#[derive(Deserialize)]
+pub struct Search {
+    #[serde(default)]
+    search: String,
+}
+
+/// A note.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoteBody {
+    /// 0 (not rated) to 5.
+    pub rating: u8,
+    /// Anything.
+    pub text: String,
+}
+
+/// Adds the routes.
+pub fn routes(api: Api) -> Api {
+    api.get::<Captures, _, _>("/api/captures", "The captures of the session, by name.", list)
+        .query("/api/captures", "search", "Words that record, optics or note hold.")
+        .post::<Wish, Capturing, _, _>(
+            "/api/captures",
+            For::Driver,
+            "Captures a pair, a series, a still or a stack.",
+            capture,
+        )
+        .get::<OneCapture, _, _>("/api/captures/{capture}", "One capture.", one)
+        .put::<NoteBody, Done, _, _>(
+            "/api/captures/{capture}/note",
+            For::Seated,
+            "Rating and note of a capture.",
+            note,
+        )
+}
+
+async fn list(
+    State(app): Shared,
+    Query(Search { search }): Query<Search>,
+) -> Result<Json<Captures>, Failure> {
+    let captures = aside(move || {
+        let found = sessions::list(&app.session, &search)?;
+        found.into_iter().map(|capture| Ok(figures(capture)?)).collect::<Result<Vec<_>, Failure>>()
+    })
+    .await?;
+    Ok(Json(Captures { captures }))
+}
+
+async fn one(State(app): Shared, Path(name): Path<String>) -> Result<Json<OneCapture>, Failure> {
+    let folder = sessions::folder_of(&app.session, &name)?;
+    let capture = aside(move || Ok(figures(sessions::read(&folder)?)?)).await?;
+    Ok(Json(OneCapture { capture }))
+}
+
+async fn note(
+    State(app): Shared,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    Body(NoteBody { rating, text }): Body<NoteBody>,
+) -> Result<Json<Done>, Failure> {
+    if app.with_seats(|seats| seats.number_of(super::secret(&headers))).is_none() {
+        return Err(Failure::new(StatusCode::FORBIDDEN, "no such seat; a seat comes with a socket"));
+    }
+    let folder = sessions::folder_of(&app.session, &name)?;
+    sessions::write_note(&folder, &Note { rating, text })?;
+    app.change(|state| state.captures += 1);
+    Ok(Json(DONE))
+}
+
+async fn capture(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<Wish>,
+) -> Result<Json<Capturing>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    let (camera, optics) = (app.camera(), app.optics_file());
+    let free = |kind, count| sessions::free_names(&app.session, kind, count);
+    let (task, out) = match wish {
+        Wish::Pair { name } => {
+            let out = match name {
+                Some(name) => sessions::folder_of(&app.session, &name)?,
+                None => free("pair", 1)?.remove(0),
+            };
+            let settings = PairSettings { rig, camera, optics, out: out.clone() };
+            let work = move |app: &App, context: &Context<'_>| {
+                kept(app, figures(pair::capture(&settings, context)?))
+            };
+            (Task { kind: "pair", title: "Capture a pair".into(), work: Box::new(work) }, vec![out])
+        }
+        Wish::Series { pairs } => {
+            if !(1..=STACK_MAX).contains(&pairs) {
+                return Err(Failure::new(
+                    StatusCode::BAD_REQUEST,
+                    format!("pairs {pairs}: expected 1 to {STACK_MAX}"),
+                ));
+            }
+            let out = free("series", pairs)?;
+            let settings = SeriesSettings { rig, camera, optics, out: out.clone() };
+            let work = move |app: &App, context: &Context<'_>| {
+                let captured = series::capture(&settings, context);
+                kept(app, figures(captured?)) // those that are complete stay, also of a series that was stopped
+            };
+            (Task { kind: "series", title: format!("Capture {pairs} pairs"), work: Box::new(work) }, out)
+        }
+        Wish::Still {} => {
+            let info = app.state().rig.info;
+            let fine_um =
+                info.as_ref().and_then(|info| info["fine"]["asked_um"].as_f64()).unwrap_or_default();
+            let limit = |name: &str, otherwise| {
+                info.as_ref().and_then(|info| info[name].as_f64()).unwrap_or(otherwise)
+            };
+            let at_um = fine_um.clamp(limit("fine_min_um", fine_um), limit("fine_max_um", fine_um));
+            let out = free("still", 1)?.remove(0);
+            let program = Program::Stack { axis: Axis::SensorFine, from_um: at_um, to_um: at_um, steps: 1 };
+            let settings =
+                SequenceSettings { rig, camera, program, runs: 1, optics: Some(optics), out: out.clone() };
+            let work = move |app: &App, context: &Context<'_>| {
+                kept(app, figures(sequence::run(&settings, context)?))
+            };
+            (Task { kind: "still", title: "Capture a still".into(), work: Box::new(work) }, vec![out])
+        }
+        Wish::Stack { axis, from_um, to_um, steps } => {
+            if !(1..=STACK_MAX).contains(&steps) {
+                return Err(Failure::new(
+                    StatusCode::BAD_REQUEST,
+                    format!("steps {steps}: expected 1 to {STACK_MAX}"),
+                ));
+            }
+            let out = free("stack", 1)?.remove(0);
+            let program = Program::Stack { axis: axis.into(), from_um, to_um, steps };
+            let settings =
+                SequenceSettings { rig, camera, program, runs: 1, optics: Some(optics), out: out.clone() };
+            let work = move |app: &App, context: &Context<'_>| {
+                kept(app, figures(sequence::run(&settings, context)?))
+            };
+            (
+                Task { kind: "stack", title: format!("Capture {steps} images"), work: Box::new(work) },
+                vec![out],
+            )
+        }
+    };
+    let names =
+        out.iter().map(|folder| folder.file_name().unwrap_or_default().to_string_lossy().into_owned());
+    let names = names.collect();
+    let Json(Begun { job }) = begin(&app, task)?;
+    Ok(Json(Capturing { job, names }))
+}
+
+/// A capture has come.
+fn kept(app: &App, figures: farnear_workflows::Result<Value>) -> farnear_workflows::Result<Value> {
+    app.change(|state| state.captures += 1);
+    figures
+}

@@ -1,0 +1,354 @@
+//! What moves the rig and looks through it.
+
+use axum::{
+    Json,
+    extract::State,
+    http::{HeaderMap, StatusCode},
+};
+use farnear_protocol::{Micros, message::Axis};
+use farnear_workflows::{
+    Context, WorkflowError,
+    rig::{
+        RigAddress, alarms, board,
+        check::{self, CheckSettings},
+        focus::{self, FocusSettings},
+        goto::{self, GotoSettings},
+        motion::{self, MoveSettings},
+        open::OpenRig,
+    },
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Body, Shared, aside, driver};
+use crate::{
+    api::{Api, For},
+    app::App,
+    failure::Failure,
+    lane::Task,
+    view::{AxisName, Begun, DONE, Done, LiveMode, Nothing},
+};
+
+/// Longest exposure that is taken live, us.
+const EXPOSURE_MAX_US: u32 = 1_000_000;
+
+/// Which axes to home.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Home {
+    /// All with a home switch where none is named.
+    #[serde(default)]
+    pub axes: Vec<AxisName>,
+}
+
+/// Where an axis goes.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Which.
+    pub axis: AxisName,
+    /// Absolute position.
+    pub to_um: f64,
+}
+
+/// Where axes go, at the same time.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Move {
+    /// Each at most once.
+    pub targets: Vec<Target>,
+    /// Whether to home first what is not homed.
+    #[serde(default)]
+    pub home: bool,
+}
+
+/// One of the images of a pair.
+#[derive(Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum FocusName {
+    /// Sharp at the far end of the working range.
+    Far,
+    /// Sharp at its near end.
+    Near,
+}
+
+/// To the focus of the far or the near image.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Goto {
+    /// Which.
+    pub focus: FocusName,
+}
+
+/// Find the focus of a target.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Seek {
+    /// How far the focus may be from where the stage stands.
+    #[serde(default = "half_a_millimetre")]
+    pub range_mm: f64,
+    /// `fft-sum`, `tenengrad` or `modified-laplacian`.
+    #[serde(default)]
+    pub measure: Option<String>,
+    /// Part of the image: column, row, width, height in pixels.
+    #[serde(default)]
+    pub region: Option<[usize; 4]>,
+}
+
+fn half_a_millimetre() -> f64 {
+    0.5
+}
+
+/// What is to be seen live. What is not named stays.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LiveWish {
+    /// What.
+    #[serde(default)]
+    pub mode: Option<LiveMode>,
+    /// Length of an exposure, also of captures.
+    #[serde(default)]
+    pub exposure_us: Option<u32>,
+    /// `fft-sum`, `tenengrad` or `modified-laplacian`.
+    #[serde(default)]
+    pub measure: Option<String>,
+}
+
+/// The alarm to clear.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Clear {
+    /// Its number.
+    pub number: u32,
+}
+
+/// The alarms that the board keeps.
+#[derive(Serialize, JsonSchema)]
+pub struct Alarms {
+    /// As `farnear rig alarms --json` prints them.
+    pub figures: Value,
+}
+
+/// Adds the routes.
+pub fn routes(api: Api) -> Api {
+    api.post::<Nothing, Done, _, _>("/api/rig/connect", For::Driver, "Connects to the rig again.", connect)
+        .post::<Home, Begun, _, _>("/api/rig/home", For::Driver, "Homes axes.", home)
+        .post::<Move, Begun, _, _>("/api/rig/move", For::Driver, "Moves axes to absolute positions.", move_to)
+        .post::<Goto, Begun, _, _>("/api/rig/goto", For::Driver, "Moves to the far or the near focus.", go)
+        .post::<Seek, Begun, _, _>(
+            "/api/rig/focus",
+            For::Driver,
+            "Finds the focus of a target and stays there.",
+            seek,
+        )
+        .post::<Nothing, Begun, _, _>(
+            "/api/rig/check",
+            For::Driver,
+            "The bring-up checklist, step by step.",
+            checklist,
+        )
+        .post::<Nothing, Begun, _, _>("/api/rig/reset", For::Driver, "Resets the board.", reset)
+        .post::<LiveWish, Done, _, _>("/api/live", For::Driver, "What is to be seen live, and how.", live)
+        .get::<Alarms, _, _>(
+            "/api/rig/alarms",
+            "The alarms that the board keeps, the last one first.",
+            list_alarms,
+        )
+        .post::<Clear, Begun, _, _>("/api/rig/alarms/clear", For::Driver, "Clears the latched alarm.", clear)
+}
+
+/// The rig, where it is connected.
+///
+/// # Errors
+/// 503 with what to do.
+pub fn connected(app: &App) -> Result<OpenRig, Failure> {
+    let state = app.state().rig;
+    app.rig().ok_or_else(|| {
+        let why = state.error.unwrap_or_else(|| "no rig is connected".into());
+        Failure::new(StatusCode::SERVICE_UNAVAILABLE, why)
+            .with_hint("Start `farnear serve` with --rig sim or a port, or connect again.")
+    })
+}
+
+/// Begins a job on the rig.
+///
+/// # Errors
+/// 409 with what is under way.
+pub fn begin(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
+    let job = app.begin_on_rig(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Begun { job }))
+}
+
+/// Figures as JSON.
+///
+/// # Errors
+/// [`farnear_workflows::WorkflowError::File`] for figures without a JSON form, such as a number that is not finite.
+pub fn figures(figures: impl Serialize) -> farnear_workflows::Result<Value> {
+    let nowhere = std::path::Path::new("the figures");
+    serde_json::to_value(figures).map_err(WorkflowError::file(nowhere, "plain values"))
+}
+
+async fn connect(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(Nothing {}): Body<Nothing>,
+) -> Result<Json<Done>, Failure> {
+    driver(&app, &headers)?;
+    if app.address.is_none() {
+        connected(&app)?;
+    }
+    if app.rig_lane.is_busy() {
+        return Err(Failure::busy("a job on the rig"));
+    }
+    app.interrupt_live();
+    app.ask_to_connect();
+    Ok(Json(DONE))
+}
+
+async fn home(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<Home>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    let axes: Vec<Axis> = wish.axes.into_iter().map(Into::into).collect();
+    let work = move |_: &App, context: &Context<'_>| figures(motion::home(&rig, &axes, context)?);
+    begin(&app, Task { kind: "home", title: "Home".into(), work: Box::new(work) })
+}
+
+async fn move_to(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<Move>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    let targets: Vec<(Axis, f64)> =
+        wish.targets.iter().map(|target| (target.axis.into(), target.to_um)).collect();
+    let twice = targets
+        .iter()
+        .enumerate()
+        .any(|(at, (axis, _))| targets[..at].iter().any(|(other, _)| other == axis));
+    if targets.is_empty() || twice {
+        return Err(Failure::new(
+            StatusCode::BAD_REQUEST,
+            "expected one target or more, each axis at most once",
+        ));
+    }
+    for (_, to_um) in &targets {
+        motion::nanometres("to_um", *to_um)?;
+    }
+    let words: Vec<_> =
+        targets.iter().map(|(axis, to_um)| format!("{} to {to_um:.3} um", axis.name())).collect();
+    let settings = MoveSettings { rig, targets, home: wish.home };
+    let work = move |_: &App, context: &Context<'_>| figures(motion::move_to(&settings, context)?);
+    begin(&app, Task { kind: "move", title: format!("Move {}", words.join(", ")), work: Box::new(work) })
+}
+
+async fn go(State(app): Shared, headers: HeaderMap, Body(wish): Body<Goto>) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    let (focus, title) = match wish.focus {
+        FocusName::Far => (goto::Focus::Far, "Go to the far focus"),
+        FocusName::Near => (goto::Focus::Near, "Go to the near focus"),
+    };
+    let settings = GotoSettings { rig, optics: app.optics_file(), focus };
+    let work = move |_: &App, context: &Context<'_>| figures(goto::goto(&settings, context)?);
+    begin(&app, Task { kind: "goto", title: title.into(), work: Box::new(work) })
+}
+
+/// A focus measure by its name.
+fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Failure> {
+    name.parse().map_err(|error: farnear_depth::focus_measure::FocusError| {
+        Failure::new(StatusCode::BAD_REQUEST, error.to_string())
+    })
+}
+
+async fn seek(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<Seek>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    if !(wish.range_mm > 0.0 && wish.range_mm <= 10.0) {
+        let error = format!("range_mm {}: expected more than 0 and at most 10 mm", wish.range_mm);
+        return Err(Failure::new(StatusCode::BAD_REQUEST, error));
+    }
+    let settings = FocusSettings {
+        rig,
+        camera: app.camera(),
+        optics: app.optics_file(),
+        start_mm: None,
+        range_mm: wish.range_mm,
+        measure: wish.measure.as_deref().map_or(Ok(app.live().measure), measure)?,
+        region: wish.region,
+    };
+    let work = move |_: &App, context: &Context<'_>| figures(focus::focus(&settings, context)?);
+    begin(&app, Task { kind: "focus", title: "Find the focus".into(), work: Box::new(work) })
+}
+
+async fn checklist(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(Nothing {}): Body<Nothing>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = connected(&app)?;
+    let hands = !rig.is_emulated();
+    let settings =
+        CheckSettings { rig: RigAddress::Open(rig), camera: app.camera(), resting_only: false, hands };
+    let work = move |_: &App, context: &Context<'_>| figures(check::check(&settings, context)?);
+    begin(&app, Task { kind: "check", title: "Bring-up checklist".into(), work: Box::new(work) })
+}
+
+async fn reset(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(Nothing {}): Body<Nothing>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    let work = move |_: &App, context: &Context<'_>| figures(board::reset(&rig, context)?);
+    begin(&app, Task { kind: "reset", title: "Reset the board".into(), work: Box::new(work) })
+}
+
+async fn live(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<LiveWish>,
+) -> Result<Json<Done>, Failure> {
+    driver(&app, &headers)?;
+    if let Some(us) = wish.exposure_us.filter(|us| !(1..=EXPOSURE_MAX_US).contains(us)) {
+        let error = format!("exposure_us {us}: expected 1 to {EXPOSURE_MAX_US} us");
+        return Err(Failure::new(StatusCode::BAD_REQUEST, error));
+    }
+    let measure = wish.measure.as_deref().map(measure).transpose()?;
+    app.set_live(|live| {
+        live.mode = wish.mode.unwrap_or(live.mode);
+        live.exposure = wish.exposure_us.map_or(live.exposure, Micros);
+        live.measure = measure.unwrap_or(live.measure);
+    });
+    Ok(Json(DONE))
+}
+
+async fn list_alarms(State(app): Shared) -> Result<Json<Alarms>, Failure> {
+    let rig = RigAddress::Open(connected(&app)?);
+    let context = Context::unattended();
+    let figures = aside(move || Ok(figures(alarms::alarms(&rig, None, &context)?)?)).await?;
+    Ok(Json(Alarms { figures }))
+}
+
+async fn clear(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<Clear>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let rig = RigAddress::Open(connected(&app)?);
+    let work =
+        move |_: &App, context: &Context<'_>| figures(alarms::alarms(&rig, Some(wish.number), context)?);
+    begin(&app, Task { kind: "alarm", title: format!("Clear alarm {}", wish.number), work: Box::new(work) })
+}

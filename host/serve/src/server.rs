@@ -1,0 +1,105 @@
+//! From settings to a page that answers, and back to nothing that runs.
+
+use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
+
+use farnear_workflows::{
+    Cancel, Context, WorkflowError,
+    rig::{RigAddress, camera::CameraSettings},
+};
+
+use crate::{
+    app::App,
+    guard::{Guard, Listen},
+    lane, rig_watch, routes,
+};
+
+/// From one look at the wish to end to the next.
+const LOOK: Duration = Duration::from_millis(50);
+/// Longest wait for requests that are under way at the end.
+const FAREWELL: Duration = Duration::from_secs(2);
+
+/// What is served, and to whom.
+#[derive(Debug)]
+pub struct ServeSettings {
+    /// The rig; without one the page shows captures.
+    pub rig: Option<RigAddress>,
+    /// Its camera.
+    pub camera: CameraSettings,
+    /// The folder of captures; made where it is missing.
+    pub session: PathBuf,
+    /// The optics to begin with; without it those of the session, or of the 50 mm lens.
+    pub optics: Option<PathBuf>,
+    /// Where to listen.
+    pub listen: Listen,
+}
+
+/// The page cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The address is taken or not this computer's.
+    #[error("cannot listen at {address}: {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The system has no threads or sockets left.
+    #[error("cannot serve: {source}")]
+    System {
+        /// What the system says.
+        #[from]
+        source: std::io::Error,
+    },
+    /// The session or its optics.
+    #[error(transparent)]
+    Workflow(#[from] WorkflowError),
+}
+
+/// Serves the page until `context` is cancelled; what moves is stopped then. `ready` is told the address as soon as it answers;
+/// the rig is connected to meanwhile.
+///
+/// # Errors
+/// [`ServeError`], before anything is served. A rig that cannot be connected to is shown on the page, where it can be tried
+/// again.
+pub fn serve(
+    settings: ServeSettings,
+    context: &Context<'_>,
+    ready: impl FnOnce(&str),
+) -> Result<(), ServeError> {
+    let address = settings.listen.address();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+    let failed = |source| ServeError::Listen { address, source };
+    let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(failed)?;
+    let bound = listener.local_addr()?;
+    let guard = Guard::new(&settings.listen);
+    let app = App::new(settings, guard)?;
+    let lanes = lane::start(&app)?;
+    let watch = rig_watch::start(&app)?;
+    let service = routes::service(&app).into_make_service();
+    ready(&format!("http://{bound}/"));
+    let ending = ended(context.cancel.clone(), Arc::clone(&app));
+    let served = runtime.block_on(async {
+        let server = axum::serve(listener, service).with_graceful_shutdown(ending).into_future();
+        let patience = async {
+            app.ended().await;
+            tokio::time::sleep(FAREWELL).await;
+        };
+        tokio::select! {
+            served = server => served,
+            () = patience => Ok(()), // a browser that does not let go of its connection
+        }
+    });
+    app.stop_everything();
+    lanes.join();
+    let _ = watch.join(); // it never panics
+    runtime.shutdown_timeout(FAREWELL);
+    Ok(served?)
+}
+
+async fn ended(cancel: Cancel, app: Arc<App>) {
+    while !cancel.is_cancelled() {
+        tokio::time::sleep(LOOK).await;
+    }
+    app.end();
+}

@@ -1,0 +1,121 @@
+//! What is told without being asked: a socket per browser, with a seat that ends with it.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::{
+    extract::{
+        State, WebSocketUpgrade,
+        ws::{Message, WebSocket},
+    },
+    response::Response,
+};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
+
+use crate::{app::App, routes::Shared, view::Hello};
+
+/// From one question whether the browser is still there to the next.
+const ASK: Duration = Duration::from_secs(1);
+/// Longest silence of a browser that is there: it answers by itself, also while its page is busy.
+const SILENCE: Duration = Duration::from_secs(5);
+/// Longest message of a browser.
+const MESSAGE_MAX: usize = 4096;
+
+/// What a browser may say.
+#[derive(Deserialize)]
+#[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
+enum Said {
+    /// Stops the rig.
+    Stop,
+}
+
+/// Opens a socket.
+pub async fn open(State(app): Shared, upgrade: WebSocketUpgrade) -> Response {
+    upgrade
+        .max_message_size(MESSAGE_MAX)
+        .max_frame_size(MESSAGE_MAX)
+        .on_upgrade(move |socket| run(socket, app))
+}
+
+async fn run(mut socket: WebSocket, app: Arc<App>) {
+    let Ok(seat) = app.with_seats(crate::seats::Seats::join) else { return };
+    let version = env!("CARGO_PKG_VERSION").into();
+    let hello = Hello { seat: seat.number, secret: seat.secret, version };
+    let hello = json!({ "type": "hello", "hello": hello }).to_string();
+    if send(&mut socket, Message::text(hello)).await {
+        talk(&mut socket, &app).await;
+    }
+    if app.with_seats(|seats| seats.leave(seat.number)) {
+        app.note("the browser that drove has gone: stopping");
+        let _ = tokio::task::spawn_blocking(move || app.stop()).await; // the board has its deadline
+    }
+}
+
+/// Gives whether it was taken in time: a browser that takes nothing is gone.
+async fn send(socket: &mut WebSocket, message: Message) -> bool {
+    matches!(timeout(SILENCE, socket.send(message)).await, Ok(Ok(())))
+}
+
+async fn talk(socket: &mut WebSocket, app: &Arc<App>) {
+    let (mut state, mut pictures) = (app.follow(), app.pictures.subscribe());
+    let mut ask = interval(ASK);
+    ask.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut heard = Instant::now();
+    loop {
+        let message = tokio::select! {
+            () = app.ended() => return,
+            said = socket.recv() => {
+                heard = Instant::now();
+                let Some(Ok(said)) = said else { return };
+                match hear(said, app) {
+                    Heard::Nothing => continue,
+                    Heard::Bye => return,
+                    Heard::Wrong(text) => Message::text(json!({ "type": "error", "error": text }).to_string()),
+                }
+            }
+            _ = state.changed() => {
+                let state = Arc::clone(&state.borrow_and_update());
+                Message::text(format!("{{\"type\":\"state\",\"state\":{state}}}"))
+            }
+            // The newest only: what came while the one before was sent is never seen.
+            _ = pictures.changed() => Message::Binary(pictures.borrow_and_update().clone()),
+            _ = ask.tick() => {
+                if heard.elapsed() > SILENCE {
+                    return;
+                }
+                Message::Ping(Vec::new().into())
+            }
+        };
+        if !send(socket, message).await {
+            return;
+        }
+    }
+}
+
+enum Heard {
+    Nothing,
+    Bye,
+    Wrong(String),
+}
+
+fn hear(said: Message, app: &Arc<App>) -> Heard {
+    match said {
+        Message::Text(text) => match serde_json::from_str(&text) {
+            Ok(Said::Stop) => {
+                app.note("stop");
+                let app = Arc::clone(app);
+                drop(tokio::task::spawn_blocking(move || {
+                    if let Err(error) = app.stop() {
+                        app.note(format!("stop: {error}"));
+                    }
+                }));
+                Heard::Nothing
+            }
+            Err(error) => Heard::Wrong(format!("expected {{\"type\":\"stop\"}}: {error}")),
+        },
+        Message::Binary(_) => Heard::Wrong("expected text".into()),
+        Message::Ping(_) | Message::Pong(_) => Heard::Nothing,
+        Message::Close(_) => Heard::Bye,
+    }
+}

@@ -1,0 +1,129 @@
+//! What was captured, and what is measured in it.
+
+use std::fs;
+
+use farnear_files::image_file::encode_png;
+use ndarray::Array2;
+use serde_json::{Value, json};
+
+use super::client::{Served, Socket};
+
+const RECORD: &str = include_str!("../../../workflows/src/sessions/capture.toml");
+
+/// A capture of a textured plane; the near image is a little softer.
+fn put(served: &Served, name: &str, seed: usize) {
+    let folder = served.session.join(name);
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("capture.toml"), RECORD).unwrap();
+    let sharp = Array2::from_shape_fn((64, 96), |(y, x)| ((x * 7919 + y * 104_729 + seed) % 199) as u16 + 20);
+    let soft = Array2::from_shape_fn((64, 96), |(y, x)| (sharp[[y, x]] + sharp[[y, (x + 1).min(95)]]) / 2);
+    fs::write(folder.join("far.png"), encode_png(soft.view(), 8).unwrap()).unwrap();
+    fs::write(folder.join("near.png"), encode_png(sharp.view(), 8).unwrap()).unwrap();
+}
+
+fn computed(served: &Served, seat: &str, name: &str, wish: &Value) -> Value {
+    let begun = served.post(&format!("/api/captures/{name}/depth"), seat, &wish.to_string());
+    assert_eq!(begun.status, 200, "{begun:?}");
+    served.ended("computation", &begun.json()["job"])
+}
+
+#[test]
+fn depth_is_computed_measured_compared_and_taken_along() {
+    let served = Served::captures_only();
+    let seat = Socket::open(&served).secret.clone();
+    let socket = Socket::open(&served);
+    assert_eq!(served.post("/api/captures/pair-001/depth", &seat, "{}").status, 403, "its socket has gone");
+    let seat = socket.secret.clone();
+    put(&served, "pair-001", 0);
+    put(&served, "pair-002", 77);
+    for name in ["pair-001", "pair-002"] {
+        let job = computed(&served, &seat, name, &json!({}));
+        assert_eq!(job["phase"], "done", "{job:#}");
+        assert_eq!((&job["result"]["width"], &job["result"]["height"]), (&96.into(), &64.into()));
+    }
+    let job = computed(&served, &seat, "pair-001", &json!({ "method": "subbarao", "variant": "subbarao" }));
+    assert_eq!(job["phase"], "done", "{job:#}");
+    let map = served.get("/api/captures/pair-001/variants/subbarao/depth.npy");
+    assert!(map.status == 200 && map.body.starts_with(b"\x93NUMPY"));
+
+    let one = served.get("/api/captures/pair-001").json();
+    assert_eq!(one["capture"]["variants"], json!(["subbarao"]));
+    assert_eq!(one["capture"]["has_depth"], true);
+    let region =
+        served.post("/api/captures/pair-001/region", "", r#"{"x":8,"y":8,"width":40,"height":30}"#).json();
+    assert!(region["figures"]["mean_mm"].as_f64().unwrap() > 800.0, "{region:#}");
+    let outside = served.post("/api/captures/pair-001/region", "", r#"{"x":90,"y":0,"width":40,"height":1}"#);
+    assert_eq!(outside.status, 400);
+    let profile = served.post("/api/captures/pair-001/profile", "", r#"{"from":[0,9],"to":[95,9]}"#).json();
+    assert_eq!(profile["figures"]["points"].as_array().unwrap().len(), 96);
+    let difference = served.get("/api/captures/pair-001/difference/pair-002").json();
+    assert!(difference["figures"]["pixels"].as_u64().unwrap() > 1000, "{difference:#}");
+    assert!(served.get("/api/captures/pair-001/difference/pair-002/map.npy").body.starts_with(b"\x93NUMPY"));
+    assert!(served.get("/api/captures/pair-001/mesh.ply").body.starts_with(b"ply\n"));
+    let zip = served.get("/api/captures/pair-001/zip");
+    assert!(
+        zip.body.starts_with(b"PK") && zip.headers.contains("filename=\"pair-001.zip\""),
+        "{}",
+        zip.headers
+    );
+    let report = served.get("/api/captures/pair-001/report.html");
+    assert!(report.headers.contains("content-security-policy: default-src 'none'"), "{}", report.headers);
+    assert!(String::from_utf8_lossy(&report.body).contains("<h1>pair-001</h1>"));
+}
+
+#[test]
+fn notes_are_kept_and_searched_and_broken_captures_are_said() {
+    let served = Served::captures_only();
+    put(&served, "pair-001", 0);
+    put(&served, "pair-002", 1);
+    fs::write(served.session.join("pair-002/capture.toml"), "format = \"?\"").unwrap();
+    let socket = Socket::open(&served);
+    let seat = [("x-farnear-seat", socket.secret.as_str())];
+    let note = json!({ "rating": 5, "text": "sandpaper" }).to_string();
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &[], &note).status, 403);
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &seat, &note).status, 200);
+    assert_eq!(served.ask("PUT", "/api/captures/absent/note", &seat, &note).status, 404);
+    let too_good = json!({ "rating": 6, "text": "" }).to_string();
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &seat, &too_good).status, 400);
+    let found = served.get("/api/captures?search=SandPaper").json();
+    assert_eq!(found["captures"].as_array().unwrap().len(), 1);
+    let all = served.get("/api/captures").json();
+    assert!(all["captures"][1]["broken"].as_str().is_some_and(|reason| reason.contains("format")), "{all:#}");
+}
+
+#[test]
+fn no_name_leads_out_of_the_session() {
+    let served = Served::captures_only();
+    fs::write(served.session.parent().unwrap().join("secret"), "s").unwrap();
+    for path in [
+        "/api/captures/..%2fsecret",
+        "/api/captures/%2e%2e/files/secret",
+        "/api/captures/../../secret",
+        "/api/captures/pair-001/files/..%2f..%2fsecret",
+        "/api/captures/.hidden",
+    ] {
+        let answer = served.get(path);
+        assert!((400..500).contains(&answer.status), "{path}: {answer:?}");
+        assert_ne!(answer.body, b"s");
+    }
+}
+
+#[test]
+fn optics_are_checked_before_they_are_kept() {
+    let served = Served::captures_only();
+    let socket = Socket::open(&served);
+    let seat = [("x-farnear-seat", socket.secret.as_str())];
+    let mut optics = served.get("/api/optics").json();
+    optics["optics"]["focus"]["far_mm"] = json!(800.0);
+    assert_eq!(served.ask("PUT", "/api/optics", &seat, &optics.to_string()).status, 200);
+    assert!(fs::read_to_string(served.session.join("optics.toml")).unwrap().contains("far_mm = 800.0"));
+    let before = fs::read(served.session.join("optics.toml")).unwrap();
+    optics["optics"]["focus"]["far_mm"] = json!(20.0);
+    let refused = served.ask("PUT", "/api/optics", &seat, &optics.to_string());
+    assert!(refused.status == 400 && refused.error().contains("far_mm"), "{refused:?}");
+    assert_eq!(fs::read(served.session.join("optics.toml")).unwrap(), before);
+    let typed =
+        json!({ "optics": served.get("/api/optics").json()["optics"], "readings": { "far_mm": 5.17 } });
+    let found = served.post("/api/optics/calculate", "", &typed.to_string()).json();
+    assert!((found["figures"]["reading_near"]["mm"].as_f64().unwrap() - 5.3263).abs() < 1e-3, "{found:#}");
+}

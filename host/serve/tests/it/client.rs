@@ -1,0 +1,243 @@
+//! A served page, and a client that is as plain as HTTP and WebSocket allow: what it sends is what stands here.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    io::{Read, Write},
+    net::TcpStream,
+    path::{Path, PathBuf},
+    sync::mpsc::channel,
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use farnear_protocol::Micros;
+use farnear_scripted_board::{Faults, plug_in};
+use farnear_serve::{Listen, ServeSettings, serve};
+use farnear_workflows::{
+    Cancel, Context, Nobody,
+    rig::{
+        RigAddress,
+        camera::{CameraAddress, CameraSettings},
+    },
+};
+use serde_json::Value;
+
+/// Longest wait for something that comes in milliseconds on an idle computer.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A page that is served until this value goes.
+pub struct Served {
+    pub address: String,
+    pub session: PathBuf,
+    cancel: Cancel,
+    thread: Option<JoinHandle<()>>,
+    _folder: tempfile::TempDir,
+    _board: Option<Box<dyn std::any::Any>>,
+}
+
+impl Served {
+    /// With a board that has these faults.
+    pub fn with_board(faults: Faults) -> Self {
+        let (port, board) = plug_in(faults);
+        Self::start(Some(RigAddress::Port(port)), Some(Box::new(board)), |_| Listen::Loopback { port: 0 })
+    }
+
+    /// Without a rig.
+    pub fn captures_only() -> Self {
+        Self::start(None, None, |_| Listen::Loopback { port: 0 })
+    }
+
+    pub fn start(
+        rig: Option<RigAddress>,
+        board: Option<Box<dyn std::any::Any>>,
+        listen: impl FnOnce(&Path) -> Listen,
+    ) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let session = folder.path().join("session");
+        let shots = folder.path().join("shots");
+        fs::create_dir(&shots).unwrap();
+        let camera = CameraSettings {
+            address: CameraAddress::Folder(shots),
+            exposure: Micros(5_000),
+            image_wait: Duration::from_secs(5),
+        };
+        let listen = listen(folder.path());
+        let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen };
+        let (cancel, (sender, address)) = (Cancel::default(), channel());
+        let wish = cancel.clone();
+        let thread = std::thread::spawn(move || {
+            let context = Context { progress: &Nobody, questions: &Nobody, cancel: wish };
+            serve(settings, &context, |address| sender.send(address.to_owned()).unwrap()).unwrap();
+        });
+        let address = address.recv_timeout(PATIENCE).unwrap();
+        let address = address.trim_start_matches("http://").trim_end_matches('/').to_owned();
+        Self { address, session, cancel, thread: Some(thread), _folder: folder, _board: board }
+    }
+
+    /// Sends these bytes and gives all that comes back.
+    pub fn raw(&self, bytes: &[u8]) -> Vec<u8> {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let _ = stream.write_all(bytes); // it may refuse to hear more
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer); // a connection that is reset has answered as well
+        answer
+    }
+
+    /// Asks; gives status, headers and body.
+    pub fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
+        let mut request = format!("{method} {path} HTTP/1.1\r\nconnection: close\r\n");
+        if !headers.iter().any(|(name, _)| name.eq_ignore_ascii_case("host")) {
+            let _ = write!(request, "host: {}\r\n", self.address);
+        }
+        for (name, value) in headers {
+            let _ = write!(request, "{name}: {value}\r\n");
+        }
+        if method != "GET" {
+            let _ = write!(request, "content-type: application/json\r\ncontent-length: {}\r\n", body.len());
+        }
+        let _ = write!(request, "\r\n{body}");
+        Answer::parse(&self.raw(request.as_bytes()))
+    }
+
+    pub fn get(&self, path: &str) -> Answer {
+        self.ask("GET", path, &[], "")
+    }
+
+    pub fn post(&self, path: &str, seat: &str, body: &str) -> Answer {
+        self.ask("POST", path, &[("x-farnear-seat", seat)], body)
+    }
+
+    /// The state, once `fits`.
+    pub fn state_when(&self, fits: impl Fn(&Value) -> bool) -> Value {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            let state = self.get("/api/state").json();
+            if fits(&state) {
+                return state;
+            }
+            assert!(Instant::now() < until, "{state:#}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// The state with a rig that answers.
+    pub fn ready(&self) -> Value {
+        self.state_when(|state| state["rig"]["phase"] == "ready")
+    }
+
+    /// The job of this number, ended.
+    pub fn ended(&self, lane: &str, job: &Value) -> Value {
+        let state = self.state_when(|state| state[lane]["id"] == *job && state[lane]["phase"] != "running");
+        state[lane].clone()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.cancel.cancel();
+        let ended = self.thread.take().unwrap().join();
+        assert!(ended.is_ok() || std::thread::panicking());
+    }
+}
+
+/// What came back.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: u16,
+    pub headers: String,
+    pub body: Vec<u8>,
+}
+
+impl Answer {
+    fn parse(bytes: &[u8]) -> Self {
+        let split = bytes.windows(4).position(|four| four == b"\r\n\r\n").unwrap_or(bytes.len());
+        let headers = String::from_utf8_lossy(&bytes[..split]).into_owned();
+        let status = headers.split(' ').nth(1).and_then(|text| text.parse().ok()).unwrap_or(0);
+        Self { status, headers, body: bytes[(split + 4).min(bytes.len())..].to_vec() }
+    }
+
+    pub fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).unwrap_or_else(|error| panic!("{error}: {self:?}"))
+    }
+
+    pub fn error(&self) -> String {
+        self.json()["error"].as_str().unwrap_or_default().to_owned()
+    }
+}
+
+/// A socket, as RFC 6455 has it, without what a test does not need.
+pub struct Socket {
+    stream: TcpStream,
+    pub seat: u64,
+    pub secret: String,
+}
+
+impl Socket {
+    pub fn open(served: &Served) -> Self {
+        let mut stream = TcpStream::connect(&served.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let request = format!(
+            "GET /api/socket HTTP/1.1\r\nhost: {}\r\nconnection: upgrade\r\nupgrade: websocket\r\n\
+             sec-websocket-version: 13\r\nsec-websocket-key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
+            served.address
+        );
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut headers = Vec::new();
+        while !headers.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            headers.push(byte[0]);
+        }
+        assert!(headers.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&headers));
+        let mut socket = Self { stream, seat: 0, secret: String::new() };
+        let hello = socket.told("hello");
+        socket.seat = hello["hello"]["seat"].as_u64().unwrap();
+        socket.secret = hello["hello"]["secret"].as_str().unwrap().into();
+        socket
+    }
+
+    /// The next text of this type.
+    pub fn told(&mut self, kind: &str) -> Value {
+        loop {
+            let (opcode, payload) = self.frame().unwrap();
+            if opcode == 1 {
+                let value: Value = serde_json::from_slice(&payload).unwrap();
+                if value["type"] == kind {
+                    return value;
+                }
+            }
+        }
+    }
+
+    fn frame(&mut self) -> std::io::Result<(u8, Vec<u8>)> {
+        let mut head = [0; 2];
+        self.stream.read_exact(&mut head)?;
+        let length = match head[1] & 127 {
+            126 => {
+                let mut bytes = [0; 2];
+                self.stream.read_exact(&mut bytes)?;
+                usize::from(u16::from_be_bytes(bytes))
+            }
+            127 => {
+                let mut bytes = [0; 8];
+                self.stream.read_exact(&mut bytes)?;
+                usize::try_from(u64::from_be_bytes(bytes)).unwrap()
+            }
+            short => usize::from(short),
+        };
+        let mut payload = vec![0; length];
+        self.stream.read_exact(&mut payload)?;
+        Ok((head[0] & 15, payload))
+    }
+
+    /// Sends a frame of at most 125 bytes, masked by zeros.
+    pub fn say(&mut self, opcode: u8, payload: &[u8]) {
+        assert!(payload.len() < 126);
+        let mut frame = vec![0x80 | opcode, 0x80 | payload.len() as u8, 0, 0, 0, 0];
+        frame.extend(payload);
+        let _ = self.stream.write_all(&frame); // the other end may have gone, which is what some tests want
+    }
+}

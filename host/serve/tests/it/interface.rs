@@ -1,0 +1,156 @@
+//! The document, the guard, and every route once.
+
+use std::collections::BTreeSet;
+
+use farnear_scripted_board::Faults;
+use farnear_serve::{Listen, Token};
+use serde_json::{Value, json};
+
+use super::client::{Served, Socket};
+
+/// Every `$ref` in a document.
+fn references(value: &Value, found: &mut Vec<String>) {
+    match value {
+        Value::Object(fields) => {
+            if let Some(Value::String(reference)) = fields.get("$ref") {
+                found.push(reference.clone());
+            }
+            fields.values().for_each(|value| references(value, found));
+        }
+        Value::Array(values) => values.iter().for_each(|value| references(value, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn the_document_describes_the_routes_and_refers_to_nothing_that_is_not_there() {
+    let served = Served::captures_only();
+    let document = served.get("/openapi.json").json();
+    assert_eq!(document["openapi"], "3.1.0");
+    let mut found = Vec::new();
+    references(&document, &mut found);
+    assert!(found.len() > 20, "{found:?}");
+    for reference in found {
+        let pointer = reference.strip_prefix('#').unwrap();
+        assert!(document.pointer(pointer).is_some(), "{reference} leads nowhere");
+    }
+    let mut ids = BTreeSet::new();
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for (method, operation) in methods.as_object().unwrap() {
+            assert!(ids.insert(operation["operationId"].as_str().unwrap()), "{method} {path}");
+            assert!(operation["summary"].as_str().unwrap().ends_with('.'), "{method} {path}");
+            let named: Vec<_> = operation["parameters"].as_array().into_iter().flatten().collect();
+            for part in path.split('/').filter_map(|part| part.strip_prefix('{')?.strip_suffix('}')) {
+                assert!(named.iter().any(|one| one["name"] == part && one["in"] == "path"), "{path}: {part}");
+            }
+        }
+    }
+}
+
+/// What is sent to a route, the first time.
+fn body_of(method: &str, path: &str) -> &'static str {
+    match (method, path) {
+        ("post", "/api/answer") => r#"{"text":""}"#,
+        ("post", "/api/seat/answer") => r#"{"give":false}"#,
+        ("post", "/login") => r#"{"token":"x"}"#,
+        ("post", "/api/rig/move") => r#"{"targets":[{"axis":"fine","to_um":20}]}"#,
+        ("post", "/api/rig/goto") => r#"{"focus":"far"}"#,
+        ("post", "/api/live") => r#"{"mode":"off"}"#,
+        ("post", "/api/rig/alarms/clear") => r#"{"number":1}"#,
+        ("put", "/api/optics") => {
+            r#"{"optics":{"lens":{"focal_length_mm":50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900,"max_blur_px":2.7},"psf":{"model":"pillbox"}}}"#
+        }
+        ("post", "/api/optics/calculate") => {
+            r#"{"optics":{"lens":{"focal_length_mm":50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900,"max_blur_px":2.7}}}"#
+        }
+        ("post", "/api/captures") => r#"{"kind":"still"}"#,
+        ("put", "/api/captures/{capture}/note") => r#"{"rating":1,"text":"n"}"#,
+        ("post", "/api/captures/{capture}/region") => r#"{"x":0,"y":0,"width":2,"height":2}"#,
+        ("post", "/api/captures/{capture}/profile") => r#"{"from":[0,0],"to":[3,3]}"#,
+        ("post", "/api/quality") => r#"{"pairs":2}"#,
+        _ => "{}",
+    }
+}
+
+#[test]
+fn every_route_answers_in_its_own_words() {
+    let served = Served::with_board(Faults::default());
+    served.ready();
+    let socket = Socket::open(&served);
+    let document = served.get("/openapi.json").json();
+    let mut asked = 0;
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for method in methods.as_object().unwrap().keys() {
+            let place =
+                path.replace("{capture}", "absent").replace("{other}", "other").replace("{file}", "a.png");
+            let place = place.replace("{variant}", "favaro");
+            let seat = [("x-farnear-seat", socket.secret.as_str())];
+            let answer = served.ask(&method.to_uppercase(), &place, &seat, body_of(method, path));
+            asked += 1;
+            let fits = match answer.status {
+                200 => true,
+                // A socket that was asked for without an upgrade is refused by the library in plain words.
+                400 | 426 if path == "/api/socket" => true,
+                400..600 => !answer.error().is_empty(),
+                _ => false,
+            };
+            assert!(fits, "{method} {path}: {answer:?}");
+            assert!(answer.status != 404 || place.contains("absent"), "{method} {path}: {answer:?}");
+            assert!(answer.status != 422, "{method} {path}: the body of this test does not fit: {answer:?}");
+            served.post("/api/stop", "", "{}");
+            served.state_when(|state| state["job"].is_null() || state["job"]["phase"] != "running");
+        }
+    }
+    assert!(asked >= 35, "{asked} routes");
+}
+
+#[test]
+fn the_page_and_its_files_are_there_with_a_policy() {
+    let served = Served::captures_only();
+    for (path, media) in [("/", "text/html"), ("/main.js", "text/javascript"), ("/style.css", "text/css")] {
+        let answer = served.get(path);
+        assert_eq!(answer.status, 200);
+        assert!(answer.headers.contains(&format!("content-type: {media}")), "{}", answer.headers);
+        assert!(answer.headers.contains("content-security-policy: default-src 'self'"), "{}", answer.headers);
+    }
+    assert_eq!(served.get("/../Cargo.toml").status, 404);
+    assert_eq!(served.get("/nothing").error(), "there is no such page");
+    assert_eq!(served.ask("DELETE", "/api/state", &[], "").status, 405);
+}
+
+#[test]
+fn names_and_origins_from_elsewhere_are_refused() {
+    let served = Served::captures_only();
+    assert_eq!(served.ask("GET", "/", &[("host", "evil.example")], "").status, 403);
+    let origin = [("origin", "http://evil.example")];
+    assert_eq!(served.ask("POST", "/api/stop", &origin, "{}").status, 403);
+    let own = format!("http://{}", served.address);
+    assert_eq!(served.ask("POST", "/api/stop", &[("origin", own.as_str())], "{}").status, 200);
+}
+
+#[test]
+fn the_network_needs_the_token() {
+    const TOKEN: &str = "0123456789abcdef";
+    let listen = |folder: &std::path::Path| {
+        let file = folder.join("token");
+        std::fs::write(&file, format!("{TOKEN}\n")).unwrap();
+        let (address, token) = ("127.0.0.1:0".parse().unwrap(), Token::read(&file).unwrap());
+        Listen::Network { address, token, names: Vec::new() }
+    };
+    let served = Served::start(None, None, listen);
+    let page = served.get("/");
+    assert_eq!(page.status, 401);
+    assert!(String::from_utf8_lossy(&page.body).contains("id=\"token\""));
+    for path in ["/api/state", "/main.js", "/openapi.json"] {
+        assert_eq!(served.get(path).status, 401, "{path}");
+    }
+    assert_eq!(served.get("/login.js").status, 200);
+    let wrong = json!({ "token": "0123456789abcdee" }).to_string();
+    assert_eq!(served.post("/login", "", &wrong).status, 401);
+    let let_in = served.post("/login", "", &json!({ "token": TOKEN }).to_string());
+    assert!(let_in.headers.contains(&format!("set-cookie: farnear-token={TOKEN}; HttpOnly")), "{let_in:?}");
+    let cookie = format!("farnear-token={TOKEN}");
+    assert_eq!(served.ask("GET", "/api/state", &[("cookie", cookie.as_str())], "").status, 200);
+    let bearer = format!("Bearer {TOKEN}");
+    assert_eq!(served.ask("GET", "/api/state", &[("authorization", bearer.as_str())], "").status, 200);
+}

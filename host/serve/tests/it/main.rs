@@ -1,0 +1,9 @@
+//! farnear-serve as a browser meets it, one program for all of it. A scripted board stands behind the port.
+#![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
+#![cfg(target_os = "linux")] // where a pseudo-terminal holds the board
+
+mod captures;
+mod client;
+mod driving;
+mod garbage;
+mod interface;

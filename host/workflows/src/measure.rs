@@ -1,0 +1,96 @@
+//! Figures of a depth map: a region with the plane through it, a profile, the difference of two maps, over time.
+//!
+//! A pixel of pitch p sees p (z - F) / F of the object at distance z (telecentric lens, see `farnear_files::mesh`), which gives
+//! positions beside the optical axis in mm.
+
+mod difference;
+mod mesh;
+mod plane;
+mod profile;
+mod region;
+
+use std::path::Path;
+
+use farnear_files::{map, mesh::Projection};
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+pub use difference::{DifferenceFigures, difference};
+pub use mesh::mesh;
+pub use plane::{Plane, fit};
+pub use profile::{ProfileFigures, ProfilePoint, profile};
+pub use region::{RegionFigures, region};
+
+use crate::{
+    error::{Result, WorkflowError},
+    optics,
+};
+
+/// A depth map with its standard deviation, where that was computed, and where its rays go.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Depths in mm, (height, width); NaN = no value.
+    pub depth_mm: Array2<f32>,
+    /// Standard deviation of each depth, mm.
+    pub deviation_mm: Option<Array2<f32>>,
+    /// Where a pixel's ray goes.
+    pub projection: Projection,
+}
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rectangle {
+    /// Leftmost column.
+    pub x: usize,
+    /// Topmost row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Measured {
+    /// Reads what [`crate::depth::compute`] wrote to a folder.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Map`] where there is no `depth.npy`, [`WorkflowError::NoOptics`]; [`WorkflowError::File`] for a
+    /// deviation of another size.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let depth_mm = map::read(&folder.join("depth.npy"))?;
+        let path = folder.join("uncertainty.npy");
+        let deviation_mm = path.exists().then(|| map::read(&path)).transpose()?;
+        if let Some(deviation) = deviation_mm.as_ref().filter(|map| map.dim() != depth_mm.dim()) {
+            let reason =
+                format!("{:?} rows and columns, depth.npy has {:?}", deviation.dim(), depth_mm.dim());
+            return Err(WorkflowError::file(&path, "a map of the depth's size")(reason));
+        }
+        let optics = optics::of_pair(None, &folder.join("far.png"))?;
+        let projection =
+            Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um() };
+        Ok(Self { depth_mm, deviation_mm, projection })
+    }
+
+    /// Where the pixel sees the object, mm: to the right, up, away from the lens. `None` where there is no depth.
+    pub fn point_mm(&self, column: usize, row: usize) -> Option<[f64; 3]> {
+        let z = f64::from(*self.depth_mm.get((row, column))?);
+        let (height, width) = self.depth_mm.dim();
+        let scale = self.projection.pixel_um * 1e-3 * (z / self.projection.focal_length_mm - 1.0);
+        let beside = |at: usize, size: usize| (at as f64 - 0.5 * (size as f64 - 1.0)) * scale;
+        z.is_finite().then(|| [beside(column, width), -beside(row, height), z])
+    }
+
+    fn check(&self, at: &Rectangle) -> Result<()> {
+        let (height, width) = self.depth_mm.dim();
+        let fits = |begin: usize, size: usize, all: usize| {
+            size > 0 && begin.checked_add(size).is_some_and(|end| end <= all)
+        };
+        if fits(at.x, at.width, width) && fits(at.y, at.height, height) {
+            return Ok(());
+        }
+        let Rectangle { x, y, width: columns, height: rows } = at;
+        let value = format!("{columns}x{rows} at ({x}, {y})");
+        Err(WorkflowError::parameter("region", value, format!("expected a part of {width}x{height} pixels")))
+    }
+}

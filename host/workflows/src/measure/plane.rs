@@ -1,0 +1,93 @@
+//! The plane through points, by least squares along the optical axis: z = z0 + a x + b y.
+
+use serde::Serialize;
+
+/// A plane, and how well the points keep to it.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Plane {
+    /// Distance in the points' middle.
+    pub z_mm: f64,
+    /// Slope to the right, mm per mm.
+    pub slope_x: f64,
+    /// Slope upwards.
+    pub slope_y: f64,
+    /// Angle between the plane and one square to the optical axis.
+    pub tilt_deg: f64,
+    /// Root mean square of the distances along the axis.
+    pub rms_mm: f64,
+    /// Largest minus smallest of them: the flatness.
+    pub peak_to_valley_mm: f64,
+}
+
+/// Fits a plane; `None` with fewer than three points or all of them in a line. Three passes.
+pub fn fit(points_mm: &[[f64; 3]]) -> Option<Plane> {
+    let count = points_mm.len();
+    if count < 3 {
+        return None;
+    }
+    let mean = |axis: usize| points_mm.iter().map(|point| point[axis]).sum::<f64>() / count as f64;
+    let [mx, my, mz] = [mean(0), mean(1), mean(2)];
+    let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
+    for [x, y, z] in points_mm {
+        let (x, y, z) = (x - mx, y - my, z - mz);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+        xz += x * z;
+        yz += y * z;
+    }
+    let determinant = xx * yy - xy * xy;
+    // Relative to what it would be for points that spread in both directions.
+    if determinant <= 1e-9 * (xx * yy) || determinant.is_nan() {
+        return None;
+    }
+    let (a, b) = ((xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant);
+    let off = |[x, y, z]: &[f64; 3]| z - mz - a * (x - mx) - b * (y - my);
+    let (mut squares, mut low, mut high) = (0.0, f64::MAX, f64::MIN);
+    for off in points_mm.iter().map(off) {
+        squares += off * off;
+        low = low.min(off);
+        high = high.max(off);
+    }
+    Some(Plane {
+        z_mm: mz,
+        slope_x: a,
+        slope_y: b,
+        tilt_deg: a.hypot(b).atan().to_degrees(),
+        rms_mm: (squares / count as f64).sqrt(),
+        peak_to_valley_mm: high - low,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(z: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
+        (0..400).map(|i| (f64::from(i % 20) - 4.0, f64::from(i / 20))).map(|(x, y)| [x, y, z(x, y)]).collect()
+    }
+
+    #[test]
+    fn a_plane_is_found() {
+        let plane = fit(&grid(|x, y| 900.0 + 0.3 * x - 0.4 * y)).unwrap();
+        assert!((plane.slope_x - 0.3).abs() < 1e-9 && (plane.slope_y + 0.4).abs() < 1e-9, "{plane:?}");
+        assert!((plane.tilt_deg - 0.5f64.atan().to_degrees()).abs() < 1e-9);
+        assert!(plane.rms_mm < 1e-9 && plane.peak_to_valley_mm < 1e-9);
+    }
+
+    #[test]
+    fn what_is_off_the_plane_is_measured() {
+        let plane = fit(&grid(|x, y| 900.0 + if (x + y) as i64 % 2 == 0 { 1.0 } else { -1.0 })).unwrap();
+        assert!(
+            (plane.rms_mm - 1.0).abs() < 0.01 && (plane.peak_to_valley_mm - 2.0).abs() < 0.05,
+            "{plane:?}"
+        );
+    }
+
+    #[test]
+    fn too_few_points_or_a_line_make_no_plane() {
+        assert_eq!(fit(&[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]), None);
+        let line: Vec<_> = (0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 1.0]).collect();
+        assert_eq!(fit(&line), None);
+    }
+}

@@ -1,0 +1,82 @@
+//! Depths along a line.
+
+use serde::Serialize;
+
+use super::Measured;
+use crate::error::{Result, WorkflowError};
+
+/// A point of a profile.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct ProfilePoint {
+    /// Column.
+    pub x: usize,
+    /// Row.
+    pub y: usize,
+    /// From the profile's begin, in pixels.
+    pub at_px: f64,
+    /// Depth, where there is one.
+    pub depth_mm: Option<f64>,
+    /// Its standard deviation, where it was computed.
+    pub deviation_mm: Option<f64>,
+}
+
+/// A profile.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct ProfileFigures {
+    /// Its points, a pixel apart.
+    pub points: Vec<ProfilePoint>,
+}
+
+/// Takes the depths nearest to the line between two pixels.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for an end outside the map.
+pub fn profile(map: &Measured, from: [usize; 2], to: [usize; 2]) -> Result<ProfileFigures> {
+    let (height, width) = map.depth_mm.dim();
+    for [x, y] in [from, to] {
+        if x >= width || y >= height {
+            let expected = format!("expected a pixel of {width}x{height}");
+            return Err(WorkflowError::parameter("profile", format!("({x}, {y})"), expected));
+        }
+    }
+    let [dx, dy] = [0, 1].map(|axis| to[axis] as f64 - from[axis] as f64);
+    let length = dx.hypot(dy);
+    let steps = dx.abs().max(dy.abs()) as usize;
+    let points = (0..=steps).map(|step| {
+        let part = if steps == 0 { 0.0 } else { step as f64 / steps as f64 };
+        let x = (from[0] as f64 + part * dx).round() as usize;
+        let y = (from[1] as f64 + part * dy).round() as usize;
+        let value = |value: f32| value.is_finite().then_some(f64::from(value));
+        ProfilePoint {
+            x,
+            y,
+            at_px: part * length,
+            depth_mm: value(map.depth_mm[[y, x]]),
+            deviation_mm: map.deviation_mm.as_ref().and_then(|deviation| value(deviation[[y, x]])),
+        }
+    });
+    Ok(ProfileFigures { points: points.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_files::mesh::Projection;
+    use ndarray::Array2;
+
+    use super::*;
+
+    #[test]
+    fn the_line_is_followed() {
+        let mut depth_mm = Array2::from_shape_fn((10, 20), |(y, x)| (100 * y + x) as f32);
+        depth_mm[[2, 4]] = f32::NAN;
+        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4 };
+        let map = Measured { depth_mm, deviation_mm: None, projection };
+        let found = profile(&map, [0, 0], [8, 4]).unwrap().points;
+        assert_eq!(found.len(), 9);
+        assert_eq!((found[4].x, found[4].y, found[4].depth_mm), (4, 2, None));
+        assert_eq!(found[8].depth_mm, Some(408.0));
+        assert!((found[8].at_px - 80f64.sqrt()).abs() < 1e-12);
+        assert_eq!(profile(&map, [3, 3], [3, 3]).unwrap().points.len(), 1);
+        assert!(profile(&map, [0, 0], [20, 0]).unwrap_err().is_usage());
+    }
+}

@@ -1,0 +1,130 @@
+//! Figures of one image while it is looked at: brightness, saturation, texture, focus.
+
+use farnear_capture::camera::Image;
+use farnear_depth::focus_measure::FocusMeasure;
+use serde::Serialize;
+
+use crate::figures::rounded;
+
+/// Bins of the histogram.
+const BINS: usize = 256;
+/// Part of saturated pixels from which depth suffers: their true values, and so the blur, are unknown.
+const SATURATED: f64 = 0.005;
+/// Mean, as part of the full scale, below which the noise of reading dominates.
+const DARK: f64 = 0.04;
+/// Contrast (standard deviation over mean) below which there is hardly a texture to defocus.
+const TEXTURELESS: f64 = 0.02;
+
+/// Figures of an image.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PictureFigures {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Bits of a pixel.
+    pub bits: u8,
+    /// Mean, as part of the full scale.
+    pub mean: f64,
+    /// Standard deviation over mean.
+    pub contrast: f64,
+    /// Part of the pixels at the largest code.
+    pub saturated_fraction: f64,
+    /// Pixels per bin of the full scale, darkest first.
+    pub histogram: Vec<u32>,
+    /// The focus measure; larger is sharper. None for an image that has none (dark, tiny).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focus: Option<f64>,
+    /// What makes this image unfit for depth, each with what to do.
+    pub warnings: Vec<String>,
+}
+
+/// Looks at an image. One pass for the brightness; the focus measure costs what it says.
+pub fn figures(image: &Image, measure: FocusMeasure) -> PictureFigures {
+    let (height, width) = image.pixels.dim();
+    let bits = image.bits.clamp(1, 16);
+    let largest = ((1u32 << bits) - 1) as f64;
+    let mut histogram = vec![0u32; BINS];
+    let (mut sum, mut squares, mut saturated) = (0.0f64, 0.0f64, 0usize);
+    for &code in &image.pixels {
+        let value = f64::from(code);
+        let bin = if bits >= 8 { usize::from(code) >> (bits - 8) } else { usize::from(code) << (8 - bits) };
+        histogram[bin.min(BINS - 1)] += 1;
+        sum += value;
+        squares += value * value;
+        saturated += usize::from(value >= largest);
+    }
+    let count = image.pixels.len().max(1) as f64;
+    let mean = sum / count;
+    let deviation = (squares / count - mean * mean).max(0.0).sqrt();
+    let contrast = if mean > 0.0 { deviation / mean } else { 0.0 };
+    let saturated_fraction = saturated as f64 / count;
+    let focus = measure.of(image.pixels.mapv(f32::from).view()).ok();
+    PictureFigures {
+        width,
+        height,
+        bits: image.bits,
+        mean: rounded(mean / largest, 4),
+        contrast: rounded(contrast, 4),
+        saturated_fraction: rounded(saturated_fraction, 6),
+        histogram,
+        focus,
+        warnings: warnings(saturated_fraction, mean / largest, contrast),
+    }
+}
+
+fn warnings(saturated: f64, mean: f64, contrast: f64) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if saturated > SATURATED {
+        let percent = 100.0 * saturated;
+        warnings
+            .push(format!("{percent:.1} % of the pixels are saturated: expose shorter or close the light"));
+    }
+    if mean < DARK {
+        warnings.push(format!("dark: {:.1} % of the full scale in the mean; expose longer", 100.0 * mean));
+    }
+    if contrast < TEXTURELESS {
+        warnings.push("hardly any texture: depth from defocus needs some; project or paint a pattern".into());
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    fn seen(bits: u8, code: impl Fn(usize, usize) -> u16) -> PictureFigures {
+        let pixels = Array2::from_shape_fn((32, 48), |(y, x)| code(y, x));
+        figures(&Image { pixels, bits }, FocusMeasure::Tenengrad)
+    }
+
+    #[test]
+    fn a_textured_picture_draws_no_warning() {
+        let found = seen(12, |y, x| if (x / 2 + y / 2) % 2 == 0 { 1000 } else { 3000 });
+        assert_eq!(found.warnings, Vec::<String>::new());
+        assert_eq!((found.width, found.height, found.bits), (48, 32, 12));
+        assert_eq!(found.histogram.iter().sum::<u32>(), 48 * 32);
+        // 1000 of 4096 codes lies in bin 62, 3000 in bin 187.
+        assert_eq!((found.histogram[62], found.histogram[187]), (768, 768));
+        assert!((found.mean - 2000.0 / 4095.0).abs() < 1e-4);
+        assert!((found.contrast - 0.5).abs() < 1e-4);
+    }
+
+    #[test]
+    fn sharper_is_larger() {
+        let sharp = seen(8, |_, x| if x % 8 < 4 { 50 } else { 200 }).focus.unwrap();
+        let soft = seen(8, |_, x| (125.0 + 75.0 * (x as f64 * 0.785).sin()) as u16).focus.unwrap();
+        assert!(sharp > soft, "{sharp} {soft}");
+    }
+
+    #[test]
+    fn what_is_unfit_is_said() {
+        assert!(seen(8, |_, x| if x < 4 { 255 } else { 100 }).warnings[0].starts_with("8.3 % of the pixels"));
+        let dark = seen(8, |_, x| (x % 2) as u16);
+        assert!(dark.warnings[0].starts_with("dark"), "{:?}", dark.warnings);
+        assert!(seen(8, |_, _| 100).warnings[0].starts_with("hardly any texture"));
+        assert_eq!(seen(8, |_, _| 0).focus, None);
+    }
+}

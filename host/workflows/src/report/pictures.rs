@@ -1,0 +1,67 @@
+//! Maps as pictures with a colour map that is told apart by every eye (viridis), and a histogram as SVG.
+
+use std::{fmt::Write as _, io::Cursor};
+
+use farnear_files::EncodeError;
+use image::{ImageFormat, Rgb, RgbImage};
+use ndarray::ArrayView2;
+
+use crate::error::Result;
+
+/// Bins of the histogram.
+const BINS: usize = 96;
+/// What has no value.
+const NONE: Rgb<u8> = Rgb([150, 150, 152]);
+
+/// The value below which this part of the finite values lies; `None` where there are none.
+pub fn quantile(map: ArrayView2<f32>, part: f64) -> Option<f32> {
+    let mut finite: Vec<f32> = map.iter().copied().filter(|value| value.is_finite()).collect();
+    if finite.is_empty() {
+        return None;
+    }
+    let at = (part * (finite.len() - 1) as f64) as usize;
+    Some(*finite.select_nth_unstable_by(at, f32::total_cmp).1)
+}
+
+/// A map as the bytes of a PNG, from dark at `low` to bright at `high`.
+pub fn colours(map: ArrayView2<f32>, [low, high]: [f32; 2]) -> Result<Vec<u8>> {
+    let (height, width) = map.dim();
+    let span = f64::from((high - low).max(f32::MIN_POSITIVE));
+    let picture = RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let value = map[[y as usize, x as usize]];
+        if !value.is_finite() {
+            return NONE;
+        }
+        let colour = colorous::VIRIDIS.eval_continuous((f64::from(value - low) / span).clamp(0.0, 1.0));
+        Rgb([colour.r, colour.g, colour.b])
+    });
+    let mut png = Cursor::new(Vec::new());
+    picture.write_to(&mut png, ImageFormat::Png).map_err(EncodeError::of("a map's picture"))?;
+    Ok(png.into_inner())
+}
+
+/// How often which depth occurs, between the outermost half percents, as SVG.
+pub fn histogram(depth_mm: ArrayView2<f32>) -> String {
+    let (Some(low), Some(high)) = (quantile(depth_mm, 0.005), quantile(depth_mm, 0.995)) else {
+        return "<p>no depth</p>".into();
+    };
+    let span = (high - low).max(1e-3);
+    let mut counts = [0u32; BINS];
+    for value in depth_mm.iter().copied().filter(|value| (low..=high).contains(value)) {
+        let bin = ((value - low) / span * BINS as f32) as usize;
+        counts[bin.min(BINS - 1)] += 1;
+    }
+    let most = f64::from(counts.iter().copied().max().unwrap_or(1).max(1));
+    let mut svg =
+        String::from("<svg viewBox=\"0 0 960 180\" role=\"img\" aria-label=\"histogram of depth\">");
+    for (bin, count) in counts.iter().enumerate() {
+        let height = 150.0 * f64::from(*count) / most;
+        let (x, y) = (bin * 10, 150.0 - height);
+        let _ = write!(svg, "<rect x={x} y={y:.1} width=9 height={height:.1} fill=\"#31688e\"/>");
+    }
+    for (x, anchor, value) in [(0, "start", low), (480, "middle", low + 0.5 * span), (960, "end", high)] {
+        let _ = write!(svg, "<text x={x} y=170 font-size=14 text-anchor={anchor}>{value:.1} mm</text>");
+    }
+    svg.push_str("</svg>");
+    svg
+}

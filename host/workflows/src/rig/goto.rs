@@ -1,0 +1,72 @@
+//! To the far or the near focus: the sensor where one image of a pair is taken, to look at it.
+
+use std::path::PathBuf;
+
+use farnear_capture::{
+    describe::um,
+    plan::{SensorPair, coarse_for, fine_for},
+    ready::{base_nm, base_when_homed_nm, ensure_homed},
+};
+use farnear_protocol::message::Axis;
+use serde::Serialize;
+
+use super::{Rig, RigAddress};
+use crate::{context::Context, error::Result, optics::GivenOptics};
+
+/// Which image of a pair.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Focus {
+    /// The one that is sharp at the far end of the working range.
+    Far,
+    /// The one that is sharp at its near end.
+    Near,
+}
+
+/// Where to go.
+#[derive(Clone, PartialEq, Debug)]
+pub struct GotoSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// The optics file, whose working range counts.
+    pub optics: PathBuf,
+    /// Which focus.
+    pub focus: Focus,
+}
+
+/// Where the sensor has come to.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct GotoFigures {
+    /// Sensor distance that was asked for.
+    pub sensor_mm: f64,
+    /// Where the coarse stage's encoder says it is.
+    pub coarse_um: f64,
+    /// Where the piezo's gauge says it is.
+    pub fine_um: f64,
+}
+
+/// Homes where needed, brings the coarse stage where the piezo reaches both focus settings, and sends the piezo to one.
+///
+/// # Errors
+/// Optics; [`crate::WorkflowError::Plan`] where the rig does not reach; [`crate::WorkflowError::Client`].
+pub fn goto(settings: &GotoSettings, context: &Context<'_>) -> Result<GotoFigures> {
+    let optics = GivenOptics::read(&settings.optics)?;
+    let range = optics.optics.working_range();
+    let pair = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
+    let rig = Rig::connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let client = &rig.client;
+    let limits = client.hello().limits;
+    // What the stage cannot reach is said before anything moves.
+    coarse_for(&pair, base_when_homed_nm(client, &client.status()?), &limits)?;
+    ensure_homed(client, &mut |what| context.say(what))?;
+    let base = base_nm(client, &client.status()?);
+    let target = coarse_for(&pair, base, &limits)?;
+    context.say(&format!("moving the coarse stage to {:.3} um", um(target)));
+    let coarse = client.move_to(Axis::SensorCoarse, target)?;
+    let sensor_mm = match settings.focus {
+        Focus::Far => pair.far_mm,
+        Focus::Near => pair.near_mm,
+    };
+    let fine = fine_for(sensor_mm, base, coarse.measured, &limits)?;
+    let fine = client.move_to(Axis::SensorFine, fine)?;
+    Ok(GotoFigures { sensor_mm, coarse_um: um(coarse.measured), fine_um: um(fine.measured) })
+}

@@ -1,0 +1,82 @@
+//! The live image: a program that is repeated where the piezo stands, frame after frame, until somebody wishes it to end.
+//!
+//! Nothing moves but the piezo, which is held where it is. A program takes as many exposures as come within a quarter of a second, so
+//! that a fast camera costs little on the line, and a slow one has no queue of old images when something else is wanted.
+
+use std::time::{Duration, Instant};
+
+use farnear_capture::{camera::Image, expose::expose, sequence::ShotDefaults};
+use farnear_protocol::message::{Axis, Shot, ShotRecord};
+
+use super::{RigAddress, camera::CameraSettings};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// About how long a program lasts.
+const PROGRAM: Duration = Duration::from_millis(250);
+/// Most exposures of a program.
+const REPEATS_MAX: u16 = 100;
+
+/// What is looked at.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LiveSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Its camera.
+    pub camera: CameraSettings,
+}
+
+/// Gives frame after frame to `on_frame` until it or the context wants no more. The rig is stopped before this returns.
+///
+/// # Errors
+/// [`WorkflowError::Cancelled`] or the client's word for it at the wished end; camera and rig; what `on_frame` gives.
+pub fn watch(
+    settings: &LiveSettings,
+    context: &Context<'_>,
+    mut on_frame: impl FnMut(ShotRecord, Image) -> Result<()>,
+) -> Result<()> {
+    let mut equipped = settings.camera.connect(&settings.rig, None, context)?;
+    let (client, camera) = (&equipped.rig.client, equipped.camera.as_mut());
+    let mut repeats = 1;
+    loop {
+        context.cancel.check("watching the live image")?;
+        let begin = Instant::now();
+        let shot = [Shot { repeat: repeats, ..held(client.status()?.fine.asked.0, client, settings) }];
+        expose(client, camera, &shot, settings.camera.image_wait, |record, image| {
+            context.cancel.check("watching the live image")?;
+            on_frame(record, image)
+        })
+        .map_err(|error: WorkflowError| error)?;
+        repeats = next(repeats, begin.elapsed());
+    }
+}
+
+/// A shot where the piezo stands; a piezo that was never sent anywhere may stand outside its limits.
+fn held(fine_nm: i32, client: &farnear_capture::Client, settings: &LiveSettings) -> Shot {
+    let limits = client.hello().limits;
+    let target = farnear_protocol::Nanometres(fine_nm.clamp(limits.fine_min.0, limits.fine_max.0));
+    let defaults = ShotDefaults { exposure: settings.camera.exposure, ..ShotDefaults::default() };
+    defaults.shot(Axis::SensorFine, target)
+}
+
+/// How many exposures the next program takes, where the last one took `repeats` in `took`.
+fn next(repeats: u16, took: Duration) -> u16 {
+    let each_s = took.as_secs_f64() / f64::from(repeats.max(1));
+    (PROGRAM.as_secs_f64() / each_s.max(1e-3)).clamp(1.0, f64::from(REPEATS_MAX)) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_camera_is_asked_for_one_image_at_a_time() {
+        assert_eq!(next(1, Duration::from_secs(3)), 1);
+        assert_eq!(next(100, Duration::from_secs(50)), 1);
+        assert_eq!(next(1, Duration::from_millis(25)), 10);
+        assert_eq!(next(10, Duration::from_millis(100)), 25);
+        assert_eq!(next(1, Duration::ZERO), 100);
+    }
+}

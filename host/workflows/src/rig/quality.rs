@@ -1,0 +1,254 @@
+//! How good depth is: pairs of a flat target, and what owners of depth cameras ask of them. Each measurement is a line in a
+//! record, so that a rig's health is seen over weeks.
+
+use std::{
+    fs,
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
+
+use farnear_depth::{
+    pipeline::{Settings, depth_from_pair},
+    uncertainty::{Noise, standard_deviation_mm},
+};
+use farnear_files::{mesh::Projection, staging::write_file};
+use ndarray::{Array2, s};
+use serde::{Deserialize, Serialize};
+
+use super::{RigAddress, camera::CameraSettings, live_depth::grey, pair::take};
+use crate::{
+    clock,
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    measure::{Measured, fit},
+    operators,
+    optics::GivenOptics,
+};
+
+/// Fewest and most pairs.
+const PAIRS: std::ops::RangeInclusive<usize> = 2..=50;
+/// Part of the image that is looked at, along each side: the rim has less light and more distortion.
+const MIDDLE: f64 = 0.8;
+
+/// What is measured.
+#[derive(Clone, PartialEq, Debug)]
+pub struct QualitySettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Its camera.
+    pub camera: CameraSettings,
+    /// The optics file.
+    pub optics: PathBuf,
+    /// Pairs.
+    pub pairs: usize,
+    /// How far the target is, where that is known.
+    pub true_mm: Option<f64>,
+    /// The record that the figures are added to.
+    pub record: PathBuf,
+}
+
+/// How good depth is.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct QualityFigures {
+    /// When; only of real hardware.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    /// Pairs.
+    pub pairs: usize,
+    /// Part of the pixels with a depth.
+    pub fill_rate: f64,
+    /// Mean depth.
+    pub mean_mm: f64,
+    /// Distance of the depths from the plane through them, root mean square; of the mean over the pairs.
+    pub plane_rms_mm: f64,
+    /// Angle between the plane and one square to the optical axis.
+    pub tilt_deg: f64,
+    /// Median over the pixels of the standard deviation over the pairs.
+    pub temporal_noise_mm: f64,
+    /// Median of the standard deviations that are predicted for each pixel of the first pair.
+    pub predicted_noise_mm: f64,
+    /// Mean depth minus the true distance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy_mm: Option<f64>,
+}
+
+/// The measurements of a rig.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+pub struct QualityRecord {
+    /// The oldest first.
+    #[serde(default, rename = "measurement")]
+    pub measurements: Vec<QualityFigures>,
+}
+
+/// Reads a record; empty where there is none.
+///
+/// # Errors
+/// [`WorkflowError::Read`], [`WorkflowError::File`].
+pub fn read_record(path: &Path) -> Result<QualityRecord> {
+    match fs::read_to_string(path) {
+        Ok(text) => toml::from_str(&text).map_err(WorkflowError::file(path, "a record of depth quality")),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(QualityRecord::default()),
+        Err(error) => Err(WorkflowError::read("the record", path)(error)),
+    }
+}
+
+/// Takes the pairs, computes their depth and adds the figures to the record.
+///
+/// # Errors
+/// Parameters, optics, record, camera, rig, computation: in this order. The record changes only at the end.
+pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<QualityFigures> {
+    if !PAIRS.contains(&settings.pairs) {
+        return Err(WorkflowError::parameter("pairs", settings.pairs, "expected 2 to 50"));
+    }
+    if let Some(true_mm) = settings.true_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
+        return Err(WorkflowError::parameter("true distance", true_mm, "expected a positive number of mm"));
+    }
+    let optics = GivenOptics::read(&settings.optics)?;
+    let mut record = read_record(&settings.record)?;
+    let designed = operators::find(None, &optics.optics)?;
+    let computation = Settings::default();
+    let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let emulated = rig.rig.client.hello().emulated;
+    let mut maps = Vec::new();
+    let mut predicted = None;
+    for index in 0..settings.pairs {
+        context.cancel.check("measuring the depth quality")?;
+        let (pair, _) = take(&mut rig, &optics, &settings.camera, context)?;
+        let (far, near) = (grey(&pair.far.image), grey(&pair.near.image));
+        let map = depth_from_pair(far.view(), near.view(), &designed, &optics.optics, &computation)?;
+        if index == 0 {
+            let (far, near) = (far.view(), near.view());
+            let noise = Noise::Estimated;
+            predicted =
+                Some(standard_deviation_mm(far, near, &designed, &optics.optics, &computation, noise)?);
+        }
+        maps.push(map.depth_mm);
+        context.progress.advance("pairs", index + 1, Some(settings.pairs));
+    }
+    let projection =
+        Projection { focal_length_mm: optics.optics.focal_length_mm(), pixel_um: optics.optics.pixel_um() };
+    let found = figures(&maps, predicted.as_ref(), projection, settings.true_mm)?;
+    let found = QualityFigures { time: (!emulated).then(clock::now_rfc3339).flatten(), ..found };
+    record.measurements.push(found.clone());
+    write_file(&settings.record, toml::to_string(&record)?.as_bytes())?;
+    Ok(found)
+}
+
+/// What follows from the maps. Only the middle of the image counts.
+fn figures(
+    maps: &[Array2<f32>],
+    predicted: Option<&Array2<f32>>,
+    projection: Projection,
+    true_mm: Option<f64>,
+) -> Result<QualityFigures> {
+    let (height, width) = maps.first().map_or((0, 0), Array2::dim);
+    let rim = |size: usize| ((1.0 - MIDDLE) / 2.0 * size as f64) as usize;
+    let (top, left) = (rim(height), rim(width));
+    let window = s![top..height - top, left..width - left];
+    let middles: Vec<_> = maps.iter().map(|map| map.slice(window)).collect();
+    let (mut mean, mut noise, mut filled) =
+        (Array2::from_elem((height, width), f32::NAN), Vec::new(), 0usize);
+    let pixels = middles.first().map_or(0, |map| map.len());
+    for row in 0..height - 2 * top {
+        for column in 0..width - 2 * left {
+            let depths: Vec<f64> =
+                middles.iter().map(|map| f64::from(map[[row, column]])).filter(|z| z.is_finite()).collect();
+            filled += depths.len();
+            if depths.len() < maps.len() {
+                continue; // a pixel that is there now and then says nothing about the noise of depth
+            }
+            let (middle, deviation) = spread(&depths);
+            mean[[row + top, column + left]] = middle as f32;
+            noise.push(deviation);
+        }
+    }
+    let map = Measured { depth_mm: mean, deviation_mm: None, projection };
+    let points: Vec<_> = (0..height)
+        .flat_map(|row| (0..width).filter_map(|column| map.point_mm(column, row)).collect::<Vec<_>>())
+        .collect();
+    let plane = fit(&points).ok_or_else(|| {
+        WorkflowError::parameter(
+            "target",
+            format!("{} pixels with a depth", points.len()),
+            "expected a textured plane",
+        )
+    })?;
+    let predicted = predicted.map(|map| {
+        map.slice(window).iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).collect()
+    });
+    Ok(QualityFigures {
+        time: None,
+        pairs: maps.len(),
+        fill_rate: rounded(filled as f64 / (pixels * maps.len()).max(1) as f64, 6),
+        mean_mm: rounded(plane.z_mm, 4),
+        plane_rms_mm: rounded(plane.rms_mm, 4),
+        tilt_deg: rounded(plane.tilt_deg, 3),
+        temporal_noise_mm: rounded(median(noise), 4),
+        predicted_noise_mm: rounded(median(predicted.unwrap_or_default()), 4),
+        accuracy_mm: true_mm.map(|true_mm| rounded(plane.z_mm - true_mm, 4)),
+    })
+}
+
+/// Mean and standard deviation (of a sample) of two values or more.
+fn spread(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, (squares / (count - 1.0)).sqrt())
+}
+
+/// The middle value; 0 where there is none.
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROJECTION: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4 };
+
+    /// Maps of a plane at 900 mm that tremble by `noise` from pair to pair.
+    fn maps(noise: f32) -> Vec<Array2<f32>> {
+        let sign = |index: usize| if index.is_multiple_of(2) { 1.0 } else { -1.0 };
+        (0..4).map(|index| Array2::from_shape_fn((50, 60), |_| 900.0 + noise * sign(index))).collect()
+    }
+
+    #[test]
+    fn noise_over_time_and_accuracy_are_measured() {
+        let predicted = Array2::from_elem((50, 60), 2.5f32);
+        let found = figures(&maps(2.0), Some(&predicted), PROJECTION, Some(899.0)).unwrap();
+        // +2, -2, +2, -2: the sample's deviation is sqrt(16 / 3).
+        assert!((found.temporal_noise_mm - (16.0f64 / 3.0).sqrt()).abs() < 1e-3, "{found:?}");
+        assert_eq!((found.fill_rate, found.plane_rms_mm, found.tilt_deg), (1.0, 0.0, 0.0));
+        assert_eq!((found.mean_mm, found.accuracy_mm, found.predicted_noise_mm), (900.0, Some(1.0), 2.5));
+    }
+
+    #[test]
+    fn what_is_not_there_lowers_the_fill_rate_and_without_depth_there_is_no_quality() {
+        let mut some = maps(0.0);
+        some[0].slice_mut(s![.., ..30]).fill(f32::NAN);
+        let found = figures(&some, None, PROJECTION, None).unwrap();
+        assert!((found.fill_rate - 0.875).abs() < 1e-9 && found.accuracy_mm.is_none(), "{found:?}");
+        let none = vec![Array2::from_elem((50, 60), f32::NAN); 2];
+        assert!(figures(&none, None, PROJECTION, None).is_err());
+    }
+
+    #[test]
+    fn records_are_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("quality.toml");
+        assert_eq!(read_record(&path).unwrap(), QualityRecord::default());
+        let measurements = vec![figures(&maps(1.0), None, PROJECTION, None).unwrap()];
+        let record = QualityRecord { measurements };
+        fs::write(&path, toml::to_string(&record).unwrap()).unwrap();
+        assert_eq!(read_record(&path).unwrap(), record);
+        fs::write(&path, "measurement = 3").unwrap();
+        assert!(read_record(&path).is_err());
+    }
+}

@@ -1,0 +1,63 @@
+//! Pair after pair, each in a folder of its own: for the noise over time, and for what changes.
+
+use std::path::PathBuf;
+
+use farnear_capture::record::{begin_folder, finish_folder};
+use serde::Serialize;
+
+use super::{
+    RigAddress,
+    camera::CameraSettings,
+    pair::{PairFigures, take},
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    optics::GivenOptics,
+};
+
+/// Most pairs of a series: more belong into several.
+const MOST: usize = 1000;
+
+/// What is captured, and where to.
+#[derive(Clone, Debug)]
+pub struct SeriesSettings {
+    /// The rig.
+    pub rig: RigAddress,
+    /// Its camera.
+    pub camera: CameraSettings,
+    /// The optics file.
+    pub optics: PathBuf,
+    /// The new capture folders, one per pair.
+    pub out: Vec<PathBuf>,
+}
+
+/// What there is to say of a series.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SeriesFigures {
+    /// Of each pair.
+    pub pairs: Vec<PairFigures>,
+}
+
+/// Captures the pairs. A series that is cancelled keeps the pairs that are complete.
+///
+/// # Errors
+/// As [`super::pair::capture`]; [`WorkflowError::Parameter`] for no pairs or more than 1000.
+pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<SeriesFigures> {
+    let count = settings.out.len();
+    if count == 0 || count > MOST {
+        return Err(WorkflowError::parameter("pairs", count, format!("expected 1 to {MOST}")));
+    }
+    let optics = GivenOptics::read(&settings.optics)?;
+    let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let mut pairs = Vec::new();
+    for out in &settings.out {
+        context.cancel.check("capturing a series")?;
+        let folder = begin_folder(out)?;
+        let (pair, record) = take(&mut rig, &optics, &settings.camera, context)?;
+        finish_folder(folder, &pair, &record)?;
+        pairs.push(PairFigures::from(&pair));
+        context.progress.advance("pairs", pairs.len(), Some(count));
+    }
+    Ok(SeriesFigures { pairs })
+}

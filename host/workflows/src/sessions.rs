@@ -1,0 +1,298 @@
+//! Captures that were kept: the folders of a session, what is in them, and what a person noted.
+//!
+//! A capture is a folder with `capture.toml` ([`farnear_capture::record`]); a note lies beside it in `note.toml`.
+
+use std::{
+    fs,
+    path::{Component, Path, PathBuf},
+};
+
+use farnear_capture::record::{CAPTURE_FILE, CaptureRecord, read_record};
+use farnear_files::staging::write_file;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{About, Result, WorkflowError};
+
+/// The file of a note.
+const NOTE_FILE: &str = "note.toml";
+/// Longest note, bytes: a note, not a file store.
+const NOTE_MAX: usize = 64 * 1024;
+/// Best rating.
+const BEST: u8 = 5;
+
+/// What a person noted about a capture.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Note {
+    /// 0 (not rated) to 5.
+    #[serde(default)]
+    pub rating: u8,
+    /// Anything.
+    #[serde(default)]
+    pub text: String,
+}
+
+/// A capture in a list.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Capture {
+    /// Its folder's name.
+    pub name: String,
+    /// `pair` or `sequence`.
+    pub kind: &'static str,
+    /// Its images, in the order of the exposures.
+    pub images: Vec<String>,
+    /// All files.
+    pub files: Vec<String>,
+    /// Other maps of the same pair: folders in the capture's with a `depth.npy`.
+    pub variants: Vec<String>,
+    /// When it was taken; only of real hardware.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Bits of the camera.
+    pub bits: u8,
+    /// Length of an exposure.
+    pub exposure_us: u32,
+    /// The scene that was emulated, if it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    /// The optics file, as it was given.
+    pub optics: toml::Table,
+    /// Whether a depth map lies there.
+    pub has_depth: bool,
+    /// What a person noted.
+    pub note: Note,
+    /// Why the folder cannot be read, though it is there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub broken: Option<String>,
+}
+
+/// The folder of a capture in a session's folder.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for a name that is not one folder's: it could lead anywhere.
+pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
+    let mut parts = Path::new(name).components();
+    let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
+    let letters = name.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c));
+    if !plain || !letters || name.starts_with('.') || name.len() > 100 {
+        let expected =
+            "expected a name of letters, digits, -, _ and . (at most 100, not beginning with a dot)";
+        return Err(WorkflowError::parameter("capture", name, expected));
+    }
+    Ok(session.join(name))
+}
+
+/// The first free names `KIND-001`, `KIND-002` and so on. A name is free until something has it.
+///
+/// # Errors
+/// As [`folder_of`].
+pub fn free_names(session: &Path, kind: &str, count: usize) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    let mut number = 1;
+    while found.len() < count {
+        let folder = folder_of(session, &format!("{kind}-{number:03}"))?;
+        if !folder.exists() {
+            found.push(folder);
+        }
+        number += 1;
+    }
+    Ok(found)
+}
+
+/// The captures of a session whose record, optics or note hold all words of `search`, by name. A folder that is not there has
+/// none.
+///
+/// # Errors
+/// [`WorkflowError::Read`] for a session's folder that cannot be looked into. A broken capture is listed with what is wrong.
+pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
+    let entries = match fs::read_dir(session) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(WorkflowError::read("the session", session)(error)),
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(WorkflowError::read("the session", session))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if name.starts_with('.') || !path.join(CAPTURE_FILE).is_file() {
+            continue;
+        }
+        // Somebody may take the folder away while it is read: that is a broken capture, not a broken list.
+        let capture = read(&path).unwrap_or_else(|error| broken(&name, &error));
+        if matches(&path, &capture, search) {
+            found.push(capture);
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(found)
+}
+
+/// Reads one capture.
+///
+/// # Errors
+/// [`WorkflowError::Record`], [`WorkflowError::Read`] where it is none.
+pub fn read(folder: &Path) -> Result<Capture> {
+    let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
+    let record: CaptureRecord = read_record(folder)?.ok_or_else(missing)?;
+    let (mut files, mut variants) = (Vec::new(), Vec::new());
+    for entry in fs::read_dir(folder).map_err(WorkflowError::read("the capture", folder))? {
+        let entry = entry.map_err(WorkflowError::read("the capture", folder))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_file() && !name.starts_with('.') {
+            files.push(name);
+        } else if entry.path().join("depth.npy").is_file() {
+            variants.push(name);
+        }
+    }
+    files.sort();
+    variants.sort();
+    let images: Vec<_> = record.exposure.iter().map(|exposure| exposure.image.clone()).collect();
+    let pair = images == ["far.png", "near.png"];
+    Ok(Capture {
+        name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        kind: if pair { "pair" } else { "sequence" },
+        images,
+        has_depth: files.iter().any(|file| file == "depth.npy"),
+        files,
+        variants,
+        time: record.time,
+        width: record.camera.width,
+        height: record.camera.height,
+        bits: record.camera.bits,
+        exposure_us: record.exposure.first().map_or(0, |exposure| exposure.exposure_us),
+        scene: record.simulation.map(|simulation| simulation.scene),
+        optics: record.optics,
+        note: read_note(folder)?,
+        broken: None,
+    })
+}
+
+fn broken(name: &str, error: &WorkflowError) -> Capture {
+    Capture {
+        name: name.into(),
+        kind: "sequence",
+        images: Vec::new(),
+        files: Vec::new(),
+        variants: Vec::new(),
+        time: None,
+        width: 0,
+        height: 0,
+        bits: 0,
+        exposure_us: 0,
+        scene: None,
+        optics: toml::Table::new(),
+        has_depth: false,
+        note: Note::default(),
+        broken: Some(error.to_string()),
+    }
+}
+
+/// Whether name, record and note hold all words, whatever their case.
+fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
+    if search.trim().is_empty() {
+        return true;
+    }
+    let record = fs::read_to_string(folder.join(CAPTURE_FILE)).unwrap_or_default();
+    let depth = fs::read_to_string(folder.join("depth.toml")).unwrap_or_default();
+    let all = format!("{} {} {record} {depth}", capture.name, capture.note.text).to_lowercase();
+    search.to_lowercase().split_whitespace().all(|word| all.contains(word))
+}
+
+/// What was noted; nothing where nobody did.
+///
+/// # Errors
+/// [`WorkflowError::Parse`] for a note that is no TOML.
+pub fn read_note(folder: &Path) -> Result<Note> {
+    let path = folder.join(NOTE_FILE);
+    match fs::read_to_string(&path) {
+        Ok(text) => toml::from_str(&text).about(|| format!("the note {}", path.display())),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Note::default()),
+        Err(error) => Err(WorkflowError::read("the note", &path)(error)),
+    }
+}
+
+/// Notes something about a capture.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for a rating above 5 or a note of more than 64 KiB; [`WorkflowError::Read`] where there is no
+/// such capture; [`WorkflowError::Staging`].
+pub fn write_note(folder: &Path, note: &Note) -> Result<()> {
+    if note.rating > BEST {
+        return Err(WorkflowError::parameter("rating", note.rating, "expected 0 (not rated) to 5"));
+    }
+    if note.text.len() > NOTE_MAX {
+        let length = note.text.len();
+        return Err(WorkflowError::parameter(
+            "note",
+            format!("of {length} bytes"),
+            format!("at most {NOTE_MAX}"),
+        ));
+    }
+    fs::metadata(folder.join(CAPTURE_FILE)).map_err(WorkflowError::read("the capture", folder))?;
+    Ok(write_file(&folder.join(NOTE_FILE), toml::to_string(note)?.as_bytes())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RECORD: &str = include_str!("sessions/capture.toml");
+
+    fn session() -> tempfile::TempDir {
+        let session = tempfile::tempdir().unwrap();
+        for name in ["pair-002", "pair-001", ".partial"] {
+            fs::create_dir(session.path().join(name)).unwrap();
+            fs::write(session.path().join(name).join(CAPTURE_FILE), RECORD).unwrap();
+        }
+        fs::create_dir(session.path().join("other")).unwrap();
+        session
+    }
+
+    #[test]
+    fn captures_are_listed_by_name_and_others_are_not() {
+        let session = session();
+        let found = list(session.path(), "").unwrap();
+        let names: Vec<_> = found.iter().map(|capture| capture.name.as_str()).collect();
+        assert_eq!(names, ["pair-001", "pair-002"]);
+        assert_eq!((found[0].kind, found[0].width, found[0].has_depth), ("pair", 640, false));
+        assert_eq!(found[0].scene.as_deref(), Some("staircase"));
+        assert_eq!(list(&session.path().join("absent"), "").unwrap(), []);
+        let free = free_names(session.path(), "pair", 2).unwrap();
+        assert_eq!(free, [session.path().join("pair-003"), session.path().join("pair-004")]);
+    }
+
+    #[test]
+    fn notes_are_kept_and_found() {
+        let session = session();
+        let folder = folder_of(session.path(), "pair-002").unwrap();
+        let note = Note { rating: 4, text: "Sandpaper, \"lamp\" left".into() };
+        write_note(&folder, &note).unwrap();
+        assert_eq!(read_note(&folder).unwrap(), note);
+        let found = |search: &str| list(session.path(), search).unwrap().len();
+        assert_eq!([found("sandpaper LAMP"), found("staircase"), found("sandpaper cone")], [1, 2, 0]);
+        assert!(write_note(&folder, &Note { rating: 6, ..note.clone() }).unwrap_err().is_usage());
+        assert!(write_note(&session.path().join("other"), &note).is_err(), "it is no capture");
+        assert!(!session.path().join("other").join(NOTE_FILE).exists());
+    }
+
+    #[test]
+    fn a_broken_capture_is_listed_with_what_is_wrong() {
+        let session = session();
+        fs::write(session.path().join("pair-001").join(CAPTURE_FILE), "format = \"x\"").unwrap();
+        let found = list(session.path(), "").unwrap();
+        assert!(found[0].broken.as_ref().is_some_and(|reason| reason.contains("format")), "{found:?}");
+        assert_eq!(found[1].broken, None);
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_are_refused() {
+        for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "a b", "x\0"] {
+            assert!(folder_of(Path::new("s"), name).is_err(), "{name:?}");
+        }
+        assert_eq!(folder_of(Path::new("s"), "pair-001_b.2").unwrap(), Path::new("s/pair-001_b.2"));
+    }
+}

@@ -1,0 +1,96 @@
+//! The tests of the page in a real browser, where Node, its packages and a Chromium are there.
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context, Result};
+
+use crate::run::{ROOT, target_folder};
+
+/// Where a Chromium may lie beside the one that `CHROMIUM` names.
+const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+
+/// How the tests ended.
+#[derive(Default)]
+pub struct Counts {
+    /// Passed.
+    pub passed: u32,
+    /// Failed.
+    pub failed: u32,
+    /// Not run.
+    pub skipped: u32,
+    /// Whether the runner ended well.
+    pub ended_well: bool,
+}
+
+/// Runs them with the programs that were built, or says what is missing and counts them as skipped.
+///
+/// # Errors
+/// A runner that cannot be started, though it is there.
+pub fn run() -> Result<Counts> {
+    let folder = &ROOT.join("host/serve/tests-browser");
+    let tests = folder.join("page.test.mjs");
+    if let Some(missing) = missing(folder) {
+        let text = std::fs::read_to_string(&tests).context("the page's tests are not there")?;
+        eprintln!("skipped: the page in a browser ({missing})");
+        return Ok(Counts { skipped: written(&text), ended_well: true, ..Counts::default() });
+    }
+    let output = Command::new("node")
+        .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs"])
+        .current_dir(folder)
+        .env("FARNEAR", target_folder().join("debug/farnear"))
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot start node")?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    print!("{text}");
+    let count = |name| number(&text, name);
+    Ok(Counts {
+        passed: count("pass"),
+        failed: count("fail"),
+        skipped: count("skipped"),
+        ended_well: output.status.success(),
+    })
+}
+
+/// What there is not.
+fn missing(folder: &Path) -> Option<&'static str> {
+    let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
+    let browser = BROWSERS.into_iter().map(PathBuf::from).chain(named).any(|path| path.is_file());
+    let node = Command::new("node").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    if !node.is_ok_and(|status| status.success()) {
+        Some("there is no node; Debian's package is nodejs")
+    } else if !folder.join("node_modules/playwright-core").is_dir() {
+        Some("`npm ci` in host/serve/tests-browser fetches what it needs")
+    } else if !browser {
+        Some("there is no Chromium; Debian's package is chromium, and CHROMIUM names another")
+    } else {
+        None
+    }
+}
+
+/// How many tests stand in the file; those in the loop over sizes and schemes count once.
+fn written(text: &str) -> u32 {
+    text.lines().filter(|line| line.trim_start().starts_with("test(")).count() as u32
+}
+
+/// The number after "# pass " in the runner's last lines.
+fn number(text: &str, name: &str) -> u32 {
+    let line =
+        text.lines().rev().find_map(|line| line.strip_prefix("# ")?.strip_prefix(name)?.strip_prefix(' '));
+    line.and_then(|number| number.parse().ok()).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{number, written};
+
+    #[test]
+    fn counts_are_read() {
+        let text = "ok 1 - a\n# pass is a word\n# tests 14\n# pass 12\n# fail 1\n# skipped 1\n";
+        assert_eq!([number(text, "pass"), number(text, "fail"), number(text, "skipped")], [12, 1, 1]);
+        assert_eq!(written("test(\"a\")\n  test(`b`)\nconst test = 1;\n"), 2);
+    }
+}
