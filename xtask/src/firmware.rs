@@ -51,11 +51,6 @@ fn build_board(board: &Board, way: Way, selection: Selection) -> Result<PathBuf>
     Ok(elf)
 }
 
-/// The workspace of the board that is emulated.
-pub fn folder() -> PathBuf {
-    EMULATED.folder()
-}
-
 /// The counting program's ELF, after a build.
 pub fn counter() -> Result<PathBuf> {
     built(EMULATED, COUNTER)

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::{firmware, host};
+use crate::{boards::BOARDS, firmware, host};
 
 /// Copies `farnear`, `farnear-sim` and the firmware's ELF into cargo's bin folder.
 pub fn run() -> Result<()> {
@@ -16,10 +16,11 @@ pub fn run() -> Result<()> {
         .context("no home folder: set CARGO_HOME to the folder whose bin/ is to take the programs")?;
     let bin = home.join("bin");
     fs::create_dir_all(&bin).with_context(|| format!("cannot create {}", bin.display()))?;
-    for name in ["farnear", "farnear-sim", "farnear-nucleo-f429zi.elf"] {
+    let programs = ["farnear", "farnear-sim"].map(String::from);
+    for name in programs.into_iter().chain(BOARDS.iter().map(|board| format!("{}.elf", board.program()))) {
         // Aside first: a program that runs cannot be overwritten, but it can be replaced.
-        let (aside, place) = (bin.join(format!(".{name}.new")), bin.join(name));
-        fs::copy(built.join(name), &aside)
+        let (aside, place) = (bin.join(format!(".{name}.new")), bin.join(&name));
+        fs::copy(built.join(&name), &aside)
             .and_then(|_| fs::rename(&aside, &place))
             .with_context(|| format!("cannot write {}", place.display()))?;
         println!("{}", place.display());

@@ -5,6 +5,7 @@ use std::{process::Stdio, time::Instant};
 use anyhow::{Result, bail};
 
 use crate::{
+    boards::BOARDS,
     browser, firmware, instructions,
     run::{cargo, finish, step},
     sizes, test_programs,
@@ -24,10 +25,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     step("format");
     finish(cargo(["fmt", "--all", "--check"]).stdout(Stdio::null()))?;
-    let firmware_fmt = &mut cargo(["fmt", "--check"]);
-    finish(firmware_fmt.current_dir(firmware::folder()).stdout(Stdio::null()))?;
+    for board in &BOARDS {
+        finish(cargo(["fmt", "--check"]).current_dir(board.folder()).stdout(Stdio::null()))?;
+    }
 
-    step("firmware for the NUCLEO-F429ZI");
+    step("firmware");
     let way = Way::find()?;
     let elf = firmware::build_with(way)?;
     sizes::check(&elf)?;
@@ -37,7 +39,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     finish(&mut cargo(["clippy", "--workspace", "--all-targets", "--locked", "--", "--deny", "warnings"]))?;
     if way.has_clippy() {
         let arguments = ["--release", "--locked", "--", "--deny", "warnings"];
-        finish(way.cargo(&firmware::folder(), "clippy").args(arguments))?;
+        for board in &BOARDS {
+            finish(way.cargo(&board.folder(), "clippy").args(arguments))?;
+        }
     } else {
         eprintln!("skipped: clippy for the firmware (Debian's rust-web-clippy is not installed)");
     }
