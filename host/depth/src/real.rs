@@ -15,7 +15,7 @@ use crate::pipeline::{RunError, Settings, depth_from_pair, fill_rim, warnings_af
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare};
 use crate::psf::Psf;
 use crate::reason::Reason;
-use crate::windowed::{Bank, Estimate, Window, WindowSettings, estimate};
+use crate::windowed::{Bank, Estimate, Window, WindowSettings, check_pair, estimate};
 
 /// Part of the pixels without depth for one reason from which it is said.
 const WORTH_SAYING: f64 = 0.002;
@@ -181,6 +181,8 @@ pub fn depth_of_real_pair(
     camera: Option<&CameraFrames>,
     settings: &RealSettings,
 ) -> Result<RealDepth, RealError> {
+    // As they came: what is clipped everywhere is constant, and not full of holes.
+    check_pair(far, near)?;
     let prepared = prepare(far, near, optics, camera, &settings.prepare)?;
     let (mut map, estimate) = measure(&prepared, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);

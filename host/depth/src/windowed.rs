@@ -133,7 +133,11 @@ pub fn estimate(
     optics: &Optics,
     settings: &WindowSettings,
 ) -> Result<Estimate, RunError> {
-    check(far, near, settings)?;
+    check_pair(far, near)?;
+    let smoothing_px = if let Window::Fixed(side) = settings.window { side } else { 1 };
+    let windows =
+        crate::pipeline::Settings { smoothing_px, median_px: settings.median_px, ..Default::default() };
+    crate::pipeline::check_windows(&windows)?;
     let size = far.dim();
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let scales = Scales::new(far, near, settings.noise);
@@ -163,7 +167,8 @@ pub fn estimate(
     Ok(Estimate { depth_mm, deviation_mm, misfit, left_over, excess })
 }
 
-fn check(far: ArrayView2<f32>, near: ArrayView2<f32>, settings: &WindowSettings) -> Result<(), RunError> {
+/// Refuses images that differ in size, are too small, wholly invalid or constant.
+pub(crate) fn check_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<(), RunError> {
     let (height, width) = far.dim();
     let (near_height, near_width) = near.dim();
     if (near_height, near_width) != (height, width) {
@@ -179,8 +184,5 @@ fn check(far: ArrayView2<f32>, near: ArrayView2<f32>, settings: &WindowSettings)
             return Err(RunError::Constant { which, value });
         }
     }
-    let smoothing_px = if let Window::Fixed(side) = settings.window { side } else { 1 };
-    let windows =
-        crate::pipeline::Settings { smoothing_px, median_px: settings.median_px, ..Default::default() };
-    crate::pipeline::check_windows(&windows)
+    Ok(())
 }

@@ -6,6 +6,7 @@ pub mod compare;
 pub mod completions;
 pub mod correct;
 pub mod depth;
+pub mod measure;
 pub mod operators;
 pub mod optics;
 pub mod render;

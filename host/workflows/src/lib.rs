@@ -64,6 +64,7 @@ mod counter;
 pub mod depth;
 pub mod error;
 pub mod figures;
+pub mod measure;
 mod operator_cache;
 pub mod operator_plot;
 pub mod operators;
