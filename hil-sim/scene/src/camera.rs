@@ -159,13 +159,10 @@ impl Camera {
     }
 
     /// Codes of one exposure of `radiance` (blurred scene, mean 1). The noise is a function of `seed` and
-    /// `exposure_number` alone. The camera must have passed its check.
-    pub(crate) fn expose(
-        &self,
-        radiance: ArrayView2<'_, f32>,
-        seed: u64,
-        exposure_number: u32,
-    ) -> Array2<u16> {
+    /// `exposure_number` alone. Where the camera makes no sense (which [`Renderer::new`](crate::Renderer::new) refuses) so do
+    /// the codes.
+    #[must_use]
+    pub fn expose(&self, radiance: ArrayView2<'_, f32>, seed: u64, exposure_number: u32) -> Array2<u16> {
         let max_code = f64::from(self.noise.max_code());
         let code = |electrons: f64| {
             (electrons.clamp(0.0, self.full_well_e) / self.full_well_e * max_code).round() as u16

@@ -29,6 +29,9 @@ pub struct Lens {
     pub sensor_near_mm: f64,
     /// Field dependence of the focus; `None` is a perfect lens.
     pub distortion: Option<EllipticalDistortion>,
+    /// Whether the lens is telecentric on the image side: then moving the sensor does not change the magnification,
+    /// else the image grows with the sensor's distance.
+    pub telecentric: bool,
 }
 
 /// What a lens cannot image.
@@ -91,6 +94,7 @@ impl Lens {
             sensor_far_mm: image_distance_mm(focal_length_mm, optics.far_mm),
             sensor_near_mm: image_distance_mm(focal_length_mm, optics.near_mm),
             distortion: None,
+            telecentric: optics.telecentric.unwrap_or(true),
         })
     }
 

@@ -51,6 +51,7 @@ mod scene_text;
 pub mod standard;
 pub mod texture;
 mod thin_lens;
+pub mod view;
 
 pub use camera::{Camera, CameraError, Noise};
 pub use lens::{EllipticalDistortion, Lens, LensError};
@@ -62,3 +63,4 @@ pub use scene::{Scene, Shape};
 pub use scene_error::SceneError;
 pub use scene_file::SceneFile;
 pub use texture::Texture;
+pub use view::View;

@@ -30,6 +30,8 @@ pub struct OpticsFile {
     pub max_blur_px: f64,
     /// The PSF of `[psf]`, if the file has one.
     pub psf: Option<Psf>,
+    /// Whether moving the sensor leaves the magnification as it is, if the file says so.
+    pub telecentric: Option<bool>,
 }
 
 /// Why an `optics.toml` was refused.
@@ -141,7 +143,8 @@ impl OpticsFile {
             per_blur_mm: 2.0 * f_number * pixel_um * 1e-3,
         };
         let (near_mm, max_blur_px) = raw.focus.range(&travel)?;
-        Ok(Self { focal_length_mm, aperture_mm, pixel_um, far_mm, near_mm, max_blur_px, psf })
+        let telecentric = raw.lens.telecentric;
+        Ok(Self { focal_length_mm, aperture_mm, pixel_um, far_mm, near_mm, max_blur_px, psf, telecentric })
     }
 }
 
@@ -260,6 +263,7 @@ struct RawLens {
     focal_length_mm: f64,
     aperture_mm: Option<f64>,
     f_number: Option<f64>,
+    telecentric: Option<bool>,
 }
 
 #[derive(Deserialize)]

@@ -11,6 +11,7 @@ use crate::maps::Picture;
 use crate::psf::Psf;
 use crate::scene::{Scene, Shape};
 use crate::texture::{Spectrum, Texture};
+use crate::view::{self, View};
 
 /// Largest blur radius that is rendered, px: memory grows with its square.
 const MAX_BLUR_PX: f64 = 600.0;
@@ -105,6 +106,7 @@ pub struct Renderer {
     seed: u64,
     texture: Paint,
     surface: Surface,
+    view: View,
 }
 
 /// What the surface is painted with.
@@ -147,7 +149,7 @@ impl Renderer {
             Shape::Plane { depth_mm } if lens.distortion.is_none() => {
                 Surface::Plane(lens.image_distance_mm(depth_mm)? - lens.sensor_far_mm)
             }
-            _ => Surface::Field(image_field(scene, lens, camera, KEPT_MARGIN_PX)?),
+            _ => Surface::Field(image_field(scene, lens, camera, KEPT_MARGIN_PX, &View::default())?),
         };
         Ok(Self {
             scene: scene.clone(),
@@ -157,7 +159,21 @@ impl Renderer {
             seed,
             texture,
             surface,
+            view: View::default(),
         })
+    }
+
+    /// The same scene before a camera that has been shifted, turned or zoomed.
+    #[must_use]
+    pub fn seen_by(mut self, view: View) -> Self {
+        self.view = view;
+        self
+    }
+
+    /// How the scene lies in an exposure: the camera's own view, and the magnification of a lens that is not telecentric.
+    fn view_at(&self, sensor_distance_mm: f64) -> View {
+        let grown = if self.lens.telecentric { 1.0 } else { sensor_distance_mm / self.lens.sensor_far_mm };
+        View { magnification: self.view.magnification * grown, ..self.view }
     }
 
     /// One exposure with the sensor at `sensor_distance_mm`: codes of shape (height, width).
@@ -195,27 +211,37 @@ impl Renderer {
                 near_mm: self.lens.sensor_near_mm,
             });
         }
+        let view = self.view_at(sensor_distance_mm);
         let margin_px = kernel_reach_px(&self.psf, widest_px).max(1);
         let blur_px = match &self.surface {
             Surface::Plane(offset_mm) => Blur::Uniform(blur_px(*offset_mm)),
             Surface::Field(kept) => {
-                let field = if margin_px <= KEPT_MARGIN_PX {
+                let field = if margin_px <= KEPT_MARGIN_PX && view == View::default() {
                     let skip = (KEPT_MARGIN_PX - margin_px) * CELLS_PER_PIXEL;
                     let (rows, columns) = kept.dim();
                     kept.slice(ndarray::s![skip..rows - skip, skip..columns - skip]).to_owned()
                 } else {
-                    image_field(&self.scene, &self.lens, &self.camera, margin_px)?
+                    image_field(&self.scene, &self.lens, &self.camera, margin_px, &view)?
                 };
                 Blur::Varying(field.mapv_into(|offset_mm| blur_px(f64::from(offset_mm))))
             }
         };
-        Ok(Cells { margin_px, radiance: self.cell_radiance(margin_px), blur_px }.blurred(&self.psf))
+        Ok(Cells { margin_px, radiance: self.cell_radiance(margin_px, &view), blur_px }.blurred(&self.psf))
     }
 
     /// Radiance of the cells of the image and `margin_px` around it.
-    fn cell_radiance(&self, margin_px: usize) -> Array2<f32> {
+    fn cell_radiance(&self, margin_px: usize, view: &View) -> Array2<f32> {
         let size = cell_grid(&self.camera, margin_px);
         match &self.texture {
+            Paint::Random(period) if *view != View::default() => {
+                let (width, height) = (self.camera.width_px as f64, self.camera.height_px as f64);
+                let placed = view.placed(width, height);
+                Array2::from_shape_fn(size, |cell| {
+                    let (x_px, y_px) = placed.scene_px(cell_centre_px(cell, margin_px));
+                    let cells = CELLS_PER_PIXEL as f64;
+                    view::periodic(period, x_px * cells - 0.5, y_px * cells - 0.5)
+                })
+            }
             Paint::Random(period) => {
                 let (height, width) = period.dim();
                 let margin = (margin_px * CELLS_PER_PIXEL) as isize;
@@ -225,8 +251,9 @@ impl Renderer {
                 Array2::from_shape_fn(size, |(row, column)| period[[wrap(row, height), wrap(column, width)]])
             }
             Paint::Picture(picture) => Array2::from_shape_fn(size, |cell| {
-                let (x_px, y_px) = cell_centre_px(cell, margin_px);
-                let (x, y) = (x_px / self.camera.width_px as f64, y_px / self.camera.height_px as f64);
+                let (width, height) = (self.camera.width_px as f64, self.camera.height_px as f64);
+                let (x_px, y_px) = view.placed(width, height).scene_px(cell_centre_px(cell, margin_px));
+                let (x, y) = (x_px / width, y_px / height);
                 picture.radiance(x, y) as f32
             }),
         }
@@ -251,11 +278,14 @@ fn image_field(
     lens: &Lens,
     camera: &Camera,
     margin_px: usize,
+    view: &View,
 ) -> Result<Array2<f32>, LensError> {
+    let placed = view.placed(camera.width_px as f64, camera.height_px as f64);
     let mut field = Array2::zeros(cell_grid(camera, margin_px));
     for (cell, offset_mm) in field.indexed_iter_mut() {
         let (x_px, y_px) = cell_centre_px(cell, margin_px);
-        let image_mm = lens.image_distance_mm(scene.depth_mm(lens, camera, x_px, y_px))?;
+        let (scene_x, scene_y) = placed.scene_px((x_px, y_px));
+        let image_mm = lens.image_distance_mm(scene.depth_mm(lens, camera, scene_x, scene_y))?;
         let (x, y) = (x_px / camera.width_px as f64, y_px / camera.height_px as f64);
         *offset_mm = (lens.distorted_image_distance_mm(image_mm, x, y) - lens.sensor_far_mm) as f32;
     }

@@ -22,7 +22,12 @@ const DIM: (usize, usize) = (480, 640);
 
 fn optics() -> Optics {
     OpticsFile {
-        lens: LensSection { focal_length_mm: 50.0, aperture_mm: Some(12.8), f_number: None },
+        lens: LensSection {
+            focal_length_mm: 50.0,
+            aperture_mm: Some(12.8),
+            f_number: None,
+            telecentric: None,
+        },
         sensor: SensorSection { pixel_um: 7.4 },
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: "gaussian:k=0.4578".parse().unwrap(),

@@ -23,7 +23,12 @@ use rand_chacha::ChaCha8Rng;
 
 fn optics(psf: &str) -> Optics {
     OpticsFile {
-        lens: LensSection { focal_length_mm: 50.0, aperture_mm: Some(12.8), f_number: None },
+        lens: LensSection {
+            focal_length_mm: 50.0,
+            aperture_mm: Some(12.8),
+            f_number: None,
+            telecentric: None,
+        },
         sensor: SensorSection { pixel_um: 7.4 },
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: psf.parse().unwrap(),

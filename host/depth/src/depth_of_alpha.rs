@@ -1,6 +1,7 @@
 //! Normalised depth to mm, as the run time needs it.
 
 use crate::operators::Operators;
+use crate::operators::linearise::Polynomial;
 use crate::optics::Optics;
 
 /// The cubic's alpha to mm in single precision without cancellation.
@@ -15,6 +16,11 @@ pub(crate) struct DepthOfAlpha {
 
 impl DepthOfAlpha {
     pub(crate) fn new(operators: &Operators, optics: &Optics) -> Self {
+        Self::linear(optics, *operators.linearisation())
+    }
+
+    /// For an alpha that goes through the polynomial first.
+    pub(crate) fn linear(optics: &Optics, linearisation: Polynomial) -> Self {
         let [offset, slope] = optics.defocus_line_mm();
         let f = optics.focal_length_mm();
         Self {
@@ -22,7 +28,7 @@ impl DepthOfAlpha {
             focal_length_squared: (f * f) as f32,
             offset: offset as f32,
             slope: slope as f32,
-            linearisation: operators.linearisation().map(|c| c as f32),
+            linearisation: linearisation.map(|c| c as f32),
         }
     }
 

@@ -14,7 +14,7 @@
 //! use ndarray::Array2;
 //!
 //! let optics = OpticsFile {
-//!     lens: LensSection { focal_length_mm: 50.0, aperture_mm: Some(12.8), f_number: None },
+//!     lens: LensSection { focal_length_mm: 50.0, aperture_mm: Some(12.8), f_number: None, telecentric: None },
 //!     sensor: SensorSection { pixel_um: 7.4 },
 //!     focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
 //!     psf: Psf::PillBox,
@@ -35,19 +35,24 @@ pub mod calibrate;
 pub mod confidence;
 pub mod corrections;
 mod cubic;
-mod depth_map;
+pub mod depth_map;
 mod depth_of_alpha;
 pub mod fill;
 pub mod filter;
 pub mod focus_measure;
 pub mod fourier;
 pub mod hankel;
+pub mod judge;
 pub mod kernel;
 pub mod metrics;
 pub mod nir;
 pub mod operators;
 pub mod optics;
 pub mod pipeline;
+pub mod prepare;
 pub mod psf;
+pub mod real;
+pub mod reason;
 mod simd;
 pub mod uncertainty;
+pub mod windowed;

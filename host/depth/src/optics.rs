@@ -8,6 +8,7 @@
 //!
 //! Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
 
+mod doubt;
 mod error;
 mod file;
 
@@ -15,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::psf::Psf;
 
+pub use doubt::Doubt;
 pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
 
@@ -33,6 +35,7 @@ pub struct Optics {
     far_mm: f64,
     max_blur_px: f64,
     psf: Psf,
+    telecentric: Option<bool>,
 }
 
 /// The distances between which a pair measures depth, and where the sensor stands for them.
@@ -81,6 +84,18 @@ impl Optics {
     /// Point-spread function of the lens.
     pub fn psf(&self) -> Psf {
         self.psf
+    }
+
+    /// Whether the lens is telecentric on the image side; `None` where the optics file does not say.
+    pub fn telecentric(&self) -> Option<bool> {
+        self.telecentric
+    }
+
+    /// By how much a lens that is not telecentric magnifies the near-focused image more than the far-focused one: the
+    /// ratio of the sensor's distances.
+    pub fn magnification_ratio(&self) -> f64 {
+        let range = self.working_range();
+        range.sensor_near_mm / range.sensor_far_mm
     }
 
     /// The same geometry with another point-spread function.

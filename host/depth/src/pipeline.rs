@@ -30,6 +30,7 @@ pub use crate::depth_map::{DepthMap, SwapEvidence, Warning};
 pub use crate::simd::Backend;
 pub(crate) use check::{after as warnings_after, check, check_windows};
 pub use processor::Processor;
+pub(crate) use rim::fill as fill_rim;
 
 /// Smallest width and height that can be processed: below, the operators see little but reflections.
 pub const MIN_SIDE_PX: usize = 16;

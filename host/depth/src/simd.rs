@@ -16,6 +16,7 @@ mod lanes;
 mod median;
 mod peak;
 mod rows;
+mod windows;
 
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +27,7 @@ pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
     vertical_sums_of_seven,
 };
+pub(crate) use windows::{Choice, CubicSums, Found, Weighing, choose, choose_safe, roots, row_sums};
 
 /// Calls the generic function for the backend inside a function that has the backend's instructions enabled, so that
 /// the whole loop is inlined and compiled with them.

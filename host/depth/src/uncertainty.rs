@@ -293,6 +293,7 @@ mod tests {
                 focal_length_mm: 50.0,
                 aperture_mm: Some(12.8),
                 f_number: None,
+                telecentric: None,
             },
             sensor: crate::optics::SensorSection { pixel_um: 7.4 },
             focus: crate::optics::FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },

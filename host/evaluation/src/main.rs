@@ -4,7 +4,7 @@
 //! every point spread function and noise, wrong point spread functions, corrections of the elliptical distortion on
 //! depths that taught nothing, calibration. Where real pairs and focal stacks are at hand their figures go to
 //! `docs/accuracy-real.md`. What [`people`] measures - activities recognised, shadows taken off, the sun - goes to
-//! `docs/activity.md`.
+//! `docs/activity.md`; what a disturbed pair comes to ([`robust`]) to `docs/robustness.md`.
 //!
 //! Everything is seeded and no clock enters, so that two runs on one kind of processor write the same bytes.
 //! One part per file in [`depth`]; [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes Markdown, [`chart`] and [`panels`]
@@ -16,6 +16,7 @@ mod page;
 mod panels;
 mod people;
 mod rig;
+mod robust;
 mod sweep;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -55,8 +56,13 @@ fn run(arguments: &Arguments) -> Result<()> {
     let images = arguments.docs.join("images");
     std::fs::create_dir_all(&images).with_context(|| format!("cannot make {}", images.display()))?;
     let of_people = people::PARTS.iter().map(|(name, _)| *name);
-    let known =
-        depth::RENDERED.iter().map(|(name, _)| *name).chain(["real"]).chain(of_people).collect::<Vec<_>>();
+    let known = depth::RENDERED
+        .iter()
+        .chain(&robust::PARTS)
+        .map(|(name, _)| *name)
+        .chain(["real"])
+        .chain(of_people)
+        .collect::<Vec<_>>();
     if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
         bail!("no part is called {unknown:?}, there are {}", known.join(", "));
     }
@@ -71,6 +77,16 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
         }
         finish(page, arguments, "accuracy.md")?;
+    }
+    if robust::PARTS.iter().any(|(name, _)| wanted(name)) {
+        let mut page = Page::new(&images, robust::INTRODUCTION);
+        for (name, measure) in robust::PARTS {
+            if wanted(name) {
+                eprintln!("{name}");
+                measure(&mut page).with_context(|| format!("measuring {name}"))?;
+            }
+        }
+        finish(page, arguments, "robustness.md")?;
     }
 
     let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));

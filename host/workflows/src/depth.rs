@@ -10,19 +10,26 @@ use std::{path::PathBuf, time::Instant};
 
 use farnear_depth::{
     corrections::Correction,
+    judge::Judgement,
     optics::Optics,
     pipeline::{DepthMap, Settings},
+    prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
+    real::{RealSettings, depth_of_real_pair},
+    reason::Reason,
+    windowed::Window,
 };
 use ndarray::Array2;
 use serde::Serialize;
 
 use crate::{
+    camera_frames,
     context::Context,
     correction_file,
     error::{About, Result, WorkflowError},
     figures::rounded,
     optics,
 };
+use farnear_files::image_file::Samples;
 use method::{Method, Prepared};
 use noise::{CameraNoise, Source, Uncertainty};
 use output::{Outputs, Results};
@@ -43,6 +50,17 @@ pub struct DepthSettings {
     pub method: Method,
     /// Windows, filling and threads.
     pub computation: Settings,
+    /// Over how many pixels evidence is summed; without it adaptive windows for whitened operators, and the computation's
+    /// smoothing for the others.
+    pub window: Option<Window>,
+    /// How the near image is laid on the far one.
+    pub align: Align,
+    /// How both are brought to one brightness.
+    pub balance: Balance,
+    /// Folder with the camera's dark and flat frames.
+    pub camera: Option<PathBuf>,
+    /// Confidence, 0 to 1, below which a depth is taken away.
+    pub min_confidence: f32,
     /// The file of a correction that the map goes through.
     pub correction: Option<PathBuf>,
     /// Whether the standard deviation of each depth is wanted, and from what noise.
@@ -66,6 +84,8 @@ pub struct DepthFigures {
     pub median_mm: f64,
     /// Part of the pixels with too little texture.
     pub low_texture_fraction: f64,
+    /// Part of the pixels that have a depth.
+    pub valid_fraction: f64,
     /// Figures of the standard deviation, where it was wanted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
@@ -84,7 +104,7 @@ pub fn compute(settings: &DepthSettings, context: &Context<'_>) -> Result<DepthF
     let start = Instant::now();
     let computed = inputs.compute(settings, context)?;
     let seconds = start.elapsed().as_secs_f64();
-    let warnings = pair::warnings(&computed.map.warnings, &settings.far, &settings.near);
+    let warnings = pair::warnings(computed.findings.clone(), &settings.far, &settings.near);
     for warning in &warnings {
         context.progress.warn(warning);
     }
@@ -98,6 +118,7 @@ pub fn compute(settings: &DepthSettings, context: &Context<'_>) -> Result<DepthF
         height,
         median_mm: rounded(median(&computed.map.depth_mm), 3),
         low_texture_fraction: rounded(computed.map.low_texture_fraction, 6),
+        valid_fraction: rounded(valid_fraction(&computed.map.depth_mm), 6),
         uncertainty: computed.deviation.map(|(_, found)| found),
         warnings,
     })
@@ -106,7 +127,24 @@ pub fn compute(settings: &DepthSettings, context: &Context<'_>) -> Result<DepthF
 impl DepthSettings {
     /// Finds what contradicts itself.
     fn check(&self) -> Result<()> {
+        if !(0.0..=1.0).contains(&self.min_confidence) {
+            return Err(WorkflowError::parameter(
+                "min-confidence",
+                self.min_confidence,
+                "a probability, 0 to 1",
+            ));
+        }
+        if let (Method::Whitened, Some(asked)) = (self.method, &self.operators) {
+            return Err(WorkflowError::parameter("operators", asked.display(), "method whitened uses none"));
+        }
         let Method::Baseline(method) = self.method else { return Ok(()) };
+        if let Some(window @ (Window::Adaptive | Window::Safe)) = self.window {
+            return Err(WorkflowError::parameter(
+                "window",
+                window,
+                format!("method {method} takes a number of pixels"),
+            ));
+        }
         if let Some(asked) = &self.operators {
             return Err(WorkflowError::parameter(
                 "operators",
@@ -115,7 +153,8 @@ impl DepthSettings {
             ));
         }
         if let Some(noise) = self.uncertainty {
-            let expected = format!("the standard deviation is known of method ro, not of {method}");
+            let expected =
+                format!("the standard deviation is known of methods ro and whitened, not of {method}");
             return Err(WorkflowError::parameter("uncertainty", noise, expected));
         }
         Ok(())
@@ -128,56 +167,118 @@ struct Inputs {
     pair: Pair,
     method: Prepared,
     correction: Option<Correction>,
+    camera: Option<CameraFrames>,
+    /// What there is to say of the optics.
+    doubts: Vec<String>,
 }
 
 /// What was computed.
 struct Computed {
     map: DepthMap,
     deviation: Option<(Array2<f32>, Uncertainty)>,
+    judgement: Judgement,
+    report: Report,
+    window: Window,
+    findings: Vec<String>,
 }
 
 impl Inputs {
     fn read(settings: &DepthSettings) -> Result<Self> {
-        let optics = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
+        let (optics, doubts) = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
         let pair = Pair::read(&settings.far, &settings.near)?;
         let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics)?;
         let correction = settings.correction.as_deref().map(correction_file::read).transpose()?;
         if let Some(correction) = &correction {
             correction.check_range(&optics.working_range())?;
         }
-        Ok(Self { optics, pair, method, correction })
+        let camera = settings.camera.as_deref().map(camera_frames::read).transpose()?;
+        Ok(Self { optics, pair, method, correction, camera, doubts })
     }
 
     fn compute(&self, settings: &DepthSettings, context: &Context<'_>) -> Result<Computed> {
         let cancel = |during| context.cancel.check(during);
         cancel("reading the pair")?;
-        let mut map = self
-            .method
-            .depth(&self.pair, &self.optics, &settings.computation)
-            .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
+        let real = self.settings(settings);
+        let found = depth_of_real_pair(
+            self.pair.far.view(),
+            self.pair.near.view(),
+            &self.optics,
+            self.method.as_real(),
+            self.camera.as_ref(),
+            &real,
+        )
+        .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
         cancel("computing depth")?;
-        let deviation = match (settings.uncertainty, self.method.operators()) {
-            (Some(noise), Some(operators)) => {
-                let Self { pair, optics, .. } = self;
-                let source = Source { pair, operators, optics, settings: &settings.computation };
-                Some(noise::deviation(noise, &source, &map, self.correction.as_ref())?)
-            }
-            _ => None,
-        };
+        let (mut map, mut judgement) = (found.map, found.judgement);
+        let deviation = settings
+            .uncertainty
+            .map(|noise| {
+                let Self { optics, .. } = self;
+                let source = Source {
+                    samples: self.pair.samples,
+                    prepared: &found.prepared,
+                    operators: self.method.operators().filter(|_| matches!(real.window, Window::Fixed(_))),
+                    optics,
+                    settings: &real.run,
+                    judged: &judgement.deviation_mm,
+                };
+                noise::deviation(noise, &source, &map, self.correction.as_ref())
+            })
+            .transpose()?;
         cancel("computing its deviation")?;
         if let Some(correction) = &self.correction {
-            correct(&mut map, correction)?;
+            correct(&mut map, &mut judgement, correction)?;
         }
-        Ok(Computed { map, deviation })
+        let said = found.findings.iter().map(ToString::to_string);
+        let findings = self.doubts.iter().cloned().chain(said).collect();
+        Ok(Computed { map, deviation, judgement, report: found.report, window: real.window, findings })
+    }
+
+    /// As the library takes them.
+    fn settings(&self, settings: &DepthSettings) -> RealSettings {
+        let usual = match settings.method {
+            Method::Whitened => Window::Adaptive,
+            Method::RationalOperators | Method::Baseline(_) => {
+                Window::Fixed(settings.computation.smoothing_px)
+            }
+        };
+        let window = settings.window.unwrap_or(usual);
+        let smoothing_px =
+            if let Window::Fixed(side) = window { side } else { settings.computation.smoothing_px };
+        let limits = match self.pair.samples {
+            Samples::Integer(_) => Some([0.0, 1.0]),
+            Samples::Float => None,
+        };
+        RealSettings {
+            prepare: PrepareSettings {
+                align: settings.align,
+                balance: settings.balance,
+                limits,
+                trust: false,
+                noise: settings.uncertainty.and_then(|noise| noise.of_camera(self.pair.samples)),
+            },
+            window,
+            run: Settings { smoothing_px, ..settings.computation },
+            least_confidence: settings.min_confidence,
+        }
     }
 }
 
+/// Part of the pixels that have a depth.
+fn valid_fraction(map: &Array2<f32>) -> f64 {
+    map.iter().filter(|depth| depth.is_finite()).count() as f64 / map.len() as f64
+}
+
 /// Corrects a map; what lies beyond the correction loses depth and confidence alike.
-fn correct(depth: &mut DepthMap, correction: &Correction) -> Result<()> {
+fn correct(depth: &mut DepthMap, judgement: &mut Judgement, correction: &Correction) -> Result<()> {
     correction.apply_in_place(depth.depth_mm.view_mut())?;
-    for (confidence, depth_mm) in depth.confidence.iter_mut().zip(&depth.depth_mm) {
+    let pixels = depth.confidence.iter_mut().zip(&depth.depth_mm).zip(&mut judgement.reasons);
+    for ((confidence, depth_mm), reason) in pixels {
         if depth_mm.is_nan() {
             *confidence = 0.0;
+            if *reason == 0 {
+                *reason = Reason::BeyondCorrection.code();
+            }
         }
     }
     Ok(())
@@ -208,8 +309,13 @@ mod tests {
     /// A pair whose names contradict its order, so that a warning stands between computing and writing.
     fn settings(folder: &Path) -> DepthSettings {
         fs::write(folder.join("optics.toml"), OPTICS).unwrap();
-        for (name, factor) in [("near.png", 7919), ("far.png", 104_729)] {
-            let pixels = Array2::from_shape_fn((48, 64), |(y, x)| ((y * 31 + x * 17) * factor % 251) as u16);
+        for (name, spread) in [("near.png", 1), ("far.png", 2)] {
+            // A texture, and the mean of it over some pixels.
+            let texture = |y: usize, x: usize| 40 + (y * 31 + x * 17) * (y + 7) * 7919 % 151;
+            let pixels = Array2::from_shape_fn((48, 64), |(y, x)| {
+                let sum: usize = (0..spread * spread).map(|i| texture(y + i / spread, x + i % spread)).sum();
+                (sum / (spread * spread)) as u16
+            });
             fs::write(folder.join(name), encode_png(pixels.view(), 8).unwrap()).unwrap();
         }
         DepthSettings {
@@ -219,6 +325,11 @@ mod tests {
             operators: None,
             method: Method::default(),
             computation: Settings::default(),
+            window: None,
+            align: Align::default(),
+            balance: Balance::default(),
+            camera: None,
+            min_confidence: 0.0,
             correction: None,
             uncertainty: None,
             write: Outputs::default(),

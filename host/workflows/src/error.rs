@@ -18,8 +18,15 @@ use farnear_capture::{
     sequence::ProgramError,
 };
 use farnear_depth::{
-    baselines::BaselineError, calibrate::CalibrationError, corrections::CorrectionError,
-    metrics::CompareError, operators::DesignError, optics::OpticsError, pipeline::RunError,
+    baselines::BaselineError,
+    calibrate::CalibrationError,
+    corrections::CorrectionError,
+    metrics::CompareError,
+    operators::DesignError,
+    optics::OpticsError,
+    pipeline::RunError,
+    prepare::{CameraError as CameraFramesError, PrepareError},
+    real::RealError,
 };
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,
@@ -143,6 +150,12 @@ pub enum WorkflowError {
     /// A pair that gives no depth.
     #[error(transparent)]
     Depth(#[from] RunError),
+    /// Images that are no pair.
+    #[error(transparent)]
+    Unpaired(PrepareError),
+    /// A camera's dark and flat frames.
+    #[error(transparent)]
+    CameraFrames(#[from] CameraFramesError),
     /// The same with a method to compare with.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
@@ -254,6 +267,18 @@ pub enum WorkflowError {
     /// A record that cannot be put into TOML.
     #[error("cannot write a record: {0}")]
     Toml(#[from] toml::ser::Error),
+}
+
+impl From<RealError> for WorkflowError {
+    fn from(error: RealError) -> Self {
+        match error {
+            RealError::Run(error) | RealError::Prepare(PrepareError::Pair(error)) => Self::Depth(error),
+            RealError::Prepare(PrepareError::Camera(error)) => Self::CameraFrames(error),
+            RealError::Prepare(error) => Self::Unpaired(error),
+            RealError::Baseline(error) => Self::Baseline(error),
+            RealError::Design(error) => Self::Design(error),
+        }
+    }
 }
 
 impl WorkflowError {

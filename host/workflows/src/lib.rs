@@ -56,6 +56,7 @@
 
 pub mod activity;
 pub mod calibrate;
+pub mod camera_frames;
 pub mod clock;
 pub mod compare;
 pub mod context;

@@ -9,8 +9,9 @@ mod plane;
 mod profile;
 mod region;
 
-use std::path::Path;
+use std::{fs, path::Path};
 
+use farnear_depth::optics::Optics;
 use farnear_files::{map, mesh::Projection};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,24 @@ pub struct Measured {
     pub projection: Projection,
 }
 
+/// What of the record beside a map is needed here.
+#[derive(Deserialize)]
+struct Record {
+    optics: Optics,
+}
+
+/// The optics that made the map of a folder: its record's, else the pair's.
+fn optics_of(folder: &Path) -> Result<Optics> {
+    let record = folder.join("depth.toml");
+    if !record.exists() {
+        return Ok(optics::of_pair(None, &folder.join("far.png"))?.0);
+    }
+    let text = fs::read_to_string(&record).map_err(WorkflowError::read("the map's record", &record))?;
+    let Record { optics } =
+        toml::from_str(&text).map_err(WorkflowError::file(&record, "a record of a depth map"))?;
+    Ok(optics)
+}
+
 /// A rectangle of pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -52,13 +71,15 @@ pub struct Rectangle {
 }
 
 impl Measured {
-    /// Reads what [`crate::depth::compute`] wrote to a folder.
+    /// Reads what [`crate::depth::compute`] wrote: a folder, or a map in it.
     ///
     /// # Errors
     /// [`WorkflowError::Map`] where there is no `depth.npy`, [`WorkflowError::NoOptics`]; [`WorkflowError::File`] for a
     /// deviation of another size.
-    pub fn read(folder: &Path) -> Result<Self> {
-        let depth_mm = map::read(&folder.join("depth.npy"))?;
+    pub fn read(capture: &Path) -> Result<Self> {
+        let file = if capture.is_dir() { capture.join("depth.npy") } else { capture.to_owned() };
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let depth_mm = map::read(&file)?;
         let path = folder.join("uncertainty.npy");
         let deviation_mm = path.exists().then(|| map::read(&path)).transpose()?;
         if let Some(deviation) = deviation_mm.as_ref().filter(|map| map.dim() != depth_mm.dim()) {
@@ -66,7 +87,7 @@ impl Measured {
                 format!("{:?} rows and columns, depth.npy has {:?}", deviation.dim(), depth_mm.dim());
             return Err(WorkflowError::file(&path, "a map of the depth's size")(reason));
         }
-        let optics = optics::of_pair(None, &folder.join("far.png"))?;
+        let optics = optics_of(folder)?;
         let projection =
             Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um() };
         Ok(Self { depth_mm, deviation_mm, projection })

@@ -35,6 +35,12 @@ impl GivenOptics {
         Ok(Self { path: path.into(), optics: check(&text, path)?, table })
     }
 
+    /// The optics, and what there is to say of them.
+    fn with_doubts(self) -> (Optics, Vec<String>) {
+        let said = doubts(&self.optics, self.table.contains_key("psf"));
+        (self.optics, said)
+    }
+
     /// As the emulated rig's lens takes them.
     pub fn for_emulation(&self) -> (&Path, Psf) {
         (&self.path, self.optics.psf())
@@ -49,22 +55,33 @@ pub fn read(path: &Path) -> Result<Optics> {
     GivenOptics::read(path).map(|given| given.optics)
 }
 
+fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<String> {
+    let mut said: Vec<String> = optics.doubts().iter().map(ToString::to_string).collect();
+    if !psf_is_given {
+        said.push(
+            "the optics name no [psf]: a pill-box is assumed, which may be wrong by millimetres; calibrate psf finds it".into(),
+        );
+    }
+    said
+}
+
 /// The optics of a pair: the file that is named, else what the far image's folder knows (`capture.toml` or
-/// `optics.toml`).
+/// `optics.toml`). With what there is to say of them: numbers that are hardly right, a point spread function that is not given.
 ///
 /// # Errors
 /// As [`GivenOptics::read`]; [`WorkflowError::NoOptics`] where there is nothing.
-pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<Optics> {
+pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<String>)> {
     if let Some(path) = named {
-        return read(path);
+        return GivenOptics::read(path).map(|given| given.with_doubts());
     }
     let folder = far.parent().unwrap_or(Path::new(""));
     if let Some(record) = read_record(folder)? {
-        return check(&toml::to_string(&record.optics)?, &folder.join(CAPTURE_FILE));
+        let optics = check(&toml::to_string(&record.optics)?, &folder.join(CAPTURE_FILE))?;
+        return Ok((optics, doubts(&optics, record.optics.contains_key("psf"))));
     }
     let beside = folder.join("optics.toml");
     if beside.exists() {
-        return read(&beside);
+        return GivenOptics::read(&beside).map(|given| given.with_doubts());
     }
     Err(WorkflowError::NoOptics { far: far.into() })
 }

@@ -23,6 +23,9 @@ pub struct LensSection {
     /// f-number `Fe = F / (2a)`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
+    /// Whether the lens is telecentric on the image side, so that moving the sensor does not change the magnification.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub telecentric: Option<bool>,
 }
 
 /// `[sensor]` of an optics file.
@@ -76,7 +79,16 @@ impl OpticsFile {
         let far_mm = positive("focus", "far_mm", self.focus.far_mm, " of mm")?;
         beyond_focal_length("far_mm", far_mm, focal_length_mm)?;
         let psf = self.psf.checked()?;
-        let of_blur = |max_blur_px| Optics { focal_length_mm, f_number, pixel_um, far_mm, max_blur_px, psf };
+        let telecentric = self.lens.telecentric;
+        let of_blur = |max_blur_px| Optics {
+            focal_length_mm,
+            f_number,
+            pixel_um,
+            far_mm,
+            max_blur_px,
+            psf,
+            telecentric,
+        };
         let of_near = |near_mm: f64| -> Result<Optics, OpticsError> {
             beyond_focal_length("near_mm", near_mm, focal_length_mm)?;
             if near_mm >= far_mm {
@@ -170,6 +182,7 @@ impl From<Optics> for OpticsFile {
                 focal_length_mm: optics.focal_length_mm,
                 aperture_mm: None,
                 f_number: Some(optics.f_number),
+                telecentric: optics.telecentric,
             },
             sensor: SensorSection { pixel_um: optics.pixel_um },
             focus: FocusSection {

@@ -8,13 +8,13 @@
 //!
 //! Cost: the rim's pixels once.
 
-use super::DepthMap;
+use crate::depth_map::DepthMap;
 
 /// How far a value is trusted that belongs to a neighbour.
 const RIM_CONFIDENCE: f32 = 0.5;
 
 /// Fills the rim of `width_px` pixels; at most to the middle of a small map.
-pub(super) fn fill(map: &mut DepthMap, width_px: usize) {
+pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     let (height, width) = map.depth_mm.dim();
     let rim = |n: usize| width_px.min((n - 1) / 2);
     let (Some(depths), Some(confidences)) = (map.depth_mm.as_slice_mut(), map.confidence.as_slice_mut())

@@ -16,7 +16,12 @@ use rustfft::{FftDirection, FftPlanner, num_complex::Complex64};
 /// Rig of Li 2014: 50 mm, aperture 12.8 mm, 7.4 um pixels, 933 mm far focus, largest blur 2.703 px.
 pub fn rig(psf: &str) -> Optics {
     let file = OpticsFile {
-        lens: LensSection { focal_length_mm: 50.0, aperture_mm: Some(12.8), f_number: None },
+        lens: LensSection {
+            focal_length_mm: 50.0,
+            aperture_mm: Some(12.8),
+            f_number: None,
+            telecentric: None,
+        },
         sensor: SensorSection { pixel_um: 7.4 },
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: psf.parse().unwrap(),

@@ -9,4 +9,5 @@ mod designs;
 mod input;
 mod optics_files;
 mod planes;
+mod real;
 mod uncertainty;

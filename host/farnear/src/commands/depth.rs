@@ -4,7 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_depth::pipeline::{MAX_SMOOTHING_PX, Settings};
+use farnear_depth::{
+    pipeline::{MAX_SMOOTHING_PX, Settings},
+    prepare::{Align, Balance},
+    windowed::Window,
+};
 use farnear_workflows::depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs};
 
 use crate::{report, terminal};
@@ -12,7 +16,7 @@ use crate::{report, terminal};
 /// Compute a depth map from a far- and a near-focused image.
 ///
 /// Writes depth.npy and depth.tiff (mm, NaN = no value), depth.png (16 bit), confidence.npy (0 to 1), mesh.ply, view.png
-/// (a picture with a scale), depth.toml (what made them) and, if asked, uncertainty.npy (mm).
+/// (a picture with a scale), reason.png (0 = a depth, else why there is none, as listed in depth.toml), depth.toml (what made them) and, if asked, uncertainty.npy (mm).
 #[derive(Args)]
 #[command(after_help = "Example: farnear depth far.png near.png --optics optics.toml --out depth/")]
 pub struct Arguments {
@@ -27,9 +31,30 @@ pub struct Arguments {
     /// are designed for the optics.
     #[arg(long, value_name = "NAME|FILE")]
     operators: Option<PathBuf>,
-    /// How: ro (rational operators), or a method to compare with: subbarao, subbarao-fourier or favaro.
+    /// How: ro (rational operators), whitened (operators at the limit that noise sets), or a method to compare with:
+    /// subbarao, subbarao-fourier or favaro.
     #[arg(long, default_value_t)]
     method: Method,
+    /// Window over which evidence is summed: an odd number of pixels, adaptive (the largest of 7, 13 and 21 that nothing
+    /// contradicts: a third of the noise), or safe (the smallest of 9, 13 and 21 that is certain enough); without it
+    /// adaptive for whitened, and that of --smooth for the others.
+    #[arg(long, value_name = "PX|adaptive|safe", conflicts_with = "smooth")]
+    window: Option<Window>,
+    /// How the near image is laid on the far one: auto (a similarity, where one is found beyond doubt), none, optics (the
+    /// magnification of a lens that is not telecentric), shift, similarity or affine.
+    #[arg(long, value_name = "HOW", default_value_t)]
+    align: Align,
+    /// How both images are brought to one brightness: auto (a gain, or one that varies, where one is found beyond doubt),
+    /// none, gain or local.
+    #[arg(long, value_name = "HOW", default_value_t)]
+    balance: Balance,
+    /// Folder of the camera's dark and flat frames, from `farnear calibrate camera`.
+    #[arg(long, value_name = "DIR")]
+    camera: Option<PathBuf>,
+    /// Take depths away that are less confident than this: the probability that a depth is off by less than three of its
+    /// standard deviations, 0 to 1.
+    #[arg(long, value_name = "C", default_value_t = 0.0)]
+    min_confidence: f32,
     /// Correction saved by `farnear calibrate correction`, applied to the map.
     #[arg(long, value_name = "FILE")]
     correction: Option<PathBuf>,
@@ -38,7 +63,7 @@ pub struct Arguments {
     fill: bool,
     /// Write uncertainty.npy too: the standard deviation of each depth in mm, for noise that is estimated from the pair
     /// or follows from the camera, --uncertainty=camera:full_well_e=20000,read_noise_e=12 (and bits=12 where the file has
-    /// more); ro only.
+    /// more); ro and whitened only.
     #[arg(long, value_name = "NOISE", num_args = 0..=1, require_equals = true, default_missing_value = "estimated")]
     uncertainty: Option<CameraNoise>,
     /// Side of the window over which coefficients are summed, in pixels: odd, 1 to 63.
@@ -87,6 +112,11 @@ pub fn run(arguments: Arguments) -> Result<()> {
         operators: arguments.operators,
         method: arguments.method,
         computation,
+        window: arguments.window,
+        align: arguments.align,
+        balance: arguments.balance,
+        camera: arguments.camera,
+        min_confidence: arguments.min_confidence,
         correction: arguments.correction,
         uncertainty: arguments.uncertainty,
         write: arguments.write,

@@ -16,6 +16,7 @@ mod emulated_work;
 mod maps;
 mod markers;
 mod outputs;
+mod real_pairs;
 mod scene_files;
 mod scripted_board;
 mod shadow_remove;

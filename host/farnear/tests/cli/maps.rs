@@ -86,6 +86,7 @@ fn maps_are_replaced_and_other_files_left_alone() {
             "out/depth.toml",
             "out/mesh.ply",
             "out/notes.txt",
+            "out/reason.png",
             "out/view.png"
         ]
     );

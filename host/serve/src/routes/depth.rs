@@ -6,7 +6,10 @@ use axum::{
     http::{HeaderMap, StatusCode},
     response::{IntoResponse, Response},
 };
-use farnear_depth::pipeline::Settings;
+use farnear_depth::{
+    pipeline::Settings,
+    prepare::{Align, Balance},
+};
 use farnear_files::{map, npy};
 use farnear_workflows::{
     Context, WorkflowError,
@@ -158,6 +161,11 @@ async fn compute(
             fill: wish.fill,
             ..Settings::default()
         },
+        window: None,
+        align: Align::default(),
+        balance: Balance::default(),
+        camera: None,
+        min_confidence: 0.0,
         correction: None,
         uncertainty: (method == Method::RationalOperators).then_some(CameraNoise::Estimated),
         write: Outputs::default(),

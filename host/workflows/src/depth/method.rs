@@ -2,14 +2,8 @@
 
 use std::{fmt, path::Path, str::FromStr};
 
-use farnear_depth::{
-    baselines,
-    operators::Operators,
-    optics::Optics,
-    pipeline::{DepthMap, Settings, depth_from_pair},
-};
+use farnear_depth::{baselines, operators::Operators, optics::Optics, real::RealMethod};
 
-use super::pair::Pair;
 use crate::{
     error::{Result, WorkflowError},
     operators,
@@ -21,13 +15,15 @@ pub enum Method {
     /// `ro`.
     #[default]
     RationalOperators,
+    /// `whitened`: operators with a white residual.
+    Whitened,
     /// Somebody else's.
     Baseline(baselines::Method),
 }
 
 /// A name that belongs to no method.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("expected ro, subbarao, subbarao-fourier or favaro")]
+#[error("expected ro, whitened, subbarao, subbarao-fourier or favaro")]
 pub struct UnknownMethod {
     /// The name.
     pub name: String,
@@ -40,6 +36,9 @@ impl FromStr for Method {
         if text == "ro" {
             return Ok(Self::RationalOperators);
         }
+        if text == "whitened" {
+            return Ok(Self::Whitened);
+        }
         text.parse().map(Self::Baseline).map_err(|_| UnknownMethod { name: text.into() })
     }
 }
@@ -48,6 +47,7 @@ impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::RationalOperators => "ro",
+            Self::Whitened => "whitened",
             Self::Baseline(method) => method.name(),
         })
     }
@@ -57,6 +57,8 @@ impl fmt::Display for Method {
 pub enum Prepared {
     /// With its operators.
     RationalOperators(Box<Operators>),
+    /// Designs its kernels for the optics.
+    Whitened,
     /// Learns what it needs by itself.
     Baseline(baselines::Method),
 }
@@ -71,11 +73,12 @@ impl Prepared {
             (Method::RationalOperators, asked) => {
                 Ok(Self::RationalOperators(Box::new(operators::find(asked, optics)?)))
             }
-            (Method::Baseline(method), Some(asked)) => Err(WorkflowError::parameter(
+            (Method::Whitened | Method::Baseline(_), Some(asked)) => Err(WorkflowError::parameter(
                 "operators",
                 asked.display(),
                 format!("method {method} uses none"),
             )),
+            (Method::Whitened, None) => Ok(Self::Whitened),
             (Method::Baseline(method), None) => Ok(Self::Baseline(method)),
         }
     }
@@ -84,6 +87,7 @@ impl Prepared {
     pub fn method(&self) -> Method {
         match self {
             Self::RationalOperators(_) => Method::RationalOperators,
+            Self::Whitened => Method::Whitened,
             Self::Baseline(method) => Method::Baseline(*method),
         }
     }
@@ -92,19 +96,16 @@ impl Prepared {
     pub fn operators(&self) -> Option<&Operators> {
         match self {
             Self::RationalOperators(operators) => Some(operators),
-            Self::Baseline(_) => None,
+            Self::Whitened | Self::Baseline(_) => None,
         }
     }
 
-    /// Depth of a pair.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Depth`], [`WorkflowError::Baseline`].
-    pub fn depth(&self, pair: &Pair, optics: &Optics, settings: &Settings) -> Result<DepthMap> {
-        let (far, near) = (pair.far.view(), pair.near.view());
-        Ok(match self {
-            Self::RationalOperators(operators) => depth_from_pair(far, near, operators, optics, settings)?,
-            Self::Baseline(method) => baselines::depth_from_pair(*method, far, near, optics, settings)?,
-        })
+    /// As the library calls it.
+    pub fn as_real(&self) -> RealMethod<'_> {
+        match self {
+            Self::RationalOperators(operators) => RealMethod::Rational(operators),
+            Self::Whitened => RealMethod::Whitened,
+            Self::Baseline(method) => RealMethod::Baseline(*method),
+        }
     }
 }

@@ -8,13 +8,13 @@ use farnear_depth::{
     operators::Operators,
     optics::Optics,
     pipeline::{DepthMap, Settings},
+    prepare::{Prepared, noise::PairNoise},
     uncertainty::{Noise, standard_deviation_mm},
 };
 use farnear_files::image_file::Samples;
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 
-use super::pair::Pair;
 use crate::{error::Result, figures::rounded};
 
 /// Step in mm over which a correction's slope is taken: far above rounding, far below what a correction bends over.
@@ -102,6 +102,17 @@ impl fmt::Display for CameraNoise {
 }
 
 impl CameraNoise {
+    /// A camera's noise as the windows take it; `None` where it is to be estimated.
+    pub fn of_camera(self, samples: Samples) -> Option<PairNoise> {
+        match self.of(samples) {
+            Noise::Camera { constant, per_unit } => {
+                // At half of full scale.
+                Some(PairNoise { constant, per_unit, mean_variance: constant + 0.5 * per_unit })
+            }
+            Noise::Estimated => None,
+        }
+    }
+
     /// The noise of images whose files have such samples and whose values are 1 at full scale.
     fn of(self, samples: Samples) -> Noise {
         let Self::Camera { full_well_e, read_noise_e, bits } = self else { return Noise::Estimated };
@@ -130,14 +141,18 @@ pub struct Uncertainty {
 
 /// What the standard deviation follows from.
 pub struct Source<'a> {
-    /// Far- and near-focused image.
-    pub pair: &'a Pair,
-    /// What the depth was computed with.
-    pub operators: &'a Operators,
+    /// How the files store a pixel.
+    pub samples: Samples,
+    /// The pair as it was measured.
+    pub prepared: &'a Prepared,
+    /// The rational operators of one window that the depth was computed with, if it was.
+    pub operators: Option<&'a Operators>,
     /// See there.
     pub optics: &'a Optics,
     /// See there.
     pub settings: &'a Settings,
+    /// What the judge says, for every other method.
+    pub judged: &'a Array2<f32>,
 }
 
 /// Standard deviation of `raw` (before `correction`), mm; NaN where there is no depth and where it was filled in from
@@ -151,15 +166,17 @@ pub fn deviation(
     raw: &DepthMap,
     correction: Option<&Correction>,
 ) -> Result<(Array2<f32>, Uncertainty)> {
-    let pair = source.pair;
-    let mut deviation = standard_deviation_mm(
-        pair.far.view(),
-        pair.near.view(),
-        source.operators,
-        source.optics,
-        source.settings,
-        noise.of(pair.samples),
-    )?;
+    let mut deviation = match source.operators {
+        Some(operators) => standard_deviation_mm(
+            source.prepared.far.view(),
+            source.prepared.near.view(),
+            operators,
+            source.optics,
+            source.settings,
+            noise.of(source.samples),
+        )?,
+        None => source.judged.clone(),
+    };
     let filled = |confidence: f32| source.settings.fill && confidence == FILLED_CONFIDENCE;
     Zip::from(&mut deviation).and(&raw.depth_mm).and(&raw.confidence).for_each(
         |deviation, depth_mm, confidence| {

@@ -35,6 +35,7 @@ const OUTPUTS: &[Output] = &[
     Output { names: &["png"], file: "depth.png", bytes: |results| results.png() },
     // A map does not travel without its confidence; depth.exr and view.png hold it themselves.
     Output { names: &["npy", "tiff", "png"], file: "confidence.npy", bytes: |results| Ok(Some(npy::write(results.confidence()))) },
+    Output { names: &["npy", "tiff", "png"], file: "reason.png", bytes: |results| results.reasons() },
     Output { names: &["npy", "tiff", "png"], file: "uncertainty.npy", bytes: |results| Ok(results.deviation().map(npy::write)) },
     Output { names: &["mesh"], file: "mesh.ply", bytes: |results| Ok(Some(results.mesh())) },
     Output { names: &["view"], file: "view.png", bytes: |results| Ok(Some(view::view_png(results.depth(), results.confidence())?)) },
@@ -157,6 +158,11 @@ impl<'a> Results<'a> {
         Ok(encoded.transpose()?)
     }
 
+    fn reasons(&self) -> Result<Option<Vec<u8>>> {
+        let codes = self.computed.judgement.reasons.mapv(u16::from);
+        Ok(Some(encode_png(codes.view(), 8)?))
+    }
+
     fn mesh(&self) -> Vec<u8> {
         let optics = &self.inputs.optics;
         let projection =
@@ -187,7 +193,7 @@ mod tests {
         let some: Outputs = "exr, npy".parse().unwrap();
         assert_eq!(some.to_string(), "npy,exr");
         let files: Vec<_> = some.outputs().map(|output| output.file).collect();
-        assert_eq!(files, ["depth.npy", "confidence.npy", "uncertainty.npy", "depth.exr"]);
+        assert_eq!(files, ["depth.npy", "confidence.npy", "reason.png", "uncertainty.npy", "depth.exr"]);
         assert_eq!("npy,tiff,png,mesh,view".parse(), Ok(Outputs::default()));
         let unknown = "npy,jpg".parse::<Outputs>().unwrap_err();
         assert_eq!(

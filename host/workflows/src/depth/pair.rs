@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use farnear_capture::record::CAPTURE_FILE;
-use farnear_depth::pipeline::Warning;
 use farnear_files::image_file::{Samples, read_grey};
 use ndarray::Array2;
 
@@ -49,9 +48,9 @@ impl Pair {
 ///
 /// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near: only
 /// the names tell.
-pub fn warnings(found: &[Warning], far: &Path, near: &Path) -> Vec<String> {
-    let mut warnings: Vec<String> = found.iter().map(ToString::to_string).collect();
-    let seen_already = found.iter().any(|warning| matches!(warning, Warning::LooksSwapped { .. }));
+pub fn warnings(found: Vec<String>, far: &Path, near: &Path) -> Vec<String> {
+    let mut warnings = found;
+    let seen_already = warnings.iter().any(|warning| warning.contains("looks swapped"));
     if named_the_other_way_round(far, near) && !seen_already {
         warnings.push(format!(
             "the pair looks swapped by its names: {} was given as FAR and {} as NEAR",

@@ -1,6 +1,6 @@
 //! `depth.toml`: what made a map.
 
-use farnear_depth::{operators::Operators, optics::Optics, pipeline::Settings};
+use farnear_depth::{judge::Lost, operators::Operators, optics::Optics, pipeline::Settings, prepare::Report};
 use farnear_files::map::Scale;
 use serde::Serialize;
 
@@ -25,9 +25,21 @@ struct Record<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     png: Option<Scale>,
     method: String,
+    /// Over how many pixels evidence was summed.
+    window: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     correction: Option<String>,
+    /// What was asked for; what was done stands under `prepared`.
+    align: String,
+    balance: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera: Option<String>,
+    min_confidence: f32,
     settings: Settings,
+    /// What was found and done before depth.
+    prepared: Report,
+    /// Why pixels have no depth: the numbers in reason.png, in words, and the part of the map.
+    no_depth: &'a [Lost],
     #[serde(skip_serializing_if = "Option::is_none")]
     uncertainty: Option<&'a Uncertainty>,
     optics: Optics,
@@ -54,7 +66,14 @@ pub fn record(
         write: (!usual).then(|| settings.write.to_string()),
         png,
         method: inputs.method.method().to_string(),
+        window: computed.window.to_string(),
         correction: settings.correction.as_deref().map(name_of),
+        align: settings.align.to_string(),
+        balance: settings.balance.to_string(),
+        camera: settings.camera.as_deref().map(name_of),
+        min_confidence: settings.min_confidence,
+        prepared: computed.report,
+        no_depth: &computed.judgement.lost,
         // The number of threads changes nothing in the result.
         settings: Settings { threads: Settings::default().threads, ..settings.computation },
         uncertainty: computed.deviation.as_ref().map(|(_, found)| found),

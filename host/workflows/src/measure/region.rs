@@ -1,10 +1,13 @@
 //! Figures of a part of a map.
 
-use ndarray::s;
+use ndarray::{ArrayView2, s};
 use serde::Serialize;
 
 use super::{Measured, Plane, Rectangle, fit};
 use crate::error::Result;
+
+/// Side of the blocks whose means count as independent, px: wider than usual windows.
+const BLOCK_PX: usize = 24;
 
 /// Figures of a region.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -15,9 +18,16 @@ pub struct RegionFigures {
     pub pixels: usize,
     /// Their part of all pixels of the region.
     pub fill_rate: f64,
-    /// Mean depth; none where there is no depth at all, as the next three.
+    /// Mean depth; none where there is no depth at all, as the next five.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_mm: Option<f64>,
+    /// Standard error of the mean, from the means of blocks that are wider than a window, because neighbouring depths share
+    /// windows; none with fewer than four blocks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error_mm: Option<f64>,
+    /// Median depth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median_mm: Option<f64>,
     /// Standard deviation of the depths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_deviation_mm: Option<f64>,
@@ -40,7 +50,7 @@ pub fn region(map: &Measured, at: Rectangle) -> Result<RegionFigures> {
     map.check(&at)?;
     let Rectangle { x, y, width, height } = at;
     let window = s![y..y + height, x..x + width];
-    let depths: Vec<f64> =
+    let mut depths: Vec<f64> =
         map.depth_mm.slice(window).iter().filter(|z| z.is_finite()).map(|z| f64::from(*z)).collect();
     let count = depths.len() as f64;
     let some = !depths.is_empty();
@@ -59,12 +69,32 @@ pub fn region(map: &Measured, at: Rectangle) -> Result<RegionFigures> {
         pixels: depths.len(),
         fill_rate: count / (width * height) as f64,
         mean_mm: some.then_some(mean),
+        standard_error_mm: standard_error(map.depth_mm.slice(window)),
+        median_mm: median(&mut depths),
         standard_deviation_mm: some.then(|| variance.sqrt()),
         range_mm: some
             .then(|| depths.iter().fold([f64::MAX, f64::MIN], |[low, high], z| [low.min(*z), high.max(*z)])),
         predicted_deviation_mm: predicted,
         plane: fit(&points),
     })
+}
+
+/// The value in the middle; the upper one of two.
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+fn standard_error(depths: ArrayView2<f32>) -> Option<f64> {
+    let mean_of = |block: ArrayView2<f32>| {
+        let finite: Vec<f64> = block.iter().filter(|z| z.is_finite()).map(|z| f64::from(*z)).collect();
+        (2 * finite.len() > block.len()).then(|| finite.iter().sum::<f64>() / finite.len() as f64)
+    };
+    let means: Vec<f64> = depths.exact_chunks((BLOCK_PX, BLOCK_PX)).into_iter().filter_map(mean_of).collect();
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (means.len() >= 4).then(|| (variance / n).sqrt())
 }
 
 #[cfg(test)]
@@ -87,6 +117,9 @@ mod tests {
         assert_eq!(found.pixels, 2399);
         assert!((found.fill_rate - 2399.0 / 2400.0).abs() < 1e-12);
         assert_eq!(found.predicted_deviation_mm, Some(0.5));
+        // Two blocks of 24 pixels fit: too few for a standard error.
+        assert_eq!(found.standard_error_mm, None);
+        assert!((found.median_mm.unwrap() - 901.5).abs() < 0.06, "{found:?}");
         // A pixel sees 7.4 um * 17 = 0.126 mm at 900 mm, so 0.05 mm per pixel is a slope of 0.397.
         let plane = found.plane.unwrap();
         assert!((plane.slope_x - 0.397).abs() < 0.002, "{plane:?}");

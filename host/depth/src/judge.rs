@@ -1,0 +1,192 @@
+//! What can be known of each depth: whether there is one, why not, how far it may be off and how sure that is.
+//!
+//! A depth is taken away where it lies beyond the working range (there the model ends: the found depth stays near the
+//! range's end however far the surface is), where its standard deviation is so large that noise alone may have made it,
+//! and where the model leaves far more than noise. What is left has a standard deviation, widened by what the model leaves,
+//! and a confidence: the probability that the depth is off by less than three of these.
+
+use ndarray::{Array2, Zip};
+use serde::{Deserialize, Serialize};
+
+use crate::depth_map::DepthMap;
+use crate::fill::FILLED_CONFIDENCE;
+use crate::metrics::dilate_square;
+use crate::optics::Optics;
+use crate::prepare::Prepared;
+use crate::reason::Reason;
+use crate::windowed::Estimate;
+
+/// Largest |alpha| that is believed: a tenth beyond either focus the operators still hold to 1 mm.
+pub const LARGEST_ALPHA: f64 = 1.1;
+/// Standard deviation of alpha from which noise alone may have made a depth.
+const LARGEST_DEVIATION: f32 = 0.12;
+/// Mean square of what the model leaves, relative to the noise, from which it does not hold.
+const LARGEST_MISFIT: f32 = 60.0;
+/// How far around a hole the reason for it is looked for, px.
+const SEARCH_PX: usize = 24;
+
+/// What a pair is judged by.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JudgeSettings {
+    /// Confidence below which a depth is taken away.
+    pub least_confidence: f32,
+    /// Whether regions without texture were filled; what was filled is kept.
+    pub filled: bool,
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub struct Judgement {
+    /// For each pixel the code of the [`Reason`] why it has no depth, 0 where it has one.
+    pub reasons: Array2<u8>,
+    /// Standard deviation of each depth, mm; NaN where there is none.
+    pub deviation_mm: Array2<f32>,
+    /// How many pixels have no depth, by reason.
+    pub lost: Vec<Lost>,
+    /// Part of the pixels that have a depth.
+    pub valid_fraction: f64,
+}
+
+/// Pixels without depth for one reason.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Lost {
+    /// The reason.
+    pub reason: Reason,
+    /// Its number in `reason.png`.
+    pub code: u8,
+    /// Part of all pixels.
+    pub fraction: f64,
+}
+
+/// Judges a map: takes depths away that cannot be believed, sets each confidence to its probability. `estimate` is of the same
+/// prepared pair.
+pub fn judge(
+    map: &mut DepthMap,
+    prepared: &Prepared,
+    estimate: &Estimate,
+    optics: &Optics,
+    settings: &JudgeSettings,
+) -> Judgement {
+    let size = map.depth_mm.dim();
+    let mut reasons = prepared.reasons.clone();
+    let mut deviation_mm = estimate.deviation_mm.clone();
+    let range = Range::new(optics);
+    Zip::from(&mut reasons)
+        .and(&mut map.depth_mm)
+        .and(&mut map.confidence)
+        .and(&mut deviation_mm)
+        .and(&estimate.misfit)
+        .for_each(|reason, depth, confidence, deviation, misfit| {
+            if settings.filled && *confidence == FILLED_CONFIDENCE && depth.is_finite() {
+                (*reason, *deviation) = (0, f32::NAN);
+                return;
+            }
+            let noise = *deviation;
+            *deviation *= misfit.max(1.0).sqrt();
+            let verdict = if *reason != 0 || !depth.is_finite() {
+                None
+            } else {
+                range.verdict(*depth, [noise, *deviation], *misfit, settings.least_confidence)
+            };
+            match verdict {
+                Some(Ok(probability)) => *confidence = probability,
+                Some(Err(why)) => *reason = why.code(),
+                None => {}
+            }
+            if !matches!(verdict, Some(Ok(_))) {
+                (*depth, *confidence, *deviation) = (f32::NAN, 0.0, f32::NAN);
+            }
+        });
+    explain_holes(&mut reasons, map);
+    let total = reasons.len() as f64;
+    let lost: Vec<Lost> = Reason::ALL
+        .into_iter()
+        .map(|reason| (reason, reasons.iter().filter(|code| **code == reason.code()).count()))
+        .filter(|(_, count)| *count > 0)
+        .map(|(reason, count)| Lost { reason, code: reason.code(), fraction: count as f64 / total })
+        .collect();
+    let valid = map.depth_mm.iter().filter(|depth| depth.is_finite()).count();
+    map.low_texture_fraction =
+        lost.iter().filter(|l| l.reason == Reason::NoTexture).map(|l| l.fraction).sum();
+    Judgement { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
+}
+
+/// The range in which depths are believed.
+struct Range {
+    far_mm: f32,
+    near_mm: f32,
+    /// Magnitude of the change of depth with alpha, mm, at alpha 0.
+    slope_mm: f32,
+}
+
+impl Range {
+    fn new(optics: &Optics) -> Self {
+        let [far_mm, near_mm] = [-LARGEST_ALPHA, LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha) as f32);
+        Self { far_mm, near_mm, slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32 }
+    }
+
+    /// The confidence of a depth, or why there is none.
+    /// `deviations_mm` are from noise alone, and with what the model leaves.
+    fn verdict(
+        &self,
+        depth: f32,
+        deviations_mm: [f32; 2],
+        misfit: f32,
+        least: f32,
+    ) -> Option<Result<f32, Reason>> {
+        let [of_noise, of_alpha] = deviations_mm.map(|deviation| deviation / self.slope_mm);
+        if of_noise.is_nan() || of_noise >= LARGEST_DEVIATION {
+            return Some(Err(Reason::NoTexture));
+        }
+        if !(self.near_mm..=self.far_mm).contains(&depth) {
+            return Some(Err(Reason::OutOfRange));
+        }
+        if misfit > LARGEST_MISFIT || of_alpha > 3.0 * LARGEST_DEVIATION {
+            return Some(Err(Reason::Misfit));
+        }
+        let probability = probability(of_alpha, misfit);
+        Some(if probability < least { Err(Reason::Unsure) } else { Ok(probability) })
+    }
+}
+
+/// Probability that a depth is off by less than three standard deviations. Of a normal error it is 0.997; it falls where the
+/// deviation is no longer small against the range, and where the model leaves more than noise.
+fn probability(deviation_of_alpha: f32, misfit: f32) -> f32 {
+    let noisy = (deviation_of_alpha / LARGEST_DEVIATION).powi(2);
+    let unexplained = (misfit - 1.5).max(0.0);
+    0.997 / ((1.0 + 0.3 * noisy) * (1.0 + 0.02 * unexplained))
+}
+
+/// Gives pixels without depth, of which nothing says why, the reason of what lies nearest.
+fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
+    let unexplained = |reasons: &Array2<u8>| {
+        reasons
+            .indexed_iter()
+            .filter(|(at, code)| **code == 0 && !map.depth_mm[*at].is_finite())
+            .map(|(at, _)| at)
+            .collect::<Vec<_>>()
+    };
+    let mut left = unexplained(reasons);
+    // Reasons that make holes around them, before the judge's own.
+    let spreading =
+        [Reason::Saturated, Reason::Dark, Reason::Edge, Reason::Moved, Reason::BadPixel, Reason::NotFinite];
+    let original = reasons.clone();
+    for reason in spreading {
+        if left.is_empty() {
+            return;
+        }
+        let own = original.mapv(|code| code == reason.code());
+        if own.iter().any(|own| *own) {
+            let near = dilate_square(&own, SEARCH_PX);
+            left.retain(|at| {
+                if near[*at] {
+                    reasons[*at] = reason.code();
+                }
+                !near[*at]
+            });
+        }
+    }
+    for at in left {
+        reasons[at] = Reason::NoTexture.code();
+    }
+}

@@ -1,0 +1,285 @@
+//! How much brighter one image of a pair is than the other: one gain, or one that varies slowly over the field.
+//!
+//! Defocus spreads light and loses none, so that means over blocks far larger than the blur are alike in both images. Their
+//! ratio is exposure, lamp, aperture and vignetting. It is fitted by a polynomial of fourth degree over the field, which
+//! follows vignetting (`r^2` and `r^4` about any centre), with Huber's weights: a block across whose border much light
+//! spreads, or in which something moved, has little say.
+//!
+//! Cost: one pass over both images for the means; one multiplication and a Horner sum per pixel to apply.
+
+use nalgebra::{DMatrix, DVector};
+use ndarray::{ArrayView2, ArrayViewMut2, Axis};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::operators::least_squares;
+
+/// Blocks along the shorter side.
+const BLOCKS: usize = 24;
+/// Shortest side of a block, px: far larger than the blur.
+const LEAST_BLOCK_PX: usize = 12;
+/// Degree of the polynomial.
+const DEGREE: usize = 4;
+/// Its terms.
+const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
+/// Rounds of reweighting.
+const ROUNDS: usize = 5;
+
+/// Brightness of the near image relative to the far one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Gain {
+    /// Its mean over the field.
+    pub mean: f64,
+    /// Smallest and largest over the field.
+    pub range: [f64; 2],
+    /// Standard error of the mean.
+    pub standard_error: f64,
+    /// Root mean square of what the mean alone leaves of the blocks' ratios, and of what the polynomial leaves.
+    pub left_over: [f64; 2],
+    /// Blocks that were compared.
+    pub blocks: usize,
+    polynomial: Polynomial,
+}
+
+/// Coefficients of x^i y^j with i + j <= [`DEGREE`], x and y from -1 to 1 along the longer side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Polynomial {
+    /// Whether the value is the near image's brightness over the far one's, or its reciprocal: one of the two is closer to
+    /// a polynomial, depending on which image is vignetted.
+    reciprocal: bool,
+    coefficients: Vec<f64>,
+}
+
+/// The exponents of the terms.
+fn exponents() -> impl Iterator<Item = (i32, i32)> {
+    (0..=DEGREE as i32).flat_map(|i| (0..=DEGREE as i32 - i).map(move |j| (i, j)))
+}
+
+/// Field coordinates of a place.
+fn field([x, y]: [f64; 2], (height, width): (usize, usize)) -> [f64; 2] {
+    let half = 0.5 * height.max(width) as f64;
+    [(x + 0.5 - 0.5 * width as f64) / half, (y + 0.5 - 0.5 * height as f64) / half]
+}
+
+/// A block: its middle in field coordinates, and the mean of both images.
+struct Block {
+    at: [f64; 2],
+    far: f64,
+    near: f64,
+}
+
+impl Gain {
+    /// Measures the gain of a pair that lies on each other; pixels without a value (NaN) in either image do not count.
+    /// `None` where brightness says nothing: an image around 0, as differences have, or fewer blocks than terms.
+    pub fn measure(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<Self> {
+        let blocks = blocks(far, near);
+        if blocks.len() < 2 * TERMS || blocks.iter().any(|block| block.far <= 0.0 || block.near <= 0.0) {
+            return None;
+        }
+        // The brighter block is the better known one: noise and what spreads over its border count less.
+        let weights: Vec<f64> = blocks.iter().map(|block| block.far * block.near).collect();
+        let ratios: Vec<f64> = blocks.iter().map(|block| block.near / block.far).collect();
+        let flat = Fit::new(&[ratios.clone()], &weights, |_| vec![1.0], &blocks)?;
+        let terms = |at: [f64; 2]| exponents().map(|(i, j)| at[0].powi(i) * at[1].powi(j)).collect();
+        let reciprocals: Vec<f64> = ratios.iter().map(|ratio| ratio.recip()).collect();
+        let curved = Fit::new(&[ratios, reciprocals], &weights, terms, &blocks)?;
+        let polynomial = Polynomial { reciprocal: curved.which == 1, coefficients: curved.coefficients };
+        let mean = flat.coefficients[0];
+        let values = corners_and_middle(far.dim()).map(|at| polynomial.at(at));
+        Some(Self {
+            mean,
+            range: [values.iter().copied().fold(mean, f64::min), values.iter().copied().fold(mean, f64::max)],
+            standard_error: flat.rms / (blocks.len() as f64).sqrt(),
+            left_over: [flat.rms / mean, curved.rms / if curved.which == 1 { mean.recip() } else { mean }],
+            blocks: blocks.len(),
+            polynomial,
+        })
+    }
+
+    /// Whether the gain varies over the field by more than chance and by more than matters.
+    pub fn varies(&self, least: f64) -> bool {
+        let [flat, curved] = self.left_over;
+        let explained = (flat * flat - curved * curved).max(0.0);
+        let by_chance = curved * curved * TERMS as f64 / self.blocks as f64;
+        explained.sqrt() > least && explained > 4.0 * by_chance
+    }
+
+    /// Divides an image by the mean gain.
+    pub fn divide_by_mean(&self, image: &mut ArrayViewMut2<f32>) {
+        let factor = self.mean.recip() as f32;
+        image.par_mapv_inplace(|value| value * factor);
+    }
+
+    /// Divides an image by the gain at each of its places.
+    pub fn divide_by_field(&self, image: &mut ArrayViewMut2<f32>) {
+        let size = image.dim();
+        let reciprocal = self.polynomial.reciprocal;
+        image.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
+            let [first, v] = field([0.0, y as f64], size);
+            let step = field([1.0, 0.0], size)[0] - field([0.0, 0.0], size)[0];
+            let of_row = self.polynomial.of_row(v);
+            for (x, value) in row.iter_mut().enumerate() {
+                let u = (first + step * x as f64) as f32;
+                let gain = of_row.iter().rev().fold(0.0_f32, |sum, c| sum * u + c);
+                *value = if reciprocal { *value * gain } else { *value / gain };
+            }
+        });
+    }
+}
+
+impl Polynomial {
+    /// The gain at a place in field coordinates.
+    fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        let value: f64 =
+            exponents().zip(&self.coefficients).map(|((i, j), c)| c * x.powi(i) * y.powi(j)).sum();
+        if self.reciprocal { value.recip() } else { value }
+    }
+
+    /// Coefficients of the powers of x along a row.
+    fn of_row(&self, y: f64) -> [f32; DEGREE + 1] {
+        let mut row = [0.0_f64; DEGREE + 1];
+        for ((i, j), c) in exponents().zip(&self.coefficients) {
+            row[i as usize] += c * y.powi(j);
+        }
+        row.map(|c| c as f32)
+    }
+}
+
+fn corners_and_middle(size: (usize, usize)) -> [[f64; 2]; 5] {
+    let (bottom, right) = ((size.0 - 1) as f64, (size.1 - 1) as f64);
+    [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom], [0.5 * right, 0.5 * bottom]]
+        .map(|at| field(at, size))
+}
+
+/// A robust fit to one of several targets: the one that leaves least, relative to its mean.
+struct Fit {
+    which: usize,
+    coefficients: Vec<f64>,
+    rms: f64,
+}
+
+impl Fit {
+    fn new(
+        targets: &[Vec<f64>],
+        weights: &[f64],
+        terms: impl Fn([f64; 2]) -> Vec<f64>,
+        blocks: &[Block],
+    ) -> Option<Self> {
+        let rows: Vec<Vec<f64>> = blocks.iter().map(|block| terms(block.at)).collect();
+        let fits = targets.iter().enumerate().filter_map(|(which, target)| {
+            let (coefficients, rms) = robust(&rows, target, weights)?;
+            let mean = target.iter().sum::<f64>() / target.len() as f64;
+            Some((rms / mean, Self { which, coefficients, rms }))
+        });
+        fits.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, fit)| fit)
+    }
+}
+
+/// Coefficients and robust root mean square (1.48 times the median of the magnitudes) of what they leave.
+fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let mut trust = vec![1.0; rows.len()];
+    let mut found = (Vec::new(), f64::INFINITY);
+    for _ in 0..ROUNDS {
+        let root: Vec<f64> = weights.iter().zip(&trust).map(|(w, t)| (w * t).sqrt()).collect();
+        let matrix = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| root[i] * rows[i][j]);
+        let right = DVector::from_fn(rows.len(), |i, _| root[i] * target[i]);
+        let coefficients = least_squares::solve(matrix, right).ok()?;
+        let left: Vec<f64> = rows
+            .iter()
+            .zip(target)
+            .map(|(row, t)| t - row.iter().zip(coefficients.iter()).map(|(a, b)| a * b).sum::<f64>())
+            .collect();
+        let mut sizes: Vec<f64> = left.iter().map(|l| l.abs()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        let rms = (1.4826 * sizes[sizes.len() / 2]).max(1e-12);
+        // Huber's weights.
+        trust = left.iter().map(|l| (1.5 * rms / l.abs().max(1e-300)).min(1.0)).collect();
+        found = (coefficients.as_slice().to_vec(), rms);
+    }
+    Some(found)
+}
+
+fn blocks(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Vec<Block> {
+    let (height, width) = far.dim();
+    let side = (height.min(width) / BLOCKS).max(LEAST_BLOCK_PX);
+    let of_row = |row: usize| -> Vec<Block> {
+        let top = row * side;
+        (0..width / side)
+            .filter_map(|column| {
+                let left = column * side;
+                let area = ndarray::s![top..top + side, left..left + side];
+                let (mut sums, mut count) = ([0.0_f64; 2], 0_usize);
+                for (far, near) in far.slice(area).rows().into_iter().zip(near.slice(area).rows()) {
+                    for (far, near) in far.iter().zip(near).filter(|(f, n)| f.is_finite() && n.is_finite()) {
+                        sums[0] += f64::from(*far);
+                        sums[1] += f64::from(*near);
+                        count += 1;
+                    }
+                }
+                let half = 0.5 * (side as f64 - 1.0);
+                let at = field([left as f64 + half, top as f64 + half], (height, width));
+                let [far, near] = sums.map(|sum| sum / count as f64);
+                (2 * count > side * side).then_some(Block { at, far, near })
+            })
+            .collect()
+    };
+    (0..height / side).into_par_iter().flat_map_iter(of_row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    fn texture(y: usize, x: usize) -> f32 {
+        let hash = (y * 7919 + x * 104_729 + y * x * 31) as u32;
+        1.0 + 0.4 * ((hash.wrapping_mul(2_654_435_761) >> 16) as f32 / 65_536.0 - 0.5)
+    }
+
+    fn pair(gain: impl Fn(f64, f64) -> f64) -> [Array2<f32>; 2] {
+        let far = Array2::from_shape_fn((240, 320), |(y, x)| texture(y, x));
+        let near = Array2::from_shape_fn((240, 320), |(y, x)| {
+            let [u, v] = field([x as f64, y as f64], (240, 320));
+            texture(y, x) * gain(u, v) as f32
+        });
+        [far, near]
+    }
+
+    #[test]
+    fn one_gain_is_one_gain() {
+        let [far, near] = pair(|_, _| 1.2);
+        let gain = Gain::measure(far.view(), near.view()).unwrap();
+        assert!((gain.mean - 1.2).abs() < 1e-6 && !gain.varies(1e-3), "{gain:?}");
+    }
+
+    #[test]
+    fn vignetting_of_either_image_is_undone() {
+        for of_far in [false, true] {
+            let falloff = |u: f64, v: f64| 1.0 - 0.4 * (u * u + v * v) / 1.5625;
+            let [far, near] = pair(|u, v| if of_far { falloff(u, v).recip() } else { falloff(u, v) });
+            let gain = Gain::measure(far.view(), near.view()).unwrap();
+            assert!(gain.varies(1e-3), "{gain:?}");
+            let mut mended = near.clone();
+            gain.divide_by_field(&mut mended.view_mut());
+            for (a, b) in mended.iter().zip(&far) {
+                assert!((a / b - 1.0).abs() < 2e-3, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_moved_and_what_is_missing_have_no_say() {
+        let [far, mut near] = pair(|_, _| 0.9);
+        near.slice_mut(ndarray::s![60..100, 80..130]).fill(0.2);
+        near.slice_mut(ndarray::s![.., 0..9]).fill(f32::NAN);
+        let gain = Gain::measure(far.view(), near.view()).unwrap();
+        assert!((gain.mean - 0.9).abs() < 2e-3 && !gain.varies(4e-3), "{gain:?}");
+    }
+
+    #[test]
+    fn images_around_zero_have_no_gain() {
+        let [far, near] = pair(|_, _| 1.0).map(|image| image.mapv(|v| v - 1.0));
+        assert!(Gain::measure(far.view(), near.view()).is_none());
+    }
+}

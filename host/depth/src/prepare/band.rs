@@ -1,0 +1,201 @@
+//! What both images of a pair share: the detail that defocus leaves in both, with its strength taken out.
+//!
+//! Defocus takes the finest detail from one image and not from the other, by an amount that varies from place to place; lamp,
+//! aperture and vignetting change the brightness of one. So images are compared in a band of middle frequencies and divided
+//! by the root mean square of that band around each pixel: what is left is alike in both wherever they show the same.
+//! Point spread functions are symmetric and move nothing, so that a difference of blur draws no estimate to one side.
+
+use ndarray::{Array2, ArrayView2, Axis};
+use rayon::prelude::*;
+
+use crate::border::reflect;
+
+/// Side of the window whose mean is taken away: the band's lower end.
+const MEAN_PX: usize = 9;
+/// Side of the window over which the strength is measured.
+const STRENGTH_PX: usize = 15;
+/// Part of the image's mean strength that is added everywhere, so that noise is not made large where nothing is.
+const FLOOR: f32 = 0.1;
+
+/// An image of half the size: binomial weights, so that what the smaller grid cannot carry is gone.
+pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
+    const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
+    let (height, width) = image.dim();
+    let (rows, columns) = (height / 2, width / 2);
+    let mut half = Array2::zeros((rows, columns));
+    half.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
+        || vec![0.0_f32; width],
+        |across, (y, mut row)| {
+            across.fill(0.0);
+            for (tap, weight) in WEIGHTS.iter().enumerate() {
+                let from = image.row(reflect(2 * y as isize + tap as isize - 1, height));
+                across.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+            }
+            for (x, value) in row.iter_mut().enumerate() {
+                let taps = (0..4).map(|tap| across[reflect(2 * x as isize + tap - 1, width)]);
+                *value = taps.zip(WEIGHTS).map(|(value, weight)| value * weight).sum();
+            }
+        },
+    );
+    half
+}
+
+/// The image with its pixels without a value set to the mean of the others.
+pub(crate) fn without_holes(image: ArrayView2<f32>) -> Array2<f32> {
+    let (sum, count) = image
+        .iter()
+        .filter(|v| v.is_finite())
+        .fold((0.0_f64, 0.0_f64), |(sum, count), v| (sum + f64::from(*v), count + 1.0));
+    let mean = if count > 0.0 { (sum / count) as f32 } else { 0.0 };
+    image.mapv(|v| if v.is_finite() { v } else { mean })
+}
+
+/// The band of an image as it is: blurred by a binomial of five taps, less its mean over [`MEAN_PX`].
+pub(crate) fn band(image: ArrayView2<f32>) -> Array2<f32> {
+    let fine = binomial(image);
+    let mut coarse = box_mean(fine.view(), MEAN_PX);
+    coarse.zip_mut_with(&fine, |coarse, fine| *coarse = fine - *coarse);
+    coarse
+}
+
+/// By how much [`band`] changes the variance of noise that is independent from pixel to pixel: sum of its squared taps.
+pub(crate) fn band_noise_gain() -> f64 {
+    let taps = [1.0, 4.0, 6.0, 4.0, 1.0].map(|t| t / 16.0);
+    let n = MEAN_PX as f64;
+    let own: f64 = taps.iter().map(|t| t * t).sum::<f64>().powi(2);
+    // Binomial and box overlap wholly: the mixed term is the box's weight; the box of the binomial is a little wider.
+    own - 2.0 / (n * n) + 1.0 / (n * n)
+}
+
+/// By how much [`halved`] changes it, once.
+pub(crate) fn halving_noise_gain() -> f64 {
+    (2.0 * (0.125_f64.powi(2) + 0.375_f64.powi(2))).powi(2)
+}
+
+/// The band divided by its strength around each pixel.
+pub(crate) fn normalised(band: &Array2<f32>) -> Array2<f32> {
+    let square = band.mapv(|v| v * v);
+    let mean = square.iter().map(|v| f64::from(*v)).sum::<f64>() / square.len() as f64;
+    let floor = (FLOOR * mean as f32).max(f32::MIN_POSITIVE);
+    let mut strength = box_mean(square.view(), STRENGTH_PX);
+    strength.zip_mut_with(band, |strength, band| *strength = band / (*strength + floor).sqrt());
+    strength
+}
+
+/// Binomial of five taps along both axes; borders reflected.
+fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
+    const WEIGHTS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
+    let (height, width) = image.dim();
+    let mut result = Array2::zeros((height, width));
+    result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
+        || vec![0.0_f32; width + 4],
+        |row_sum, (y, mut row)| {
+            row_sum.fill(0.0);
+            for (tap, weight) in WEIGHTS.iter().enumerate() {
+                let from = image.row(reflect(y as isize + tap as isize - 2, height));
+                row_sum[2..2 + width].iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+            }
+            for d in 1..=2_isize {
+                row_sum[(2 - d) as usize] = row_sum[2 + reflect(-d, width)];
+                row_sum[(width as isize + 1 + d) as usize] =
+                    row_sum[2 + reflect(width as isize - 1 + d, width)];
+            }
+            for (tap, weight) in WEIGHTS.iter().enumerate() {
+                let from = &row_sum[tap..tap + width];
+                row.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+            }
+        },
+    );
+    result
+}
+
+/// Mean over a window of odd side around each pixel, fewer pixels at the borders.
+pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
+    let (height, width) = image.dim();
+    let r = side / 2;
+    let mut across = Array2::zeros((height, width));
+    across.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
+        || vec![0.0_f64; width + 1],
+        |sums, (y, mut row)| {
+            for (x, value) in image.row(y).iter().enumerate() {
+                sums[x + 1] = sums[x] + f64::from(*value);
+            }
+            for (x, value) in row.iter_mut().enumerate() {
+                let [from, to] = [x.saturating_sub(r), (x + r + 1).min(width)];
+                *value = ((sums[to] - sums[from]) / (to - from) as f64) as f32;
+            }
+        },
+    );
+    let mut result = Array2::zeros((height, width));
+    let rows = height.div_ceil(rayon::current_num_threads().max(1)).max(32);
+    result.axis_chunks_iter_mut(Axis(0), rows).into_par_iter().enumerate().for_each(
+        |(chunk, mut rows_out)| {
+            let top = chunk * rows;
+            let mut sums = vec![0.0_f64; width];
+            let add = |sums: &mut [f64], y: usize, sign: f64| {
+                sums.iter_mut().zip(across.row(y)).for_each(|(sum, value)| *sum += sign * f64::from(*value));
+            };
+            let [mut from, mut to] = [top.saturating_sub(r), top.saturating_sub(r)];
+            for (i, mut row) in rows_out.axis_iter_mut(Axis(0)).enumerate() {
+                let y = top + i;
+                while to < (y + r + 1).min(height) {
+                    add(&mut sums, to, 1.0);
+                    to += 1;
+                }
+                while from < y.saturating_sub(r) {
+                    add(&mut sums, from, -1.0);
+                    from += 1;
+                }
+                let share = 1.0 / (to - from) as f64;
+                row.iter_mut().zip(&sums).for_each(|(value, sum)| *value = (sum * share) as f32);
+            }
+        },
+    );
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_are_those_of_the_window() {
+        let image = Array2::from_shape_fn((70, 23), |(y, x)| ((y * 31 + x * 17) % 23) as f32);
+        let found = box_mean(image.view(), 9);
+        for (y, x) in [(0_usize, 0_usize), (5, 9), (33, 22), (69, 11), (64, 3)] {
+            let rows = y.saturating_sub(4)..(y + 5).min(70);
+            let columns = x.saturating_sub(4)..(x + 5).min(23);
+            let window = image.slice(ndarray::s![rows, columns]);
+            assert!((found[(y, x)] - window.sum() / window.len() as f32).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn the_gain_of_noise_is_that_of_an_impulse() {
+        let mut image = Array2::zeros((41, 41));
+        image[(20, 20)] = 1.0;
+        let energy: f64 = band(image.view()).iter().map(|v| f64::from(*v).powi(2)).sum();
+        assert!((energy / band_noise_gain() - 1.0).abs() < 0.05, "{energy} {}", band_noise_gain());
+        let energies = [(20, 20), (20, 21), (21, 20), (21, 21)].map(|at| {
+            let mut image = Array2::zeros((42, 42));
+            image[at] = 1.0;
+            halved(image.view()).iter().map(|v| f64::from(*v).powi(2)).sum::<f64>()
+        });
+        // A quarter of the pixels each: their sum is that of one output pixel's taps.
+        assert!((energies.iter().sum::<f64>() / 4.0 * 4.0 - halving_noise_gain()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn strength_is_taken_out() {
+        let image = Array2::from_shape_fn((60, 80), |(y, x)| {
+            let strength = if x < 40 { 1.0 } else { 5.0 };
+            strength * ((y * 7 + x * x * 3) % 11) as f32
+        });
+        let band = normalised(&band(image.view()));
+        let rms = |columns: std::ops::Range<usize>| {
+            let part = band.slice(ndarray::s![.., columns]);
+            (part.mapv(|v| v * v).sum() / part.len() as f32).sqrt()
+        };
+        assert!((rms(5..30) / rms(50..75) - 1.0).abs() < 0.4);
+    }
+}

@@ -1,0 +1,211 @@
+//! A camera's own frames: what it says in the dark, how each pixel responds, and which pixels say nothing.
+//!
+//! `dark` is the mean of exposures with the lens covered, `flat` the response of each pixel to even light relative to the mean
+//! of what surrounds it: (light - dark) over its mean in a large window, so that the lamp's and the lens' slow falloff stays,
+//! which balancing takes off. A pixel is bad whose dark value or response lies far from all others.
+
+use ndarray::{Array2, ArrayView2, Zip};
+
+use super::band::box_mean;
+
+/// Side of the window that a pixel's response is relative to.
+const SURROUNDINGS_PX: usize = 31;
+/// Robust standard deviations from which a pixel is bad.
+const BAD: f32 = 8.0;
+/// Least and largest response of a good pixel.
+const RESPONSE: [f32; 2] = [0.5, 1.5];
+
+/// What is wrong with a camera's frames.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// They are of another size than the images.
+    #[error(
+        "the camera's frames are {width}x{height}, the images {image_width}x{image_height}: calibrate the camera as it is used"
+    )]
+    Size {
+        /// Width of the frames.
+        width: usize,
+        /// Height of the frames.
+        height: usize,
+        /// Width of the images.
+        image_width: usize,
+        /// Height of the images.
+        image_height: usize,
+    },
+    /// No exposures of a kind.
+    #[error("no {kind} exposures: give at least one")]
+    None {
+        /// Which kind.
+        kind: &'static str,
+    },
+    /// The flat exposures are hardly brighter than the dark ones.
+    #[error(
+        "the flat exposures have a mean of {flat:.4}, the dark ones of {dark:.4}: give evenly lit exposures at about half of \
+         full scale"
+    )]
+    NoLight {
+        /// Mean of the flat exposures.
+        flat: f64,
+        /// Mean of the dark ones.
+        dark: f64,
+    },
+}
+
+/// A camera's frames, (height, width).
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraFrames {
+    dark: Array2<f32>,
+    response: Array2<f32>,
+    bad: Array2<bool>,
+}
+
+impl CameraFrames {
+    /// Frames as they were stored.
+    ///
+    /// # Errors
+    /// [`CameraError::Size`] where they differ in size.
+    pub fn new(dark: Array2<f32>, response: Array2<f32>, bad: Array2<bool>) -> Result<Self, CameraError> {
+        let frames = Self { dark, response, bad };
+        frames.check(frames.response.dim())?;
+        let (height, width) = frames.bad.dim();
+        if frames.response.dim() != frames.bad.dim() {
+            let (image_height, image_width) = frames.response.dim();
+            return Err(CameraError::Size { width, height, image_width, image_height });
+        }
+        Ok(frames)
+    }
+
+    /// Learns them from exposures in the dark and of even light, all of one size.
+    ///
+    /// # Errors
+    /// [`CameraError`].
+    pub fn learn(dark: &[Array2<f32>], flat: &[Array2<f32>]) -> Result<Self, CameraError> {
+        let flat = mean(flat, "flat")?;
+        let dark = if dark.is_empty() { Array2::zeros(flat.dim()) } else { mean(dark, "dark")? };
+        if dark.dim() != flat.dim() {
+            let ((height, width), (image_height, image_width)) = (dark.dim(), flat.dim());
+            return Err(CameraError::Size { width, height, image_width, image_height });
+        }
+        let light = &flat - &dark;
+        let average =
+            |image: &Array2<f32>| image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
+        let [of_flat, of_dark] = [&flat, &dark].map(average);
+        if of_flat - of_dark <= 0.02 * of_flat.abs() || of_flat <= 0.0 {
+            return Err(CameraError::NoLight { flat: of_flat, dark: of_dark });
+        }
+        let around = box_mean(light.view(), SURROUNDINGS_PX);
+        let response = &light / &around.mapv(|v| v.max(1e-6));
+        let far_off = |image: &Array2<f32>| {
+            let middle = median(image.iter().copied());
+            let spread = 1.4826 * median(image.iter().map(|v| (v - middle).abs()));
+            let limit = BAD * spread.max(1e-6);
+            image.mapv(|v| (v - middle).abs() > limit)
+        };
+        let [of_dark, of_response] = [far_off(&dark), far_off(&response)];
+        let [least, largest] = RESPONSE;
+        let bad = Zip::from(&of_dark)
+            .and(&of_response)
+            .and(&response)
+            .map_collect(|a, b, v| *a || *b || !(least..=largest).contains(v));
+        Ok(Self { dark, response, bad })
+    }
+
+    /// The frame in the dark.
+    pub fn dark(&self) -> ArrayView2<'_, f32> {
+        self.dark.view()
+    }
+
+    /// Response of each pixel, about 1.
+    pub fn response(&self) -> ArrayView2<'_, f32> {
+        self.response.view()
+    }
+
+    /// Bad pixels, if there are any.
+    pub fn bad(&self) -> Option<ArrayView2<'_, bool>> {
+        self.bad.iter().any(|bad| *bad).then(|| self.bad.view())
+    }
+
+    /// Which pixels are bad.
+    pub fn bad_pixels(&self) -> ArrayView2<'_, bool> {
+        self.bad.view()
+    }
+
+    /// Number of bad pixels.
+    pub fn bad_count(&self) -> usize {
+        self.bad.iter().filter(|bad| **bad).count()
+    }
+
+    pub(super) fn check(&self, (image_height, image_width): (usize, usize)) -> Result<(), CameraError> {
+        let (height, width) = self.dark.dim();
+        if (height, width) == (image_height, image_width) {
+            return Ok(());
+        }
+        Err(CameraError::Size { width, height, image_width, image_height })
+    }
+
+    /// The image as a camera without these faults would have taken it.
+    pub(super) fn apply(&self, image: ArrayView2<f32>) -> Array2<f32> {
+        Zip::from(&image).and(&self.dark).and(&self.response).map_collect(|v, dark, response| {
+            let [least, largest] = RESPONSE;
+            (v - dark) / response.clamp(least, largest)
+        })
+    }
+}
+
+fn mean(images: &[Array2<f32>], kind: &'static str) -> Result<Array2<f32>, CameraError> {
+    let first = images.first().ok_or(CameraError::None { kind })?;
+    let mut sum = Array2::<f32>::zeros(first.dim());
+    for image in images {
+        if image.dim() != first.dim() {
+            let ((height, width), (image_height, image_width)) = (first.dim(), image.dim());
+            return Err(CameraError::Size { width, height, image_width, image_height });
+        }
+        sum += image;
+    }
+    Ok(sum / images.len() as f32)
+}
+
+fn median(values: impl Iterator<Item = f32>) -> f32 {
+    let mut values: Vec<f32> = values.collect();
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn response(y: usize, x: usize) -> f32 {
+        1.0 + 0.03 * (((y * 131 + x * 71) % 17) as f32 / 8.0 - 1.0)
+    }
+
+    #[test]
+    fn a_learned_camera_sees_evenly() {
+        let dark = Array2::from_shape_fn((60, 80), |(y, x)| 0.01 + 0.002 * ((y + x) % 3) as f32);
+        let mut flat = Array2::from_shape_fn((60, 80), |(y, x)| 0.5 * response(y, x)) + &dark;
+        flat[(20, 30)] = 0.02;
+        let frames = CameraFrames::learn(&[dark.clone()], &[flat.clone()]).unwrap();
+        assert_eq!(frames.bad_count(), 1);
+        assert!(frames.bad().unwrap()[(20, 30)]);
+        let seen = frames.apply(flat.view());
+        for ((y, x), value) in seen.indexed_iter().filter(|(at, _)| *at != (20, 30)) {
+            assert!((value - 0.5).abs() < 0.01, "({x}, {y}): {value}");
+        }
+    }
+
+    #[test]
+    fn frames_that_do_not_fit_are_refused() {
+        let image = |height, value| Array2::from_elem((height, 40), value);
+        assert!(matches!(CameraFrames::learn(&[], &[]), Err(CameraError::None { kind: "flat" })));
+        assert!(matches!(
+            CameraFrames::learn(&[image(30, 0.1)], &[image(31, 0.5)]),
+            Err(CameraError::Size { .. })
+        ));
+        assert!(matches!(
+            CameraFrames::learn(&[image(30, 0.5)], &[image(30, 0.5)]),
+            Err(CameraError::NoLight { .. })
+        ));
+        let frames = CameraFrames::learn(&[], &[image(30, 0.5)]).unwrap();
+        assert!(frames.check((31, 40)).unwrap_err().to_string().contains("40x30"));
+    }
+}

@@ -1,0 +1,106 @@
+//! Pixels that do not say what the scene is: saturated, black, bad, not finite.
+//!
+//! A single one is replaced by the mean of its neighbours: among the hundreds of pixels that a depth rests on, its error
+//! counts no more than a little noise. A patch has no such neighbours and becomes a hole (NaN), which takes everything
+//! along that sees it.
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::reason::Reason;
+
+/// Half the side of the neighbourhood that decides whether a pixel stands alone.
+const NEIGHBOURHOOD_PX: isize = 2;
+/// Most defects in it, the pixel included.
+const ALONE: usize = 6;
+
+/// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a camera
+/// that clips, `bad` the camera's bad pixels.
+pub(super) fn find(
+    image: ArrayView2<f32>,
+    limits: Option<[f32; 2]>,
+    bad: Option<ArrayView2<bool>>,
+) -> Option<Array2<u8>> {
+    let (height, width) = image.dim();
+    let black = |y: isize, x: isize| {
+        limits.is_some_and(|[black, _]| {
+            image[(y.clamp(0, height as isize - 1) as usize, x.clamp(0, width as isize - 1) as usize)]
+                <= black
+        })
+    };
+    let mut marks = None;
+    for ((y, x), value) in image.indexed_iter() {
+        let reason = if !value.is_finite() {
+            Reason::NotFinite
+        } else if bad.is_some_and(|bad| bad[(y, x)]) {
+            Reason::BadPixel
+        } else if limits.is_some_and(|[_, white]| *value >= white) {
+            Reason::Saturated
+        } else if limits.is_some_and(|[dark, _]| *value <= dark) {
+            // A black pixel alone may be what the scene is; a patch of them was clipped.
+            let (y, x) = (y as isize, x as isize);
+            let patch = (-1..=1).all(|dy| (-1..=1).all(|dx| black(y + dy, x + dx)));
+            if !patch {
+                continue;
+            }
+            Reason::Dark
+        } else {
+            continue;
+        };
+        marks.get_or_insert_with(|| Array2::zeros((height, width)))[(y, x)] = reason.code();
+    }
+    marks
+}
+
+/// Replaces defects that stand alone, and makes holes of the others.
+pub(super) fn mend(image: &mut Array2<f32>, marks: &Array2<u8>) {
+    let (height, width) = image.dim();
+    let original = image.clone();
+    for ((y, x), _) in marks.indexed_iter().filter(|(_, mark)| **mark != 0) {
+        let around = |reach: isize| {
+            (-reach..=reach).flat_map(move |dy| (-reach..=reach).map(move |dx| (dy, dx))).filter_map(
+                move |(dy, dx)| {
+                    let at = (y.checked_add_signed(dy)?, x.checked_add_signed(dx)?);
+                    (at.0 < height && at.1 < width).then_some((at, dy * dy + dx * dx))
+                },
+            )
+        };
+        let defects = around(NEIGHBOURHOOD_PX).filter(|(at, _)| marks[*at] != 0).count();
+        let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
+        for (at, square) in around(NEIGHBOURHOOD_PX).filter(|(at, _)| marks[*at] == 0) {
+            // The nearest count most: 1, 1/4, 1/16, 1/25 and 1/64.
+            let weight = 1.0 / (square * square) as f32;
+            sum += weight * original[at];
+            weights += weight;
+        }
+        image[(y, x)] = if defects <= ALONE && weights > 0.5 { sum / weights } else { f32::NAN };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_pixels_are_mended_and_patches_become_holes() {
+        let mut image = Array2::from_shape_fn((30, 40), |(y, x)| 0.2 + 0.01 * (y + x) as f32);
+        image[(10, 10)] = 1.0;
+        image.slice_mut(ndarray::s![20..26, 20..26]).fill(1.0);
+        image[(3, 3)] = 0.0;
+        image.slice_mut(ndarray::s![0..6, 30..36]).fill(0.0);
+        image[(15, 5)] = f32::NAN;
+        let marks = find(image.view(), Some([0.0, 1.0]), None).unwrap();
+        assert_eq!(marks[(10, 10)], Reason::Saturated.code());
+        assert_eq!(marks[(15, 5)], Reason::NotFinite.code());
+        assert_eq!((marks[(3, 3)], marks[(2, 32)]), (0, Reason::Dark.code()));
+        mend(&mut image, &marks);
+        assert!((image[(10, 10)] - 0.4).abs() < 1e-3 && (image[(15, 5)] - 0.4).abs() < 1e-3);
+        assert!(image[(22, 22)].is_nan() && !image[(18, 18)].is_nan());
+    }
+
+    #[test]
+    fn a_whole_image_has_no_marks() {
+        let image = Array2::from_elem((20, 20), 0.5_f32);
+        assert!(find(image.view(), Some([0.0, 1.0]), None).is_none());
+        assert!(find(Array2::from_elem((9, 9), 3.0_f32).view(), None, None).is_none());
+    }
+}

@@ -1,0 +1,355 @@
+//! The whole way of a pair from a real camera: prepared, measured, judged.
+
+use std::fmt;
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::baselines::{self, BaselineError};
+use crate::depth_map::{DepthMap, Warning};
+use crate::fill::fill_low_texture;
+use crate::judge::{JudgeSettings, Judgement, Lost, judge};
+use crate::operators::{DesignError, Operators};
+use crate::optics::Optics;
+use crate::pipeline::{RunError, Settings, depth_from_pair, fill_rim, warnings_after};
+use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare};
+use crate::psf::Psf;
+use crate::reason::Reason;
+use crate::windowed::{Bank, Estimate, Window, WindowSettings, check_pair, estimate};
+
+/// Part of the pixels without depth for one reason from which it is said.
+const WORTH_SAYING: f64 = 0.002;
+/// What the model leaves of the texture, mean squares, from which point spread function or blur are doubted.
+const DOUBTFUL: f64 = 3e-4;
+/// The same relative to the noise: the noise itself is known to some percent.
+const EXCESSIVE: f64 = 1.025;
+/// Least part of the image with detail for that doubt.
+const TELLING: f64 = 0.2;
+
+/// Standard deviation of rational operators relative to that of operators with a white residual, at equal windows: 1.05 to 1.16 were
+/// measured.
+const RATIONAL_OVER_WHITENED: f32 = 1.12;
+/// The same of methods to compare with, Subbarao's; Favaro's is below 1.
+const BASELINE_OVER_WHITENED: f32 = 2.5;
+
+/// By what depth is found.
+#[derive(Debug, Clone, Copy)]
+pub enum RealMethod<'a> {
+    /// Rational operators.
+    Rational(&'a Operators),
+    /// Operators with a white residual.
+    Whitened,
+    /// A method to compare with.
+    Baseline(baselines::Method),
+}
+
+/// How the whole way is gone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RealSettings {
+    /// Geometry, brightness, the camera's limits.
+    pub prepare: PrepareSettings,
+    /// Over how many pixels evidence is summed.
+    pub window: Window,
+    /// Median, filling and threads; its smoothing is not looked at.
+    pub run: Settings,
+    /// Confidence below which a depth is taken away.
+    pub least_confidence: f32,
+}
+
+impl Default for RealSettings {
+    fn default() -> Self {
+        Self {
+            prepare: PrepareSettings::default(),
+            window: Window::Fixed(7),
+            run: Settings::default(),
+            least_confidence: 0.0,
+        }
+    }
+}
+
+/// Why there is no depth.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RealError {
+    /// The pair is none.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// It cannot be processed.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A method to compare with.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
+    /// No operators for these optics.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+}
+
+/// What a user should know before trusting a map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Finding {
+    /// As the run time says it.
+    Run(String),
+    /// Pixels without depth.
+    Lost(Lost),
+    /// The near image is larger as by a lens that is not telecentric.
+    NotTelecentric {
+        /// Its measured size relative to the far image.
+        magnification: f64,
+        /// What follows from the optics.
+        of_optics: f64,
+    },
+    /// The near image is smaller by as much as it would have to be larger.
+    SwappedByMagnification {
+        /// Its measured size relative to the far image.
+        magnification: f64,
+    },
+    /// The model leaves too much.
+    Unexplained {
+        /// What is left of the texture beyond the noise, mean squares.
+        left_over: f64,
+        /// The point spread function that was assumed.
+        psf: String,
+        /// Largest blur radius, px.
+        max_blur_px: f64,
+    },
+    /// Nothing rises above the noise.
+    NothingSharp,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Run(text) => f.write_str(text),
+            Self::Lost(Lost { reason, fraction, .. }) => {
+                write!(f, "{:.1} % of the map have no depth: {}", 100.0 * fraction, reason.words())
+            }
+            Self::NotTelecentric { magnification, of_optics } => write!(
+                f,
+                "the near image is {:.3} % larger, as by a lens that is not telecentric ({:.3} %): say telecentric = false in \
+                 [lens]",
+                100.0 * (magnification - 1.0),
+                100.0 * (of_optics - 1.0)
+            ),
+            Self::SwappedByMagnification { magnification } => write!(
+                f,
+                "the pair looks swapped: the near image is {:.3} % smaller than the far one, and by its optics it is larger; is FAR \
+                 really the far-focused image?",
+                100.0 * (1.0 - magnification)
+            ),
+            Self::Unexplained { left_over, psf, max_blur_px } => write!(
+                f,
+                "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
+                 {max_blur_px:.3} px right? farnear calibrate psf finds it",
+                100.0 * left_over.sqrt()
+            ),
+            Self::NothingSharp => f.write_str(
+                "neither image has detail above its noise: the scene lies far outside the range, or has none",
+            ),
+        }
+    }
+}
+
+/// Depth of a real pair with all that is known of it.
+#[derive(Debug, Clone)]
+pub struct RealDepth {
+    /// Depth and confidence: the probability that the depth is off by less than three of its standard deviations.
+    pub map: DepthMap,
+    /// Reasons and standard deviations.
+    pub judgement: Judgement,
+    /// What was done to the pair.
+    pub report: Report,
+    /// What a user should know.
+    pub findings: Vec<Finding>,
+    /// What the model leaves of the texture beyond the noise, mean squares ([`Estimate::left_over`]).
+    pub left_over: f64,
+    /// The same relative to the noise ([`Estimate::excess`]).
+    pub excess: f64,
+    /// The pair as it was measured.
+    pub prepared: Prepared,
+}
+
+/// Depth of a pair of any common scale, (height, width), with everything that [`prepare`](crate::prepare) and
+/// [`judge`](crate::judge) do.
+///
+/// # Errors
+/// [`RealError`].
+pub fn depth_of_real_pair(
+    far: ArrayView2<f32>,
+    near: ArrayView2<f32>,
+    optics: &Optics,
+    method: RealMethod<'_>,
+    camera: Option<&CameraFrames>,
+    settings: &RealSettings,
+) -> Result<RealDepth, RealError> {
+    // As they came: what is clipped everywhere is constant, and not full of holes.
+    check_pair(far, near)?;
+    let prepared = prepare(far, near, optics, camera, &settings.prepare)?;
+    let (mut map, estimate) = measure(&prepared, optics, method, settings)?;
+    let mut findings = findings(&map, &prepared, &estimate, optics);
+    let judging = JudgeSettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
+    let judgement = judge(&mut map, &prepared, &estimate, optics, &judging);
+    let lost =
+        judgement.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
+    findings.extend(lost.copied().map(Finding::Lost));
+    if judgement.valid_fraction < TELLING {
+        // Where nearly nothing has a depth, what the model leaves says nothing of the lens.
+        findings.retain(|finding| !matches!(finding, Finding::Unexplained { .. }));
+    }
+    map.warnings.clear();
+    let (report, left_over, excess) = (prepared.report, estimate.left_over, estimate.excess);
+    Ok(RealDepth { map, judgement, report, findings, left_over, excess, prepared })
+}
+
+fn measure(
+    prepared: &Prepared,
+    optics: &Optics,
+    method: RealMethod<'_>,
+    settings: &RealSettings,
+) -> Result<(DepthMap, Estimate), RealError> {
+    let (far, near) = (prepared.far.view(), prepared.near.view());
+    let of_windows = WindowSettings {
+        window: settings.window,
+        median_px: settings.run.median_px,
+        noise: prepared.noise,
+        backend: settings.run.backend,
+    };
+    // Every method is judged by the white residual, whose deviation is known best.
+    let white = Bank::whitened(optics)?;
+    let mut judging = estimate(far, near, &white, optics, &of_windows)?;
+    let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
+    let map = match (method, settings.window) {
+        (RealMethod::Whitened, _) => of_estimate(&judging, &white, optics, settings),
+        (RealMethod::Rational(operators), Window::Fixed(side)) => {
+            depth_from_pair(far, near, operators, optics, &run(side))?
+        }
+        (RealMethod::Rational(operators), _) => {
+            let bank = Bank::rational(operators);
+            of_estimate(&estimate(far, near, &bank, optics, &of_windows)?, &bank, optics, settings)
+        }
+        (RealMethod::Baseline(method), window) => {
+            let side = if let Window::Fixed(side) = window { side } else { 7 };
+            baselines::depth_from_pair(method, far, near, optics, &run(side))?
+        }
+    };
+    let noisier = match method {
+        RealMethod::Whitened => 1.0,
+        RealMethod::Rational(_) => RATIONAL_OVER_WHITENED,
+        RealMethod::Baseline(_) => BASELINE_OVER_WHITENED,
+    };
+    judging.deviation_mm *= noisier;
+    let estimate = judging;
+    let mut map = map;
+    if let Some(aligned) = prepared.report.aligned {
+        undo_scaled_blur(&mut map.depth_mm, aligned.magnification, optics);
+    }
+    Ok((map, estimate))
+}
+
+/// Bringing the near image to the far one's size scales its blur circle too, by `1 / m`. Depth follows from the difference of the
+/// blurs' second moments, so that what is found is `((1 + alpha)^2 - (1 - alpha)^2 / m^2) / 4`; this solves it for alpha.
+fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Optics) {
+    let r = magnification.powi(-2);
+    if (r - 1.0).abs() < 1e-4 {
+        return;
+    }
+    // (1 - r) alpha^2 + 2 (1 + r) alpha + (1 - r) - 4 found = 0, on the branch that stays finite for r = 1.
+    let alpha_of = |found: f64| {
+        let (b, c) = (1.0 + r, (1.0 - r) - 4.0 * found);
+        let root = (b * b - (1.0 - r) * c).max(0.0).sqrt();
+        -c / (b + root)
+    };
+    depth_mm.mapv_inplace(|depth| {
+        if depth.is_finite() {
+            optics.depth_mm(alpha_of(optics.alpha(f64::from(depth)))) as f32
+        } else {
+            depth
+        }
+    });
+}
+
+/// A map of what windows found.
+fn of_estimate(estimate: &Estimate, bank: &Bank, optics: &Optics, settings: &RealSettings) -> DepthMap {
+    let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
+    // Evidence: the variance's reciprocal, which is what texture energy is to the run time.
+    let evidence: Array2<f32> = estimate.deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
+    let confidence =
+        evidence.mapv(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
+    let mut map = DepthMap {
+        depth_mm: estimate.depth_mm.clone(),
+        confidence,
+        low_texture_fraction: 0.0,
+        warnings: Vec::new(),
+    };
+    fill_rim(&mut map, bank.reach_px() + 1);
+    if settings.run.fill {
+        fill_low_texture(&mut map, evidence.view(), bank.reach_px() + 3);
+    }
+    map.warnings.extend(warnings_after(&map, optics));
+    map
+}
+
+fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &Optics) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = map
+        .warnings
+        .iter()
+        // Holes are told by their reasons.
+        .filter(|warning| !matches!(warning, Warning::NotFinite { .. } | Warning::Saturated { .. }))
+        .map(|warning| Finding::Run(warning.to_string()))
+        .collect();
+    let report = &prepared.report;
+    let of_optics = optics.magnification_ratio();
+    if let Some(aligned) = report.aligned.filter(|_| report.looks_not_telecentric) {
+        findings.push(Finding::NotTelecentric { magnification: aligned.magnification, of_optics });
+    }
+    if let Some(aligned) = report.aligned.filter(|aligned| aligned.standard_error_px.is_some()) {
+        let shrunk = aligned.magnification.recip();
+        if optics.telecentric() != Some(true) && (shrunk - of_optics).abs() < 0.25 * (of_optics - 1.0) {
+            findings.push(Finding::SwappedByMagnification { magnification: aligned.magnification });
+        }
+    }
+    if report.detailed_fraction < 0.01 {
+        findings.push(Finding::NothingSharp);
+    } else if report.detailed_fraction > TELLING
+        && estimate.left_over > DOUBTFUL
+        && estimate.excess > EXCESSIVE
+    {
+        let psf: Psf = optics.psf();
+        findings.push(Finding::Unexplained {
+            left_over: estimate.left_over,
+            psf: psf.to_string(),
+            max_blur_px: optics.max_blur_px(),
+        });
+    }
+    findings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optics::{FocusSection, LensSection, OpticsFile, SensorSection};
+
+    #[test]
+    fn a_scaled_blur_is_undone() {
+        let optics = OpticsFile {
+            lens: LensSection {
+                focal_length_mm: 50.0,
+                aperture_mm: Some(12.8),
+                f_number: None,
+                telecentric: None,
+            },
+            sensor: SensorSection { pixel_um: 7.4 },
+            focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
+            psf: Psf::PillBox,
+        }
+        .check()
+        .unwrap();
+        for m in [0.97, 1.003, 1.03_f64] {
+            for alpha in [-1.0, -0.3, 0.0, 0.8_f64] {
+                let found = 0.25 * ((1.0 + alpha).powi(2) - (1.0 - alpha).powi(2) / (m * m));
+                let mut map = Array2::from_elem((1, 1), optics.depth_mm(found) as f32);
+                undo_scaled_blur(&mut map, m, &optics);
+                assert!((f64::from(map[(0, 0)]) - optics.depth_mm(alpha)).abs() < 1e-3, "{m} {alpha}");
+            }
+        }
+    }
+}

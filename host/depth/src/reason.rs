@@ -1,0 +1,83 @@
+//! Why a pixel has no depth.
+
+use serde::{Deserialize, Serialize};
+
+/// Why a pixel has no depth; as a number in `reason.png`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum Reason {
+    /// A pixel that is as bright as the camera can say.
+    Saturated = 1,
+    /// A patch that is as dark as the camera can say.
+    Dark = 2,
+    /// Too little texture above the noise.
+    NoTexture = 3,
+    /// Beyond the working range.
+    OutOfRange = 4,
+    /// Seen in one of the images only.
+    Edge = 5,
+    /// Moved between the exposures.
+    Moved = 6,
+    /// A bad pixel of the camera.
+    BadPixel = 7,
+    /// The model does not explain the pair here.
+    Misfit = 8,
+    /// No finite number in the file.
+    NotFinite = 9,
+    /// Less confident than was asked for.
+    Unsure = 10,
+    /// Beyond what a correction was taught.
+    BeyondCorrection = 11,
+}
+
+impl Reason {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 11] = [
+        Self::Saturated,
+        Self::Dark,
+        Self::NoTexture,
+        Self::OutOfRange,
+        Self::Edge,
+        Self::Moved,
+        Self::BadPixel,
+        Self::Misfit,
+        Self::NotFinite,
+        Self::Unsure,
+        Self::BeyondCorrection,
+    ];
+
+    /// Its number; 0 stands for a pixel that has a depth.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Saturated => "saturated",
+            Self::Dark => "black",
+            Self::NoTexture => "too little texture above the noise",
+            Self::OutOfRange => "outside the working range",
+            Self::Edge => "seen in one image only",
+            Self::Moved => "moved between the exposures",
+            Self::BadPixel => "bad pixel of the camera",
+            Self::Misfit => "not explained by the model",
+            Self::NotFinite => "no finite number in the file",
+            Self::Unsure => "less confident than asked for",
+            Self::BeyondCorrection => "beyond what the correction was taught",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_the_places_in_the_list() {
+        for (index, reason) in Reason::ALL.iter().enumerate() {
+            assert_eq!(usize::from(reason.code()), index + 1);
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Depth by windows of one or several sizes, with its standard deviation and how well the model explains the pair.
+//!
+//! [`Bank`] filters a pair so that `rho0 + alpha rho1 + alpha^2 rho2 + alpha^3 rho3` vanishes at the true depth, but for noise. A
+//! window finds the root of `sum c_k alpha^k`, `c_k = sum rho_k u`, u being the matched filter, whose variance follows from
+//! the noise, the filter's energy and the cubic's slope. Windows are of one size, or of three:
+//!
+//! - [`Window::Adaptive`] takes at each pixel the largest window whose value lies within two standard deviations of all smaller
+//!   ones' (the intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999), so that planes are
+//!   smoothed over 21 px and steps stay where they are;
+//! - [`Window::Safe`] takes the smallest window that is certain enough, whatever lies beside it.
+//!
+//! The work is done in bands of rows, so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
+//! five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
+
+mod band;
+mod bank;
+mod whitened;
+
+use std::fmt;
+use std::str::FromStr;
+
+use ndarray::{Array2, ArrayView2, Axis};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::optics::Optics;
+use crate::pipeline::{MAX_SMOOTHING_PX, RunError};
+use crate::prepare::noise::PairNoise;
+use crate::simd::Backend;
+use band::{Band, Scales};
+
+pub use bank::Bank;
+
+/// Sides of the windows that [`Window::Adaptive`] chooses from, px.
+pub const ADAPTIVE_PX: [usize; 3] = [7, 13, 21];
+/// Sides of those that [`Window::Safe`] chooses from.
+pub const SAFE_PX: [usize; 3] = [9, 13, 21];
+
+/// Over how many pixels evidence is summed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum Window {
+    /// A square of one side everywhere, px: odd.
+    Fixed(usize),
+    /// The largest of [`ADAPTIVE_PX`] that nothing contradicts.
+    Adaptive,
+    /// The smallest of [`SAFE_PX`] that is certain enough.
+    Safe,
+}
+
+/// A text that names no window.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("expected adaptive, safe or an odd number of pixels from 1 to {MAX_SMOOTHING_PX}")]
+pub struct UnknownWindow;
+
+impl FromStr for Window {
+    type Err = UnknownWindow;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWindow> {
+        match text.trim() {
+            "adaptive" => Ok(Self::Adaptive),
+            "safe" => Ok(Self::Safe),
+            number => {
+                let side = number.parse().map_err(|_| UnknownWindow)?;
+                let usable = side % 2 == 1 && side <= MAX_SMOOTHING_PX;
+                if usable { Ok(Self::Fixed(side)) } else { Err(UnknownWindow) }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fixed(side) => write!(f, "{side}"),
+            Self::Adaptive => f.write_str("adaptive"),
+            Self::Safe => f.write_str("safe"),
+        }
+    }
+}
+
+impl From<Window> for String {
+    fn from(window: Window) -> Self {
+        window.to_string()
+    }
+}
+
+impl TryFrom<String> for Window {
+    type Error = UnknownWindow;
+
+    fn try_from(text: String) -> Result<Self, UnknownWindow> {
+        text.parse()
+    }
+}
+
+/// How a pair is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowSettings {
+    /// The windows.
+    pub window: Window,
+    /// Side of the median over depth: 1 (none), 3, 5 or 7.
+    pub median_px: usize,
+    /// The noise of the images.
+    pub noise: PairNoise,
+    /// Vector unit; the fastest that the processor has if none is named.
+    pub backend: Option<Backend>,
+}
+
+/// What windows find, each (height, width).
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Depth in mm; NaN where the filters saw a pixel without a value.
+    pub depth_mm: Array2<f32>,
+    /// Its standard deviation in mm for the noise of the settings.
+    pub deviation_mm: Array2<f32>,
+    /// Mean square of what the model leaves around the pixel, relative to the noise: about 1 where the model holds.
+    pub misfit: Array2<f32>,
+    /// What the model leaves beyond the noise, over the whole image and relative to the texture that depth rests on, mean
+    /// squares: a few thousandths where point spread function and blur are right.
+    pub left_over: f64,
+    /// The same mean square relative to what noise alone would leave.
+    pub excess: f64,
+}
+
+/// Depth of a pair that lies on each other and is of one brightness; pixels without a value (NaN) take no part.
+///
+/// # Errors
+/// [`RunError`] for images that differ in size, are too small, constant or wholly invalid, and for unusable windows.
+pub fn estimate(
+    far: ArrayView2<f32>,
+    near: ArrayView2<f32>,
+    bank: &Bank,
+    optics: &Optics,
+    settings: &WindowSettings,
+) -> Result<Estimate, RunError> {
+    check_pair(far, near)?;
+    let smoothing_px = if let Window::Fixed(side) = settings.window { side } else { 1 };
+    let windows =
+        crate::pipeline::Settings { smoothing_px, median_px: settings.median_px, ..Default::default() };
+    crate::pipeline::check_windows(&windows)?;
+    let size = far.dim();
+    let backend = settings.backend.unwrap_or_else(Backend::best);
+    let scales = Scales::new(far, near, settings.noise);
+    let mut maps = [(); 3].map(|()| Array2::<f32>::zeros(size));
+    let rows = band::rows(size);
+    let [depth, deviation, misfit] = &mut maps;
+    let of_bands: Vec<[f64; 3]> = depth
+        .axis_chunks_iter_mut(Axis(0), rows)
+        .into_par_iter()
+        .zip(deviation.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+        .zip(misfit.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
+        .enumerate()
+        .map(|(index, ((depth_mm, deviation_mm), misfit))| {
+            Band { far, near, bank, optics, settings, scales: &scales, backend, top: index * rows }.run(
+                depth_mm,
+                deviation_mm,
+                misfit,
+            )
+        })
+        .collect();
+    // In the bands' order, so that the sum does not depend on how threads share them.
+    let [left, noise, texture] =
+        of_bands.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
+    let left_over = if texture > 0.0 { (left - noise) / texture } else { f64::NAN };
+    let excess = if noise > 0.0 { left / noise } else { f64::NAN };
+    let [depth_mm, deviation_mm, misfit] = maps;
+    Ok(Estimate { depth_mm, deviation_mm, misfit, left_over, excess })
+}
+
+/// Refuses images that differ in size, are too small, wholly invalid or constant.
+pub(crate) fn check_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<(), RunError> {
+    let (height, width) = far.dim();
+    let (near_height, near_width) = near.dim();
+    if (near_height, near_width) != (height, width) {
+        return Err(RunError::SizeMismatch { far_width: width, far_height: height, near_width, near_height });
+    }
+    if height < crate::pipeline::MIN_SIDE_PX || width < crate::pipeline::MIN_SIDE_PX {
+        return Err(RunError::TooSmall { width, height });
+    }
+    for (which, image) in [("far", far), ("near", near)] {
+        let mut finite = image.iter().copied().filter(|v| v.is_finite());
+        let Some(value) = finite.next() else { return Err(RunError::NothingFinite) };
+        if finite.all(|v| v == value) {
+            return Err(RunError::Constant { which, value });
+        }
+    }
+    Ok(())
+}

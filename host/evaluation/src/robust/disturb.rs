@@ -1,0 +1,243 @@
+//! A pair as an ordinary camera takes it, and depth with and without what farnear does about it.
+
+use std::{io::Cursor, ops::Range};
+
+use anyhow::Result;
+use farnear_depth::{
+    operators::Operators,
+    optics::Optics,
+    pipeline::{Settings, depth_from_pair},
+    prepare::{CameraFrames, PrepareSettings},
+    real::{Finding, RealDepth, RealError, RealMethod, RealSettings, depth_of_real_pair},
+    windowed::Window,
+};
+use farnear_scene::{Camera, Lens, Noise, Renderer, Scene, View, truth};
+use image::codecs::jpeg::JpegEncoder;
+use ndarray::Array2;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::rig;
+
+/// The lens' own point spread function.
+pub const PSF: &str = "gaussian:k=0.4578";
+/// Pixels of the rim that do not count.
+const RIM_PX: usize = 16;
+/// Nor those so near to a step.
+const STEP_PX: usize = 9;
+
+/// What differs from a good pair.
+#[derive(Clone, Debug)]
+pub struct Disturbance {
+    /// Brightness of the near image.
+    pub gain: f64,
+    /// Part of the light that the near image lacks in its corners.
+    pub vignetting: f64,
+    /// How the near image lies.
+    pub view: View,
+    /// Whether moving the sensor leaves the magnification as it is.
+    pub telecentric: bool,
+    /// By how much an object of a seventh of the image moved, px.
+    pub moved_px: f64,
+    /// Standard deviation of the pixels' response.
+    pub response: f64,
+    /// Quality of JPEG, if that is what the camera writes.
+    pub jpeg: Option<u8>,
+    /// Isolated pixels that are saturated in both images.
+    pub hot: usize,
+    /// Exposure, 1 = 45 % of the full well.
+    pub exposure: f64,
+    /// Whether the second image shows another scene.
+    pub unrelated: bool,
+    /// Whether the images are exchanged.
+    pub exchanged: bool,
+}
+
+impl Default for Disturbance {
+    fn default() -> Self {
+        Self {
+            gain: 1.0,
+            vignetting: 0.0,
+            view: View::default(),
+            telecentric: true,
+            moved_px: 0.0,
+            response: 0.0,
+            jpeg: None,
+            hot: 0,
+            exposure: 1.0,
+            unrelated: false,
+            exchanged: false,
+        }
+    }
+}
+
+/// A disturbed pair, its values 0 to 1 as from files.
+pub struct Taken {
+    pub far: Array2<f32>,
+    pub near: Array2<f32>,
+    pub truth: Array2<f32>,
+    /// Where something moved, if anything (rows, columns).
+    pub object: Option<[Range<usize>; 2]>,
+    /// The pixels' response, if it is uneven.
+    pub response: Option<Array2<f32>>,
+}
+
+/// Takes a pair of (width, height).
+pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed: u64) -> Result<Taken> {
+    let lens = Lens { telecentric: disturbance.telecentric, ..rig::lens(false)? };
+    let psf = PSF.parse()?;
+    let camera = Camera::new(size.0, size.1, Noise::EightBit);
+    let still = Renderer::new(scene, &lens, &psf, &camera, seed)?;
+    let other = match disturbance.unrelated {
+        true => Renderer::new(scene, &lens, &psf, &camera, seed + 1)?,
+        false => still.clone(),
+    };
+    let far = still.radiance(lens.sensor_far_mm)?;
+    let mut near = other.clone().seen_by(disturbance.view).radiance(lens.sensor_near_mm)?;
+    let object = (disturbance.moved_px != 0.0).then(|| {
+        let part = |n: usize| n / 3..n / 3 + 3 * n / 8;
+        [part(size.1), part(size.0)]
+    });
+    if let Some([rows, columns]) = &object {
+        let [x, y] = disturbance.view.shift_px;
+        let view = View { shift_px: [x + disturbance.moved_px, y], ..disturbance.view };
+        let moved = other.seen_by(view).radiance(lens.sensor_near_mm)?;
+        let area = ndarray::s![rows.clone(), columns.clone()];
+        near.slice_mut(area).assign(&moved.slice(area));
+    }
+    shade(&mut near, disturbance);
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
+    let response = (disturbance.response > 0.0).then(|| {
+        // Even numbers between +-sqrt(3) have a standard deviation of 1.
+        let reach = disturbance.response * 3.0_f64.sqrt();
+        Array2::from_shape_fn(near.dim(), |_| 1.0 + (reach * (2.0 * random.random::<f64>() - 1.0)) as f32)
+    });
+    let mut images = [(far, 0), (near, 1)].map(|(mut light, number)| {
+        light *= disturbance.exposure as f32;
+        if let Some(response) = &response {
+            light *= response;
+        }
+        camera.expose(light.view(), seed, number).mapv(|code| f32::from(code) / 255.0)
+    });
+    let spots: Vec<(usize, usize)> = (0..disturbance.hot)
+        .map(|_| (random.random_range(0..size.1), random.random_range(0..size.0)))
+        .collect();
+    for image in &mut images {
+        spots.iter().for_each(|at| image[*at] = 1.0);
+        if let Some(quality) = disturbance.jpeg {
+            *image = jpeg(image, quality)?;
+        }
+    }
+    let [far, near] = images;
+    let (far, near) = if disturbance.exchanged { (near, far) } else { (far, near) };
+    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), object, response })
+}
+
+/// Gain and vignetting.
+fn shade(image: &mut Array2<f32>, disturbance: &Disturbance) {
+    let (height, width) = image.dim();
+    let (middle_y, middle_x) = (0.5 * height as f64, 0.5 * width as f64);
+    let corner = middle_x * middle_x + middle_y * middle_y;
+    for ((y, x), value) in image.indexed_iter_mut() {
+        let r2 = ((y as f64 - middle_y).powi(2) + (x as f64 - middle_x).powi(2)) / corner;
+        *value *= (disturbance.gain * (1.0 - disturbance.vignetting * r2)) as f32;
+    }
+}
+
+/// What a JPEG file keeps of an image.
+fn jpeg(image: &Array2<f32>, quality: u8) -> Result<Array2<f32>> {
+    let (height, width) = image.dim();
+    let bytes: Vec<u8> = image.iter().map(|v| (v * 255.0).round() as u8).collect();
+    let mut file = Cursor::new(Vec::new());
+    let size = (width as u32, height as u32);
+    JpegEncoder::new_with_quality(&mut file, quality).encode(
+        &bytes,
+        size.0,
+        size.1,
+        image::ExtendedColorType::L8,
+    )?;
+    let read = image::load_from_memory(file.get_ref())?.into_luma8();
+    let value = |(y, x): (usize, usize)| f32::from(read.get_pixel(x as u32, y as u32)[0]) / 255.0;
+    Ok(Array2::from_shape_fn((height, width), value))
+}
+
+/// The two ways that are compared.
+pub const WAYS: [(&str, Window); 2] =
+    [("ro, window 7", Window::Fixed(7)), ("whitened, adaptive", Window::Adaptive)];
+
+/// What a way comes to.
+pub struct Outcome {
+    /// Root mean square error over the pixels that have a depth, mm.
+    pub error_mm: f64,
+    /// Part of the pixels that have one.
+    pub valid: f64,
+    /// What was said.
+    pub said: Vec<String>,
+    /// Depth and what is known of it, if there is any.
+    pub found: Option<RealDepth>,
+}
+
+impl Taken {
+    /// The run time alone, mm; `None` where it refuses the pair.
+    pub fn plain(&self, operators: &Operators, optics: &Optics) -> f64 {
+        let settings = Settings { threads: 1, ..Settings::default() };
+        let map = depth_from_pair(self.far.view(), self.near.view(), operators, optics, &settings);
+        map.map_or(f64::NAN, |map| self.error(&map.depth_mm).0)
+    }
+
+    /// By one of the [`WAYS`].
+    pub fn measure(
+        &self,
+        way: usize,
+        operators: &Operators,
+        optics: &Optics,
+        camera: Option<&CameraFrames>,
+    ) -> Outcome {
+        let window = WAYS[way].1;
+        let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() };
+        let settings = RealSettings { prepare, window, ..RealSettings::default() };
+        let method = if way == 0 { RealMethod::Rational(operators) } else { RealMethod::Whitened };
+        let found = depth_of_real_pair(self.far.view(), self.near.view(), optics, method, camera, &settings);
+        match found {
+            Ok(found) => {
+                let (error_mm, valid) = self.error(&found.map.depth_mm);
+                let said = found.findings.iter().map(Finding::to_string).collect();
+                Outcome { error_mm, valid, said, found: Some(found) }
+            }
+            Err(error) => refused(&error),
+        }
+    }
+
+    /// Root mean square error and the part of the pixels with a depth, without rim and steps.
+    pub fn error(&self, depth: &Array2<f32>) -> (f64, f64) {
+        let (mut squares, mut valid, mut all) = (0.0, 0.0, 0.0_f64);
+        for at in self.counted() {
+            all += 1.0;
+            let error = f64::from(depth[at] - self.truth[at]);
+            if error.is_finite() {
+                squares += error * error;
+                valid += 1.0;
+            }
+        }
+        ((squares / valid).sqrt(), valid / all)
+    }
+
+    /// The pixels that count.
+    pub fn counted(&self) -> impl Iterator<Item = (usize, usize)> {
+        let (height, width) = self.truth.dim();
+        let smooth: Vec<bool> = (0..width)
+            .map(|x| {
+                let here = self.truth[(height / 2, x)];
+                let near = x.saturating_sub(STEP_PX)..(x + STEP_PX + 1).min(width);
+                near.into_iter().all(|other| (self.truth[(height / 2, other)] - here).abs() < 3.0)
+            })
+            .collect();
+        (RIM_PX..height - RIM_PX)
+            .flat_map(move |y| (RIM_PX..width - RIM_PX).map(move |x| (y, x)))
+            .filter(move |(_, x)| smooth[*x])
+    }
+}
+
+fn refused(error: &RealError) -> Outcome {
+    Outcome { error_mm: f64::NAN, valid: 0.0, said: vec![format!("error: {error}")], found: None }
+}

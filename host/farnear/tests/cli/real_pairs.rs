@@ -1,0 +1,126 @@
+//! Pairs from a camera that is not perfect, as a user meets them.
+
+use std::fs;
+
+use farnear_files::{
+    image_file::{encode_png, read_grey},
+    map,
+};
+use ndarray::Array2;
+
+use crate::common::{Folder, fails, farnear, figures, number, render, rig_optics, succeeds};
+
+/// Writes values from 0 to 1 as an 8-bit picture.
+fn write(folder: &Folder, name: &str, pixels: &Array2<f32>) -> String {
+    let codes = pixels.mapv(|v| (v * 255.0).round().clamp(0.0, 255.0) as u16);
+    folder.file(name, encode_png(codes.view(), 8).expect("a picture"))
+}
+
+#[test]
+fn brightness_and_place_are_mended_and_said() {
+    let folder = Folder::new();
+    render(&folder, "plane:905", "pair");
+    let far = folder.text("pair/far.png");
+    let near = read_grey(&folder.path("pair/near.png")).expect("the near image").pixels;
+    // 8 px to the right and a fifth darker; what is not seen is as bright as the middle.
+    let moved = Array2::from_shape_fn(near.dim(), |(y, x)| 0.8 * if x < 8 { 0.45 } else { near[(y, x - 8)] });
+    let moved = write(&folder, "moved.png", &moved);
+    let depth = |align: &str, out: &str| {
+        let out = folder.text(out);
+        let command =
+            ["depth", &far, &moved, "--optics", rig_optics(), "--align", align, "--json", "--out", &out];
+        figures(&mut farnear(&command))
+    };
+    let found = depth("auto", "auto");
+    assert!((number(&found, "median_mm") - 905.0).abs() < 0.5, "{found}");
+    let record = fs::read_to_string(folder.path("auto/depth.toml")).expect("a record");
+    for phrase in ["[prepared.aligned]", "[prepared.balanced]", "align = \"auto\"", "[[no_depth]]"] {
+        assert!(record.contains(phrase), "{phrase}: {record}");
+    }
+    let reasons = read_grey(&folder.path("auto/reason.png")).expect("reasons").pixels;
+    let map = map::read(&folder.path("auto/depth.npy")).expect("a map");
+    for (reason, depth) in reasons.iter().zip(&map) {
+        assert_eq!(*reason == 0.0, depth.is_finite());
+    }
+    // Not aligned they do not show the same anywhere.
+    let out = folder.text("none");
+    let command = ["depth", &far, &moved, "--optics", rig_optics(), "--align", "none", "--out", &out];
+    fails(&mut farnear(&command), 1, &["do not show the same scene", "correlation"]);
+}
+
+#[test]
+fn a_missing_psf_and_other_units_are_said() {
+    let folder = Folder::new();
+    render(&folder, "plane:905", "one");
+    let [far, near] = ["one/far.png", "one/near.png"].map(|name| folder.text(name));
+    let text = fs::read_to_string(rig_optics()).expect("the optics");
+    let bare = folder.file("bare.toml", text.split("[psf]").next().expect("a beginning"));
+    let (_, said) =
+        succeeds(&mut farnear(&["depth", &far, &near, "--optics", &bare, "--out", &folder.text("a")]));
+    assert!(said.contains("no [psf]") && said.contains("pill-box"), "{said}");
+    let metres = folder.file("metres.toml", text.replace("pixel_um = 7.4", "pixel_um = 0.0074"));
+    let (_, said) =
+        succeeds(&mut farnear(&["depth", &far, &near, "--optics", &metres, "--out", &folder.text("b")]));
+    assert!(said.contains("pixel_um is 0.0074") && said.contains("another unit"), "{said}");
+}
+
+#[test]
+fn windows_and_confidence_are_asked_for() {
+    let folder = Folder::new();
+    render(&folder, "plane:905", "pair");
+    let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
+    let pair = ["depth", &far, &near, "--optics", rig_optics(), "--json", "--out"];
+    let errors = |out: &str, arguments: &[&str]| {
+        figures(farnear(&pair).arg(folder.text(out)).args(arguments));
+        let measured =
+            figures(&mut farnear(&["measure", "plane", &folder.text(&format!("{out}/depth.npy")), "--json"]));
+        (number(&measured, "rms_mm"), number(&measured, "z_mm"))
+    };
+    let (ro, _) = errors("ro", &[]);
+    let (white, depth) = errors("white", &["--method", "whitened"]);
+    // Adaptive windows take the noise of a plane down 2.6 to 3 times.
+    assert!(white < 0.45 * ro && (depth - 905.0).abs() < 0.1, "{white} {ro} {depth}");
+    let (wide, _) = errors("wide", &["--window", "safe"]);
+    assert!(wide < ro, "{wide} {ro}");
+    let out = folder.text("sure");
+    let found = figures(farnear(&pair).arg(&out).args(["--min-confidence", "0.9999"]));
+    assert_eq!(number(&found, "valid_fraction"), 0.0);
+    fails(farnear(&pair).arg(&out).args(["--min-confidence", "2"]), 2, &["min-confidence", "0 to 1"]);
+    fails(farnear(&pair).arg(&out).args(["--window", "8"]), 2, &["adaptive", "odd"]);
+    fails(
+        farnear(&pair).arg(&out).args(["--window", "adaptive", "--method", "favaro"]),
+        2,
+        &["favaro", "pixels"],
+    );
+}
+
+#[test]
+fn a_camera_is_calibrated_and_used() {
+    let folder = Folder::new();
+    render(&folder, "plane:905", "pair");
+    let response = |y: usize, x: usize| 1.0 + 0.04 * (((y * 131 + x * 71) % 17) as f32 / 8.0 - 1.0);
+    let uneven = |name: &str| {
+        let image = read_grey(&folder.path(&format!("pair/{name}"))).expect("an image").pixels;
+        let seen = Array2::from_shape_fn(image.dim(), |(y, x)| image[(y, x)] * response(y, x));
+        write(&folder, name, &seen)
+    };
+    let [far, near] = ["far.png", "near.png"].map(uneven);
+    let flat = write(&folder, "flat.png", &Array2::from_shape_fn((240, 320), |(y, x)| 0.8 * response(y, x)));
+    let camera = folder.text("camera");
+    let learned =
+        figures(&mut farnear(&["calibrate", "camera", "--flat", &flat, "--out", &camera, "--json"]));
+    assert!((1.5..3.5).contains(&number(&learned, "response_sd_percent")), "{learned}");
+    let rms = |out: &str, arguments: &[&str]| {
+        let out = folder.text(out);
+        let pair = ["depth", &far, &near, "--optics", rig_optics(), "--out", &out];
+        succeeds(farnear(&pair).args(arguments));
+        let measured = figures(&mut farnear(&["measure", "plane", &format!("{out}/depth.npy"), "--json"]));
+        number(&measured, "rms_mm")
+    };
+    let (before, after) = (rms("before", &[]), rms("after", &["--camera", &camera]));
+    assert!(after < 0.8 * before, "{after} {before}");
+    let absent = folder.text("absent");
+    let pair = ["depth", &far, &near, "--optics", rig_optics(), "--out", &absent, "--camera", &absent];
+    fails(&mut farnear(&pair), 1, &["absent", "camera's frames"]);
+    assert!(!folder.path("absent").exists());
+}

@@ -1,0 +1,96 @@
+//! A camera's dark and flat frames in a folder: learned from exposures, read for a depth map.
+
+use std::path::{Path, PathBuf};
+
+use farnear_depth::prepare::CameraFrames;
+use farnear_files::{
+    image_file::{encode_png, read_grey},
+    map, npy,
+    staging::Staging,
+};
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
+
+const DARK: &str = "dark.npy";
+const RESPONSE: &str = "response.npy";
+const BAD: &str = "bad.png";
+
+/// What the frames are learned from, and where they go.
+#[derive(Clone, PartialEq, Debug)]
+pub struct CameraSettings {
+    /// Exposures with the lens covered; none: black is taken for 0.
+    pub dark: Vec<PathBuf>,
+    /// Exposures of even light, at about half of full scale.
+    pub flat: Vec<PathBuf>,
+    /// The folder.
+    pub out: PathBuf,
+}
+
+/// What there is to say of a camera.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct CameraFigures {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Mean value in the dark, 1 = full scale.
+    pub dark_mean: f64,
+    /// Standard deviation of the pixels' response, percent.
+    pub response_sd_percent: f64,
+    /// Number of bad pixels.
+    pub bad_pixels: usize,
+}
+
+/// Learns a camera's frames and writes them: all files or none.
+///
+/// # Errors
+/// Images; [`WorkflowError::CameraFrames`]; files.
+pub fn calibrate(settings: &CameraSettings, context: &Context<'_>) -> Result<CameraFigures> {
+    let read = |files: &[PathBuf]| -> Result<Vec<Array2<f32>>> {
+        files
+            .iter()
+            .map(|file| {
+                context.cancel.check("reading the exposures")?;
+                Ok(read_grey(file)?.pixels)
+            })
+            .collect()
+    };
+    let frames = CameraFrames::learn(&read(&settings.dark)?, &read(&settings.flat)?)?;
+    let staged = Staging::into_folder(&settings.out)?;
+    staged.write(DARK, &npy::write(frames.dark()))?;
+    staged.write(RESPONSE, &npy::write(frames.response()))?;
+    let bad = frames.bad_pixels().mapv(|bad| if bad { 255 } else { 0 });
+    staged.write(BAD, &encode_png(bad.view(), 8)?)?;
+    context.cancel.check("writing the frames")?;
+    staged.finish()?;
+    context.say(&format!("wrote {}", settings.out.display()));
+    let (height, width) = frames.response().dim();
+    Ok(CameraFigures {
+        width,
+        height,
+        dark_mean: rounded(f64::from(frames.dark().mean().unwrap_or(f32::NAN)), 6),
+        response_sd_percent: rounded(100.0 * f64::from(frames.response().std(0.0)), 4),
+        bad_pixels: frames.bad_count(),
+    })
+}
+
+/// Reads a camera's frames from their folder.
+///
+/// # Errors
+/// Files that are missing or hold something else; [`WorkflowError::CameraFrames`] where they differ in size.
+pub fn read(folder: &Path) -> Result<CameraFrames> {
+    if !folder.is_dir() {
+        let none = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder");
+        return Err(WorkflowError::read("the camera's frames", folder)(none));
+    }
+    let dark = map::read(&folder.join(DARK))?;
+    let response = map::read(&folder.join(RESPONSE))?;
+    let bad = map::read_mask(&folder.join(BAD))?;
+    Ok(CameraFrames::new(dark, response, bad)?)
+}
