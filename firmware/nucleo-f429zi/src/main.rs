@@ -36,6 +36,7 @@ mod control;
 mod encoder;
 mod link;
 mod memory;
+mod option_bytes;
 mod piezo;
 mod registers;
 mod stepper;
@@ -95,11 +96,15 @@ fn tell_of(last: Option<Last>) {
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
+    let brown_out_reset = option_bytes::demand_brown_out_reset();
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
     let peripherals = clock::start();
     count_cycles();
     tell_of(last);
+    if !brown_out_reset {
+        error!("the option bytes cannot be written: there is no brown-out reset");
+    }
     let Parts { mut board, sender, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,
         Err(fault) => {
