@@ -131,7 +131,9 @@ impl Board for Nucleo {
     }
 
     fn apply(&mut self, outputs: &Outputs) {
-        self.piezo.set(outputs.piezo_dac);
+        if let Some(code) = outputs.piezo_dac {
+            self.piezo.set(code);
+        }
         self.coarse.apply(&outputs.coarse);
         self.lens.apply(&outputs.lens);
         self.camera.listen(outputs.listen);
