@@ -12,9 +12,9 @@
 //! | PB4, PB5 | TIM3_CH1, CH2 (AF2) | stage B: encoder A, B |
 //! | PG0, PG1, PG2, PG3 | GPIO, pull-up | home and far switch of stage A, of stage B, normally closed to ground |
 //! | PE15, PA6 | TIM1_BKIN (AF1), TIM8_BKIN (AF3), pull-up | emergency stop, normally closed to ground, on both |
-//! | PC10, PC11, PC12 | SPI3 (AF6) | clock, data in, data out of DAC and converter |
+//! | PC10, PC11, PC12 | SPI3 (AF6) | clock, data from the converter, data to the DAC |
 //! | PD0, PD1 | GPIO | select of the piezo's DAC, CNV of the gauge's converter |
-//! | PE2, PE5, PE6 | SPI4 (AF5) | clock, data in, data out of the FRAM |
+//! | PE2, PE5, PE6 | SPI4 (AF5) | clock, data from the FRAM, data to it |
 //! | PE4 | GPIO | select of the FRAM |
 //! | PB10 | TIM2_CH3 (AF1) | camera trigger |
 //! | PB11 | TIM2_CH4 (AF1) | camera strobe (exposure active) |

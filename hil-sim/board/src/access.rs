@@ -100,10 +100,10 @@ impl RigAccess<'_, '_> {
         }
     }
 
-    /// Flips a bit of each of the FRAM's next so many answers on the bus.
-    pub fn spoil_memory_answers(&mut self, answers: u32) {
+    /// Flips a bit on the bus in each of the FRAM's next so many answers to the question for its name, and in so many reads.
+    pub fn spoil_memory_answers(&mut self, names: u32, reads: u32) {
         if let Some(memory) = self.chip().memory() {
-            memory.spoil_answers(answers);
+            memory.spoil_answers(names, reads);
         }
     }
 

@@ -15,6 +15,8 @@ use crate::parts::MemoryMake;
 
 /// Opcode of a write; two bytes of address follow it.
 const WRITE: u32 = 0x02;
+/// Opcode of a read.
+const READ: u32 = 0x03;
 /// Opcode of the question for its name.
 const READ_ID: u32 = 0x9f;
 
@@ -25,8 +27,8 @@ pub struct MemoryChip {
     make: MemoryMake,
     /// Bytes of the command under way, and its opcode.
     command: (u32, u32),
-    /// A bit of each of the next so many answers is flipped on the bus.
-    spoilt_answers: u32,
+    /// A bit of each of the next so many answers is flipped on the bus: of its name, of what it holds.
+    spoilt: (u32, u32),
     written: u64,
     /// The supply fails when so many bytes have been written.
     fails_at: Option<u64>,
@@ -40,7 +42,7 @@ impl MemoryChip {
             chip: Fm25v02::new(),
             make,
             command: (0, 0),
-            spoilt_answers: 0,
+            spoilt: (0, 0),
             written: 0,
             fails_at: None,
             failed: false,
@@ -52,9 +54,9 @@ impl MemoryChip {
         self.make = make;
     }
 
-    /// Flips a bit of each of the next so many answers on the bus.
-    pub fn spoil_answers(&mut self, answers: u32) {
-        self.spoilt_answers = answers;
+    /// Flips a bit on the bus in each of the next so many answers to the question for its name, and in so many reads.
+    pub fn spoil_answers(&mut self, names: u32, reads: u32) {
+        self.spoilt = (names, reads);
     }
 
     /// What it holds.
@@ -125,10 +127,15 @@ impl Peer for MemoryChip {
         };
         let answer = self.chip.transfer(mosi, bits, context);
         let answer = told.unwrap_or(answer);
-        // Somewhere in what comes back, behind opcode and address.
-        if *opcode != WRITE && *count == 8 && self.spoilt_answers > 0 {
-            self.spoilt_answers -= 1;
-            return answer ^ 0x10;
+        let left = match *opcode {
+            READ_ID => &mut self.spoilt.0,
+            READ => &mut self.spoilt.1,
+            _ => return answer,
+        };
+        // Somewhere in what comes back, behind opcode and address, and each time another bit.
+        if *count == 8 && *left > 0 {
+            *left -= 1;
+            return answer ^ 1 << (*left % 8);
         }
         answer
     }

@@ -124,6 +124,11 @@ impl Stepper {
         self.home_switch.is_closed()
     }
 
+    /// Whether the home switch says what it is believed to say.
+    pub(crate) const fn home_is_steady(&self) -> bool {
+        self.home_switch.is_steady()
+    }
+
     /// Where the home switch (or the far one) changed last.
     pub(crate) const fn changed(&self, far: bool) -> Place {
         if far { self.far_switch.changed() } else { self.home_switch.changed() }
@@ -302,7 +307,6 @@ impl Stepper {
     /// Believes the encoder: homing begins from a position that steps and encoder do not agree on.
     pub(crate) const fn follow_encoder(&mut self) {
         self.position = steps::to_steps(self.measured());
-        self.home_switch.forget_place();
     }
 
     /// Makes the edge of the home switch, which was met going down at `edge` (in pulses of the present count), position 0

@@ -55,6 +55,8 @@ impl Homing {
             return None;
         }
         self.phase = match (self.phase, self.leg.edge()) {
+            // One that bounces, or was just released, says in a moment what it is.
+            (Phase::Begin, _) if !axis.home_is_steady() => return None,
             (Phase::Begin, _) => {
                 self.known_before = axis.state() != PositionState::Unknown;
                 if axis.state() != PositionState::Homed {

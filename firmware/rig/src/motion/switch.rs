@@ -58,14 +58,14 @@ impl Switch {
         self.closed
     }
 
+    /// Whether its last sample said the same.
+    pub(crate) const fn is_steady(&self) -> bool {
+        self.opposite == 0
+    }
+
     /// Where it changed last.
     pub(crate) const fn changed(&self) -> Place {
         self.changed
-    }
-
-    /// The axis' positions are counted from elsewhere.
-    pub(crate) const fn forget_place(&mut self) {
-        self.opposite = 0;
     }
 }
 

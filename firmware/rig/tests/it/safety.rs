@@ -369,8 +369,10 @@ fn a_slow_rig_homes_slowly_and_a_fast_one_fast_again() {
             bench.clear(); // it was homed, and pushed
         }
         let start = bench.now;
-        assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+        let end = bench.work(&home(Axis::SensorCoarse));
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
         times.push((bench.now - start) / 100_000);
     }
-    assert!(times[1] > 2 * times[0] && times[2] == times[0], "{times:?} tenths of a second");
+    // The driver is switched on, and tuned for 0.14 s, once.
+    assert!(times[1] > 2 * times[0] && times[2].abs_diff(times[0]) <= 2, "{times:?} tenths of a second");
 }

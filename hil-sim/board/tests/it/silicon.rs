@@ -54,7 +54,8 @@ fn the_flash_accelerator_is_on() {
     bench.forget_longest_tick();
     bench.move_to(Axis::SensorFine, Nanometres(50_000));
     let longest = bench.longest_tick();
-    assert!(longest < TICK_CYCLES / 2, "{longest} cycles");
+    // A tick that carries a move out has half of it with the accelerator.
+    assert!(longest < TICK_CYCLES * 7 / 10, "{longest} cycles");
 }
 
 #[test]
@@ -107,18 +108,18 @@ fn bad_reads_at_the_start_cost_neither_the_memory_nor_a_record() {
         assert!(matches!(bench.ask(&Request::WriteSetting { key, value }), Ok(Response::Setting(_))));
         bench.rig.advance_us(20_000).expect("runs");
     }
-    for answers in 1..=4 {
+    for (names, reads) in [(3, 0), (0, 1), (1, 3)] {
         bench.access(move |rig| {
-            rig.spoil_memory_answers(answers);
+            rig.spoil_memory_answers(names, reads);
             rig.press_reset();
         });
         bench.settle();
-        assert!(has_memory(&mut bench), "{answers} answers with a wrong bit");
+        assert!(has_memory(&mut bench), "{names} names, {reads} reads with a wrong bit");
         let setting = match bench.ask(&Request::ReadSetting { key }) {
             Ok(Response::Setting(setting)) => setting.value,
             other => panic!("{other:?}"),
         };
-        assert_eq!(setting, 3_200, "{answers} answers with a wrong bit");
+        assert_eq!(setting, 3_200, "{names} names, {reads} reads with a wrong bit");
         assert_eq!(bench.alarm(), None);
     }
     assert!(!bench.events.iter().any(|event| matches!(event.kind, EventKind::RecordRepaired { .. })));

@@ -79,8 +79,8 @@ impl Hardware {
         Inputs {
             now,
             gauge_code: self.gauge(),
-            coarse: self.coarse.inputs(),
-            lens: self.lens.inputs(),
+            coarse: self.coarse.inputs(1e-3 * self.piezo_nm),
+            lens: self.lens.inputs(0.0),
             emergency_stop: self.faults.emergency_stop,
             supply_low: self.faults.supply_low,
             link_overflow: self.faults.link_overflow,
