@@ -87,9 +87,8 @@ impl Memory {
     fn read_piece(&mut self, address: u16, piece: &mut [u8]) -> bool {
         let mut again = [0; PIECE];
         let [high, low] = address.to_be_bytes();
-        let mut read = |bytes: &mut [u8]| {
-            self.command(&[READ, high, low], |spi| spi.blocking_read(bytes).is_ok())
-        };
+        let mut read =
+            |bytes: &mut [u8]| self.command(&[READ, high, low], |spi| spi.blocking_read(bytes).is_ok());
         for _ in 0..ATTEMPTS {
             if !(read(piece) && read(&mut again)) {
                 return false;

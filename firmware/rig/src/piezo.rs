@@ -221,8 +221,11 @@ impl Piezo {
     /// The gauge has said for the first time where the piezo stands.
     fn begin_to_relax(&mut self) {
         let (from, command) = self.scale.playable(fixed(self.measured));
-        (self.start, self.code, self.command) =
-            if from > RELAXED { (Start::Down { from, ticks: 0 }, from, command) } else { (Start::Over, 0, 0) };
+        (self.start, self.code, self.command) = if from > RELAXED {
+            (Start::Down { from, ticks: 0 }, from, command)
+        } else {
+            (Start::Over, 0, 0)
+        };
     }
 
     /// Leads it down, gently at both ends so that nothing swings.

@@ -363,7 +363,8 @@ impl RigBoard {
         let select = |pin| Select { port: "GPIOD", pin, active: Level::Low };
         if let (Some(dac), Some(gauge)) = (Pin::new(0), Pin::new(1)) {
             part.spi[SPI3].attach_selected(Dac::new(plant.clone()), select(dac));
-            part.spi[SPI3].attach_selected(GaugeConverter::new(plant.clone(), parts.gauge_converter), select(gauge));
+            part.spi[SPI3]
+                .attach_selected(GaugeConverter::new(plant.clone(), parts.gauge_converter), select(gauge));
         }
         if let Some(pin) = Pin::new(4) {
             let select = Select { port: "GPIOE", pin, active: Level::Low };

@@ -136,8 +136,7 @@ pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
     let plant = SharedPlant::new(Plant::new(1, &parts).into());
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
     let costs = Costs::Average(parts.processor);
-    let board =
-        RigBoard::new(&plant, Line::default(), 1, &parts, costs).map_err(|error| emulator(&error))?;
+    let board = RigBoard::new(&plant, Line::default(), 1, &parts, costs).map_err(|error| emulator(&error))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
     let counting = Counting { routines, counts, number, result: None };
     let finished = run(session, &Start::new(&[image]), counting).map_err(|error| emulator(&error))?;

@@ -151,7 +151,8 @@ impl Metered {
                 Model::ByKind { program, flash: FlashInterface::default(), handlers: 0, bus: 0 }
             }
         };
-        let meter = Meter { counted: inner.retired(), cycles: inner.retired() << FRACTION, each: model.each() };
+        let meter =
+            Meter { counted: inner.retired(), cycles: inner.retired() << FRACTION, each: model.each() };
         Self { inner, meter, model }
     }
 

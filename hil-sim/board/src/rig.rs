@@ -167,7 +167,8 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
     };
     let mut board = RigBoard::new(&plant, line.clone(), config.seed, &config.parts, costs)
         .map_err(|error| emulator(&error))?;
-    let wiring = Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip, (config.seed, &config.parts));
+    let wiring =
+        Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip, (config.seed, &config.parts));
     let trace = config.trace.as_deref().map(Trace::create).transpose()?;
     let (commands, receiver) = mpsc::channel();
     let driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);

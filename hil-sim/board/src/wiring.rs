@@ -22,8 +22,7 @@ const ENCODER_FUNCTION: u8 = 2;
 /// TIM2's counter, which the firmware keeps at the lower 32 bits of its microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
 /// Addresses of the registers whose writes can move one of the watched pins: TIM2, TIM1 and TIM8, port F.
-const WATCHED: [std::ops::Range<u64>; 3] =
-    [0x4000_0000..0x4000_0400, 0x4001_0000..0x4001_0800, DRIVER_PORT];
+const WATCHED: [std::ops::Range<u64>; 3] = [0x4000_0000..0x4000_0400, 0x4001_0000..0x4001_0800, DRIVER_PORT];
 /// Port F, on which DIR and EN of both drivers are.
 const DRIVER_PORT: std::ops::Range<u64> = 0x4002_1400..0x4002_1800;
 

@@ -97,7 +97,13 @@ impl Client {
         let owner = Owner::start(connect, port, emulated, choose, commands)?;
         let session = owner.session();
         let thread = std::thread::spawn(move || owner.run());
-        let port = Port { name: port.into(), timing, paces: Mutex::default(), inbox: Some(inbox), thread: Some(thread) };
+        let port = Port {
+            name: port.into(),
+            timing,
+            paces: Mutex::default(),
+            inbox: Some(inbox),
+            thread: Some(thread),
+        };
         Ok(Self { port: Arc::new(port), session, interrupt: None })
     }
 

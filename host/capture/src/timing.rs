@@ -148,7 +148,8 @@ pub fn program_time(shots: &[Shot], status: &Status, paces: &[(Axis, Pace)]) -> 
             };
             // The camera reads a picture out before it can take the next one.
             let once = exposure + Duration::from_millis(100) + trigger;
-            let pace = paces.iter().find(|(axis, _)| *axis == shot.axis).map_or(Pace::AT_ONCE, |(_, pace)| *pace);
+            let pace =
+                paces.iter().find(|(axis, _)| *axis == shot.axis).map_or(Pace::AT_ONCE, |(_, pace)| *pace);
             move_time(shot.axis, from, shot.target, pace) + once * u32::from(shot.repeat)
         })
         .sum()

@@ -113,13 +113,15 @@ impl GaugeScale {
                     Phase::Near
                 }
             },
-            Phase::LowerAgain(from) if ramp(piezo, self.ticks, LOWER, *from, 0) => match self.evaluate(settings) {
-                Some(found) => {
-                    self.found = found;
-                    Phase::Tell(0)
+            Phase::LowerAgain(from) if ramp(piezo, self.ticks, LOWER, *from, 0) => {
+                match self.evaluate(settings) {
+                    Some(found) => {
+                        self.found = found;
+                        Phase::Tell(0)
+                    }
+                    None => return Step::Failed(Axis::SensorFine, Failure::Implausible),
                 }
-                None => return Step::Failed(Axis::SensorFine, Failure::Implausible),
-            },
+            }
             Phase::Lower(_) | Phase::LowerAgain(_) => return Step::On,
             Phase::Tell(0) => {
                 self.phase = Phase::Tell(1);

@@ -8,7 +8,7 @@ use farnear_protocol::message::RecordName;
 use heapless::Vec;
 
 use crate::io::{MEMORY_BYTES, MEMORY_CHUNK, MemoryWrite};
-use crate::memory::record::{self, ALL, BLOCK, URGENCY, Block, Checksum, Found, RECORDS};
+use crate::memory::record::{self, ALL, BLOCK, Block, Checksum, Found, RECORDS, URGENCY};
 
 /// The next write of a record.
 #[derive(Clone, Copy, Debug)]

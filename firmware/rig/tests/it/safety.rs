@@ -322,7 +322,9 @@ fn a_second_loss_of_power_at_the_start_does_not_hide_that_an_axis_moved() {
 fn homing_and_the_piezos_routines_are_kept_apart_as_far_as_they_go() {
     // Both brake a quarter of a millimetre beyond their switches: 46.5 mm.
     let mut bench = Bench::both_homed();
-    for (min, axis_alone, both) in [(46_800_000, false, false), (46_700_000, true, false), (46_450_000, true, true)] {
+    for (min, axis_alone, both) in
+        [(46_800_000, false, false), (46_700_000, true, false), (46_450_000, true, true)]
+    {
         let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: min };
         bench.ask(&setting).1.expect("in range");
         let first = bench.ask(&home(Axis::SensorCoarse));

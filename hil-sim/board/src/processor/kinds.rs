@@ -56,7 +56,8 @@ impl Instruction {
             }
             Some(second) => {
                 let branches = first & 0xf800 == 0xf000 && second & 0x8000 != 0 && second & 0x5000 != 0;
-                let conditional = first & 0xf800 == 0xf000 && second & 0xd000 == 0x8000 && first & 0x0380 != 0x0380;
+                let conditional =
+                    first & 0xf800 == 0xf000 && second & 0xd000 == 0x8000 && first & 0x0380 != 0x0380;
                 let table = first & 0xfff0 == 0xe8d0 && second & 0xffe0 == 0xf000;
                 let pops = first & 0xfe50 == 0xe810 && second & 0x8000 != 0;
                 let loads = first & 0xff70 == 0xf850 && second & 0xf000 == 0xf000;

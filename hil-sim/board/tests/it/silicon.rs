@@ -2,7 +2,7 @@
 
 use farnear_protocol::{
     EventKind, Nanometres, Request, Response,
-    message::{Alarm, Axis, Calibration, PositionState, ResetCause, Routine, Shot, SettingKey, TriggerMode},
+    message::{Alarm, Axis, Calibration, PositionState, ResetCause, Routine, SettingKey, Shot, TriggerMode},
 };
 use farnear_sim::{
     Parts, RigConfig,
@@ -128,9 +128,10 @@ fn bad_reads_at_the_start_cost_neither_the_memory_nor_a_record() {
 #[test]
 fn a_chip_from_the_factory_gets_its_brown_out_reset() {
     let mut bench = rig_with(|parts| parts.supply.brown_out = BrownOut::Off);
-    let started = bench.events.iter().any(|event| {
-        matches!(event.kind, EventKind::Started { cause: ResetCause::PowerOn })
-    });
+    let started = bench
+        .events
+        .iter()
+        .any(|event| matches!(event.kind, EventKind::Started { cause: ResetCause::PowerOn }));
     assert!(started, "the reset of the option bytes is the power-on's: {:?}", bench.events);
     assert_eq!(bench.boot, 1);
     bench.access(|rig| rig.brown_out());
@@ -158,7 +159,8 @@ fn a_reset_does_not_let_the_piezo_go_at_once() {
 
 #[test]
 fn homing_and_moves_bear_bouncing_switches_and_the_motors_chopper() {
-    let switches = SwitchParts { bounce_us: 3_000, bounces_per_ms: 4.0, glitch_us: 150, glitches_per_s: 60.0 };
+    let switches =
+        SwitchParts { bounce_us: 3_000, bounces_per_ms: 4.0, glitch_us: 150, glitches_per_s: 60.0 };
     let mut bench = rig_with(|parts| parts.switches = switches);
     let mut places = Vec::new();
     for turn in 0..4 {
@@ -230,7 +232,8 @@ fn busy(bench: &mut Bench) -> u32 {
     bench.forget_longest_tick();
     bench.home();
     for round in 0..2 {
-        for (axis, nm) in [(Axis::SensorCoarse, 900_000), (Axis::Lens, 700_000), (Axis::SensorFine, 100_000)] {
+        for (axis, nm) in [(Axis::SensorCoarse, 900_000), (Axis::Lens, 700_000), (Axis::SensorFine, 100_000)]
+        {
             let target = nm + 50_000 * round;
             assert_eq!(bench.ask(&go(axis, target)), Ok(Response::Accepted));
         }
@@ -239,7 +242,8 @@ fn busy(bench: &mut Bench) -> u32 {
         }
         bench.settle();
     }
-    let shots = [20_000, 150_000].map(|nm| Shot { mode: TriggerMode::Hardware, ..fine_shot(nm, 1_000, 200, 1_000) });
+    let shots =
+        [20_000, 150_000].map(|nm| Shot { mode: TriggerMode::Hardware, ..fine_shot(nm, 1_000, 200, 1_000) });
     bench.arm(&shots);
     bench.run();
     bench.longest_tick()
@@ -250,7 +254,26 @@ fn on_a_processor_as_slow_as_any_was_measured_every_tick_keeps_its_time() {
     let mut bench = rig_with(|parts| parts.processor.cycles_per_instruction = 1.9);
     let longest = busy(&mut bench);
     let share = 100.0 * f64::from(longest) / f64::from(TICK_CYCLES);
-    println!("at 1.9 cycles an instruction the longest tick takes {longest} cycles, {share:.1} % of its period");
+    println!(
+        "at 1.9 cycles an instruction the longest tick takes {longest} cycles, {share:.1} % of its period"
+    );
     assert!(longest <= TICK_CYCLES * 7 / 10, "{longest} cycles");
     assert_eq!(bench.alarm(), None);
+}
+
+#[test]
+fn by_kind_instructions_take_longer_than_one_cycle_and_not_as_long_as_is_reckoned_with() {
+    let idle_tick = |costs_by_kind| {
+        let mut bench = Bench::with(&RigConfig { costs_by_kind, ..RigConfig::default() });
+        bench.rig.advance_us(20_000).expect("runs");
+        bench.forget_longest_tick();
+        bench.rig.advance_us(10_000).expect("runs");
+        bench.longest_tick()
+    };
+    let (one_each, by_kind) = (idle_tick(false), idle_tick(true));
+    let ratio = f64::from(by_kind) / f64::from(one_each);
+    println!(
+        "a tick at rest: {one_each} cycles at one an instruction, {by_kind} by kind: {ratio:.2} times as many"
+    );
+    assert!((1.0..1.9).contains(&ratio), "{by_kind} cycles by kind, {one_each} at one an instruction");
 }
