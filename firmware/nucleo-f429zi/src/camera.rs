@@ -18,7 +18,10 @@ use embassy_stm32::{
     timer::{Ch3, Ch4, input_capture::CapturePin, simple_pwm::PwmPin},
 };
 use farnear_protocol::{BoardMicros, Micros};
-use farnear_rig::io::{ExposureEdges, StrobeEdges};
+use farnear_rig::{
+    io::{ExposureEdges, StrobeEdges},
+    stamp,
+};
 
 use crate::{
     clock::{self, APB1_TIMER_HZ},
@@ -229,8 +232,8 @@ impl CameraPort {
     pub fn take_strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges> {
         critical_section::with(|cs| match &mut *EXPOSURE.borrow_ref_mut(cs) {
             Strobe::Listening { ended, .. } => ended.take().map(|(start, end)| StrobeEdges {
-                start: clock::extend(start, now),
-                end: clock::extend(end, now),
+                start: stamp::extend(start, now),
+                end: stamp::extend(end, now),
             }),
             _ => None,
         })
@@ -243,9 +246,9 @@ impl CameraPort {
             let edges = strobe.triggered().and_then(|exposure| {
                 exposure.pulse_ended.then_some(())?;
                 Some(ExposureEdges {
-                    trigger: clock::extend(exposure.rising, now),
-                    strobe_start: clock::extend(exposure.strobe_start?, now),
-                    strobe_end: clock::extend(exposure.strobe_end?, now),
+                    trigger: stamp::extend(exposure.rising, now),
+                    strobe_start: stamp::extend(exposure.strobe_start?, now),
+                    strobe_end: stamp::extend(exposure.strobe_end?, now),
                 })
             });
             if edges.is_some() {

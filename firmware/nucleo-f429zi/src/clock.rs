@@ -17,6 +17,7 @@ pub const APB2_TIMER_HZ: u32 = 168_000_000;
 pub fn start() -> Peripherals {
     critical_section::with(|_| {
         let peripherals = embassy_stm32::init(clock_tree::config());
+        accelerate();
         // The update event that embassy's time driver makes while it sets TIM5 up also leaves a compare flag.
         // Its handler would take that for "half a period has gone", and the time would be 32 ms ahead.
         pac::TIM5.sr().write(|sr| sr.0 = 0);
@@ -25,16 +26,20 @@ pub fn start() -> Peripherals {
     })
 }
 
+/// Switches the flash's accelerator on (RM0090, section 3.5.2). embassy sets the wait states by writing the whole register, which
+/// switches it off; without it the program is up to 1.9 times slower.
+fn accelerate() {
+    pac::FLASH.acr().modify(|acr| {
+        acr.set_icen(true);
+        acr.set_dcen(true);
+        acr.set_prften(true);
+    });
+}
+
 // Each log line carries the board's time.
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
 /// The board's time.
 pub fn now() -> BoardMicros {
     BoardMicros(Instant::now().as_micros())
-}
-
-/// The moment whose lower 32 bits are `stamp`, which lies less than 71 minutes before `now`.
-pub fn extend(stamp: u32, now: BoardMicros) -> BoardMicros {
-    let age = (now.0 as u32).wrapping_sub(stamp);
-    BoardMicros(now.0.saturating_sub(u64::from(age)))
 }

@@ -8,13 +8,17 @@ use embassy_stm32::{
     gpio::{Level, Output, Speed},
     peripherals::PB0,
 };
-use embassy_time::{Duration, Instant, Ticker};
-use farnear_rig::{Rig, control::Control, io::TICK_US};
+use embassy_time::{Duration, Ticker};
+use farnear_rig::{
+    Rig,
+    control::Control,
+    io::{TICK_HZ, TICK_US},
+};
 
 use crate::{board::Nucleo, clock::SYSCLK_HZ, registers};
 
-/// Half a period of the LED that shows that the loop runs.
-const BLINK: Duration = Duration::from_millis(500);
+/// Ticks of half a period of the LED that shows that the loop runs.
+const BLINK: u32 = TICK_HZ / 2;
 /// A tick this long is worth a line in the log: three quarters of its period.
 const LONG_TICK_CYCLES: u32 = SYSCLK_HZ / 1_000_000 * TICK_US * 3 / 4;
 
@@ -24,15 +28,16 @@ pub async fn run(mut board: Nucleo, rig: &mut Rig, led: Peri<'static, PB0>) -> !
     let mut led = Output::new(led, Level::High, Speed::Low);
     let mut control = Control::new(rig);
     board.wake_watchdog();
-    let mut blink = Instant::now() + BLINK;
+    let mut blink = BLINK;
     let mut ticker = Ticker::every(Duration::from_micros(u64::from(TICK_US)));
     loop {
         ticker.next().await;
         let begin = DWT::cycle_count();
         control.tick(&mut board);
-        if Instant::now() >= blink {
+        blink -= 1;
+        if blink == 0 {
             led.toggle();
-            blink += BLINK;
+            blink = BLINK;
         }
         let cycles = DWT::cycle_count().wrapping_sub(begin);
         if registers::note_tick(cycles) && cycles > LONG_TICK_CYCLES {

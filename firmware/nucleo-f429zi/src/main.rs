@@ -12,9 +12,9 @@
 //! | PB4, PB5 | TIM3_CH1, CH2 (AF2) | stage B: encoder A, B |
 //! | PG0, PG1, PG2, PG3 | GPIO, pull-up | home and far switch of stage A, of stage B, normally closed to ground |
 //! | PE15, PA6 | TIM1_BKIN (AF1), TIM8_BKIN (AF3), pull-up | emergency stop, normally closed to ground, on both |
-//! | PC10, PC11, PC12 | SPI3 (AF6) | clock, data in, data out of DAC and converter |
+//! | PC10, PC11, PC12 | SPI3 (AF6) | clock, data from the converter, data to the DAC |
 //! | PD0, PD1 | GPIO | select of the piezo's DAC, CNV of the gauge's converter |
-//! | PE2, PE5, PE6 | SPI4 (AF5) | clock, data in, data out of the FRAM |
+//! | PE2, PE5, PE6 | SPI4 (AF5) | clock, data from the FRAM, data to it |
 //! | PE4 | GPIO | select of the FRAM |
 //! | PB10 | TIM2_CH3 (AF1) | camera trigger |
 //! | PB11 | TIM2_CH4 (AF1) | camera strobe (exposure active) |
@@ -36,6 +36,7 @@ mod control;
 mod encoder;
 mod link;
 mod memory;
+mod option_bytes;
 mod piezo;
 mod registers;
 mod stepper;
@@ -95,11 +96,15 @@ fn tell_of(last: Option<Last>) {
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
+    let brown_out_reset = option_bytes::demand_brown_out_reset();
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
     let peripherals = clock::start();
     count_cycles();
     tell_of(last);
+    if !brown_out_reset {
+        error!("the option bytes cannot be written: there is no brown-out reset");
+    }
     let Parts { mut board, sender, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,
         Err(fault) => {

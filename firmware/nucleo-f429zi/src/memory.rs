@@ -1,5 +1,8 @@
-//! The memory without power: Cypress FM25V02 (document 001-84494), 32 KiB of FRAM on SPI4, mode 0. It writes at the
-//! speed of the bus, with no pages and no busy time: 64 bytes take 26 us.
+//! The memory without power: Cypress FM25V02 (document 001-84494) or FM25V02A (001-90865), 32 KiB of FRAM on SPI4, mode 0. It
+//! writes at the speed of the bus, with no pages and no busy time: 64 bytes take 26 us.
+//!
+//! It is read twice, piece by piece, and asked for its name more than once: a bit that flips on the bus, where plugs
+//! still bounce, must not cost a record, nor the whole memory.
 
 use embassy_stm32::{
     Peri,
@@ -18,8 +21,13 @@ const WRITE_ENABLE: u8 = 0x06;
 const WRITE: u8 = 0x02;
 const READ: u8 = 0x03;
 const READ_ID: u8 = 0x9f;
-/// Manufacturer, family and density (table 6), behind six bytes of a continuation code.
-const ID: [u8; 9] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22, 0x00];
+/// Manufacturer, family and density (table 6), behind six bytes of a continuation code. A last byte, the revision, follows: 00
+/// of the FM25V02, 08 of the FM25V02A.
+const ID: [u8; 8] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22];
+/// How often it is asked for its name, and a piece is read until it is the same twice in a row.
+const ATTEMPTS: usize = 4;
+/// What is read at once.
+const PIECE: usize = 256;
 
 /// The chip.
 pub struct Memory {
@@ -58,13 +66,38 @@ impl Memory {
 
     /// Whether the chip answers with its name.
     pub fn is_there(&mut self) -> bool {
-        let mut id = [0; ID.len()];
-        self.command(&[READ_ID], |spi| spi.blocking_read(&mut id).is_ok()) && id == ID
+        (0..ATTEMPTS).any(|_| {
+            let mut id = [0; ID.len()];
+            self.command(&[READ_ID], |spi| spi.blocking_read(&mut id).is_ok()) && id == ID
+        })
     }
 
     /// Reads what the rig keeps, from address 0; `false` where the bus failed.
     pub fn read(&mut self, bytes: &mut [u8; MEMORY_BYTES]) -> bool {
-        self.command(&[READ, 0, 0], |spi| spi.blocking_read(bytes).is_ok())
+        let pieces = bytes.chunks_exact_mut(PIECE).zip((0..).step_by(PIECE));
+        for (piece, address) in pieces {
+            if !self.read_piece(address, piece) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Reads a piece until it is the same twice; one that never is is left to the records' checksums.
+    fn read_piece(&mut self, address: u16, piece: &mut [u8]) -> bool {
+        let mut again = [0; PIECE];
+        let [high, low] = address.to_be_bytes();
+        let mut read =
+            |bytes: &mut [u8]| self.command(&[READ, high, low], |spi| spi.blocking_read(bytes).is_ok());
+        for _ in 0..ATTEMPTS {
+            if !(read(piece) && read(&mut again)) {
+                return false;
+            }
+            if piece == again {
+                break;
+            }
+        }
+        true
     }
 
     /// Writes; a failure shows at the next start, where each record is checked.

@@ -4,9 +4,10 @@
 //!   its select rises; starts at code 0, which leaves the piezo relaxed. Select PD0.
 //! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise) in its three-wire CS mode with busy
 //!   indicator: the rising edge of CNV (PD1) samples; CNV is low again before the shortest conversion (0.5 us)
-//!   ends. When the longest (2.2 us) has ended, the output, released and pulled up till then, is low; each clock
-//!   then gives a bit of the result, two's complement, most significant first, in SPI mode 0; after the last one
-//!   the output is released again. The leading 0 and the trailing ones tell a converter from a broken wire.
+//!   ends, which no interrupt may delay. When the longest (3.7 us at a supply of 3.3 V) has ended, the output, released and
+//!   pulled up till then, is low; each clock then gives a bit of the result, two's complement, most significant first, in SPI
+//!   mode 0; after the last one the output is released again, and what is read there is as good as the pull-up is fast: it
+//!   says nothing. The leading 0 tells a converter from a broken wire, as do codes at either end, which the rig refuses.
 //!
 //! Words of 16 bits, of which each takes 1.5 us: the processor looks for its end rarely instead of all the time, which
 //! leaves the bus alone (and is most of what an emulated tick costs).
@@ -24,8 +25,8 @@ use farnear_rig::io::GAUGE_CODE_MAX;
 
 /// APB1 / 4; the slowest part stands twice this.
 const SPI_HZ: Hertz = Hertz(10_500_000);
-/// Longest conversion of the AD7691: 2.2 us of the 168 MHz clock.
-const CONVERSION_CYCLES: u32 = 370;
+/// Longest conversion of the AD7691 at VDD = 2.3 to 4.5 V, 3.7 us (2.2 us at 5 V), of the 168 MHz clock.
+const CONVERSION_CYCLES: u32 = 622;
 /// Half of a word's 256 cycles: the loop that waits may take twice as long as it is told.
 const HALF_A_WORD_CYCLES: u32 = 128;
 /// From one look for the word's end to the next.
@@ -34,7 +35,6 @@ const LOOK_CYCLES: u32 = 12;
 const BUSY_BIT: u32 = 1 << 31;
 /// Clocks after the indicator and the 18 bits.
 const TRAILING_BITS: u32 = 13;
-const TRAILING_ONES: u32 = (1 << TRAILING_BITS) - 1;
 /// Turns two's complement into 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
 
@@ -78,15 +78,17 @@ impl Piezo {
         pac::SPI3.dr().read().dr()
     }
 
-    /// Samples and reads the gauge: 0 to [`GAUGE_CODE_MAX`], `None` where no converter answers. Takes 6 us.
+    /// Samples and reads the gauge: 0 to [`GAUGE_CODE_MAX`], `None` where no converter answers. Takes 7.5 us.
     pub fn gauge(&mut self) -> Option<u32> {
-        self.convert.set_high();
-        self.convert.set_low();
+        // An interrupt between the two would make the pulse longer than a conversion, and the result without its indicator.
+        critical_section::with(|_| {
+            self.convert.set_high();
+            self.convert.set_low();
+        });
         cortex_m::asm::delay(CONVERSION_CYCLES);
         let word = u32::from(self.exchange(0)) << 16 | u32::from(self.exchange(0));
         let code = (word >> TRAILING_BITS) & GAUGE_CODE_MAX;
-        let whole = word & BUSY_BIT == 0 && word & TRAILING_ONES == TRAILING_ONES;
-        whole.then_some(code ^ SIGN_BIT)
+        (word & BUSY_BIT == 0).then_some(code ^ SIGN_BIT)
     }
 
     /// Sets the DAC; what it holds already is not sent again.

@@ -49,15 +49,16 @@ pub fn unpend(interrupt: Interrupt) {
 pub fn take_reset_cause() -> ResetCause {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|csr| csr.set_rmvf(true));
-    // From the special to the general: every reset also sets PINRSTF, power-on sets BORRSTF too.
-    if flags.lpwrrstf() {
+    // From the special to the general: every reset also sets PINRSTF, power-on sets BORRSTF too. Power-on comes before a
+    // reset of the program's: that of the option bytes clears no flag.
+    if flags.porrstf() {
+        ResetCause::PowerOn
+    } else if flags.lpwrrstf() {
         ResetCause::LowPower
     } else if flags.wdgrstf() || flags.wwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {
         ResetCause::Software
-    } else if flags.porrstf() {
-        ResetCause::PowerOn
     } else if flags.borrstf() {
         ResetCause::BrownOut
     } else if flags.padrstf() {

@@ -218,6 +218,8 @@ where
 pub struct Stepper<T: StepInstance> {
     direction: Output<'static>,
     enable: Output<'static>,
+    /// What the two were last set to, as orders have it: a write to a port that changes nothing costs as much as one that does.
+    away_enabled: (bool, bool),
     diagnosis: Input<'static>,
     stop: Flex<'static>,
     _step: PwmPin<'static, T, Ch1>,
@@ -237,6 +239,7 @@ impl<T: StepInstance> Stepper<T> {
         Self {
             direction: Output::new(pins.direction, Level::Low, Speed::Low),
             enable: Output::new(pins.enable, Level::High, Speed::Low),
+            away_enabled: (false, false),
             diagnosis: Input::new(pins.diagnosis, Pull::Down),
             stop,
             _step: PwmPin::new(pins.step, OutputType::PushPull),
@@ -266,8 +269,11 @@ impl<T: StepInstance> Stepper<T> {
 
     /// Carries out the orders of one tick.
     pub fn apply(&mut self, outputs: &MotorOutputs) {
-        self.enable.set_level((!outputs.enable).into());
-        self.direction.set_level(outputs.direction_away.into());
+        let wanted = (outputs.direction_away, outputs.enable);
+        if core::mem::replace(&mut self.away_enabled, wanted) != wanted {
+            self.enable.set_level((!outputs.enable).into());
+            self.direction.set_level(outputs.direction_away.into());
+        }
         let timer = T::steps();
         timer.with(|queue| {
             if outputs.abort_steps {

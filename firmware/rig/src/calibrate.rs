@@ -3,18 +3,21 @@
 //! Each occupies the whole rig. What it finds, travel apart, becomes a setting; an axis is homed when its routine ends.
 
 mod backlash;
+mod gauge;
 mod sweep;
 mod travel;
 
 use farnear_protocol::message::{Axis, Calibration, Failure, Routine, SettingKey};
 
 use self::backlash::Backlash;
+use self::gauge::GaugeScale;
 use self::sweep::Sweep;
 use self::travel::Travel;
 use crate::motion::axis::Stepper;
 use crate::motion::home::Homing;
 use crate::motion::stage::Stage;
 use crate::settings::{Settings, StepperSettings};
+use farnear_protocol::Nanometres;
 
 /// A routine under way.
 #[derive(Clone, Debug)]
@@ -22,6 +25,7 @@ pub(crate) enum Calibrating {
     Travel(Travel),
     Backlash(Backlash),
     Piezo(Sweep),
+    Gauge(GaugeScale),
 }
 
 /// What a tick of a routine brought.
@@ -45,15 +49,17 @@ impl Calibrating {
             Routine::Travel { axis } => Some(Self::Travel(Travel::new(axis))),
             Routine::Backlash { axis } => Some(Self::Backlash(Backlash::new(axis))),
             Routine::Piezo => Some(Self::Piezo(Sweep::new())),
+            Routine::Gauge => Some(Self::Gauge(GaugeScale::new())),
         }
     }
 
-    /// The stepper axis that moves.
-    pub(crate) const fn stepper(&self) -> Option<Axis> {
+    /// The axes that move.
+    pub(crate) const fn axes(&self) -> &'static [Axis] {
         match self {
-            Self::Travel(travel) => Some(travel.axis()),
-            Self::Backlash(backlash) => Some(backlash.axis()),
-            Self::Piezo(_) => None,
+            Self::Travel(travel) => only(travel.axis()),
+            Self::Backlash(backlash) => only(backlash.axis()),
+            Self::Piezo(_) => only(Axis::SensorFine),
+            Self::Gauge(_) => &[Axis::SensorCoarse, Axis::SensorFine],
         }
     }
 
@@ -63,7 +69,17 @@ impl Calibrating {
             Self::Travel(travel) => travel.tick(stage, settings),
             Self::Backlash(backlash) => backlash.tick(stage, settings),
             Self::Piezo(sweep) => sweep.tick(&mut stage.fine),
+            Self::Gauge(gauge) => gauge.tick(stage, settings),
         }
+    }
+}
+
+/// A list of one axis.
+const fn only(axis: Axis) -> &'static [Axis] {
+    match axis {
+        Axis::SensorCoarse => &[Axis::SensorCoarse],
+        Axis::SensorFine => &[Axis::SensorFine],
+        Axis::Lens => &[Axis::Lens],
     }
 }
 
@@ -73,8 +89,9 @@ fn go_home(
     axis: Axis,
     stepper: &mut Stepper,
     settings: &StepperSettings,
+    carried: Nanometres,
 ) -> Result<(), Step> {
-    match homing.tick(stepper, settings) {
+    match homing.tick(stepper, settings, carried) {
         None => Err(Step::On),
         Some(Ok(_)) => Ok(()),
         Some(Err(failure)) => Err(Step::Failed(axis, failure)),

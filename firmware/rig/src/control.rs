@@ -3,8 +3,8 @@
 //! A board implements [`Board`], a few small things that only it can do, and calls [`Control::tick`]
 //! [`crate::io::TICK_HZ`] times a second. The order is here, once for all boards:
 //!
-//! 1. Bytes from the link go to the rig, stamped with the tick's first look at the clock.
-//! 2. The hardware is read. The emergency stop comes after the step timers: its circuit stops them by itself, and one
+//! 1. The strain gauge is sampled, so that its samples come evenly whatever else a tick has to do.
+//! 2. Bytes from the link go to the rig, stamped with the tick's first look at the clock. Then the rest of the hardware is read. The emergency stop comes after the step timers: its circuit stops them by itself, and one
 //!    that opens between the two readings must not look like a timer that ran dry.
 //! 3. The rig decides, and its outputs are carried out.
 //! 4. The link is given what there is to say: answers and events first, then the log.
@@ -109,9 +109,10 @@ impl<'r> Control<'r> {
         if let Some(since) = self.leaving {
             return leave(board, since);
         }
+        let gauge_code = board.gauge();
         let now = board.now();
         let link_overflow = board.receive(|byte| self.rig.receive(byte, now));
-        let inputs = read(board, link_overflow);
+        let inputs = read(board, gauge_code, link_overflow);
         self.tell_of_dry_queues(board, &inputs);
         let outputs = self.rig.tick(&inputs);
         board.apply(&outputs);
@@ -151,8 +152,7 @@ impl<'r> Control<'r> {
 }
 
 /// Reads the hardware; what is read when matters, see the module's documentation.
-fn read(board: &mut impl Board, link_overflow: bool) -> Inputs {
-    let gauge_code = board.gauge();
+fn read(board: &mut impl Board, gauge_code: Option<u32>, link_overflow: bool) -> Inputs {
     let now = board.now();
     let (coarse, lens) = (board.coarse(), board.lens());
     let emergency_stop = board.emergency_stop();

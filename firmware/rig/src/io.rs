@@ -207,8 +207,8 @@ pub struct MemoryWrite {
 /// What the board is to do now.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs {
-    /// Code for the piezo's DAC.
-    pub piezo_dac: u16,
+    /// Code for the piezo's DAC; `None` leaves it as it is.
+    pub piezo_dac: Option<u16>,
     /// Stage A's stepper.
     pub coarse: MotorOutputs,
     /// Stage B's stepper.

@@ -64,6 +64,7 @@ pub mod session;
 pub mod settings;
 mod shaper;
 mod silence;
+pub mod stamp;
 pub mod sun_query;
 mod work;
 

@@ -8,6 +8,7 @@ mod ramp;
 pub(crate) mod settling;
 pub(crate) mod stage;
 pub(crate) mod steps;
+pub(crate) mod switch;
 
 use farnear_protocol::{BoardMicros, Micros};
 

@@ -8,8 +8,10 @@
 //! What the calibration has found of hysteresis and creep is taken off the command ahead of time ([`model`]); the observer
 //! learns what is left of them.
 //!
-//! Until its first move the piezo stays relaxed (code 0) with the loop open. If the gauge fails, the command is
-//! held and the loop opens until the next move.
+//! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a reset of the board, so at
+//! the start the piezo may stand anywhere: nothing is played until the gauge has said where, and it is led down from there,
+//! for a stack that is let go at once swings into tension. If the gauge fails, the command is held and the loop opens until
+//! the next move.
 //!
 //! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64; saturating, so no input can wrap it. Cost: about 35
 //! multiplications a tick.
@@ -18,11 +20,15 @@ mod model;
 
 use farnear_protocol::Nanometres;
 
-use self::model::{Lag, Scale};
+use self::model::{GaugeScale, Lag, Scale};
 use crate::gains::{GAIN_BITS, Gains};
-use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_US};
+use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_HZ, TICK_US};
 use crate::settings::FineSettings;
 use crate::shaper::Shaper;
+
+/// Ticks of the way down at the start, and the codes (3 um) below which it is none.
+const RELAX: u32 = TICK_HZ / 10;
+const RELAXED: u16 = 1_000;
 
 /// Fraction bits of a position.
 pub(crate) const BITS: u32 = 10;
@@ -42,11 +48,24 @@ struct Loop {
     reference_before: i32,
 }
 
+/// How the piezo comes to rest after a start.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Start {
+    /// The gauge has not said where it stands.
+    Unknown,
+    /// It is led down from a code.
+    Down { from: u16, ticks: u32 },
+    /// It is relaxed, or does what it was told.
+    Over,
+}
+
 /// The fine axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Piezo {
     settings: FineSettings,
     scale: Scale,
+    gauge: GaugeScale,
+    start: Start,
     /// What hysteresis and creep should be, as the calibration found them.
     lag: Lag,
     control: Option<Loop>,
@@ -68,6 +87,8 @@ impl Piezo {
         Self {
             settings,
             scale: Scale::new(settings.gain_pm_per_code),
+            gauge: GaugeScale::new(settings.gauge_gain_ppm, settings.gauge_offset),
+            start: Start::Unknown,
             lag: Lag::new(settings.hysteresis_ppm, settings.creep_ppm_per_decade),
             control: None,
             closing: false,
@@ -100,6 +121,7 @@ impl Piezo {
     pub(crate) const fn apply(&mut self, settings: FineSettings) {
         self.settings = settings;
         self.scale = Scale::new(settings.gain_pm_per_code);
+        self.gauge = GaugeScale::new(settings.gauge_gain_ppm, settings.gauge_offset);
         self.lag = self.lag.with(settings.hysteresis_ppm, settings.creep_ppm_per_decade);
     }
 
@@ -134,6 +156,7 @@ impl Piezo {
     /// Opens the loop and plays a code.
     pub(crate) const fn drive(&mut self, code: u16) {
         (self.control, self.closing, self.driven) = (None, false, true);
+        self.start = Start::Over;
         self.code = code;
         self.command = self.scale.played(code);
         self.target = Nanometres(0);
@@ -142,6 +165,11 @@ impl Piezo {
     /// The code that is played.
     pub(crate) const fn code(&self) -> u16 {
         self.code
+    }
+
+    /// The same, once it is known.
+    pub(crate) fn played(&self) -> Option<u16> {
+        (self.start != Start::Unknown).then_some(self.code)
     }
 
     /// Closes the loop without a jump: standing still, and what the command does not explain is disturbance.
@@ -153,7 +181,7 @@ impl Piezo {
             state: [here, 0, here.saturating_sub(self.command).saturating_sub(self.lag.offset()), 0],
             reference_before: here,
         });
-        self.closing = false;
+        (self.closing, self.start) = (false, Start::Over);
     }
 
     /// Stays where the gauge says it is now.
@@ -175,7 +203,10 @@ impl Piezo {
             return;
         };
         self.gauge_missing_ticks = 0;
-        self.measured = Nanometres(code as i32 - GAUGE_CODE_ZERO as i32);
+        self.measured = self.gauge.position(code as i32 - GAUGE_CODE_ZERO as i32);
+        if self.start == Start::Unknown {
+            self.begin_to_relax();
+        }
         if self.closing {
             return self.close();
         }
@@ -187,8 +218,32 @@ impl Piezo {
         }
     }
 
-    /// The DAC code of this tick.
-    pub(crate) fn act(&mut self) -> u16 {
+    /// The gauge has said for the first time where the piezo stands.
+    fn begin_to_relax(&mut self) {
+        let (from, command) = self.scale.playable(fixed(self.measured));
+        (self.start, self.code, self.command) = if from > RELAXED {
+            (Start::Down { from, ticks: 0 }, from, command)
+        } else {
+            (Start::Over, 0, 0)
+        };
+    }
+
+    /// Leads it down, gently at both ends so that nothing swings.
+    fn relax(&mut self) {
+        let Start::Down { from, ticks } = &mut self.start else { return };
+        *ticks += 1;
+        let (at, over) = (u64::from(*ticks), u64::from(RELAX));
+        // Three squares less two cubes of the time that is left; 43 bits.
+        let left = over - at;
+        self.code = (u64::from(*from) * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // at most `from`
+        if at >= over {
+            self.start = Start::Over;
+        }
+        self.command = self.scale.played(self.code);
+    }
+
+    /// The DAC's code of this tick; `None` as long as nobody knows where the piezo stands.
+    pub(crate) fn act(&mut self) -> Option<u16> {
         let gains = &self.settings.gains;
         if let Some(control) = &mut self.control {
             let reference = control.shaper.push(&gains.shaper, fixed(self.target));
@@ -215,9 +270,10 @@ impl Piezo {
             );
             control.state = [position, velocity, disturbance.saturating_add(drift), drift];
         } else {
+            self.relax();
             self.lag.push(self.command);
         }
-        self.code
+        self.played()
     }
 }
 

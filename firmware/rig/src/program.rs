@@ -109,6 +109,8 @@ pub(crate) struct Run {
     settle: Option<Micros>,
     phase: Phase,
     pausing: bool,
+    /// It was told to go on while it still brakes: it does once it stands.
+    resuming: bool,
 }
 
 /// What a tick of a program brought.
@@ -145,6 +147,7 @@ impl Run {
             settle: None,
             phase: Phase::Positioning,
             pausing: false,
+            resuming: false,
         }
     }
 
@@ -162,22 +165,29 @@ impl Run {
 
     /// Stands after the exposure under way.
     pub(crate) const fn pause(&mut self) {
-        self.pausing = true;
+        (self.pausing, self.resuming) = (true, false);
     }
 
     /// Whether it stands, or is going to.
     pub(crate) const fn is_pausing(&self) -> bool {
-        self.pausing
+        self.pausing && !self.resuming
     }
 
     /// Goes on after a pause; settles anew.
     pub(crate) fn resume(&mut self, stage: &mut Stage, settings: &Settings, now: BoardMicros) {
-        self.pausing = false;
-        if matches!(self.phase, Phase::Paused) {
-            self.phase = Phase::Positioning;
-            self.settle = None;
-            self.positioning = approach(&self.shot, stage, settings, now);
+        match self.phase {
+            Phase::Paused => self.set_off_anew(stage, settings, now),
+            // What it was on its way to, or where it is to go next, is not where it brakes to.
+            Phase::Positioning => self.resuming = true,
+            Phase::Exposing { .. } => self.pausing = false,
         }
+    }
+
+    fn set_off_anew(&mut self, stage: &mut Stage, settings: &Settings, now: BoardMicros) {
+        (self.pausing, self.resuming) = (false, false);
+        self.phase = Phase::Positioning;
+        self.settle = None;
+        self.positioning = approach(&self.shot, stage, settings, now);
     }
 
     /// Goes on.
@@ -195,6 +205,10 @@ impl Run {
                 // Stopped on the way it stands where it stopped; to the piezo a way is 5 ms.
                 stage.stop();
                 if !stage.steppers_still() {
+                    return Progress::On;
+                }
+                if self.resuming {
+                    self.set_off_anew(stage, settings, now);
                     return Progress::On;
                 }
                 self.phase = Phase::Paused;

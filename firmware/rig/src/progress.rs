@@ -20,10 +20,11 @@ impl Rig {
     fn advance_axis(&mut self, axis: Axis, now: BoardMicros) {
         let Some(mut active) = self.works.on(axis).take() else { return };
         let request = active.request;
+        let carried = self.stage.carried(axis);
         let end = match &mut active.work {
             AxisWork::Home(homing) => match self.stage.with_numbers(axis, &self.settings) {
                 None => None, // only steppers are homed
-                Some((stepper, settings)) => match homing.tick(stepper, settings) {
+                Some((stepper, settings)) => match homing.tick(stepper, settings, carried) {
                     None => None,
                     Some(Ok(shift)) => {
                         self.counters.homings = self.counters.homings.saturating_add(1);

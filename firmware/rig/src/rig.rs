@@ -124,6 +124,9 @@ impl Rig {
     /// Says, before anything else is done, how the last boot ended and what the memory held.
     fn begin(&mut self, now: BoardMicros) {
         let Some(Untold { found, in_motion }) = self.untold.take() else { return };
+        if found.is_none() && self.parts.memory {
+            self.alarm(Alarm::MemoryMissing, now);
+        }
         for (record, found) in record::ALL.into_iter().zip(found.into_iter().flatten()) {
             self.tell_of_record(record, found, now);
         }
@@ -214,7 +217,7 @@ impl Rig {
         self.advance(now);
         self.remember_motion();
         let mut outputs = Outputs {
-            piezo_dac: 0,
+            piezo_dac: None,
             coarse: MotorOutputs::default(),
             lens: MotorOutputs::default(),
             listen: self.camera.is_listening(),

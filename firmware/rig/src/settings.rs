@@ -32,6 +32,8 @@ pub struct Settings {
     pub camera: CameraSettings,
     /// The link's timing.
     pub link: LinkSettings,
+    /// The board has a memory without power: without it an alarm says so.
+    pub memory: bool,
 }
 
 /// Stepper, screw, encoder and switches.
@@ -108,6 +110,10 @@ pub struct FineSettings {
     pub hysteresis_ppm: u32,
     /// Creep, parts per million of a step per decade of time; 0 = not known.
     pub creep_ppm_per_decade: u32,
+    /// Position for what the gauge says, parts per million.
+    pub gauge_gain_ppm: u32,
+    /// What the gauge says where the piezo is relaxed.
+    pub gauge_offset: Nanometres,
 }
 
 /// Timing of the camera.
@@ -155,7 +161,7 @@ const STEPPER: StepperSettings = StepperSettings {
     jerk: 0,
     backlash: Nanometres(0),
     following: Nanometres(0),
-    // 4 mm/s: stops within 0.23 mm of the switch, inside its over-travel of 0.5 mm.
+    // 4 mm/s: stops within 0.25 mm of the switch, inside its over-travel of 0.5 mm.
     home_search_speed: 25_600,
     // 1 mm/s: stops within 0.01 mm, so that the switch opens only just.
     home_leave_speed: 6_400,
@@ -182,8 +188,9 @@ const STEPPER: StepperSettings = StepperSettings {
     home_zone: Nanometres(300_000),
     settle: Settle::of_move(Axis::SensorCoarse),
     settle_deadline: Micros(500_000),
-    // The driver's charge pump and current regulation are up after a few milliseconds.
-    enable_delay: Micros(10_000),
+    // The TMC2209 tunes its current regulator while the motor stands, 130 ms at least, and 10 ms more (its data sheet,
+    // section 6.1, AT#1); only once, for the driver then stays on.
+    enable_delay: Micros(140_000),
     // A segment lasts 1 ms at most.
     pulse_deadline: Micros(10_000),
 };
@@ -224,6 +231,8 @@ const PARTS: Settings = Settings {
         gain_pm_per_code: 0,
         hysteresis_ppm: 0,
         creep_ppm_per_decade: 0,
+        gauge_gain_ppm: 0,
+        gauge_offset: Nanometres(0),
         gains: Gains::design(&PiezoModel {
             resonance_hz: 200.0,
             damping: 0.03,
@@ -261,4 +270,5 @@ const PARTS: Settings = Settings {
         silence_min: Micros(100_000),
         silence_max: Micros(60_000_000),
     },
+    memory: true,
 };

@@ -12,10 +12,14 @@ use rigless::{
 use crate::{
     board::{Chip, RAM, RigBoard, SpiChip, pins},
     chips::{SharedPlant, with_plant},
+    parts::MemoryMake,
     plant::{Noise, Plant, StageName},
     wiring::Wiring,
 };
 
+/// What the supply dips to where only the brown-out reset notices: below what the chip is specified for (1.7 V is where its
+/// power-down reset comes at the latest).
+const DIP_MV: u32 = 2_000;
 /// What cortex-m-rt paints the stack with before the program runs.
 const STACK_PAINT: u64 = 0xcccc_cccc;
 /// Where the firmware's stack lies, see its `memory.x`: first address and length.
@@ -82,10 +86,30 @@ impl RigAccess<'_, '_> {
         }
     }
 
-    /// The supply dips just long enough to reset the chip.
+    /// The supply dips to 2 V, so shortly that only a brown-out reset notices; a chip whose option bytes leave that off runs on.
     pub fn brown_out(&mut self) {
-        self.chip().expect_brown_out();
-        self.press_reset();
+        if self.chip().dips(DIP_MV) {
+            self.press_reset();
+        }
+    }
+
+    /// Another make of FRAM is soldered in, or none.
+    pub fn set_memory_make(&mut self, make: MemoryMake) {
+        if let Some(memory) = self.chip().memory() {
+            memory.set_make(make);
+        }
+    }
+
+    /// Flips a bit on the bus in each of the FRAM's next so many answers to the question for its name, and in so many reads.
+    pub fn spoil_memory_answers(&mut self, names: u32, reads: u32) {
+        if let Some(memory) = self.chip().memory() {
+            memory.spoil_answers(names, reads);
+        }
+    }
+
+    /// Conversions of the gauge that were read without a busy indicator.
+    pub fn conversions_without_indicator(&mut self) -> u64 {
+        self.chip().gauge_converter().map_or(0, |converter| converter.without_indicator())
     }
 
     /// Lets the power fail when the firmware has written this many more bytes to its memory.

@@ -8,6 +8,7 @@ use std::{
     collections::BTreeMap,
     num::{NonZeroU32, NonZeroU64},
     path::Path,
+    sync::Arc,
 };
 
 use rigless::{
@@ -25,7 +26,7 @@ use rigless::{
         st::tim::{BreakInput, BreakSource, Channel},
         stm32f427::{
             Stm32f427,
-            generated::rcc,
+            generated::{flash::optcr::BOR_LEV, rcc},
             peripherals::{gpio::Pin, spi::Select},
         },
     },
@@ -35,11 +36,13 @@ use rigless::{
 use crate::{
     chips::{Dac, GaugeConverter, SharedPlant},
     memory::MemoryChip,
+    parts::{Parts, SupplyParts},
     plant::{Noise, StageName},
+    processor::{Costs, Metered},
     serial::Line,
 };
 
-/// SYSCLK; also the instructions per second, so that the cycle counter counts what it should.
+/// SYSCLK; also what the emulator takes for instructions per second: [`Metered`] counts cycles.
 const SYSCLK_HZ: u64 = 168_000_000;
 const HSE_HZ: u64 = 8_000_000;
 /// The supply as it should be, millivolts.
@@ -174,6 +177,9 @@ pub struct Chip {
     breaks: [Option<Level>; 2],
     /// The flags of the reset that comes, where they are not what the emulator's part makes of it.
     reset_flags: Option<u64>,
+    supply: SupplyParts,
+    /// The brown-out level, as the option bytes had it at the last reset.
+    brown_out: u64,
 }
 
 impl Chip {
@@ -243,9 +249,25 @@ impl Chip {
         });
     }
 
-    /// The next reset is to look like a brown-out.
-    pub fn expect_brown_out(&mut self) {
-        self.reset_flags = Some(CSR_BROWN_OUT);
+    /// The supply dips to this for a moment: whether the chip resets itself, and notes why. One whose option bytes leave the
+    /// brown-out reset off runs on, whatever it then does.
+    pub fn dips(&mut self, millivolts: u32) -> bool {
+        if millivolts >= self.supply.reset_mv(self.brown_out) {
+            return false;
+        }
+        let brown_out = millivolts >= self.supply.power_down_mv;
+        self.reset_flags = Some(if brown_out { CSR_BROWN_OUT } else { CSR_POWER_ON });
+        true
+    }
+
+    /// The brown-out level that the option bytes have now; it counts from the next reset on.
+    fn read_brown_out(&mut self) -> u64 {
+        BOR_LEV.get(self.part.flash.committed_options().0)
+    }
+
+    /// The gauge's converter.
+    pub fn gauge_converter(&mut self) -> Option<&mut GaugeConverter> {
+        self.part.spi[SPI3].chip_mut::<GaugeConverter>(1)
     }
 
     /// The FRAM.
@@ -298,6 +320,7 @@ impl Mcu for Chip {
             registers.set(rcc::Register::Csr, flags);
         }
         self.breaks = [None; 2];
+        self.brown_out = self.read_brown_out();
         // The part comes back with floating pins; the outside still holds them.
         for (name, level) in self.pins.clone() {
             self.put_pin(at, name, level);
@@ -322,30 +345,43 @@ pub struct RigBoard {
     /// The chip.
     pub chip: Chip,
     unique_id: [u8; 12],
+    costs: Costs,
 }
 
 impl RigBoard {
-    /// Assembles the board; the seed makes its unique id.
-    pub fn new(plant: &SharedPlant, line: Line, seed: u64) -> Result<Self, rigless::soc::Error> {
+    /// Assembles the board of these parts; the seed makes its unique id.
+    pub fn new(
+        plant: &SharedPlant,
+        line: Line,
+        seed: u64,
+        parts: &Parts,
+        costs: Costs,
+    ) -> Result<Self, rigless::soc::Error> {
         let mut part = Stm32f427::new()?;
         part.rcc.attach_crystals(HSE_HZ, 0);
         part.set_supply(SUPPLY_MV);
         let select = |pin| Select { port: "GPIOD", pin, active: Level::Low };
         if let (Some(dac), Some(gauge)) = (Pin::new(0), Pin::new(1)) {
             part.spi[SPI3].attach_selected(Dac::new(plant.clone()), select(dac));
-            part.spi[SPI3].attach_selected(GaugeConverter::new(plant.clone()), select(gauge));
+            part.spi[SPI3]
+                .attach_selected(GaugeConverter::new(plant.clone(), parts.gauge_converter), select(gauge));
         }
         if let Some(pin) = Pin::new(4) {
             let select = Select { port: "GPIOE", pin, active: Level::Low };
-            part.spi[SPI4].attach_selected(MemoryChip::new(), select);
+            part.spi[SPI4].attach_selected(MemoryChip::new(parts.memory.make), select);
         }
         part.usart[USART3].attach(line);
+        let (program, registers) = part.program();
+        let (options, more) = program.committed_options();
+        program.keep_options(BOR_LEV.set(options, parts.supply.brown_out.bits()), more, registers);
         let mut chip = Chip {
             part,
             pins: BTreeMap::new(),
             inputs: BTreeMap::new(),
             breaks: [None; 2],
             reset_flags: None,
+            supply: parts.supply,
+            brown_out: parts.supply.brown_out.bits(),
         };
         let start = VirtualNanos(0);
         chip.drive_pin(start, STRAP, Level::High);
@@ -358,7 +394,7 @@ impl RigBoard {
         let mut noise = Noise::new(seed, "unique id");
         let (low, high) = (noise.bits().to_le_bytes(), noise.bits().to_le_bytes());
         let unique_id = core::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] });
-        Ok(Self { chip, unique_id })
+        Ok(Self { chip, unique_id, costs })
     }
 }
 
@@ -393,6 +429,11 @@ impl Board for RigBoard {
         if let Ok(id) = Image::new(Path::new("unique id"), self.unique_id.to_vec(), Some(UNIQUE_ID_AT)) {
             core.factory_images.push(id);
         }
+        let (processor, costs) = (core.processor.clone(), self.costs.clone());
+        core.processor = Arc::new(move |endian| {
+            let inner = processor(endian)?;
+            Ok(Box::new(Metered::new(inner, costs.clone())))
+        });
         vec![Target::new("stm32f427", &mut self.chip, core)]
     }
 }

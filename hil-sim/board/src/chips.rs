@@ -7,7 +7,7 @@ use rigless::{
     snapshot::Store,
 };
 
-use crate::plant::Plant;
+use crate::{parts::ConverterParts, plant::Plant};
 
 /// The plant, shared by the chips and by the wiring; all run on the emulator's thread.
 pub type SharedPlant = Arc<Mutex<Plant>>;
@@ -17,11 +17,11 @@ pub fn with_plant<T>(plant: &SharedPlant, work: impl FnOnce(&mut Plant) -> T) ->
     work(&mut plant.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Shortest and longest conversion of the AD7691 (t_CONV).
-const CONVERSION_NS: (u64, u64) = (500, 2_200);
 /// Bits of a conversion.
 const RESULT_BITS: u32 = 18;
 const SIGN_BIT: u32 = 1 << 17;
+/// A bit on SPI3, which the firmware clocks with 10.5 MHz.
+const BIT_NS: f64 = 1e9 / 10.5e6;
 
 /// TI DAC8830: shifts 16 bits in while selected; when the select rises, exactly 16 bits are taken.
 pub struct Dac {
@@ -67,37 +67,53 @@ impl std::fmt::Debug for Dac {
 }
 
 /// AD7691 in three-wire CS mode: the select line is CNV. Its rising edge samples. Where CNV is low again before
-/// the shortest conversion ends, a 0 (busy indicator) comes before the result; until the longest has ended, the
-/// output is released. A released output reads as ones, for the bus has a pull-up.
+/// the shortest conversion ends, a 0 (busy indicator) comes before the result; until the longest has ended, and from half a
+/// clock after the last bit on, the output is released and only the pull-up drives it: a line that was low then reads as
+/// low for as long as it takes to charge it.
 pub struct GaugeConverter {
     plant: SharedPlant,
+    parts: ConverterParts,
     sampled_ns: u64,
     low_ns: u64,
     result: u32,
-    /// What is still to be shifted out, most significant bit first, and ones after it; `None` until it is read.
+    /// What is shifted out, most significant bit first, and ones after it; `None` until it is read.
     shift: Option<u64>,
+    without_indicator: u64,
 }
 
 impl GaugeConverter {
     /// The chip, sampling the plant's gauge.
-    pub fn new(plant: SharedPlant) -> Self {
-        Self { plant, sampled_ns: 0, low_ns: 0, result: 0, shift: None }
+    pub fn new(plant: SharedPlant, parts: ConverterParts) -> Self {
+        Self { plant, parts, sampled_ns: 0, low_ns: 0, result: 0, shift: None, without_indicator: 0 }
+    }
+
+    /// Conversions that were read without a busy indicator, because CNV was high for too long.
+    pub fn without_indicator(&self) -> u64 {
+        self.without_indicator
     }
 
     /// What comes out when the first bit is read at this moment.
-    fn output(&self, now_ns: u64) -> u64 {
-        if now_ns < self.sampled_ns + CONVERSION_NS.1 {
+    fn output(&mut self, now_ns: u64) -> u64 {
+        if now_ns < self.sampled_ns + self.parts.conversion_max_ns {
             return u64::MAX;
         }
-        let indicates = self.low_ns < self.sampled_ns + CONVERSION_NS.0;
-        let lead = if indicates { 1 } else { 0 };
-        (u64::from(self.result) << (64 - RESULT_BITS - lead)) | (u64::MAX >> (RESULT_BITS + lead))
+        let indicates = self.low_ns < self.sampled_ns + self.parts.conversion_min_ns;
+        self.without_indicator += u64::from(!indicates);
+        let bits = RESULT_BITS + u32::from(indicates);
+        let driven = u64::from(self.result) << (64 - bits);
+        // The released line, sampled in the middle of each bit.
+        let low = if self.result & 1 == 0 { libm::ceil(self.parts.rise_ns() / BIT_NS - 0.5) } else { 0.0 };
+        let charged = (u64::MAX >> bits).checked_shr(low.clamp(0.0, 64.0) as u32).unwrap_or(0);
+        driven | charged
     }
 }
 
 impl Peer for GaugeConverter {
     fn transfer(&mut self, _mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
-        let shift = self.shift.unwrap_or_else(|| self.output(context.now().0));
+        let shift = match self.shift {
+            Some(shift) => shift,
+            None => self.output(context.now().0),
+        };
         self.shift = Some((shift << bits) | ((1 << bits) - 1));
         (shift >> (64 - u32::from(bits))) as u32
     }
@@ -121,5 +137,34 @@ impl Store for GaugeConverter {}
 impl std::fmt::Debug for GaugeConverter {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("AD7691")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parts::Parts;
+
+    /// The 32 bits that are read of a result.
+    fn read(result: u32, (low_ns, read_ns): (u64, u64)) -> u32 {
+        let parts = Parts::default();
+        let plant = SharedPlant::new(Plant::new(1, &parts).into());
+        let mut chip = GaugeConverter::new(plant, parts.gauge_converter);
+        (chip.result, chip.low_ns) = (result, low_ns);
+        (chip.output(read_ns) >> 32) as u32
+    }
+
+    #[test]
+    fn the_released_line_stays_low_for_a_while_after_a_zero() {
+        // 0.22 us are 2.4 bits, of which the first is half over when it is sampled: two are low.
+        assert_eq!(read(0x2_0001, (100, 4_000)), 0x2_0001 << 13 | 0x1fff);
+        assert_eq!(read(0x2_0000, (100, 4_000)), 0x2_0000 << 13 | 0x07ff);
+    }
+
+    #[test]
+    fn a_long_pulse_takes_the_indicator_away_and_an_early_look_sees_nothing() {
+        assert_eq!(read(0x3_ffff, (501, 4_000)), u32::MAX, "shifted by a bit");
+        assert_eq!(read(0x1_0001, (501, 4_000)) >> 14, 0x1_0001);
+        assert_eq!(read(0x1_0001, (100, 3_600)), u32::MAX);
     }
 }

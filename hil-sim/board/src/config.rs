@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::faults::Faults;
+use crate::{faults::Faults, parts::Parts};
 
 /// How virtual time passes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -23,6 +23,10 @@ pub struct RigConfig {
     pub firmware: Option<PathBuf>,
     /// Decides everything random: the mechanics' errors, noise, jitter, the unique id, the line's faults.
     pub seed: u64,
+    /// What the parts are like.
+    pub parts: Parts,
+    /// Each instruction takes what its kind takes, instead of the average: some hundred times slower, for measuring.
+    pub costs_by_kind: bool,
     /// What goes wrong.
     pub faults: Faults,
     /// How time passes.
@@ -32,8 +36,16 @@ pub struct RigConfig {
 }
 
 impl Default for RigConfig {
-    /// Seed 1, no faults, time only when told.
+    /// Seed 1, the standard parts, no faults, time only when told.
     fn default() -> Self {
-        Self { firmware: None, seed: 1, faults: Faults::default(), pace: Pace::Told, trace: None }
+        Self {
+            firmware: None,
+            seed: 1,
+            parts: Parts::default(),
+            costs_by_kind: false,
+            faults: Faults::default(),
+            pace: Pace::Told,
+            trace: None,
+        }
     }
 }

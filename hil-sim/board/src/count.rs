@@ -13,7 +13,15 @@ use rigless::{
     time::VirtualNanos,
 };
 
-use crate::{board::RigBoard, chips::SharedPlant, error::SimError, plant::Plant, serial::Line};
+use crate::{
+    board::RigBoard,
+    chips::SharedPlant,
+    error::SimError,
+    parts::{Parts, ProcessorParts},
+    plant::Plant,
+    processor::Costs,
+    serial::Line,
+};
 
 /// Where the counting program lays its routines and its counts.
 const ROUTINES: &str = "FARNEAR_ROUTINES";
@@ -122,9 +130,13 @@ pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
         return Err(missing(COUNTS));
     }
     let image = Image::read(path, None).map_err(|error| unusable(error.to_string()))?;
-    let plant = SharedPlant::new(Plant::new(1).into());
+    let mut parts = Parts::default();
+    // Instructions are what is counted here, not cycles.
+    parts.processor = ProcessorParts { cycles_per_instruction: 1.0, without_accelerator: 1.0 };
+    let plant = SharedPlant::new(Plant::new(1, &parts).into());
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
-    let board = RigBoard::new(&plant, Line::default(), 1).map_err(|error| emulator(&error))?;
+    let costs = Costs::Average(parts.processor);
+    let board = RigBoard::new(&plant, Line::default(), 1, &parts, costs).map_err(|error| emulator(&error))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
     let counting = Counting { routines, counts, number, result: None };
     let finished = run(session, &Start::new(&[image]), counting).map_err(|error| emulator(&error))?;

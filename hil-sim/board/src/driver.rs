@@ -114,6 +114,7 @@ impl Driver {
     }
 
     fn stage_report(&self, name: StageName) -> StageReport {
+        let driver_violations = self.wiring.driver_violations(name);
         let (position_um, microsteps, lost_microsteps) = with_plant(&self.plant, |plant| {
             let stage = plant.stage(name);
             (stage.position_um(), stage.microsteps(), stage.lost_microsteps())
@@ -124,6 +125,7 @@ impl Driver {
             lost_microsteps,
             step_edges: self.wiring.step_edges(name),
             last_step_ns: self.wiring.last_step_ns(name),
+            driver_violations,
         }
     }
 
@@ -186,7 +188,7 @@ impl Driver {
         work(&mut RigAccess { session, host, stop, plant: &self.plant, wiring: &mut self.wiring });
         self.note_resets(session, stop.at);
         self.wiring.put(&mut session.board_mut().chip, stop.at);
-        session.pause_at(self.wiring.next_ns().map(VirtualNanos));
+        session.pause_at(self.wiring.next_ns(stop.at.0).map(VirtualNanos));
     }
 
     /// Lets happen what is due.
@@ -265,7 +267,7 @@ impl Driver {
 
 impl emulator::Driver<RigBoard> for Driver {
     fn on_settled(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, settled: Settled) {
-        let at = match settled {
+        let (at, written) = match settled {
             Settled::Access { access, .. } if NOTHING.contains(&access.address) => {
                 // The emulator fails one access only, so the next one is to fail again.
                 session.fail_next(NOTHING.start, NOTHING.end);
@@ -282,14 +284,14 @@ impl emulator::Driver<RigBoard> for Driver {
             Settled::Access { access, .. }
                 if access.kind == AccessKind::Write && Wiring::watches(access.address) =>
             {
-                access.virtual_time
+                (access.virtual_time, Some(access.address))
             }
-            Settled::Stop(stop) => stop.at,
+            Settled::Stop(stop) => (stop.at, None),
             _ => return,
         };
         self.note_resets(session, at);
-        self.wiring.look(&mut session.board_mut().chip, at);
-        session.pause_at(self.wiring.next_ns().map(VirtualNanos));
+        self.wiring.look(&mut session.board_mut().chip, at, written);
+        session.pause_at(self.wiring.next_ns(at.0).map(VirtualNanos));
     }
 
     fn on_stop(

@@ -37,6 +37,14 @@ pub enum SimError {
         /// What is wrong with it.
         reason: String,
     },
+    /// The file of the parts is wrong.
+    #[error("parts file {}: {reason}", path.display())]
+    Parts {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The emulator's description of the chip, or the emulation itself, failed.
     #[error("the emulator stopped: {0}")]
     Emulator(String),

@@ -4,6 +4,7 @@
 //! two motorised stages, a piezo, encoders, end switches and a camera. What the firmware measures, it measures through the
 //! registers it uses on the real board; what is really there is in [`plant`], and only tests may look.
 //!
+//! - [`parts`]: what the parts are like, the numbers of `parts.toml`; [`processor`]: what its instructions cost.
 //! - [`rig`]: the emulated rig in this process, for tests; [`config`], [`command`], [`report`]: what it is made of, what
 //!   it can be asked and what it answers.
 //! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client.
@@ -34,8 +35,10 @@ pub mod imager;
 pub mod lockstep;
 pub mod memory;
 pub mod pacing;
+pub mod parts;
 pub mod plant;
 pub mod port;
+pub mod processor;
 pub mod report;
 pub mod rig;
 pub mod run;
@@ -46,5 +49,6 @@ pub mod wiring;
 pub use access::RigAccess;
 pub use config::{Pace, RigConfig};
 pub use error::SimError;
+pub use parts::Parts;
 pub use report::{Report, StageReport};
 pub use rig::EmulatedRig;

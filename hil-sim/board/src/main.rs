@@ -11,7 +11,7 @@ use std::{
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, standard};
-use farnear_sim::{Pace, RigConfig, faults::Faults, imager::Imager, run::ServedRig};
+use farnear_sim::{Pace, Parts, RigConfig, faults::Faults, imager::Imager, run::ServedRig};
 
 /// The farnear rig without hardware: the real firmware on an emulated board.
 #[derive(Parser)]
@@ -61,6 +61,10 @@ struct Run {
     /// what = "emergency-stop", "power-loss" or "motor-stalls"; a wrong one is answered with all of them.
     #[arg(long, value_name = "FILE")]
     faults: Option<PathBuf>,
+    /// TOML file with what the parts are like where they differ from the standard rig's; `parts.toml` in the sources has all of
+    /// it, with the source of each number.
+    #[arg(long, value_name = "FILE")]
+    parts: Option<PathBuf>,
     /// Let the board's time follow the wall clock, for a person who watches; without it time passes only while
     /// the board owes an answer or an event, and a run repeats to the byte.
     #[arg(long)]
@@ -108,6 +112,8 @@ fn serve(run: &Run) -> Result<()> {
     let config = RigConfig {
         firmware: run.firmware.clone(),
         seed: run.seed,
+        parts: run.parts.as_deref().map(Parts::read).transpose()?.unwrap_or_default(),
+        costs_by_kind: false,
         faults: run.faults.as_deref().map(Faults::read).transpose()?.unwrap_or_default(),
         pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
         trace: run.trace.clone(),

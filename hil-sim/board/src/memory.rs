@@ -1,5 +1,5 @@
-//! The board's FRAM, Cypress FM25V02 (the emulator's model of it), and what can happen to such a chip: its supply fails
-//! in the middle of a write, a bit flips, somebody solders in a new one.
+//! The board's FRAM, Cypress FM25V02 or FM25V02A (the emulator's model with the name of either), and what can happen to such
+//! a chip: its supply fails in the middle of a write, a bit flips in it or on the bus, somebody solders in a new one or none.
 
 use rigless::{
     chip::{
@@ -11,15 +11,24 @@ use rigless::{
     time::{EventId, VirtualNanos},
 };
 
+use crate::parts::MemoryMake;
+
 /// Opcode of a write; two bytes of address follow it.
 const WRITE: u32 = 0x02;
+/// Opcode of a read.
+const READ: u32 = 0x03;
+/// Opcode of the question for its name.
+const READ_ID: u32 = 0x9f;
 
 /// The chip behind its select.
 #[derive(Debug)]
 pub struct MemoryChip {
     chip: Fm25v02,
-    /// Bytes of the command under way, and whether it is a write.
-    command: (u32, bool),
+    make: MemoryMake,
+    /// Bytes of the command under way, and its opcode.
+    command: (u32, u32),
+    /// A bit of each of the next so many answers is flipped on the bus: of its name, of what it holds.
+    spoilt: (u32, u32),
     written: u64,
     /// The supply fails when so many bytes have been written.
     fails_at: Option<u64>,
@@ -28,8 +37,26 @@ pub struct MemoryChip {
 
 impl MemoryChip {
     /// A new chip: all zero.
-    pub fn new() -> Self {
-        Self { chip: Fm25v02::new(), command: (0, false), written: 0, fails_at: None, failed: false }
+    pub fn new(make: MemoryMake) -> Self {
+        Self {
+            chip: Fm25v02::new(),
+            make,
+            command: (0, 0),
+            spoilt: (0, 0),
+            written: 0,
+            fails_at: None,
+            failed: false,
+        }
+    }
+
+    /// Another chip is soldered in, with the same contents; or none.
+    pub fn set_make(&mut self, make: MemoryMake) {
+        self.make = make;
+    }
+
+    /// Flips a bit on the bus in each of the next so many answers to the question for its name, and in so many reads.
+    pub fn spoil_answers(&mut self, names: u32, reads: u32) {
+        self.spoilt = (names, reads);
     }
 
     /// What it holds.
@@ -79,31 +106,42 @@ impl MemoryChip {
     }
 }
 
-impl Default for MemoryChip {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Peer for MemoryChip {
     fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
-        if self.failed {
-            return (1 << bits) - 1;
+        let released = (1 << bits) - 1;
+        if self.failed || self.make == MemoryMake::None {
+            return released;
         }
-        let (count, writes) = &mut self.command;
+        let (count, opcode) = &mut self.command;
         if *count == 0 {
-            *writes = mosi == WRITE;
+            *opcode = mosi;
         }
         *count += 1;
-        if *writes && *count > 3 {
+        if *opcode == WRITE && *count > 3 {
             self.written += 1;
             self.failed = self.fails_at.is_some_and(|at| self.written >= at);
         }
-        self.chip.transfer(mosi, bits, context)
+        let told = match (*opcode, *count) {
+            (READ_ID, 2..=10) => Some(u32::from(self.make.name()[*count as usize - 2])),
+            _ => None,
+        };
+        let answer = self.chip.transfer(mosi, bits, context);
+        let answer = told.unwrap_or(answer);
+        let left = match *opcode {
+            READ_ID => &mut self.spoilt.0,
+            READ => &mut self.spoilt.1,
+            _ => return answer,
+        };
+        // Somewhere in what comes back, behind opcode and address, and each time another bit.
+        if *count == 8 && *left > 0 {
+            *left -= 1;
+            return answer ^ 1 << (*left % 8);
+        }
+        answer
     }
 
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
-        self.command = (0, false);
+        self.command = (0, 0);
         self.chip.select(context);
     }
 
@@ -128,7 +166,7 @@ mod tests {
 
     #[test]
     fn contents_can_be_put_in_and_survive_a_loss_of_power() {
-        let mut chip = MemoryChip::new();
+        let mut chip = MemoryChip::new(MemoryMake::Fm25v02a);
         let mut contents = [0; SIZE];
         contents[77] = 0xa5;
         chip.set_contents(&contents);

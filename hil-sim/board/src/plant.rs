@@ -5,23 +5,25 @@
 //! Times are virtual nanoseconds. The plant advances only when someone asks for a moment; the order of those
 //! moments changes nothing but rounding, and lockstep fixes the order.
 
+mod contact;
 mod motor;
 mod noise;
 mod piezo;
 mod screw;
 mod stage;
 
+pub use contact::Contact;
 pub use motor::Motor;
 pub use noise::Noise;
 pub use piezo::Piezo;
 pub use screw::{BACKLASH_UM, Screw, TRAVEL_UM};
 pub use stage::{Stage, StageName};
 
+use crate::parts::{GaugeParts, Parts};
+
 /// Distance from the lens' principal plane to the sensor with both stages and the piezo at 0, millimetres. The rig
 /// is assembled and measured to this; the firmware holds the same number.
 pub const DATUM_MM: f64 = 47.0;
-/// Noise of the strain gauge and its amplifier, micrometres RMS in the 20 kHz before the converter.
-const GAUGE_NOISE_UM: f64 = 0.003;
 /// Converter code at the relaxed piezo; one code is 1 nm (data sheet of the gauge's amplifier board).
 const GAUGE_CODE_ZERO: f64 = 10_000.0;
 const GAUGE_CODE_MAX: f64 = 262_143.0;
@@ -61,18 +63,20 @@ pub struct Plant {
     sensor_stage: Stage,
     lens_stage: Stage,
     piezo: Piezo,
+    gauge: GaugeParts,
     gauge_noise: Noise,
     exposing: Option<Exposing>,
 }
 
 impl Plant {
     /// The mechanics as they stand at power-on; the seed decides where the stages stand and how their screws err.
-    pub fn new(seed: u64) -> Self {
+    pub fn new(seed: u64, parts: &Parts) -> Self {
         Self {
             now_ns: 0,
             sensor_stage: Stage::new(StageName::Sensor, seed),
             lens_stage: Stage::new(StageName::Lens, seed),
             piezo: Piezo::new(),
+            gauge: parts.gauge,
             gauge_noise: Noise::new(seed, "gauge"),
             exposing: None,
         }
@@ -80,6 +84,7 @@ impl Plant {
 
     /// Lets time pass until `now_ns`; a moment in the past changes nothing.
     pub fn advance(&mut self, now_ns: u64) {
+        let moves = self.now_ns < now_ns;
         while self.now_ns < now_ns {
             let step_ns = (now_ns - self.now_ns).min(Piezo::STEP_NS);
             self.piezo.step(step_ns);
@@ -97,6 +102,9 @@ impl Plant {
         }
         self.sensor_stage.advance(now_ns);
         self.lens_stage.advance(now_ns);
+        if moves {
+            self.sensor_stage.set_carried_um(self.piezo.position_um());
+        }
     }
 
     /// A rising edge of STEP reaches a driver that is on.
@@ -118,7 +126,8 @@ impl Plant {
     /// The gauge's converter samples: 18 bit.
     pub fn sample_gauge(&mut self, now_ns: u64) -> u32 {
         self.advance(now_ns);
-        let um = self.piezo.position_um() + GAUGE_NOISE_UM * self.gauge_noise.normal();
+        let GaugeParts { gain, offset_um, noise_um } = self.gauge;
+        let um = offset_um + gain * self.piezo.position_um() + noise_um * self.gauge_noise.normal();
         libm::round(GAUGE_CODE_ZERO + 1000.0 * um).clamp(0.0, GAUGE_CODE_MAX) as u32
     }
 
@@ -182,7 +191,7 @@ mod tests {
 
     #[test]
     fn an_exposure_sees_the_mean_of_what_moved() {
-        let mut plant = Plant::new(1);
+        let mut plant = Plant::new(1, &Parts::default());
         let start_um = plant.stage(StageName::Sensor).position_um();
         let lens_um = plant.stage(StageName::Lens).position_um();
         plant.begin_exposure(1_000_000);
@@ -202,7 +211,7 @@ mod tests {
 
     #[test]
     fn the_gauge_reads_its_zero_with_its_noise() {
-        let mut plant = Plant::new(7);
+        let mut plant = Plant::new(7, &Parts::default());
         let codes: Vec<f64> =
             (1..=2000u32).map(|i| f64::from(plant.sample_gauge(u64::from(i) * 200_000))).collect();
         let mean = codes.iter().sum::<f64>() / codes.len() as f64;

@@ -13,6 +13,8 @@ pub struct StageReport {
     pub step_edges: u64,
     /// When the last of them was.
     pub last_step_ns: u64,
+    /// Times that its driver chip was given STEP or DIR sooner than its data sheet allows.
+    pub driver_violations: u64,
 }
 
 /// How the rig is.

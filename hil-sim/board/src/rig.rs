@@ -29,6 +29,7 @@ use crate::{
     firmware,
     lockstep::BOOT_NS,
     plant::Plant,
+    processor::Costs,
     report::Report,
     serial::Line,
     trace::Trace,
@@ -157,10 +158,17 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
     let image = Image::read(&path, None).map_err(|error| unusable(error.to_string()))?;
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
 
-    let plant = SharedPlant::new(Plant::new(config.seed).into());
+    let plant = SharedPlant::new(Plant::new(config.seed, &config.parts).into());
     let line = Line::default();
-    let mut board = RigBoard::new(&plant, line.clone(), config.seed).map_err(|error| emulator(&error))?;
-    let wiring = Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip);
+    let costs = if config.costs_by_kind {
+        Costs::by_kind(image.bytes()).ok_or_else(|| unusable("it has no program in the flash".into()))?
+    } else {
+        Costs::Average(config.parts.processor)
+    };
+    let mut board = RigBoard::new(&plant, line.clone(), config.seed, &config.parts, costs)
+        .map_err(|error| emulator(&error))?;
+    let wiring =
+        Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip, (config.seed, &config.parts));
     let trace = config.trace.as_deref().map(Trace::create).transpose()?;
     let (commands, receiver) = mpsc::channel();
     let driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);

@@ -11,7 +11,8 @@ use crate::{
     board::{Chip, PinName, STROBE, TIM2, TRIGGER, pins},
     camera::{Camera, Edge},
     chips::{SharedPlant, with_plant},
-    plant::{ExposureTruth, StageName},
+    parts::{DriverParts, Parts},
+    plant::{Contact, ExposureTruth, Noise, StageName},
 };
 
 /// Alternate functions of TIM2, and of TIM3 and TIM4, on their pins (DS9405, table 12). A pin that the firmware
@@ -21,8 +22,9 @@ const ENCODER_FUNCTION: u8 = 2;
 /// TIM2's counter, which the firmware keeps at the lower 32 bits of its microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
 /// Addresses of the registers whose writes can move one of the watched pins: TIM2, TIM1 and TIM8, port F.
-const WATCHED: [(u64, u64); 3] =
-    [(0x4000_0000, 0x4000_0400), (0x4001_0000, 0x4001_0800), (0x4002_1400, 0x4002_1800)];
+const WATCHED: [std::ops::Range<u64>; 3] = [0x4000_0000..0x4000_0400, 0x4001_0000..0x4001_0800, DRIVER_PORT];
+/// Port F, on which DIR and EN of both drivers are.
+const DRIVER_PORT: std::ops::Range<u64> = 0x4002_1400..0x4002_1800;
 
 /// One exposure, as it really was.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -45,6 +47,9 @@ pub struct Shot {
 struct StageWires {
     name: StageName,
     step: bool,
+    driver: DriverWires,
+    /// Home and far switch.
+    contacts: [Contact; 2],
     counts: i64,
     step_edges: u64,
     last_step_ns: u64,
@@ -67,14 +72,82 @@ fn channel(number: u8) -> Channel {
     Channel::new(number).unwrap_or_else(|| unreachable!("timers have channels 1 to 4"))
 }
 
-impl StageWires {
-    fn new(plant: &SharedPlant, name: StageName) -> Self {
-        let counts = with_plant(plant, |plant| plant.stage(name).encoder_counts());
-        Self { name, step: false, counts, step_edges: 0, last_step_ns: 0, record: None }
+/// What a driver chip has seen of its other lines.
+#[derive(Debug)]
+struct DriverWires {
+    parts: DriverParts,
+    enabled_ns: Option<u64>,
+    away: bool,
+    direction_ns: u64,
+    /// It has not moved since it was switched on.
+    fresh: bool,
+    violations: u64,
+}
+
+impl DriverWires {
+    /// EN or DIR may have changed.
+    fn look(&mut self, chip: &mut Chip, name: StageName, (at_ns, last_step_ns): (u64, u64)) {
+        let enabled = chip.level(pins(name).enable) == Level::Low;
+        if enabled != self.enabled_ns.is_some() {
+            self.enabled_ns = enabled.then_some(at_ns);
+            self.fresh = true;
+        }
+        let away = chip.level(pins(name).direction) == Level::High;
+        if away != std::mem::replace(&mut self.away, away) {
+            self.direction_ns = at_ns;
+            let held_ns = at_ns.saturating_sub(last_step_ns);
+            self.violations += u64::from(last_step_ns > 0 && held_ns < self.parts.direction_hold_ns);
+        }
     }
 
-    /// Looks at STEP.
-    fn look(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos) {
+    /// A STEP edge: whether the driver takes it, and notes where it came too early.
+    fn step(&mut self, at_ns: u64) -> bool {
+        let Some(enabled_ns) = self.enabled_ns else { return false };
+        let too_early = at_ns.saturating_sub(self.direction_ns) < self.parts.direction_setup_ns;
+        let stood_ns = at_ns.saturating_sub(enabled_ns);
+        let not_tuned = self.fresh && stood_ns < self.parts.standstill_ms.saturating_mul(1_000_000);
+        self.violations += u64::from(too_early) + u64::from(not_tuned);
+        self.fresh = false;
+        true
+    }
+}
+
+impl StageWires {
+    fn new(plant: &SharedPlant, name: StageName, (seed, parts): (u64, &Parts)) -> Self {
+        let (counts, home, far) = with_plant(plant, |plant| {
+            let stage = plant.stage(name);
+            (stage.encoder_counts(), stage.home_closed(), stage.far_closed())
+        });
+        let purposes = match name {
+            StageName::Sensor => ["home contact", "far contact"],
+            StageName::Lens => ["lens home contact", "lens far contact"],
+        };
+        let contact = |purpose, actuated| Contact::new(parts.switches, Noise::new(seed, purpose), actuated);
+        let driver = DriverWires {
+            parts: parts.driver,
+            enabled_ns: None,
+            away: false,
+            direction_ns: 0,
+            fresh: true,
+            violations: 0,
+        };
+        Self {
+            name,
+            step: false,
+            driver,
+            contacts: [contact(purposes[0], home), contact(purposes[1], far)],
+            counts,
+            step_edges: 0,
+            last_step_ns: 0,
+            record: None,
+        }
+    }
+
+    /// Looks at STEP, and at DIR and EN where they were written.
+    fn look(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos, driver_written: bool) {
+        if driver_written {
+            self.driver.look(chip, self.name, (at.0, self.last_step_ns));
+        }
         let (pin, timer, function) = pins(self.name).step;
         let step = is_high(chip, pin, function, |chip| {
             let (timer, registers) = chip.part().advanced_timer(timer);
@@ -88,10 +161,10 @@ impl StageWires {
         if let Some(record) = &mut self.record {
             record.push(at.0);
         }
-        if chip.level(pins(self.name).enable) == Level::High {
+        if !self.driver.step(at.0) {
             return;
         }
-        let away = chip.level(pins(self.name).direction) == Level::High;
+        let away = self.driver.away;
         with_plant(plant, |plant| plant.step_edge(at.0, self.name, away));
         self.put(plant, chip, at);
     }
@@ -113,8 +186,17 @@ impl StageWires {
             }
         }
         // Normally closed to ground: an actuated switch opens, and the pull-up makes the pin high.
-        chip.drive_pin(at, pins(self.name).home, Level::from(home));
-        chip.drive_pin(at, pins(self.name).far, Level::from(far));
+        let driven = self.driver.enabled_ns.is_some();
+        let wires = [(pins(self.name).home, home), (pins(self.name).far, far)];
+        for (contact, (pin, actuated)) in self.contacts.iter_mut().zip(wires) {
+            chip.drive_pin(at, pin, Level::from(contact.level(at.0, actuated, driven)));
+        }
+    }
+
+    /// When a switch's wire may change by itself.
+    fn next_ns(&self, now_ns: u64) -> u64 {
+        let driven = self.driver.enabled_ns.is_some();
+        self.contacts.iter().map(|contact| contact.next_ns(now_ns, driven)).min().unwrap_or(u64::MAX)
     }
 
     /// Quadrature: A leads B when the count rises.
@@ -127,9 +209,9 @@ impl StageWires {
 }
 
 impl Wiring {
-    /// Connects the board to the plant at power-on.
-    pub fn new(plant: SharedPlant, camera: Camera, chip: &mut Chip) -> Self {
-        let stages = [StageName::Sensor, StageName::Lens].map(|name| StageWires::new(&plant, name));
+    /// Connects the board to the plant at power-on; the seed decides when contacts bounce.
+    pub fn new(plant: SharedPlant, camera: Camera, chip: &mut Chip, parts: (u64, &Parts)) -> Self {
+        let stages = [StageName::Sensor, StageName::Lens].map(|name| StageWires::new(&plant, name, parts));
         let mut wiring = Self { plant, camera, stages, trigger: false, begun: None, shots: Vec::new() };
         for stage in &mut wiring.stages {
             stage.put_encoder(chip, VirtualNanos(0));
@@ -140,16 +222,17 @@ impl Wiring {
 
     /// Whether a write to this address can move a watched pin.
     pub fn watches(address: u64) -> bool {
-        WATCHED.iter().any(|(from, to)| (*from..*to).contains(&address))
+        WATCHED.iter().any(|range| range.contains(&address))
     }
 
-    /// Looks at the pins at a moment, and lets what is due at the camera happen.
-    pub fn look(&mut self, chip: &mut Chip, at: VirtualNanos) {
+    /// Looks at the pins at a moment, after a register was `written` where one was, and lets what is due at the camera happen.
+    pub fn look(&mut self, chip: &mut Chip, at: VirtualNanos, written: Option<u64>) {
+        let driver_written = written.is_some_and(|address| DRIVER_PORT.contains(&address));
         while let Some((at_ns, edge)) = self.camera.due(at.0) {
             self.expose(chip, at, at_ns, edge);
         }
         for stage in &mut self.stages {
-            stage.look(&self.plant, chip, at);
+            stage.look(&self.plant, chip, at, driver_written);
         }
         let trigger = is_high(chip, TRIGGER, TIM2_FUNCTION, |chip| {
             let (timer, registers) = chip.part().timer(TIM2);
@@ -191,9 +274,16 @@ impl Wiring {
         }
     }
 
-    /// When the camera needs attention next.
-    pub fn next_ns(&self) -> Option<u64> {
-        self.camera.next_ns()
+    /// When the camera or a switch needs attention next.
+    pub fn next_ns(&self, now_ns: u64) -> Option<u64> {
+        let switches_ns = self.stages.iter().map(|stage| stage.next_ns(now_ns)).min();
+        self.camera.next_ns().into_iter().chain(switches_ns).min().filter(|at| *at < u64::MAX)
+    }
+
+    /// STEP edges that came sooner than the driver chip wants them after a change of DIR or after it was switched on, and changes
+    /// of DIR that came too soon after one.
+    pub fn driver_violations(&self, name: StageName) -> u64 {
+        self.stage(name).driver.violations
     }
 
     /// Takes the exposures that have ended.
@@ -240,7 +330,10 @@ impl Wiring {
 
     /// The board was reset.
     pub fn board_reset(&mut self, at: VirtualNanos) {
-        self.stages.iter_mut().for_each(|stage| stage.step = false);
+        for stage in &mut self.stages {
+            // A resistor holds EN while the chip's pins float.
+            (stage.step, stage.driver.enabled_ns) = (false, None);
+        }
         if std::mem::take(&mut self.trigger) {
             self.camera.trigger(at.0, false);
         }

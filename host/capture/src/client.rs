@@ -8,7 +8,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
         mpsc::{Sender, channel, sync_channel},
     },
@@ -18,14 +18,14 @@ use std::{
 
 use farnear_protocol::{
     Request, Response,
-    message::{Hello, Status},
+    message::{Axis, Hello, Status},
 };
 
 use crate::{
     error::ClientError,
     log_stream::LogStream,
     owner::{Command, Connect, Listener, Owner, Session, nonsense},
-    timing::Timing,
+    timing::{Pace, Timing},
     transport::{SerialTransport, Transport},
 };
 
@@ -44,6 +44,8 @@ pub struct Client {
 struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
+    /// How fast the axes move, as far as the board was asked.
+    paces: Mutex<Vec<(Axis, Pace)>>,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -95,7 +97,13 @@ impl Client {
         let owner = Owner::start(connect, port, emulated, choose, commands)?;
         let session = owner.session();
         let thread = std::thread::spawn(move || owner.run());
-        let port = Port { name: port.into(), timing, inbox: Some(inbox), thread: Some(thread) };
+        let port = Port {
+            name: port.into(),
+            timing,
+            paces: Mutex::default(),
+            inbox: Some(inbox),
+            thread: Some(thread),
+        };
         Ok(Self { port: Arc::new(port), session, interrupt: None })
     }
 
@@ -108,6 +116,7 @@ impl Client {
         let (answer, joined) = sync_channel(1);
         self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
         self.session = joined.recv().map_err(|_| self.ended("saying hello"))??;
+        self.paces().clear();
         Ok(())
     }
 
@@ -124,6 +133,11 @@ impl Client {
                 Err(_) => std::thread::sleep(NEXT_ATTEMPT),
             }
         }
+    }
+
+    /// How fast the axes move, as far as the board was asked; cleared where that may have changed.
+    pub(crate) fn paces(&self) -> MutexGuard<'_, Vec<(Axis, Pace)>> {
+        self.port.paces.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Who the board is.

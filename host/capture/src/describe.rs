@@ -83,5 +83,6 @@ pub fn routine_name(routine: Routine) -> String {
         Routine::Travel { axis } => format!("travel of the {}", axis_name(axis)),
         Routine::Backlash { axis } => format!("backlash of the {}", axis_name(axis)),
         Routine::Piezo => "piezo's gain, hysteresis and creep".into(),
+        Routine::Gauge => "strain gauge's gain and zero".into(),
     }
 }

@@ -112,6 +112,7 @@ impl Client {
     /// # Errors
     /// [`ClientError`]; refused outside the allowed range and while anything moves.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
+        self.paces().clear();
         let during = format!("setting {} to {value}", key.name());
         self.setting_by(&Request::WriteSetting { key, value }, &during)
     }

@@ -8,15 +8,22 @@ use std::time::Duration;
 
 use farnear_protocol::{
     Nanometres,
-    message::{Axis, Limits, Routine, Shot, Status, TriggerMode},
+    message::{Axis, Limits, Routine, SettingKey, Shot, Status, StepperKeys, TriggerMode},
 };
 
-/// The slowest coarse speed a healthy rig has; a third of its usual 6.25 mm/s.
-const SLOWEST_COARSE_NM_PER_S: u64 = 2_000_000;
+/// What homing searches a switch with at most, whatever moves are set to, and leaves it with.
+const SEARCH_NM_PER_S: u64 = 4_000_000;
+const LEAVE_NM_PER_S: u64 = 1_000_000;
+/// The motor's driver wants to stand for 0.14 s when it is switched on; and everything is a little slower than it should be.
+const SLACK: Duration = Duration::from_millis(500);
 /// Longest time a healthy position needs to settle, whatever moved.
 const SETTLE: Duration = Duration::from_secs(2);
 /// Homing approaches the switch a second time, slowly, over less than a millimetre.
 const SLOW_APPROACH: Duration = Duration::from_secs(10);
+
+/// More than the ways about a switch at homing, and than any backlash.
+const SWITCH_NM: u64 = 1_500_000;
+const BACKLASH_NM: u64 = 200_000;
 
 /// How long the board waits for an exposure that it does not trigger, and more.
 const FOREIGN_TRIGGER: Duration = Duration::from_secs(10);
@@ -67,24 +74,66 @@ impl Timing {
     }
 }
 
-/// Longest time a healthy board takes to home an axis.
-pub fn homing_time(axis: Axis, limits: &Limits) -> Duration {
-    travel_time(travel(axis, limits)) + SLOW_APPROACH
+/// How fast an axis moves, as the board's own settings have it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Pace {
+    speed_nm_per_s: u64,
+    /// What its ramps take beyond the way at full speed.
+    ramps: Duration,
 }
 
-/// Longest time a healthy board takes for a move from one position to another. The piezo's travel takes no time to speak
-/// of.
-pub fn move_time(axis: Axis, from: Nanometres, to: Nanometres) -> Duration {
+impl Pace {
+    /// Of the piezo, whose travel takes no time to speak of.
+    pub const AT_ONCE: Self = Self { speed_nm_per_s: u64::MAX, ramps: Duration::ZERO };
+
+    /// Of an axis; `setting` reads a setting of the board.
+    ///
+    /// # Errors
+    /// Those of `setting`.
+    pub fn of<E>(axis: Axis, mut setting: impl FnMut(SettingKey) -> Result<i32, E>) -> Result<Self, E> {
+        let Some(StepperKeys { speed, acceleration, jerk, .. }) = StepperKeys::of(axis) else {
+            return Ok(Self::AT_ONCE);
+        };
+        let mut positive = |key| Ok(f64::from(setting(key)?.max(1)));
+        let (speed, acceleration, jerk) = (positive(speed)?, positive(acceleration)?, positive(jerk)?);
+        // v / a and a / j: up or down from full speed takes the sum of both, half of it beyond the way's own time.
+        let ramp_s = speed / (1e3 * acceleration) + acceleration / jerk;
+        Ok(Self { speed_nm_per_s: speed as u64, ramps: Duration::from_secs_f64(ramp_s) })
+    }
+
+    /// Longest time for a way.
+    fn time(self, distance_nm: u64) -> Duration {
+        let micros = u128::from(distance_nm) * 1_000_000 / u128::from(self.speed_nm_per_s.max(1));
+        // An eighth more for its clock and for segments that round up.
+        let way = Duration::from_micros(u64::try_from(micros + micros / 8).unwrap_or(u64::MAX));
+        way + self.ramps
+    }
+
+    /// The same, no faster than a speed.
+    fn at_most(self, nm_per_s: u64) -> Self {
+        Self { speed_nm_per_s: self.speed_nm_per_s.min(nm_per_s), ..self }
+    }
+}
+
+/// Longest time a healthy board takes to home an axis.
+pub fn homing_time(axis: Axis, limits: &Limits, pace: Pace) -> Duration {
+    let way = travel(axis, limits);
+    // The search; the way off the switch and, after the slow approach, back.
+    pace.at_most(SEARCH_NM_PER_S).time(way) + 3 * pace.at_most(LEAVE_NM_PER_S).time(SWITCH_NM) + SLOW_APPROACH
+}
+
+/// Longest time a healthy board takes for a move from one position to another.
+pub fn move_time(axis: Axis, from: Nanometres, to: Nanometres, pace: Pace) -> Duration {
     let distance_nm = match axis {
         Axis::SensorCoarse | Axis::Lens => from.0.abs_diff(to.0),
         Axis::SensorFine => 0,
     };
     // Twice for a backlash that is taken out: beyond the target and back.
-    travel_time(u64::from(distance_nm)) + 2 * SETTLE
+    pace.time(u64::from(distance_nm)) + pace.time(BACKLASH_NM) + 2 * SETTLE + SLACK
 }
 
 /// Longest time a healthy board takes for an exposure program.
-pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
+pub fn program_time(shots: &[Shot], status: &Status, paces: &[(Axis, Pace)]) -> Duration {
     let mut stands = Axis::ALL.map(|axis| (axis, status.axis(axis).measured));
     shots
         .iter()
@@ -99,20 +148,25 @@ pub fn program_time(shots: &[Shot], status: &Status) -> Duration {
             };
             // The camera reads a picture out before it can take the next one.
             let once = exposure + Duration::from_millis(100) + trigger;
-            move_time(shot.axis, from, shot.target) + once * u32::from(shot.repeat)
+            let pace =
+                paces.iter().find(|(axis, _)| *axis == shot.axis).map_or(Pace::AT_ONCE, |(_, pace)| *pace);
+            move_time(shot.axis, from, shot.target, pace) + once * u32::from(shot.repeat)
         })
         .sum()
 }
 
-/// Longest time a healthy board takes for a calibration routine, homing included.
-pub fn calibration_time(routine: Routine, limits: &Limits) -> Duration {
+/// Longest time a healthy board takes for a calibration routine, homing included; `pace` is that of the axis it moves.
+pub fn calibration_time(routine: Routine, limits: &Limits, pace: Pace) -> Duration {
     match routine {
         Routine::Travel { axis } => {
-            homing_time(axis, limits) + travel_time(4 * travel(axis, limits)) + SLOW_APPROACH
+            let there_and_back = 2 * pace.at_most(SEARCH_NM_PER_S).time(2 * travel(axis, limits));
+            homing_time(axis, limits, pace) + there_and_back + SLOW_APPROACH
         }
-        Routine::Backlash { axis } => homing_time(axis, limits) + 6 * SLOW_APPROACH,
+        Routine::Backlash { axis } => homing_time(axis, limits, pace) + 6 * SLOW_APPROACH,
         // A sweep up and down, and creep over a decade of time.
         Routine::Piezo => Duration::from_secs(60),
+        // Homed twice, and eight meetings with the switch.
+        Routine::Gauge => 2 * homing_time(Axis::SensorCoarse, limits, pace) + 8 * SLOW_APPROACH,
     }
 }
 
@@ -121,20 +175,33 @@ fn travel(axis: Axis, limits: &Limits) -> u64 {
     u64::from(max.0.abs_diff(min.0))
 }
 
-fn travel_time(distance_nm: u64) -> Duration {
-    Duration::from_micros(distance_nm.saturating_mul(1_000_000) / SLOWEST_COARSE_NM_PER_S)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The pace of an axis with this speed, the rest as usual.
+    fn pace(speed_nm_per_s: i32) -> Pace {
+        let setting = |key| {
+            Ok::<_, ()>(match key {
+                SettingKey::CoarseSpeedNmPerS => speed_nm_per_s,
+                SettingKey::CoarseAccelerationUmPerS2 => 50_000,
+                SettingKey::CoarseJerkUmPerS3 => 1_600_000,
+                _ => return Err(()),
+            })
+        };
+        Pace::of(Axis::SensorCoarse, setting).expect("these three are asked for")
+    }
+
     #[test]
-    fn the_wait_grows_with_the_way() {
-        let (near, far) = (Nanometres(0), Nanometres(13_000_000));
-        assert_eq!(move_time(Axis::Lens, near, near), 2 * SETTLE);
-        assert_eq!(move_time(Axis::SensorCoarse, far, near), 2 * SETTLE + Duration::from_millis(6_500));
-        assert_eq!(move_time(Axis::SensorFine, near, far), 2 * SETTLE);
+    fn the_wait_grows_with_the_way_and_is_as_long_as_the_boards_speed_needs() {
+        let (near, far) = (Nanometres(0), Nanometres(6_500_000));
+        let time = |speed| move_time(Axis::SensorCoarse, far, near, pace(speed)).as_secs_f64();
+        // 6.5 mm at 6.25 mm/s, at the 0.5 mm/s that the bring-up begins with, and at the slowest there is.
+        for speed in [6_250_000, 500_000, 160_000] {
+            let needs = 6_500_000.0 / f64::from(speed);
+            assert!((needs + 1.0..1.2 * needs + 10.0).contains(&time(speed)), "{speed}: {}", time(speed));
+        }
+        assert!(move_time(Axis::SensorFine, near, far, Pace::AT_ONCE) <= 3 * SETTLE);
         assert!(Timing::EMULATED.allowance(SETTLE) > Timing::REAL.allowance(SETTLE));
     }
 }

@@ -24,7 +24,7 @@ use crate::{
     describe::{axis_name, routine_name, um},
     error::ClientError,
     owner::{Listener, Note, nonsense},
-    timing::{calibration_time, homing_time, move_time, program_time},
+    timing::{Pace, calibration_time, homing_time, move_time, program_time},
 };
 
 /// Longest single wait for an event, so that an interruption by the user is seen soon.
@@ -248,13 +248,24 @@ impl Client {
         asked.max(limits.silence_min).min(limits.silence_max)
     }
 
+    /// How fast an axis moves, by the board's settings, which are read when they are needed first.
+    fn pace(&self, axis: Axis) -> Result<Pace, ClientError> {
+        let known = self.paces().iter().find(|(of, _)| *of == axis).map(|(_, pace)| *pace);
+        if let Some(pace) = known {
+            return Ok(pace);
+        }
+        let pace = Pace::of(axis, |key| self.setting(key).map(|setting| setting.value))?;
+        self.paces().push((axis, pace));
+        Ok(pace)
+    }
+
     /// Begins to home an axis; another one may be homed or moved at the same time.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
         let during = format!("homing the {}", axis_name(axis));
-        let work = homing_time(axis, &self.hello().limits);
+        let work = homing_time(axis, &self.hello().limits, self.pace(axis)?);
         self.start_work(&Request::Home { axis, silence: self.keep_alive() }, work, during)
     }
 
@@ -273,7 +284,7 @@ impl Client {
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
         let during = format!("moving the {} to {:.3} um", axis_name(axis), um(target));
         let status = self.status()?;
-        let work = move_time(axis, status.axis(axis).measured, target);
+        let work = move_time(axis, status.axis(axis).measured, target, self.pace(axis)?);
         self.start_work(&Request::Move { axis, target, silence: self.keep_alive() }, work, during)
     }
 
@@ -291,7 +302,12 @@ impl Client {
     /// [`ClientError`].
     pub fn calibrate(&self, routine: Routine) -> Result<Calibration, ClientError> {
         let during = format!("measuring the {}", routine_name(routine));
-        let work = calibration_time(routine, &self.hello().limits);
+        let axis = match routine {
+            Routine::Travel { axis } | Routine::Backlash { axis } => axis,
+            Routine::Gauge => Axis::SensorCoarse,
+            Routine::Piezo => Axis::SensorFine,
+        };
+        let work = calibration_time(routine, &self.hello().limits, self.pace(axis)?);
         let request = Request::Calibrate { routine, silence: self.keep_alive() };
         match self.start_work(&request, work, during.clone())?.wait()? {
             EventKind::Calibrated { result, .. } => Ok(result),
@@ -325,7 +341,13 @@ impl Client {
         if status.program.state == ProgramState::Idle {
             return Err(ClientError::NotArmed);
         }
-        let work = program_time(shots, &status);
+        let mut paces = Vec::new();
+        for axis in Axis::ALL {
+            if shots.iter().any(|shot| shot.axis == axis) {
+                paces.push((axis, self.pace(axis)?));
+            }
+        }
+        let work = program_time(shots, &status, &paces);
         let during = "running the exposure program".to_string();
         self.start_work(&Request::RunProgram { silence: self.keep_alive() }, work, during)
     }

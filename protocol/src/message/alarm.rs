@@ -80,4 +80,6 @@ pub enum Alarm {
         /// Which.
         record: RecordName,
     },
+    /// The board's memory does not answer: nothing outlasts a loss of power.
+    MemoryMissing,
 }

@@ -22,6 +22,8 @@ pub enum Routine {
     },
     /// The piezo's gain and hysteresis: an open-loop sweep up and down.
     Piezo,
+    /// Gain and zero of the strain gauge against stage A's encoder, by way of its home switch. The axis is homed.
+    Gauge,
 }
 
 /// What a routine found. Travel is only reported; the rest is also stored as settings.
@@ -51,5 +53,12 @@ pub enum Calibration {
         hysteresis_ppm: u32,
         /// Creep in parts per million of a step per decade of time.
         creep_ppm_per_decade: u32,
+    },
+    /// The strain gauge.
+    Gauge {
+        /// Position for what the gauge says, parts per million.
+        gain_ppm: i32,
+        /// What it says where the piezo is relaxed.
+        offset: Nanometres,
     },
 }

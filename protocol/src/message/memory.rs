@@ -69,11 +69,15 @@ pub enum SettingKey {
     CameraReadoutUs,
     /// The camera's exposure signal must have come this long after the trigger pulse has ended.
     StrobeDeadlineUs,
+    /// Position for what the strain gauge says, parts per million, from its calibration.
+    GaugeGainPpm,
+    /// What the strain gauge says where the piezo is relaxed, from its calibration.
+    GaugeOffsetNm,
 }
 
 impl SettingKey {
     /// All, in order.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 25] = [
         Self::DatumNm,
         Self::DistanceMinNm,
         Self::CoarseMinNm,
@@ -97,6 +101,8 @@ impl SettingKey {
         Self::PiezoCreepPpmPerDecade,
         Self::CameraReadoutUs,
         Self::StrobeDeadlineUs,
+        Self::GaugeGainPpm,
+        Self::GaugeOffsetNm,
     ];
 
     /// Its name for people and files, e.g. `coarse_min_nm`.
@@ -125,6 +131,8 @@ impl SettingKey {
             Self::PiezoCreepPpmPerDecade => "piezo_creep_ppm_per_decade",
             Self::CameraReadoutUs => "camera_readout_us",
             Self::StrobeDeadlineUs => "strobe_deadline_us",
+            Self::GaugeGainPpm => "gauge_gain_ppm",
+            Self::GaugeOffsetNm => "gauge_offset_nm",
         }
     }
 }

@@ -153,6 +153,7 @@ impl Board {
                         hysteresis_ppm: 120_000,
                         creep_ppm_per_decade: 15_000,
                     },
+                    Routine::Gauge => Calibration::Gauge { gain_ppm: 1_000_000, offset: Nanometres(0) },
                 };
                 self.event(EventKind::Calibrated { request: id, result });
             }

@@ -59,14 +59,15 @@ impl Backlash {
 
     pub(crate) fn tick(&mut self, stage: &mut Stage, settings: &Settings) -> Step {
         let axis = self.axis;
+        let carried = stage.carried(axis);
         let Some((stepper, settings)) = stage.with_numbers(axis, settings) else { return Step::On };
         let next = match &mut self.phase {
-            Phase::Home(homing) => match go_home(homing, axis, stepper, settings) {
+            Phase::Home(homing) => match go_home(homing, axis, stepper, settings, carried) {
                 Ok(()) => Phase::Clear,
                 Err(step) => return step,
             },
             Phase::HomeAgain(homing) => {
-                return match go_home(homing, axis, stepper, settings) {
+                return match go_home(homing, axis, stepper, settings, carried) {
                     Ok(()) => Step::Done(self.result(settings)),
                     Err(step) => step,
                 };

@@ -155,7 +155,7 @@ impl Sweep {
 }
 
 /// Drives from one code to another over some ticks, gently at both ends so that nothing swings; gives whether it is there.
-fn ramp(piezo: &mut Piezo, ticks: u32, over: u32, from: u16, to: u16) -> bool {
+pub(super) fn ramp(piezo: &mut Piezo, ticks: u32, over: u32, from: u16, to: u16) -> bool {
     let (at, over) = (i64::from(ticks.min(over)), i64::from(over));
     // Three squares less two cubes of the time. The way has 17 bits and the time 12: all of it has 54.
     let way = (i64::from(to) - i64::from(from)) * at * at * (3 * over - 2 * at) / (over * over * over);

@@ -42,9 +42,10 @@ impl Travel {
 
     pub(crate) fn tick(&mut self, stage: &mut Stage, settings: &Settings) -> Step {
         let axis = self.axis;
+        let carried = stage.carried(axis);
         let Some((stepper, settings)) = stage.with_numbers(axis, settings) else { return Step::On };
         let next = if let Phase::Home(homing) = &mut self.phase {
-            match go_home(homing, axis, stepper, settings) {
+            match go_home(homing, axis, stepper, settings, carried) {
                 Ok(()) => Phase::Search,
                 Err(step) => return step,
             }

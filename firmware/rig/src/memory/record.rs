@@ -32,10 +32,20 @@ const COVERED: usize = 12;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// All records, in the order of their places and of their urgency: what moves is known first.
+/// All records, in the order of their places.
 pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Counters,
     RecordName::Alarms,
+    RecordName::Settings,
+    RecordName::Program,
+    RecordName::Correction,
+];
+
+/// All records, the most urgent first. Alarms come before the counters, which also say what moved: at a start they take
+/// that over, and a power that goes again in between must not lose it.
+pub(crate) const URGENCY: [RecordName; RECORDS] = [
+    RecordName::Alarms,
+    RecordName::Counters,
     RecordName::Settings,
     RecordName::Program,
     RecordName::Correction,

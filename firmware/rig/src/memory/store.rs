@@ -8,7 +8,7 @@ use farnear_protocol::message::RecordName;
 use heapless::Vec;
 
 use crate::io::{MEMORY_BYTES, MEMORY_CHUNK, MemoryWrite};
-use crate::memory::record::{self, ALL, BLOCK, Block, Checksum, Found, RECORDS};
+use crate::memory::record::{self, ALL, BLOCK, Block, Checksum, Found, RECORDS, URGENCY};
 
 /// The next write of a record.
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +81,7 @@ impl Store {
         &mut self,
         contents: impl Fn(RecordName, usize) -> Block,
     ) -> Option<(MemoryWrite, Option<RecordName>)> {
-        let record = ALL.into_iter().find(|record| self.slots[record::index(*record)].changed)?;
+        let record = URGENCY.into_iter().find(|record| self.slots[record::index(*record)].changed)?;
         let slot = &mut self.slots[record::index(record)];
         let mut job = match self.job.take() {
             Some(job) if job.record == record => job,

@@ -17,8 +17,9 @@ use farnear_protocol::message::{Failure, PositionState};
 use heapless::Deque;
 
 use crate::io::{MotorOutputs, Segment, StepperState, TICK_US};
-use crate::motion::ramp::{Ramp, RampLimits};
+use crate::motion::ramp::{self, Ramp, RampLimits};
 use crate::motion::steps;
+use crate::motion::switch::{self, Place, Switch};
 use crate::settings::StepperSettings;
 
 /// Segments that may be under way at once: those that wait in the board and the one that runs.
@@ -84,8 +85,8 @@ pub(crate) struct Stepper {
     target: Nanometres,
     speed: u32,
     fault: Option<Failure>,
-    home_closed: bool,
-    far_closed: bool,
+    home_switch: Switch,
+    far_switch: Switch,
     driver_fault: bool,
 }
 
@@ -112,15 +113,25 @@ impl Stepper {
             target: Nanometres(0),
             speed: 0,
             fault: None,
-            home_closed: false,
-            far_closed: false,
+            home_switch: Switch::new(),
+            far_switch: Switch::new(),
             driver_fault: false,
         }
     }
 
-    /// Whether the home switch was closed at the last tick.
+    /// Whether the home switch is closed.
     pub(crate) const fn home_closed(&self) -> bool {
-        self.home_closed
+        self.home_switch.is_closed()
+    }
+
+    /// Whether the home switch says what it is believed to say.
+    pub(crate) const fn home_is_steady(&self) -> bool {
+        self.home_switch.is_steady()
+    }
+
+    /// Where the home switch (or the far one) changed last.
+    pub(crate) const fn changed(&self, far: bool) -> Place {
+        if far { self.far_switch.changed() } else { self.home_switch.changed() }
     }
 
     /// Whether the driver reported a fault at the last tick.
@@ -128,9 +139,9 @@ impl Stepper {
         self.driver_fault
     }
 
-    /// Whether the far switch was closed at the last tick.
+    /// Whether the far switch is closed.
     pub(crate) const fn far_closed(&self) -> bool {
-        self.far_closed
+        self.far_switch.is_closed()
     }
 
     /// What is known of the position.
@@ -271,8 +282,26 @@ impl Stepper {
                 let back = self.target.0.saturating_sub(self.approach().0);
                 Nanometres(self.measured().0.min(back))
             }
-            _ => self.settings.min.min(Nanometres(0)),
+            // Wherever the search for its switch brought it, or may bring it.
+            _ => self.lowest_of_homing(),
         }
+    }
+
+    /// The lowest position that homing comes to: beyond its switch it brakes.
+    pub(crate) fn lowest_of_homing(&self) -> Nanometres {
+        let settings = &self.settings;
+        let limits = RampLimits {
+            start_speed: settings.start_speed,
+            speed: settings.home_search_speed.max(settings.start_speed),
+            acceleration: settings.home_acceleration,
+            jerk: settings.home_jerk,
+        };
+        // What was handed over is played, a millisecond each; the switch is believed after some ticks.
+        let late_us = OUTSTANDING as u32 * 1_000 + u32::from(switch::SAMPLES) * TICK_US;
+        let late = u64::from(limits.speed) * u64::from(late_us) / 1_000_000;
+        let way = ramp::braking(&limits).saturating_add(late as u32); // some milliseconds of pulses
+        let way = steps::to_nanometres(i32::try_from(way).unwrap_or(i32::MAX));
+        Nanometres(settings.min.0.min(0).saturating_sub(way.0))
     }
 
     /// Believes the encoder: homing begins from a position that steps and encoder do not agree on.
@@ -282,9 +311,11 @@ impl Stepper {
 
     /// Makes the edge of the home switch, which was met going down at `edge` (in pulses of the present count), position 0
     /// and the position known; gives how far the encoder's zero moved. The axis stands still. Coming from below the
-    /// motor is the backlash farther up when the stage is there.
-    pub(crate) const fn set_home(&mut self, edge: i32) -> Nanometres {
-        let zero = edge.wrapping_add(steps::to_steps(self.settings.backlash));
+    /// motor is the backlash farther up when the stage is there. The switch sees what the axis carries, `carried` farther away
+    /// from it: without that it would have been met there.
+    pub(crate) const fn set_home(&mut self, edge: i32, carried: Nanometres) -> Nanometres {
+        let farther = self.settings.backlash.0.saturating_add(carried.0);
+        let zero = edge.wrapping_add(steps::to_steps(Nanometres(farther)));
         self.position = self.position.wrapping_sub(zero);
         let expected = steps::to_encoder(steps::to_nanometres(self.position));
         let new_zero = self.encoder.wrapping_sub(expected);

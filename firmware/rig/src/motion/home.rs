@@ -2,7 +2,9 @@
 //!
 //! 1. Search: towards the switch at some speed, braking when it closes. Left out where it is closed already.
 //! 2. Leave: away until it opens, then a little further.
-//! 3. Approach: a pulse a millisecond until it closes again; that edge, with the screw's backlash, becomes position 0.
+//! 3. Approach: a pulse a millisecond until it closes again; that edge, with the screw's backlash and what a piezo on the
+//!    stage carries the switch's tab away, becomes position 0. Only from a switch that is open: one that closed again by
+//!    itself would put position 0 anywhere.
 //! 4. Return: to position 0 from below, like every move.
 //!
 //! The exact approach always comes from the same side at the same speed, so that the switch's hysteresis and its
@@ -41,16 +43,20 @@ impl Homing {
         Self { phase: Phase::Begin, leg: Leg::REST, known_before: false }
     }
 
-    /// Goes on while the axis has no fault; gives the shift of position 0 at the end.
+    /// Goes on while the axis has no fault; gives the shift of position 0 at the end. `carried`: how far the piezo on the stage
+    /// holds the switch's tab away.
     pub(crate) fn tick(
         &mut self,
         axis: &mut Stepper,
         settings: &StepperSettings,
+        carried: Nanometres,
     ) -> Option<Result<Nanometres, Failure>> {
         if !self.leg.is_over(axis) {
             return None;
         }
         self.phase = match (self.phase, self.leg.edge()) {
+            // One that bounces, or was just released, says in a moment what it is.
+            (Phase::Begin, _) if !axis.home_is_steady() => return None,
             (Phase::Begin, _) => {
                 self.known_before = axis.state() != PositionState::Unknown;
                 if axis.state() != PositionState::Homed {
@@ -60,9 +66,10 @@ impl Homing {
             }
             (Phase::Search, Some(_)) => Phase::Leave,
             (Phase::Leave, Some(_)) => Phase::Clear,
+            (Phase::Clear, _) if axis.home_closed() => return Some(Err(Failure::HomeSwitchStuck)),
             (Phase::Clear, _) => Phase::Approach,
             (Phase::Approach, Some(zero)) => {
-                let shift = axis.set_home(zero.position);
+                let shift = axis.set_home(zero.position, carried);
                 Phase::Return { shift: if self.known_before { shift } else { Nanometres(0) } }
             }
             (Phase::Return { shift }, _) => return Some(Ok(shift)),

@@ -4,6 +4,7 @@ use farnear_protocol::Nanometres;
 
 use crate::motion::axis::{Purpose, Stepper};
 use crate::motion::steps;
+use crate::motion::switch::Place;
 
 /// What ends a leg before its way is over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -16,20 +17,11 @@ pub(crate) enum Until {
     Far(bool),
 }
 
-/// Where the switch did what the leg waited for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Edge {
-    /// In pulses of the present count.
-    pub(crate) position: i32,
-    /// By the encoder on the motor's shaft.
-    pub(crate) measured: Nanometres,
-}
-
 /// A leg under way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Leg {
     until: Until,
-    edge: Option<Edge>,
+    edge: Option<Place>,
 }
 
 impl Leg {
@@ -56,14 +48,14 @@ impl Leg {
             Until::Far(closed) => axis.far_closed() == closed,
         };
         if met && self.edge.is_none() {
-            self.edge = Some(Edge { position: axis.position(), measured: axis.measured() });
+            self.edge = Some(axis.changed(matches!(self.until, Until::Far(_))));
             axis.stop();
         }
         axis.is_still()
     }
 
     /// Where the switch did it; `None` where the whole way was gone without.
-    pub(crate) const fn edge(&self) -> Option<Edge> {
+    pub(crate) const fn edge(&self) -> Option<Place> {
         self.edge
     }
 }

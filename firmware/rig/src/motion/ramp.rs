@@ -128,6 +128,11 @@ impl Curve {
     }
 }
 
+/// Pulses from top speed to rest.
+pub(crate) fn braking(limits: &RampLimits) -> u32 {
+    ceil(Curve::fit(limits, u32::MAX).way)
+}
+
 /// A way that is being planned, segment by segment.
 #[derive(Clone, Debug)]
 pub(crate) struct Ramp {

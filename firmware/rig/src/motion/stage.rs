@@ -55,7 +55,7 @@ impl Stage {
     pub(crate) fn act(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
         self.coarse.act(&inputs.coarse.stepper, &mut outputs.coarse);
         self.lens.act(&inputs.lens.stepper, &mut outputs.lens);
-        outputs.piezo_dac = if self.on_time { self.fine.act() } else { self.fine.code() };
+        outputs.piezo_dac = if self.on_time { self.fine.act() } else { self.fine.played() };
     }
 
     /// A stepper axis; the piezo is none.
@@ -94,6 +94,14 @@ impl Stage {
         match self.stepper(axis) {
             Some(stepper) => stepper.measured(),
             None => self.fine.measured(),
+        }
+    }
+
+    /// How far the piezo holds the tab of the axis' home switch away from it: that of stage A is on the sensor's plate.
+    pub(crate) const fn carried(&self, axis: Axis) -> Nanometres {
+        match axis {
+            Axis::SensorCoarse => self.fine.measured(),
+            Axis::SensorFine | Axis::Lens => Nanometres(0),
         }
     }
 

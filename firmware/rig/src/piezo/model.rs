@@ -7,6 +7,8 @@
 //!
 //! All positions in the fine loop's fixed point. Cost: 12 comparisons and 6 multiplications a tick.
 
+use farnear_protocol::Nanometres;
+
 use super::BITS;
 use crate::io::{DAC_CODE_MAX, DAC_FULL_SCALE_NM};
 
@@ -23,6 +25,26 @@ const HALF_WIDTHS: i64 = ((PLAYS as i64 + 1) << 16) / 8;
 const LAGS: [u32; 3] = [9, 12, 16];
 /// Fraction bits that a lag has beyond a position's.
 const LAG_BITS: u32 = 16;
+
+/// Between what the gauge says and the position.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct GaugeScale {
+    offset: i32,
+    /// Times 2^24.
+    gain: i64,
+}
+
+impl GaugeScale {
+    pub(crate) const fn new(gain_ppm: u32, offset: Nanometres) -> Self {
+        Self { offset: offset.0, gain: ((gain_ppm as i64) << 24) / 1_000_000 }
+    }
+
+    /// The position where the gauge says this, in nanometres from its nominal zero.
+    pub(crate) const fn position(&self, says: i32) -> Nanometres {
+        let nm = (says - self.offset) as i64 * self.gain; // 18 bits times 25
+        Nanometres(((nm + (1 << 23)) >> 24) as i32)
+    }
+}
 
 /// Between codes and the stroke that they command.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -140,6 +162,16 @@ const fn weights(hysteresis_ppm: u32, creep_ppm_per_decade: u32) -> [i64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gauge_is_taken_as_it_was_calibrated() {
+        let plain = GaugeScale::new(1_000_000, Nanometres(0));
+        assert!((-10_000..252_143).all(|says| plain.position(says) == Nanometres(says)));
+        // It says 2 % too much, and 1 um where the piezo is relaxed.
+        let scale = GaugeScale::new(980_392, Nanometres(1_000));
+        assert_eq!(scale.position(1_000), Nanometres(0));
+        assert!((scale.position(205_000).0 - 200_000).abs() <= 1);
+    }
 
     #[test]
     fn every_code_is_its_own_nearest() {

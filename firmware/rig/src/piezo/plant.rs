@@ -63,11 +63,11 @@ impl Plant {
         Some(code.round().clamp(0.0, f64::from(GAUGE_CODE_MAX)) as u32)
     }
 
-    /// One control tick, in which the DAC gets this code.
-    pub(crate) fn tick(&mut self, code: u16) {
+    /// One control tick, in which the DAC gets this code, or none.
+    pub(crate) fn tick(&mut self, code: Option<u16>) {
         let before = self.part.latency_us / 10;
         self.run(before);
-        self.code = code;
+        self.code = code.unwrap_or(self.code);
         self.run(20 - before);
     }
 

@@ -89,14 +89,15 @@ fn a_dead_gauge_opens_the_loop_and_holds_the_command() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(NOMINAL, 1);
     step(&mut piezo, &mut plant, 100_000);
-    let held = piezo.act();
+    let held = piezo.act().expect("it is known where it stands");
     for silent in [None, Some(0), Some(GAUGE_CODE_MAX)] {
         for _ in 0..10 {
             piezo.sense(silent);
             piezo.act();
         }
         assert!(piezo.gauge_failed());
-        assert!(piezo.act().abs_diff(held) < 20, "{} after {held}", piezo.act());
+        let code = piezo.act().expect("it is known where it stands");
+        assert!(code.abs_diff(held) < 20, "{code} after {held}");
         piezo.go(Nanometres(20_000));
     }
     // It comes back: the next move begins without a jump.
@@ -187,4 +188,25 @@ fn what_the_calibration_knows_makes_the_way_cleaner() {
     let (blind, knowing) = (swing(0, 0), swing(120_000, 15_000));
     // The plant's plays are wider than the model's, so a part is left to the observer.
     assert!(knowing < 0.7 * blind, "{knowing} nm in place of {blind} nm beyond the target");
+}
+
+#[test]
+fn after_a_reset_it_is_led_down_from_where_it_stands() {
+    let mut plant = Plant::new(NOMINAL, 5);
+    for _ in 0..5_000 {
+        plant.tick(Some(51_000));
+    }
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    // The converter does not answer at once.
+    piezo.sense(None);
+    assert_eq!(piezo.act(), None, "nothing is played while nobody knows");
+    let mut lowest = f64::MAX;
+    for _ in 0..2_000 {
+        let gauge = plant.gauge();
+        piezo.sense(gauge);
+        plant.tick(piezo.act());
+        lowest = lowest.min(plant.position);
+    }
+    assert_eq!(piezo.act(), Some(0));
+    assert!(lowest > -1_000.0 && plant.position.abs() < 100.0, "{lowest} nm, {} nm", plant.position);
 }

@@ -65,6 +65,11 @@ impl Rig {
         self.stage.stepper(axis).map_or_else(|| self.stage.fine.lowest(), Stepper::lowest)
     }
 
+    /// The lowest that an axis comes to where it is homed; the piezo, where it is relaxed.
+    pub(super) fn lowest_of_homing(&self, axis: Axis) -> Nanometres {
+        self.stage.stepper(axis).map_or(Nanometres(0), Stepper::lowest_of_homing)
+    }
+
     /// The lowest that an axis comes on its way to a target.
     pub(super) fn lowest_to(&self, axis: Axis, target: Nanometres) -> Nanometres {
         self.with_approach(axis, target).min(self.stage.measured(axis))

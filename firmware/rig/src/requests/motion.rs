@@ -17,7 +17,7 @@ impl Rig {
         }
         self.may_move(silence)?;
         self.must_be_free(axis)?;
-        self.must_not_come_close(axis, Nanometres(0))?;
+        self.must_not_come_close(axis, self.lowest_of_homing(axis))?;
         let work = AxisWork::Home(Homing::new());
         *self.works.on(axis) = Some(Active { request, silence, work });
         Ok(Response::Accepted)
@@ -46,8 +46,8 @@ impl Rig {
         let work = Calibrating::new(routine).ok_or(RequestError::NoSuchRoutine)?;
         self.may_move(silence)?;
         self.all_must_be_free()?;
-        if let Some(axis) = work.stepper() {
-            self.must_not_come_close(axis, Nanometres(0))?;
+        for axis in work.axes() {
+            self.must_not_come_close(*axis, self.lowest_of_homing(*axis))?;
         }
         self.works.whole = Some(Active { request, silence, work: WholeWork::Calibration(work) });
         Ok(Response::Accepted)

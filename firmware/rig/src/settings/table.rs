@@ -91,8 +91,8 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
     match key {
         // The thesis' lens (f = 50 mm) needs 52.8 to 53.0 mm (Li 2014, chapter 4): 5.9 mm into the travel.
         SettingKey::DatumNm => (47_000_000, 10_000_000, 200_000_000),
-        // Half a millimetre of over-travel at the home switch is the least that the stages come to at homing.
-        SettingKey::DistanceMinNm => (46_500_000, 0, 200_000_000),
+        // Homing brakes a quarter of a millimetre beyond the switch, and both stages may be homed at once.
+        SettingKey::DistanceMinNm => (46_450_000, 0, 200_000_000),
         SettingKey::CoarseMinNm | SettingKey::LensMinNm => (0, 0, TRAVEL_NM),
         SettingKey::CoarseMaxNm | SettingKey::LensMaxNm => (TRAVEL_NM, 0, TRAVEL_NM),
         // 6.25 mm/s is 40 kHz: 13 mm in 2.2 s, and 750 rpm, where such a motor still has torque at 24 V.
@@ -118,6 +118,10 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
         SettingKey::CameraReadoutUs => (10_500, 0, 1_000_000),
         // Latency 20 us; a camera that has not answered after 5 ms did not hear.
         SettingKey::StrobeDeadlineUs => (5_000, 100, 1_000_000),
+        // As its data sheet has it, until it is calibrated; a tenth is more than such a gauge errs.
+        SettingKey::GaugeGainPpm => (1_000_000, 900_000, 1_100_000),
+        // The converter sees 10 um below zero.
+        SettingKey::GaugeOffsetNm => (0, -9_000, 9_000),
     }
 }
 
@@ -140,6 +144,8 @@ impl Settings {
         self.fine.gain_pm_per_code = values.get(SettingKey::PiezoGainPmPerCode) as u32;
         self.fine.hysteresis_ppm = values.get(SettingKey::PiezoHysteresisPpm) as u32;
         self.fine.creep_ppm_per_decade = values.get(SettingKey::PiezoCreepPpmPerDecade) as u32;
+        self.fine.gauge_gain_ppm = values.get(SettingKey::GaugeGainPpm) as u32;
+        self.fine.gauge_offset = Nanometres(values.get(SettingKey::GaugeOffsetNm));
         self.camera.readout = Micros(values.get(SettingKey::CameraReadoutUs) as u32);
         self.camera.strobe_deadline = Micros(values.get(SettingKey::StrobeDeadlineUs) as u32);
         self

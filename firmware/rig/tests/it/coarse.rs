@@ -184,7 +184,8 @@ fn switches_end_a_move_within_a_millisecond() {
         assert_eq!(bench.alarm(), Some(Alarm::UnexpectedSwitch { axis: Axis::SensorCoarse, far }));
         bench.clear();
         bench.hardware.coarse.faults = Faults::default();
-        assert!(matches!(bench.work(&HOME), EventKind::Homed { .. }));
+        let end = bench.work(&HOME);
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
     }
 }
 

@@ -10,15 +10,16 @@ use farnear_protocol::{BoardMicros, Event, Log, Request};
 use farnear_rig::Rig;
 use farnear_rig::control::{Control, LAST_FRAME, Note};
 use farnear_rig::io::TICK_US;
+use farnear_rig::settings::Settings;
 
 use self::fake::{Call, Fake};
 use crate::bench::{self, BOOT};
 
 /// All that happens in a tick in which there is an event and a line of the log to send.
 const TICK: [Call; 15] = [
+    Call::Gauge,
     Call::Now,
     Call::Receive,
-    Call::Gauge,
     Call::Now,
     Call::Coarse,
     Call::Lens,
@@ -34,7 +35,8 @@ const TICK: [Call; 15] = [
 ];
 
 fn rig() -> Rig {
-    Rig::new(bench::identity(BOOT, ResetCause::Pin), None, BoardMicros(0))
+    let parts = Settings { memory: false, ..Settings::DEFAULT };
+    Rig::with_parts(bench::identity(BOOT, ResetCause::Pin), parts, None, BoardMicros(0))
 }
 
 fn log() -> Log {

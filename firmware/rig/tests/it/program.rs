@@ -333,6 +333,49 @@ fn a_pause_waits_for_the_exposure_and_a_resumed_program_settles_anew() {
 }
 
 #[test]
+fn a_program_that_goes_on_while_it_still_brakes_comes_to_its_place() {
+    for wait_ms in [1, 20, 60, 120, 200] {
+        let mut bench = Bench::homed();
+        let coarse = Shot { axis: Axis::SensorCoarse, settle_window: Nanometres(1_000), ..shot(6_000_000) };
+        load(&mut bench, &[coarse]);
+        bench.events.clear();
+        bench.accepted(&Request::ArmProgram { shots: 1 });
+        let id = bench.accepted(&RUN);
+        bench.run_ms(600);
+        bench.accepted(&Request::PauseProgram);
+        bench.run_ms(wait_ms);
+        bench.accepted(&Request::ResumeProgram);
+        let end = bench.end_of(id);
+        assert!(matches!(end, EventKind::ProgramDone { exposures: 1, .. }), "after {wait_ms} ms: {end:?}");
+        assert!((shots_of(&bench)[0].coarse.0 - 6_000_000).abs() <= 1_000);
+    }
+}
+
+#[test]
+fn a_pause_and_its_end_between_two_shots_move_to_the_next_place() {
+    // The pause comes while the first exposure is under way, its end in each of the ticks about the exposure's.
+    for ticks in 0..60 {
+        let mut bench = Bench::new(700.0);
+        load(&mut bench, &[Shot { exposure: Micros(1_000), ..shot(FAR) }, shot(NEAR)]);
+        bench.events.clear();
+        bench.accepted(&Request::ArmProgram { shots: 2 });
+        let id = bench.accepted(&RUN);
+        while bench.hardware.triggers.is_empty() {
+            bench.tick();
+        }
+        bench.accepted(&Request::PauseProgram);
+        for _ in 0..ticks {
+            bench.tick();
+        }
+        bench.accepted(&Request::ResumeProgram);
+        assert!(matches!(bench.end_of(id), EventKind::ProgramDone { exposures: 2, .. }));
+        let shot = shots_of(&bench)[1];
+        assert!((shot.fine.0 - NEAR).abs() <= 50, "after {ticks} ticks: {shot:?}");
+        assert!((bench.hardware.piezo_at_trigger[1] - f64::from(NEAR)).abs() <= 60.0, "after {ticks} ticks");
+    }
+}
+
+#[test]
 fn a_changed_program_must_be_armed_again() {
     let mut bench = Bench::new(700.0);
     load(&mut bench, &[shot(FAR)]);

@@ -2,7 +2,7 @@
 
 use crate::bench::{self, Bench, failure, go, home};
 use farnear_protocol::message::{
-    Alarm, AlarmRecord, Axis, EventKind, Failure, PositionState, RecordName, ResetCause, SettingKey,
+    Alarm, AlarmRecord, Axis, EventKind, Failure, PositionState, RecordName, ResetCause, Routine, SettingKey,
 };
 use farnear_protocol::{Micros, Nanometres, Request, RequestError, Response};
 
@@ -301,10 +301,59 @@ fn damaged_records_are_told_and_lost_ones_are_an_alarm() {
 }
 
 #[test]
+fn a_second_loss_of_power_at_the_start_does_not_hide_that_an_axis_moved() {
+    let mut bench = Bench::both_homed();
+    bench.run_ms(5);
+    bench.accepted(&go(Axis::SensorCoarse, 9_000_000));
+    bench.run_ms(300);
+    let memory = bench.memory.clone();
+    for ticks in 0..40 {
+        let mut bench = Bench::with_memory(700.0, memory.clone());
+        for _ in 0..ticks {
+            bench.tick();
+        }
+        bench.restart(1, ResetCause::PowerOn);
+        let interrupted = Alarm::MotionInterrupted { axis: Axis::SensorCoarse };
+        assert_eq!(bench.alarm(), Some(interrupted), "the power went again after {ticks} ticks");
+    }
+}
+
+#[test]
+fn homing_and_the_piezos_routines_are_kept_apart_as_far_as_they_go() {
+    // Both brake a quarter of a millimetre beyond their switches: 46.5 mm.
+    let mut bench = Bench::both_homed();
+    for (min, axis_alone, both) in
+        [(46_800_000, false, false), (46_700_000, true, false), (46_450_000, true, true)]
+    {
+        let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: min };
+        bench.ask(&setting).1.expect("in range");
+        let first = bench.ask(&home(Axis::SensorCoarse));
+        assert_eq!(first.1.is_ok(), axis_alone, "{min}: {first:?}");
+        let second = bench.ask(&home(Axis::Lens));
+        assert_eq!(second.1.is_ok(), both, "{min}: {second:?}");
+        for (id, answer) in [first, second] {
+            if answer.is_ok() {
+                assert!(matches!(bench.end_of(id), EventKind::Homed { .. }));
+            }
+        }
+    }
+    // The piezo's routine relaxes it, 0.1 mm towards the lens; the gauge's also homes.
+    bench.work(&go(Axis::SensorFine, 150_000));
+    let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 47_050_000 };
+    bench.ask(&setting).1.expect("in range");
+    for routine in [Routine::Piezo, Routine::Gauge] {
+        let refused = bench.ask(&Request::Calibrate { routine, silence: bench::SILENCE }).1;
+        assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{routine:?}: {refused:?}");
+    }
+}
+
+#[test]
 fn a_board_without_memory_works_and_says_so() {
     let mut bench = Bench::new(700.0);
     bench.rig = farnear_rig::Rig::new(*bench.rig.identity(), None, farnear_protocol::BoardMicros(0));
     assert!(!bench.hello().capabilities.memory);
+    assert_eq!(bench.alarm(), Some(Alarm::MemoryMissing));
+    bench.clear();
     assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
     assert!(matches!(bench.work(&go(Axis::SensorCoarse, 50_000)), EventKind::MoveDone { .. }));
 }
@@ -322,8 +371,10 @@ fn a_slow_rig_homes_slowly_and_a_fast_one_fast_again() {
             bench.clear(); // it was homed, and pushed
         }
         let start = bench.now;
-        assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+        let end = bench.work(&home(Axis::SensorCoarse));
+        assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
         times.push((bench.now - start) / 100_000);
     }
-    assert!(times[1] > 2 * times[0] && times[2] == times[0], "{times:?} tenths of a second");
+    // The driver is switched on, and tuned for 0.14 s, once.
+    assert!(times[1] > 2 * times[0] && times[2].abs_diff(times[0]) <= 2, "{times:?} tenths of a second");
 }

@@ -1,7 +1,8 @@
 //! A motorised stage: motor, screw, encoder on the motor's shaft, end switches at the stage.
 //!
 //! Micrometres from the true home edge, positive = sensor and lens away from each other. The encoder sees the rotor,
-//! not the screw's error nor its play; the switches see the stage.
+//! not the screw's error nor its play. The switches see the stage; stage A's home switch sees the sensor's plate, which the piezo
+//! carries: so the strain gauge can be held against the encoder.
 
 use super::{
     Noise,
@@ -57,6 +58,8 @@ pub struct Stage {
     motor: Motor,
     screw: Screw,
     home: HomeSwitch,
+    /// How far a piezo on the stage carries what the home switch sees.
+    carried_um: f64,
     stuck_home: Option<bool>,
 }
 
@@ -75,7 +78,7 @@ impl Stage {
         let mut screw = Screw::new(&mut noise);
         // It came from its lower end.
         screw.turn(microsteps as f64);
-        Self { motor: Motor::new(microsteps), screw, home, stuck_home: None }
+        Self { motor: Motor::new(microsteps), screw, home, carried_um: 0.0, stuck_home: None }
     }
 
     /// A STEP pulse reaches the driver while it is on.
@@ -85,13 +88,19 @@ impl Stage {
 
     /// Lets time pass until `now_ns`.
     pub fn advance(&mut self, now_ns: u64) {
-        let Self { motor, screw, home, .. } = self;
+        let Self { motor, screw, home, carried_um, .. } = self;
         motor.advance(now_ns, |rotor| {
             let held = rotor.clamp(-END_STOP_UM / MICROSTEP_UM, (TRAVEL_UM + END_STOP_UM) / MICROSTEP_UM);
             screw.turn(held);
-            home.update(screw.stage_um());
+            home.update(screw.stage_um() + *carried_um);
             held
         });
+    }
+
+    /// The piezo on the stage is here now.
+    pub fn set_carried_um(&mut self, um: f64) {
+        self.carried_um = um;
+        self.home.update(self.screw.stage_um() + um);
     }
 
     /// Where the stage really is, micrometres from the true home edge.

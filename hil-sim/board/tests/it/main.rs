@@ -14,4 +14,5 @@ mod repeat;
 mod reset;
 mod session;
 mod silence;
+mod silicon;
 mod steps;

@@ -48,6 +48,9 @@ pub fn alarm_text(alarm: Alarm) -> String {
             "both copies of the {} in the board's memory are bad and defaults are in use; check and set them again",
             record_name(record)
         ),
+        Alarm::MemoryMissing => {
+            "the board's memory does not answer, so nothing outlasts a loss of power; check it and its wires".into()
+        }
     }
 }
 

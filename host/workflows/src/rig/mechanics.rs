@@ -1,4 +1,4 @@
-//! The board measures its own mechanics: travel, backlash, the piezo's gain.
+//! The board measures its own mechanics: travel, backlash, the piezo's and the strain gauge's gain.
 
 use farnear_capture::{describe::um, ready::ensure_homed};
 use farnear_protocol::message::{Calibration, Routine};
@@ -36,6 +36,13 @@ pub enum MechanicsFigures {
         /// Creep after a step, in percent of the step for each decade of time.
         creep_percent_per_decade: f64,
     },
+    /// The strain gauge against stage A's encoder.
+    Gauge {
+        /// Position for what it says, 1 = as its data sheet has it.
+        gauge_gain: f64,
+        /// What it says where the piezo is relaxed.
+        gauge_offset_um: f64,
+    },
 }
 
 /// Lets the board measure; backlash and the piezo's figures are kept as settings. A stage is homed by having its travel
@@ -61,6 +68,9 @@ pub fn measure(rig: &RigAddress, routine: Routine, context: &Context<'_>) -> Res
                 hysteresis_percent: f64::from(hysteresis_ppm) / 1e4,
                 creep_percent_per_decade: f64::from(creep_ppm_per_decade) / 1e4,
             }
+        }
+        Calibration::Gauge { gain_ppm, offset } => {
+            MechanicsFigures::Gauge { gauge_gain: f64::from(gain_ppm) / 1e6, gauge_offset_um: um(offset) }
         }
     })
 }

@@ -13,6 +13,7 @@ use farnear_rig::{
         GAUGE_CODE_ZERO, Inputs, MotorInputs, MotorOutputs, STEP_TIMER_HZ, Segment, StepperState, TICK_HZ,
         TICK_US,
     },
+    settings::Settings,
 };
 
 use crate::{cycles, fail};
@@ -56,8 +57,11 @@ fn identity() -> Identity {
     }
 }
 
+/// Without a memory: what is written to it is not counted.
+const WITHOUT_MEMORY: Settings = Settings { memory: false, ..Settings::DEFAULT };
+
 pub fn tick_at_rest() -> u32 {
-    let mut rig = Rig::new(identity(), None, BoardMicros(0));
+    let mut rig = Rig::with_parts(identity(), WITHOUT_MEMORY, None, BoardMicros(0));
     let mut now = 0;
     for _ in 0..100 {
         now += u64::from(TICK_US);
@@ -144,7 +148,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let rig = Rig::new(identity(), None, BoardMicros(0));
+        let rig = Rig::with_parts(identity(), WITHOUT_MEMORY, None, BoardMicros(0));
         Self { rig, now: 0, id: 0, coarse: Motor::new(), lens: Motor::new(), piezo: 0, longest: 0 }
     }
 
@@ -163,7 +167,7 @@ impl Bench {
         let Some(outputs) = outputs else { fail() };
         self.coarse.run(&outputs.coarse);
         self.lens.run(&outputs.lens);
-        self.piezo = u32::from(outputs.piezo_dac) * 3_052 / 1_000;
+        self.piezo = u32::from(outputs.piezo_dac.unwrap_or(0)) * 3_052 / 1_000;
         while self.rig.transmit().is_some() {}
     }
 

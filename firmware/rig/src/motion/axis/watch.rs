@@ -6,14 +6,17 @@ use farnear_protocol::message::{Failure, PositionState};
 use super::{Motion, Purpose, Stepper};
 use crate::io::{MotorInputs, StepperState, TICK_US};
 use crate::motion::steps;
+use crate::motion::switch::Place;
 
 impl Stepper {
     /// Reads the board; finds faults.
     pub(crate) fn sense(&mut self, inputs: &MotorInputs) {
         self.encoder = inputs.encoder_counts;
-        (self.home_closed, self.far_closed) = (inputs.home_switch, inputs.far_switch);
         self.driver_fault = inputs.driver_fault;
         let progressed = self.count(&inputs.stepper);
+        let here = Place { position: self.position, measured: self.measured() };
+        self.home_switch.sample(inputs.home_switch, here);
+        self.far_switch.sample(inputs.far_switch, here);
         if let Motion::Aborting { ticks } = &mut self.motion {
             *ticks += 1;
             let late = *ticks * TICK_US > self.settings.pulse_deadline.0;
@@ -95,11 +98,11 @@ impl Stepper {
             Motion::Still | Motion::Aborting { .. } => return None,
             Motion::Preparing { .. } => {}
         }
-        if self.away && inputs.far_switch && self.purpose != Purpose::SeekFar {
+        if self.away && self.far_closed() && self.purpose != Purpose::SeekFar {
             return Some(Failure::FarSwitch);
         }
         let outside = self.position > steps::to_steps(self.settings.home_zone);
-        (inputs.home_switch && outside && self.purpose != Purpose::SeekHome).then_some(Failure::HomeSwitch)
+        (self.home_closed() && outside && self.purpose != Purpose::SeekHome).then_some(Failure::HomeSwitch)
     }
 
     /// How far the encoder is from where the pulses may have brought the motor, where that is too far. Without

@@ -79,8 +79,8 @@ impl Hardware {
         Inputs {
             now,
             gauge_code: self.gauge(),
-            coarse: self.coarse.inputs(),
-            lens: self.lens.inputs(),
+            coarse: self.coarse.inputs(1e-3 * self.piezo_nm),
+            lens: self.lens.inputs(0.0),
             emergency_stop: self.faults.emergency_stop,
             supply_low: self.faults.supply_low,
             link_overflow: self.faults.link_overflow,
@@ -130,7 +130,7 @@ impl Hardware {
     pub fn run(&mut self, outputs: &Outputs, now: u64) {
         self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
         self.lens.run(&outputs.lens, now, self.faults.emergency_stop);
-        self.dac = outputs.piezo_dac;
+        self.dac = outputs.piezo_dac.unwrap_or(self.dac);
         if let Some(length) = outputs.trigger {
             assert!(self.exposure.is_none(), "triggered while exposing");
             assert!(!outputs.listen, "triggered while listening");

@@ -91,9 +91,10 @@ impl Motor {
         (self.running, self.enabled, self.underrun) = (None, false, false);
     }
 
-    pub fn inputs(&mut self) -> MotorInputs {
+    /// What the board reads; `carried_um`: how far a piezo on the stage holds the home switch's tab away.
+    pub fn inputs(&mut self, carried_um: f64) -> MotorInputs {
         let um = self.position_um();
-        self.home_closed = um <= if self.home_closed { HOME_HYSTERESIS_UM } else { 0.0 };
+        self.home_closed = um + carried_um <= if self.home_closed { HOME_HYSTERESIS_UM } else { 0.0 };
         MotorInputs {
             // The encoder's own zero is anywhere.
             encoder_counts: (self.microsteps * 5).div_euclid(4) as i32 + 12_345,

@@ -125,14 +125,14 @@ impl Board for Fake {
 
     fn coarse(&mut self) -> MotorInputs {
         self.did(Call::Coarse);
-        let mut inputs = self.hardware.coarse.inputs();
+        let mut inputs = self.hardware.coarse.inputs(1e-3 * self.hardware.piezo_nm);
         inputs.stepper.underrun |= self.dry;
         inputs
     }
 
     fn lens(&mut self) -> MotorInputs {
         self.did(Call::Lens);
-        self.hardware.lens.inputs()
+        self.hardware.lens.inputs(0.0)
     }
 
     fn emergency_stop(&mut self) -> bool {

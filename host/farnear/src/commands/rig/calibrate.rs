@@ -27,6 +27,7 @@ enum What {
     Travel(TravelArguments),
     Backlash(BacklashArguments),
     Piezo(PiezoArguments),
+    Gauge(GaugeArguments),
     Targets(targets::Arguments),
     Fit(fit::Arguments),
 }
@@ -70,6 +71,18 @@ struct PiezoArguments {
     json: bool,
 }
 
+/// Measure the strain gauge's gain and zero against stage A's encoder, by way of its home switch, and keep them as settings. The
+/// stage is homed by it.
+#[derive(Args)]
+#[command(after_help = "Example: farnear rig calibrate gauge --port /dev/ttyACM0 --json")]
+struct GaugeArguments {
+    #[command(flatten)]
+    target: Target,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.what {
@@ -82,6 +95,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             measure(&arguments.target, Routine::Backlash { axis }, arguments.json)
         }
         What::Piezo(arguments) => measure(&arguments.target, Routine::Piezo, arguments.json),
+        What::Gauge(arguments) => measure(&arguments.target, Routine::Gauge, arguments.json),
         What::Targets(arguments) => targets::run(arguments),
         What::Fit(arguments) => fit::run(arguments),
     }

@@ -1,0 +1,276 @@
+//! What the emulated parts are like: the numbers of `parts.toml`, each with its source there.
+//!
+//! A file of the same form, whole or in part, makes another rig: what it leaves out is as in `parts.toml`.
+
+use std::path::Path;
+
+use rigless::chip::fram::DEVICE_ID;
+use serde::Deserialize;
+
+use crate::error::SimError;
+
+/// The rig that tests and the program have where nobody says otherwise.
+const STANDARD: &str = include_str!("../parts.toml");
+
+/// All parts.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parts {
+    /// What instructions cost.
+    pub processor: ProcessorParts,
+    /// The converter behind the strain gauge.
+    pub gauge_converter: ConverterParts,
+    /// The strain gauge with its amplifier.
+    pub gauge: GaugeParts,
+    /// The FRAM.
+    pub memory: MemoryParts,
+    /// The chip's own supervision of its supply.
+    pub supply: SupplyParts,
+    /// End switches.
+    pub switches: SwitchParts,
+    /// The motors' driver chips.
+    pub driver: DriverParts,
+}
+
+/// What instructions cost.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProcessorParts {
+    /// Cycles of an instruction, on average.
+    pub cycles_per_instruction: f64,
+    /// That is multiplied by this while the flash accelerator is not wholly on.
+    pub without_accelerator: f64,
+}
+
+/// The converter behind the strain gauge, and the released line of its data.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConverterParts {
+    /// Shortest conversion: CNV is low again before that, or there is no busy indicator.
+    pub conversion_min_ns: u64,
+    /// Longest conversion: before that nothing can be read.
+    pub conversion_max_ns: u64,
+    /// What pulls the released line up.
+    pub pull_up_ohm: f64,
+    /// What it has to charge.
+    pub line_pf: f64,
+    /// Share of the supply at which the input takes the line for high.
+    pub threshold: f64,
+}
+
+impl ConverterParts {
+    /// How long a released line that was low still reads as low.
+    pub fn rise_ns(&self) -> f64 {
+        let time_constant_ns = self.pull_up_ohm * self.line_pf * 1e-3;
+        -time_constant_ns * libm::log(1.0 - self.threshold)
+    }
+}
+
+/// The strain gauge with its amplifier.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GaugeParts {
+    /// What it says for a micrometre, 1 = as its data sheet has it.
+    pub gain: f64,
+    /// What it says where the piezo is relaxed.
+    pub offset_um: f64,
+    /// Its noise, RMS.
+    pub noise_um: f64,
+}
+
+/// The FRAM.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MemoryParts {
+    /// Which one it is.
+    pub make: MemoryMake,
+}
+
+/// A make of FRAM.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+pub enum MemoryMake {
+    /// Cypress FM25V02.
+    #[serde(rename = "FM25V02")]
+    Fm25v02,
+    /// Its successor, with another revision in its name.
+    #[serde(rename = "FM25V02A")]
+    Fm25v02a,
+    /// None is fitted.
+    #[serde(rename = "none")]
+    None,
+}
+
+impl MemoryMake {
+    /// What it answers when it is asked for its name.
+    pub const fn name(self) -> [u8; 9] {
+        match self {
+            Self::Fm25v02 => DEVICE_ID,
+            Self::Fm25v02a => [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22, 0x08],
+            Self::None => [0xff; 9],
+        }
+    }
+}
+
+/// The chip's own supervision of its supply.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupplyParts {
+    /// What its option bytes say at the first power-on.
+    pub brown_out: BrownOut,
+    /// Falling thresholds of the levels 1 to 3.
+    pub brown_out_mv: [u32; 3],
+    /// Where the power-down reset holds the chip, whatever the option bytes say.
+    pub power_down_mv: u32,
+}
+
+/// Levels of the brown-out reset.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BrownOut {
+    /// As the chip comes from its factory.
+    Off,
+    /// The lowest threshold.
+    #[serde(rename = "level-1")]
+    Level1,
+    /// The middle one.
+    #[serde(rename = "level-2")]
+    Level2,
+    /// The highest.
+    #[serde(rename = "level-3")]
+    Level3,
+}
+
+impl BrownOut {
+    /// The field BOR_LEV of the option bytes (RM0090, section 3.9.10).
+    pub const fn bits(self) -> u64 {
+        match self {
+            Self::Level3 => 0b00,
+            Self::Level2 => 0b01,
+            Self::Level1 => 0b10,
+            Self::Off => 0b11,
+        }
+    }
+}
+
+impl SupplyParts {
+    /// Below this the chip is held in reset, by the field BOR_LEV of its option bytes.
+    pub fn reset_mv(&self, bor_lev: u64) -> u32 {
+        match bor_lev {
+            0b00 => self.brown_out_mv[2],
+            0b01 => self.brown_out_mv[1],
+            0b10 => self.brown_out_mv[0],
+            _ => self.power_down_mv,
+        }
+    }
+}
+
+/// End switches.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SwitchParts {
+    /// How long a contact bounces that has changed.
+    pub bounce_us: u64,
+    /// How often it changes meanwhile, on average.
+    pub bounces_per_ms: f64,
+    /// How long a false opening lasts.
+    pub glitch_us: u64,
+    /// How many of them there are while the driver is on.
+    pub glitches_per_s: f64,
+}
+
+/// The motors' driver chips.
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriverParts {
+    /// From a change of DIR to the next STEP.
+    pub direction_setup_ns: u64,
+    /// From a STEP to the next change of DIR.
+    pub direction_hold_ns: u64,
+    /// How long the motor stands under current before its first motion.
+    pub standstill_ms: u64,
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        // A constant of this program, and a test reads it.
+        toml::from_str(STANDARD).unwrap_or_else(|error| unreachable!("parts.toml: {error}"))
+    }
+}
+
+impl Parts {
+    /// Reads a file in which what differs from the standard rig stands.
+    ///
+    /// # Errors
+    /// [`SimError::Parts`] where it cannot be read, is not such TOML, or a number is out of its range.
+    pub fn read(path: &Path) -> Result<Self, SimError> {
+        let wrong = |reason: String| SimError::Parts { path: path.into(), reason };
+        let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+        Self::parse(&text).map_err(wrong)
+    }
+
+    /// The standard rig with what the text says otherwise.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let mut table: toml::Table = toml::from_str(STANDARD).map_err(|error| error.to_string())?;
+        let other: toml::Table = toml::from_str(text).map_err(|error| error.to_string())?;
+        for (part, values) in other {
+            match (table.get_mut(&part), values) {
+                (Some(toml::Value::Table(known)), toml::Value::Table(values)) => known.extend(values),
+                (Some(_), _) => return Err(format!("{part} is a table: [{part}]")),
+                (None, values) => drop(table.insert(part, values)), // refused by its name below
+            }
+        }
+        let parts: Self = table.try_into().map_err(|error: toml::de::Error| error.to_string())?;
+        parts.check()?;
+        Ok(parts)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let (processor, converter) = (&self.processor, &self.gauge_converter);
+        let ranges = [
+            ("processor.cycles_per_instruction", processor.cycles_per_instruction, 0.5, 10.0),
+            ("processor.without_accelerator", processor.without_accelerator, 1.0, 10.0),
+            ("gauge_converter.pull_up_ohm", converter.pull_up_ohm, 1.0, 1e6),
+            ("gauge_converter.line_pf", converter.line_pf, 0.0, 1e4),
+            ("gauge_converter.threshold", converter.threshold, 0.01, 0.99),
+            ("gauge.gain", self.gauge.gain, 0.5, 1.5),
+            ("gauge.offset_um", self.gauge.offset_um, -20.0, 20.0),
+            ("gauge.noise_um", self.gauge.noise_um, 0.0, 10.0),
+            ("switches.bounces_per_ms", self.switches.bounces_per_ms, 0.0, 1e3),
+            ("switches.glitches_per_s", self.switches.glitches_per_s, 0.0, 1e4),
+        ];
+        for (name, value, min, max) in ranges {
+            if !(min..=max).contains(&value) {
+                return Err(format!("{name} = {value} is not in {min} to {max}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_standard_rig_is_read_and_a_file_says_only_what_differs() {
+        assert_eq!(Parts::default().check(), Ok(()));
+        let parts = Parts::parse("[memory]\nmake = \"FM25V02\"").expect("a good file");
+        assert_eq!(parts, Parts { memory: MemoryParts { make: MemoryMake::Fm25v02 }, ..Parts::default() });
+        let refused = |text, expected: &str| {
+            let reason = Parts::parse(text).expect_err(text);
+            assert!(reason.contains(expected), "{reason}");
+        };
+        refused("[gauge]\ngain = 3.0", "gauge.gain = 3 is not in 0.5 to 1.5");
+        refused("[gauge]\ngian = 1.0", "gian");
+        refused("[gouge]\ngain = 1.0", "gouge");
+        refused("gauge = 1", "gauge is a table");
+        refused("[memory]\nmake = \"FM25V05\"", "FM25V05");
+    }
+
+    #[test]
+    fn a_released_line_rises_as_slowly_as_its_resistor_lets_it() {
+        // 21.6 kOhm and 15 pF: 0.32 us, half way after 0.69 of that.
+        let rise_ns = Parts::default().gauge_converter.rise_ns();
+        assert!((rise_ns - 224.6).abs() < 1.0, "{rise_ns}");
+    }
+}

@@ -1,0 +1,114 @@
+//! What a fetch waits for: the flash with its wait states, and the accelerator in front of it (RM0090, section 3.5.2).
+//!
+//! The flash gives 16 bytes at once, after its wait states. The line that was read last is kept; the instruction cache
+//! keeps 64 more, the data cache 8 for constants, both replaced oldest first here; the prefetch reads the next line while
+//! this one runs. How the real ones choose a line to replace is not published.
+
+/// Bytes of a line, lines of the instruction cache and of the data cache.
+const LINE: u64 = 16;
+const INSTRUCTION_LINES: usize = 64;
+const DATA_LINES: usize = 8;
+/// Bits of FLASH_ACR.
+const PREFETCH: u64 = 1 << 8;
+const INSTRUCTION_CACHE: u64 = 1 << 9;
+const DATA_CACHE: u64 = 1 << 10;
+
+/// Lines that are kept, oldest first.
+#[derive(Debug, Default)]
+struct Lines(Vec<u64>);
+
+impl Lines {
+    /// Whether a line is kept; it is from now on.
+    fn take(&mut self, line: u64, most: usize) -> bool {
+        let found = self.0.iter().position(|kept| *kept == line);
+        if let Some(at) = found {
+            self.0.remove(at);
+        } else if self.0.len() >= most {
+            self.0.remove(0);
+        }
+        self.0.push(line);
+        found.is_some()
+    }
+}
+
+/// The flash's interface.
+#[derive(Debug, Default)]
+pub(super) struct FlashInterface {
+    acr: u64,
+    instructions: Lines,
+    data: Lines,
+    /// The line that was read last.
+    current: u64,
+    /// Cycles that the program has spent in it: what a prefetch of the next one had.
+    spent: u64,
+}
+
+impl FlashInterface {
+    /// FLASH_ACR was written.
+    pub(super) fn set(&mut self, acr: u64) {
+        *self = Self { acr, ..Self::default() };
+    }
+
+    const fn wait_states(&self) -> u64 {
+        self.acr & 0xf
+    }
+
+    /// Cycles for which an instruction of these bytes, which then takes `cycles`, is waited for.
+    pub(super) fn fetch(&mut self, address: u64, bytes: u64, cycles: u64) -> u64 {
+        let mut waits = 0;
+        for line in address / LINE..=(address + bytes - 1) / LINE {
+            if line != self.current {
+                waits += self.enter(line);
+            }
+        }
+        self.spent += cycles;
+        waits
+    }
+
+    fn enter(&mut self, line: u64) -> u64 {
+        let follows = line == self.current + 1;
+        let had = std::mem::take(&mut self.spent);
+        self.current = line;
+        if self.acr & INSTRUCTION_CACHE != 0 && self.instructions.take(line, INSTRUCTION_LINES) {
+            return 0;
+        }
+        let ahead = if follows && self.acr & PREFETCH != 0 { had } else { 0 };
+        self.wait_states().saturating_sub(ahead)
+    }
+
+    /// Cycles for which a constant in the flash is waited for.
+    pub(super) fn read(&mut self, address: u64) -> u64 {
+        let kept = self.acr & DATA_CACHE != 0 && self.data.take(address / LINE, DATA_LINES);
+        if kept { 0 } else { self.wait_states() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn straight_on(acr: u64, rounds: u64) -> u64 {
+        let mut flash = FlashInterface::default();
+        flash.set(acr);
+        let once = |flash: &mut FlashInterface| (0..64).map(|i| flash.fetch(0x0800_0000 + 2 * i, 2, 1)).sum();
+        (0..rounds).map(|_| once(&mut flash)).last().unwrap_or(0)
+    }
+
+    #[test]
+    fn a_loop_waits_only_where_it_is_not_kept() {
+        // 64 short instructions are 8 lines.
+        assert_eq!(straight_on(0x005, 2), 8 * 5, "five wait states a line");
+        assert_eq!(straight_on(0x105, 2), 5, "a line lasts longer than the prefetch of the next one");
+        assert_eq!(straight_on(0x705, 1), 5, "the first line");
+        assert_eq!(straight_on(0x705, 2), 0, "all of it is kept");
+    }
+
+    #[test]
+    fn constants_are_kept_too() {
+        let mut flash = FlashInterface::default();
+        flash.set(0x705);
+        assert_eq!([0, 4, 16, 0].map(|at| flash.read(0x0800_0100 + at)), [5, 0, 5, 0]);
+        flash.set(0x305);
+        assert_eq!([0, 0].map(|at| flash.read(0x0800_0100 + at)), [5, 5]);
+    }
+}
