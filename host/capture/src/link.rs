@@ -1,6 +1,7 @@
 //! One question, one answer: frames over a [`Transport`], sent again until answered.
 //!
-//! Knows no session: which boot and version a request carries, and what an event means, is the caller's.
+//! Which boot and version a request carries, and what an event means, is the caller's; the session and its request ids are
+//! kept here, see [`Link::begin_session`].
 
 use std::{
     io::{self, ErrorKind},
@@ -9,8 +10,9 @@ use std::{
 };
 
 use farnear_protocol::{
-    Request,
+    Call, Request, RequestError,
     frame::{Decoder, Header, Kind, Packet, encode},
+    message::NO_SESSION,
 };
 
 use crate::{error::ClientError, transport::Transport};
@@ -22,6 +24,10 @@ const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 /// Shortest time allowed for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 
+fn is_queue_full(packet: &Packet) -> bool {
+    matches!(packet.message(), Some(RequestError::QueueFull { .. }))
+}
+
 /// A transport with framing, request ids and retries.
 pub(crate) struct Link {
     transport: Box<dyn Transport>,
@@ -30,6 +36,7 @@ pub(crate) struct Link {
     buffer: [u8; 512],
     /// Bytes of `buffer` that were received and not decoded yet.
     unread: std::ops::Range<usize>,
+    session: u32,
     next_id: u32,
     bytes: u64,
     bad_frames: u64,
@@ -43,13 +50,20 @@ impl Link {
             decoder: Decoder::new(),
             buffer: [0; 512],
             unread: 0..0,
+            session: NO_SESSION,
             next_id: 1,
             bytes: 0,
             bad_frames: 0,
         }
     }
 
-    /// Goes on over another transport, after the first broke. Request ids go on counting.
+    /// From now on requests belong to this session, and their ids follow the last one that the board has seen.
+    pub(crate) fn begin_session(&mut self, number: u32, last_id: u32) {
+        self.session = number;
+        self.next_id = last_id.wrapping_add(1);
+    }
+
+    /// Goes on over another transport, after the first broke.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
         self.transport = transport;
         self.decoder = Decoder::new();
@@ -73,9 +87,9 @@ impl Link {
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1).max(1);
         let header = Header { version, kind: Kind::Request, id, boot };
-        let frame = encode(header, request).ok_or_else(|| ClientError::Nonsense {
-            during: during.into(),
-            answer: "the request does not fit a frame".into(),
+        let session = if *request == Request::Hello { NO_SESSION } else { self.session };
+        let frame = encode(header, &Call { session, request: request.clone() }).ok_or_else(|| {
+            ClientError::Nonsense { during: during.into(), answer: "the request does not fit a frame".into() }
         })?;
         let begin = Instant::now();
         let (bytes, bad_frames) = (self.bytes, self.bad_frames);
@@ -88,6 +102,8 @@ impl Link {
             let until = Instant::now() + *wait;
             while let Some(packet) = self.receive(until, during)? {
                 match packet.header.kind {
+                    // The board had no room for it and asks to be asked again.
+                    Kind::Error if packet.header.id == id && is_queue_full(&packet) => {}
                     Kind::Response | Kind::Error if packet.header.id == id => return Ok((id, packet)),
                     Kind::Event | Kind::Log => on_other(&packet)?,
                     // The late answer to an earlier attempt.

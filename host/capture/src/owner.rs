@@ -24,7 +24,7 @@ use farnear_protocol::{
 use crate::{
     error::{ClientError, PortError},
     events::{Events, is_under_way, request_of},
-    handshake::shake_hands,
+    handshake::{open_session, shake_hands},
     link::Link,
     log_stream::{LogPart, Readers},
     timing::Timing,
@@ -55,7 +55,13 @@ pub(crate) struct Session {
 #[derive(Clone, Debug)]
 pub(crate) enum Break {
     Gone(Arc<io::Error>),
-    Reset { was: u32, now: u32, cause: Option<ResetCause> },
+    /// Another host has opened a session.
+    TakenOver,
+    Reset {
+        was: u32,
+        now: u32,
+        cause: Option<ResetCause>,
+    },
 }
 
 impl Break {
@@ -63,6 +69,7 @@ impl Break {
         let during = during.into();
         match self.clone() {
             Self::Gone(source) => ClientError::Gone { port: port.into(), during, source },
+            Self::TakenOver => ClientError::TakenOver { port: port.into(), during },
             Self::Reset { was, now, cause } => ClientError::Reset { during, was, now, cause },
         }
     }
@@ -134,6 +141,7 @@ impl Owner {
     ) -> Result<Self, ClientError> {
         let mut link = Link::new(connect()?, port);
         let (hello, version) = shake_hands(&mut link, emulated)?;
+        open_session(&mut link, (&hello, version))?;
         let timing = timing(&hello);
         let events = Events { boot: hello.boot, ..Events::default() };
         let session = Session { number: 1, hello: Arc::new(hello), version };
@@ -257,6 +265,11 @@ impl Owner {
                 self.break_off(&error);
                 error
             }
+            RequestError::NotInSession => {
+                let error = ClientError::TakenOver { port: self.link.port().into(), during: during.into() };
+                self.break_off(&error);
+                error
+            }
             error => ClientError::Refused { during: during.into(), error },
         })
     }
@@ -275,6 +288,7 @@ impl Owner {
             ClientError::Reset { was, now, cause, .. } => {
                 Break::Reset { was: *was, now: *now, cause: *cause }
             }
+            ClientError::TakenOver { .. } => Break::TakenOver,
             _ => return,
         };
         for (_, work) in std::mem::take(&mut self.works) {
@@ -292,7 +306,9 @@ impl Owner {
     fn try_again_when_due(&mut self) {
         // The port of a simulator that has ended may be anybody's next.
         let nobodys = matches!(self.broken, Some(Break::Gone(_))) && self.session.hello.emulated;
-        if !nobodys && Instant::now() >= self.next_attempt {
+        // Whoever has taken the board over keeps it, until somebody here asks for it.
+        let taken = matches!(self.broken, Some(Break::TakenOver));
+        if !nobodys && !taken && Instant::now() >= self.next_attempt {
             // It is tried again, for as long as anybody holds a handle.
             let _ = self.reconnect();
         }
@@ -333,6 +349,8 @@ impl Owner {
             self.break_off(&ClientError::Reset { during: "saying hello".into(), was, now, cause });
             self.broken = None;
         }
+        let opened = open_session(&mut self.link, (&hello, version));
+        opened.inspect_err(|error| self.break_off(error))?;
         self.session.number += 1;
         self.events = Events { boot: hello.boot, ..Events::default() };
         self.next_log = None;

@@ -15,11 +15,12 @@ use std::{
 
 use farnear_capture::Transport;
 use farnear_protocol::{
-    Event, Log, Request, RequestError, Response,
+    Call, Event, Log, PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response,
     frame::{Decoder, Header, Kind, Packet, encode},
     message::{
         Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
-        LinkCounters, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot, Status,
+        LinkCounters, NO_SESSION, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot,
+        Status,
     },
     units::{BoardMicros, Micros, Nanometres},
 };
@@ -123,6 +124,8 @@ pub struct Board {
     active: Option<(u32, Request)>,
     asking: u32,
     logs: u32,
+    /// The number of the open session.
+    pub session: u32,
     remembered: BTreeMap<u32, (Kind, Vec<u8>)>,
     decoder: Decoder,
     out: VecDeque<u8>,
@@ -154,8 +157,8 @@ impl Peer {
             row_pixels_max: 1024,
         };
         let hello = Hello {
-            protocol_min: 2,
-            protocol_current: 2,
+            protocol_min: PROTOCOL_MIN,
+            protocol_current: PROTOCOL_CURRENT,
             schema_key: SCHEMA_KEY,
             board: "scripted".try_into().unwrap(),
             firmware: "0.0.1".try_into().unwrap(),
@@ -172,6 +175,8 @@ impl Peer {
                 emergency_stop: true,
             },
             limits,
+            last_id: 0,
+            outstanding: 8,
         };
         let started = Event { time: BoardMicros(0), kind: EventKind::Started { cause: ResetCause::PowerOn } };
         Self(Arc::new(Mutex::new(Board {
@@ -203,6 +208,7 @@ impl Peer {
             active: None,
             asking: 0,
             logs: 0,
+            session: NO_SESSION,
             remembered: BTreeMap::new(),
             decoder: Decoder::new(),
             out: VecDeque::new(),
@@ -269,7 +275,7 @@ impl Transport for Peer {
 
 impl Board {
     fn put<T: Serialize>(&mut self, kind: Kind, id: u32, message: &T) {
-        let header = Header { version: 2, kind, id, boot: self.hello.boot };
+        let header = Header { version: PROTOCOL_CURRENT, kind, id, boot: self.hello.boot };
         let frame = encode(header, message).unwrap();
         let garbage = self.faults.garbage.clone();
         self.out.extend(garbage);
@@ -289,6 +295,11 @@ impl Board {
         if !self.faults.lose_events.contains(&number) {
             self.put(Kind::Event, number, &event);
         }
+    }
+
+    /// Says that something happened, whether or not it did.
+    pub fn say(&mut self, kind: EventKind) {
+        self.event(kind);
     }
 
     fn answer(&mut self, id: u32, answer: Result<Response, RequestError>) {
@@ -323,17 +334,29 @@ impl Board {
             let error = RequestError::Version { min: version, current: version };
             return self.put(Kind::Error, id, &error);
         }
-        let request: Request = packet.message().unwrap();
+        let Call { session, request } = packet.message().unwrap();
         if request == Request::Hello {
-            self.remembered.clear();
-            return self.answer(id, Ok(Response::Hello(self.hello.clone())));
+            self.answer(id, Ok(Response::Hello(self.hello.clone())));
+            self.remembered.remove(&id);
+            return;
         }
         if packet.header.boot != self.hello.boot {
             let error = RequestError::Boot { current: self.hello.boot };
             return self.put(Kind::Error, id, &error);
         }
+        if request != Request::OpenSession && session != self.session {
+            return self.put(Kind::Error, id, &RequestError::NotInSession);
+        }
         if self.remembered.contains_key(&id) {
             return self.resend(id);
+        }
+        if id <= self.hello.last_id {
+            return self.put(Kind::Error, id, &RequestError::IdNotNew { last: self.hello.last_id });
+        }
+        self.hello.last_id = id;
+        if request == Request::OpenSession {
+            self.session = session;
+            self.remembered.clear();
         }
         self.carry_out(id, request);
     }
@@ -341,6 +364,10 @@ impl Board {
     fn carry_out(&mut self, id: u32, request: Request) {
         match request {
             Request::Hello => {}
+            Request::OpenSession => {
+                self.answer(id, Ok(Response::Accepted));
+                self.end_by_stop();
+            }
             Request::Status => {
                 let status = self.status();
                 self.answer(id, Ok(Response::Status(status)));
@@ -357,9 +384,7 @@ impl Board {
             Request::Stop => {
                 self.stops += 1;
                 self.answer(id, Ok(Response::Accepted));
-                if let Some((request, _)) = self.active.take() {
-                    self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
-                }
+                self.end_by_stop();
             }
             Request::Reboot => {
                 self.answer(id, Ok(Response::Accepted));
@@ -374,6 +399,12 @@ impl Board {
             | Request::PauseProgram
             | Request::ResumeProgram => self.prepare(id, request),
             other => self.keep(id, other),
+        }
+    }
+
+    fn end_by_stop(&mut self) {
+        if let Some((request, _)) = self.active.take() {
+            self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
         }
     }
 
@@ -403,6 +434,8 @@ impl Board {
         self.armed = 0;
         self.active = None;
         self.remembered.clear();
+        self.hello.last_id = 0;
+        self.session = NO_SESSION;
         self.events.clear();
         self.faults.reset_at_move = false;
         if self.faults.silent_reset {
@@ -460,5 +493,5 @@ impl Board {
 }
 
 fn postcard_frame<T: Serialize>(boot: u32, kind: Kind, id: u32, message: &T) -> Vec<u8> {
-    encode(Header { version: 2, kind, id, boot }, message).unwrap().to_vec()
+    encode(Header { version: PROTOCOL_CURRENT, kind, id, boot }, message).unwrap().to_vec()
 }
