@@ -24,13 +24,22 @@ const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 /// Shortest time allowed for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 
+/// Throws away what comes until nothing comes any more, or for so long.
+fn until_quiet(transport: &mut dyn Transport, buffer: &mut [u8]) -> io::Result<()> {
+    transport.discard_input()?;
+    let until = Instant::now() + QUIET_AT_MOST;
+    while Instant::now() < until && transport.receive(buffer, QUIET)? > 0 {}
+    Ok(())
+}
+
 fn is_queue_full(packet: &Packet) -> bool {
     matches!(packet.message(), Some(RequestError::QueueFull { .. }))
 }
 
 /// A transport with framing, request ids and retries.
 pub(crate) struct Link {
-    transport: Box<dyn Transport>,
+    /// `None` between an unplugging and the next connection.
+    transport: Option<Box<dyn Transport>>,
     port: String,
     decoder: Decoder,
     buffer: [u8; 512],
@@ -45,7 +54,7 @@ pub(crate) struct Link {
 impl Link {
     pub(crate) fn new(transport: Box<dyn Transport>, port: &str) -> Self {
         Self {
-            transport,
+            transport: Some(transport),
             port: port.into(),
             decoder: Decoder::new(),
             buffer: [0; 512],
@@ -65,9 +74,15 @@ impl Link {
 
     /// Goes on over another transport, after the first broke.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
-        self.transport = transport;
+        self.transport = Some(transport);
         self.decoder = Decoder::new();
         self.unread = 0..0;
+    }
+
+    /// Closes the port. As long as a program holds a port that has gone, the system gives the board that comes back another
+    /// name.
+    pub(crate) fn close(&mut self) {
+        self.transport = None;
     }
 
     pub(crate) fn port(&self) -> &str {
@@ -135,7 +150,11 @@ impl Link {
             if left.is_zero() {
                 return Ok(None);
             }
-            match self.transport.receive(&mut self.buffer, left) {
+            let received = match &mut self.transport {
+                Some(transport) => transport.receive(&mut self.buffer, left),
+                None => Err(ErrorKind::NotConnected.into()),
+            };
+            match received {
                 Ok(count) => {
                     self.bytes += count as u64;
                     self.unread = 0..count;
@@ -147,22 +166,22 @@ impl Link {
 
     /// Reads until the line is quiet, so that no answer meant for an earlier program is taken for ours.
     pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
-        self.transport.discard_input().map_err(|source| self.gone(source, during))?;
-        let until = Instant::now() + QUIET_AT_MOST;
-        while Instant::now() < until {
-            match self.transport.receive(&mut self.buffer, QUIET) {
-                Ok(0) => break,
-                Ok(_) => {}
-                Err(source) => return Err(self.gone(source, during)),
-            }
-        }
+        let drained = match &mut self.transport {
+            Some(transport) => until_quiet(transport.as_mut(), &mut self.buffer),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        drained.map_err(|source| self.gone(source, during))?;
         self.unread = 0..0;
         self.decoder = Decoder::new();
         Ok(())
     }
 
     fn send(&mut self, bytes: &[u8], wait: Duration, during: &str) -> Result<(), ClientError> {
-        match self.transport.send(bytes, wait.max(SEND_AT_LEAST)) {
+        let sent = match &mut self.transport {
+            Some(transport) => transport.send(bytes, wait.max(SEND_AT_LEAST)),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        match sent {
             // Nobody takes the bytes; the missing answer will tell.
             Err(error) if error.kind() == ErrorKind::TimedOut => Ok(()),
             result => result.map_err(|source| self.gone(source, during)),

@@ -38,6 +38,8 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Se
 const ALERT: Duration = Duration::from_millis(1);
 /// Longest wait for a command while nobody awaits an event.
 const IDLE: Duration = Duration::from_millis(50);
+/// A board that does not answer so many polls in a row, each asked as often as any request, is dead.
+const UNANSWERED_POLLS: u32 = 2;
 /// Longest look for bytes between two commands.
 const GLANCE: Duration = Duration::from_millis(1);
 /// From one attempt to reach the board again to the next.
@@ -57,6 +59,11 @@ pub(crate) enum Break {
     Gone(Arc<io::Error>),
     /// Another host has opened a session.
     TakenOver,
+    /// The port is there, and nobody answers: asked so often, for so long.
+    Silent {
+        attempts: u32,
+        waited: Duration,
+    },
     Reset {
         was: u32,
         now: u32,
@@ -69,6 +76,9 @@ impl Break {
         let during = during.into();
         match self.clone() {
             Self::Gone(source) => ClientError::Gone { port: port.into(), during, source },
+            Self::Silent { attempts, waited } => {
+                ClientError::Silent { port: port.into(), during, attempts, waited, bad_frames: 0, bytes: 0 }
+            }
             Self::TakenOver => ClientError::TakenOver { port: port.into(), during },
             Self::Reset { was, now, cause } => ClientError::Reset { during, was, now, cause },
         }
@@ -128,6 +138,8 @@ pub(crate) struct Owner {
     next_log: Option<u32>,
     still_there: bool,
     last_heard: Instant,
+    /// Polls in a row that nobody answered.
+    unanswered: u32,
 }
 
 impl Owner {
@@ -161,6 +173,7 @@ impl Owner {
             next_log: None,
             still_there: false,
             last_heard: now,
+            unanswered: 0,
         };
         owner.join_events()?;
         Ok(owner)
@@ -291,21 +304,32 @@ impl Owner {
             ClientError::TakenOver { .. } => Break::TakenOver,
             _ => return,
         };
+        self.end_session(broken);
+    }
+
+    fn end_session(&mut self, broken: Break) {
         for (_, work) in std::mem::take(&mut self.works) {
             let _ = work.notes.send(Note::Broken(broken.clone()));
         }
+        if matches!(broken, Break::Gone(_)) {
+            self.link.close();
+        }
         self.events.arrived.clear();
         self.still_there = false;
+        self.unanswered = 0;
         // A board that was reset is there; one that was unplugged takes a while.
-        let pause = if matches!(broken, Break::Gone(_)) { RECONNECT } else { Duration::ZERO };
+        let is_there = matches!(broken, Break::Reset { .. } | Break::TakenOver);
+        let pause = if is_there { Duration::ZERO } else { RECONNECT };
         self.next_attempt = Instant::now() + pause;
         self.last_break = Some(broken.clone());
         self.broken = Some(broken);
     }
 
     fn try_again_when_due(&mut self) {
-        // The port of a simulator that has ended may be anybody's next.
-        let nobodys = matches!(self.broken, Some(Break::Gone(_))) && self.session.hello.emulated;
+        // The port of a simulator that has ended may be anybody's next, unless it has a name of its own (a link).
+        let gone = matches!(self.broken, Some(Break::Gone(_)));
+        let named = std::fs::symlink_metadata(self.link.port()).is_ok_and(|found| found.is_symlink());
+        let nobodys = gone && self.session.hello.emulated && !named;
         // Whoever has taken the board over keeps it, until somebody here asks for it.
         let taken = matches!(self.broken, Some(Break::TakenOver));
         if !nobodys && !taken && Instant::now() >= self.next_attempt {
@@ -467,7 +491,20 @@ impl Owner {
             return;
         }
         self.last_heard = Instant::now();
-        let Ok(status) = self.status("asking for events that got lost") else { return };
+        let begin = Instant::now();
+        let status = match self.status("asking for events that got lost") {
+            Ok(status) => status,
+            Err(ClientError::Silent { attempts, .. }) => {
+                self.unanswered += 1;
+                if self.unanswered >= UNANSWERED_POLLS {
+                    let attempts = attempts * UNANSWERED_POLLS;
+                    self.end_session(Break::Silent { attempts, waited: begin.elapsed() });
+                }
+                return;
+            }
+            Err(_) => return,
+        };
+        self.unanswered = 0;
         if !self.events.arrived.is_empty() {
             return;
         }

@@ -204,7 +204,8 @@ impl Work {
 
     fn stop_with(&mut self, error: ClientError) -> ClientError {
         self.over = true;
-        match self.client.stop() {
+        // What is said of a rig that was stopped is true when it stands: until then it brakes.
+        match self.client.stop().and_then(|()| self.client.wait_until_it_stands()) {
             Ok(()) => error,
             Err(failed) => failed,
         }

@@ -65,6 +65,8 @@ pub struct Faults {
     pub fails_with: Option<Failure>,
     /// Work ends with this alarm.
     pub alarm_at_work: Option<Alarm>,
+    /// After a stop it brakes for so many looks at its status.
+    pub brakes_for: u32,
     /// The board refuses every version but this.
     pub other_version: Option<u8>,
 }
@@ -119,9 +121,13 @@ pub struct Board {
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
     pub still_there: u32,
+    /// Connections that are open at the host's end.
+    pub connections: usize,
     /// The line is broken: nothing arrives and nothing can be opened.
     pub gone: bool,
     active: Option<(u32, Request)>,
+    /// Looks at its status until it stands.
+    pub braking: u32,
     asking: u32,
     logs: u32,
     /// The number of the open session.
@@ -129,6 +135,15 @@ pub struct Board {
     remembered: BTreeMap<u32, (Kind, Vec<u8>)>,
     decoder: Decoder,
     out: VecDeque<u8>,
+}
+
+/// An open connection to a board.
+struct Connection(Peer);
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.0.board().connections -= 1;
+    }
 }
 
 /// The host's end of the line.
@@ -204,8 +219,10 @@ impl Peer {
             emergency_stop: false,
             counters: Counters { boots: 7, ..Counters::default() },
             still_there: 0,
+            connections: 0,
             gone: false,
             active: None,
+            braking: 0,
             asking: 0,
             logs: 0,
             session: NO_SESSION,
@@ -223,8 +240,14 @@ impl Peer {
                 let (port, present) = ("scripted".into(), Vec::new());
                 return Err(farnear_capture::PortError::Absent { port, present });
             }
-            Ok(Box::new(peer.clone()) as Box<dyn Transport>)
+            Ok(Box::new(peer.connection()) as Box<dyn Transport>)
         })
+    }
+
+    /// One more connection to this board.
+    fn connection(&self) -> Connection {
+        self.board().connections += 1;
+        Connection(self.clone())
     }
 
     /// The board, to look at it or to change it.
@@ -236,9 +259,9 @@ impl Peer {
     }
 }
 
-impl Transport for Peer {
+impl Transport for Connection {
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let mut board = self.board();
+        let mut board = self.0.board();
         if board.gone {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
@@ -255,7 +278,7 @@ impl Transport for Peer {
     }
 
     fn send(&mut self, bytes: &[u8], _: Duration) -> io::Result<()> {
-        let mut board = self.board();
+        let mut board = self.0.board();
         if board.gone {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
@@ -268,7 +291,7 @@ impl Transport for Peer {
     }
 
     fn discard_input(&mut self) -> io::Result<()> {
-        self.board().out.clear();
+        self.0.board().out.clear();
         Ok(())
     }
 }
@@ -370,6 +393,7 @@ impl Board {
             }
             Request::Status => {
                 let status = self.status();
+                self.braking = self.braking.saturating_sub(1);
                 self.answer(id, Ok(Response::Status(status)));
                 self.hear_from_host();
             }
@@ -383,6 +407,7 @@ impl Board {
             }
             Request::Stop => {
                 self.stops += 1;
+                self.braking = self.faults.brakes_for;
                 self.answer(id, Ok(Response::Accepted));
                 self.end_by_stop();
             }
@@ -473,7 +498,7 @@ impl Board {
         let state = if self.armed > 0 { ProgramState::Armed } else { ProgramState::Idle };
         Status {
             time: BoardMicros(self.time),
-            coarse: AxisStatus { request: active, ..axis(self.homed, self.coarse) },
+            coarse: AxisStatus { request: active, moving: self.braking > 0, ..axis(self.homed, self.coarse) },
             fine: axis(true, self.fine),
             lens: axis(self.lens_homed, self.lens),
             home_switch: self.switches[0],

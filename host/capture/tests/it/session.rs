@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use farnear_capture::{Client, ClientError};
+use farnear_capture::{Client, ClientError, Timing};
 use farnear_protocol::{
     message::{Axis, EventKind, ResetCause},
     units::Nanometres,
@@ -87,6 +87,41 @@ fn an_end_on_another_axis_or_at_another_place_is_not_believed() {
     let error = work.moved().err().unwrap();
     assert!(matches!(error, ClientError::Nonsense { .. }), "{error:?}");
     assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn a_board_that_dies_in_mid_move_is_told() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    client.set_timing(Timing { work_slack: Duration::from_secs(3600), ..SHORT });
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    // The power goes and does not come back; the adapter stays where it is.
+    peer.board().faults.lose_requests = u32::MAX;
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Silent { attempts: 8, .. }), "{error:?}");
+    assert!(error.to_string().starts_with("no answer from scripted while homing"), "{error}");
+    peer.board().faults.lose_requests = 0;
+    let mut client = client;
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    client.stop().unwrap();
+}
+
+#[test]
+fn the_old_port_is_closed_before_the_board_is_looked_for() {
+    let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
+    let mut client = Client::connect(peer.connect(), "scripted").unwrap();
+    client.set_timing(SHORT);
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().gone = true;
+    assert!(matches!(work.homed().err().unwrap(), ClientError::Gone { .. }));
+    assert!(client.reopen().is_err());
+    assert_eq!(
+        peer.board().connections,
+        0,
+        "whoever holds a port that has gone makes the board come back under another name"
+    );
+    peer.board().gone = false;
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    assert_eq!(peer.board().connections, 1);
 }
 
 #[test]
