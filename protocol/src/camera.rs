@@ -83,5 +83,8 @@ pub enum Control {
     },
 }
 
+/// Stands where the length of an image would: another client has the camera, and this connection is closed.
+pub const IN_USE: u32 = u32::MAX;
+
 /// [`FrameHeader::shot_id`] of an image of a camera that runs freely.
 pub const FREE_RUNNING: u32 = u32::MAX;

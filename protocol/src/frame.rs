@@ -19,8 +19,8 @@ pub const FRAME_MAX: usize = 256;
 pub const HEADER: usize = 10;
 /// Bytes of the CRC after the body.
 pub const CRC_BYTES: usize = 4;
-/// Largest body: [`FRAME_MAX`] less header, CRC, delimiter and what COBS may add.
-pub const BODY_MAX: usize = FRAME_MAX - HEADER - CRC_BYTES - 3;
+/// Largest body: [`FRAME_MAX`] less header, CRC, delimiter and the byte that COBS adds to up to 254 bytes.
+pub const BODY_MAX: usize = FRAME_MAX - HEADER - CRC_BYTES - 2;
 
 const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
@@ -31,7 +31,7 @@ pub type Encoded = Vec<u8, FRAME_MAX>;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Kind {
-    /// Host to board: [`crate::Request`]; id = request id.
+    /// Host to board: [`crate::Call`]; id = request id.
     Request = 1,
     /// Board to host: [`crate::Response`]; id = request id.
     Response = 2,
@@ -112,8 +112,10 @@ pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
 
     let mut wire = Encoded::new();
     wire.resize(FRAME_MAX, 0).ok()?;
-    let length = cobs::encode(&raw[..end + CRC_BYTES], &mut wire);
-    wire.truncate(length + 1); // the byte after the encoding is still 0: the delimiter
+    let length = cobs::try_encode(&raw[..end + CRC_BYTES], &mut wire).ok()?;
+    // The encoder may have touched the byte behind the encoding.
+    wire.truncate(length);
+    wire.push(0).ok()?;
     Some(wire)
 }
 

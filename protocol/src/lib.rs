@@ -13,7 +13,7 @@
 //! ```
 //! use farnear_protocol::frame::{Decoder, Header, Kind, encode};
 //! use farnear_protocol::message::Axis;
-//! use farnear_protocol::{Micros, Nanometres, PROTOCOL_CURRENT, Request};
+//! use farnear_protocol::{Call, Micros, Nanometres, PROTOCOL_CURRENT, Request};
 //!
 //! // To far focus, 20 um; if the host is silent for a second the board stops.
 //! let request = Request::Move {
@@ -22,7 +22,8 @@
 //!     silence: Micros(1_000_000),
 //! };
 //! let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: 7, boot: 1 };
-//! let wire = encode(header, &request).expect("every message fits a frame");
+//! let call = Call { session: 0x1234_5678, request };
+//! let wire = encode(header, &call).expect("every message fits a frame");
 //! assert_eq!(wire.last(), Some(&0), "0 ends a frame and is nowhere else in it");
 //!
 //! // The other end takes byte after byte; whatever stood on the line before is skipped.
@@ -31,7 +32,7 @@
 //! let mut packets = noise.iter().chain(&wire).filter_map(|byte| decoder.push(*byte)?.ok());
 //! let packet = packets.next().expect("the frame is whole and its CRC right");
 //! assert_eq!(packet.header, header);
-//! assert_eq!(packet.message(), Some(request));
+//! assert_eq!(packet.message(), Some(call));
 //! ```
 //!
 //! Goals: no request acts twice, nothing is believed without a CRC, a stranger can write a client from
@@ -46,11 +47,11 @@ pub mod settle;
 pub mod units;
 
 pub use log::{LOG_BYTES_MAX, Log};
-pub use message::{Event, EventKind, Request, RequestError, Response};
+pub use message::{Call, Event, EventKind, Request, RequestError, Response};
 pub use settle::Settle;
 pub use units::{BoardMicros, Micros, Nanometres};
 
 /// The oldest protocol version this crate can still speak.
-pub const PROTOCOL_MIN: u8 = 2;
+pub const PROTOCOL_MIN: u8 = 3;
 /// The protocol version this crate speaks.
-pub const PROTOCOL_CURRENT: u8 = 2;
+pub const PROTOCOL_CURRENT: u8 = 3;

@@ -10,13 +10,14 @@
 //! [`Nanometres`]: crate::Nanometres
 //!
 //! Growing the table: append variants and messages at the end; anything else is a new protocol version. The
-//! bytes of version 2 are frozen in `tests/it/frozen_wire`.
+//! bytes of version 3 are frozen in `tests/it/frozen_wire`.
 
 mod alarm;
 mod answer;
 mod axis;
 mod board;
 mod calibration;
+mod call;
 mod event;
 mod maths;
 mod memory;
@@ -31,6 +32,7 @@ pub use self::{
     axis::{Axis, AxisStatus, PositionState, sensor_distance_nm},
     board::{Capabilities, Hello, Limits, LinkCounters, ResetCause, Status},
     calibration::{Calibration, Routine},
+    call::{Call, ID_STEP_MAX, NO_SESSION},
     event::{Event, EventKind, Failure},
     maths::{
         CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,

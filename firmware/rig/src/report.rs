@@ -9,6 +9,7 @@ use heapless::String;
 use crate::correction::ROW_PIXELS_MAX;
 use crate::program::SHOTS_MAX;
 use crate::rig::Rig;
+use crate::session::OUTSTANDING;
 use crate::settings::STEP_PM;
 use crate::work::{Active, WholeWork};
 
@@ -33,6 +34,8 @@ impl Rig {
                 emergency_stop: true,
             },
             limits: self.limits(),
+            last_id: self.session.last_id(),
+            outstanding: OUTSTANDING as u8,
         }
     }
 

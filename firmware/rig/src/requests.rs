@@ -28,6 +28,7 @@ impl Rig {
         let id = incoming.id;
         match &incoming.request {
             Request::Hello => Ok(Response::Hello(self.hello())),
+            Request::OpenSession => Ok(self.stop()),
             Request::Status => Ok(Response::Status(self.status(now))),
             Request::ReadEvent { number } => self.read_event(*number),
             Request::Stop => Ok(self.stop()),

@@ -184,9 +184,9 @@ impl Rig {
     /// waits in [`Self::transmit`].
     pub fn receive(&mut self, byte: u8, now: BoardMicros) {
         self.begin(now);
-        let frames = self.session.counters().frames;
+        let heard = self.session.heard();
         let incoming = self.session.receive(byte);
-        if self.session.counters().frames != frames {
+        if self.session.heard() != heard {
             self.silence.hear(now);
         }
         if let Some(incoming) = incoming {

@@ -1,24 +1,35 @@
 //! The link's session: bytes in, requests out; answers in, frames out.
 //!
-//! A request acts once. Its id and the request itself are remembered with the answer for the last
-//! [`REMEMBERED`] requests; the same again is answered from memory, the same id with another request is refused.
-//! Hello opens a session and forgets what was before, unless it is the retry of the hello that opened this one:
-//! on a serial line a retry never overtakes, so it comes before any other request of its session.
+//! A request acts once. Ids only grow, over the whole boot ([`ids`]); with the last [`REMEMBERED`] requests their
+//! answers are remembered: the same again is answered from memory, the same id with another request is refused, and so is
+//! everything older. A request also names its host's session: one that belongs to another session than the one that is
+//! open is refused, so that of two hosts only the one that came last is heard. Hello belongs to none and changes nothing.
 //!
-//! Answers wait in a queue of their own, so no burst of events can push one out; where that queue is full the next
-//! request is dropped unseen, and the host's retry finds room.
+//! Answers wait in a queue of their own, so no burst of events can push one out. Where it is full a request is not
+//! looked at but refused with `QueueFull`; of the refusals only the ids wait, so that there is room for many. A burst that
+//! is too long even for that is counted.
 //!
-//! RAM: about 4.5 KiB, most of it remembered answers.
+//! RAM: about 5.5 KiB, most of it remembered answers.
+
+mod ids;
 
 use farnear_protocol::frame::{self, Decoder, Encoded, Header, Kind, Packet};
-use farnear_protocol::message::{LinkCounters, Request, RequestError, Response};
+use farnear_protocol::message::{Call, LinkCounters, NO_SESSION, Request, RequestError, Response};
 use farnear_protocol::{PROTOCOL_CURRENT, PROTOCOL_MIN};
 use heapless::Deque;
 
+use self::ids::Ids;
+
 /// Answers remembered for retries.
 pub const REMEMBERED: usize = 8;
-/// Answers that may wait for the UART.
-const WAITING: usize = 4;
+/// Answers that may wait for the UART: what [`farnear_protocol::message::Hello::outstanding`] promises.
+pub const OUTSTANDING: usize = 8;
+/// Requests without room that may wait for being told so. At the link's speed 10 small requests arrive in the
+/// millisecond in which as many refusals leave: this is several ticks' worth.
+const REFUSED: usize = 64;
+
+// A host that repeats the oldest of its outstanding requests must meet its answer.
+const _: () = assert!(OUTSTANDING <= REMEMBERED && REMEMBERED <= ids::IDS as usize);
 
 /// A request that was answered.
 #[derive(Clone, Debug)]
@@ -40,19 +51,30 @@ pub(crate) struct Incoming {
 pub(crate) struct Session {
     boot: u32,
     decoder: Decoder,
+    /// The open session's number, or [`NO_SESSION`].
+    number: u32,
+    ids: Ids,
     answered: Deque<Answered, REMEMBERED>,
-    waiting: Deque<Encoded, WAITING>,
+    waiting: Deque<Encoded, OUTSTANDING>,
+    refused: Deque<u32, REFUSED>,
     counters: LinkCounters,
+    /// Requests of the open session, repeated ones too.
+    heard: u32,
 }
 
 impl Session {
     pub(crate) const fn new(boot: u32) -> Self {
+        let counters = LinkCounters { frames: 0, bad_frames: 0, repeated: 0, stale: 0, overflowed: 0 };
         Self {
             boot,
             decoder: Decoder::new(),
+            number: NO_SESSION,
+            ids: Ids::new(),
             answered: Deque::new(),
             waiting: Deque::new(),
-            counters: LinkCounters { frames: 0, bad_frames: 0, repeated: 0 },
+            refused: Deque::new(),
+            counters,
+            heard: 0,
         }
     }
 
@@ -61,56 +83,100 @@ impl Session {
         self.counters
     }
 
-    /// Takes a byte; gives a request that is new and was made for this boot.
+    /// The largest request id so far.
+    pub(crate) const fn last_id(&self) -> u32 {
+        self.ids.last()
+    }
+
+    /// How often the open session's host was heard: whoever speaks for another session, or for none, does not count.
+    pub(crate) const fn heard(&self) -> u32 {
+        self.heard
+    }
+
+    /// Takes a byte; gives a request that is new and was made for this boot and this session.
     pub(crate) fn receive(&mut self, byte: u8) -> Option<Incoming> {
         match self.decoder.push(byte)? {
             Ok(packet) if packet.header.kind == Kind::Request => {
-                self.counters.frames = self.counters.frames.wrapping_add(1);
-                self.admit(&packet)
+                count(&mut self.counters.frames);
+                self.take(&packet)
             }
             // A whole frame of another kind is no request either: an echo of what this board sent.
             Ok(_) | Err(_) => {
-                self.counters.bad_frames = self.counters.bad_frames.wrapping_add(1);
+                count(&mut self.counters.bad_frames);
                 None
             }
         }
     }
 
-    fn admit(&mut self, packet: &Packet) -> Option<Incoming> {
+    fn take(&mut self, packet: &Packet) -> Option<Incoming> {
+        let id = packet.header.id;
         if self.waiting.is_full() {
+            count(&mut self.counters.overflowed);
+            let _ = self.refused.push_back(id); // without room for that either, being counted is all
             return None;
         }
+        match self.admit(packet) {
+            Ok(incoming) => incoming,
+            Err(error) => {
+                if matches!(error, RequestError::NotInSession | RequestError::IdNotNew { .. }) {
+                    count(&mut self.counters.stale);
+                }
+                // Without being remembered: nothing was done, and the same will be refused again.
+                if let Some(reply) = frame::encode(self.header(Kind::Error, id), &error) {
+                    let _ = self.waiting.push_back(reply); // not full, see above
+                }
+                None
+            }
+        }
+    }
+
+    /// A request to be carried out; nothing where it repeats one, whose answer is on its way then.
+    fn admit(&mut self, packet: &Packet) -> Result<Option<Incoming>, RequestError> {
         let Header { version, id, boot, .. } = packet.header;
         if !(PROTOCOL_MIN..=PROTOCOL_CURRENT).contains(&version) {
-            self.refuse(id, &RequestError::Version { min: PROTOCOL_MIN, current: PROTOCOL_CURRENT });
-            return None;
+            return Err(RequestError::Version { min: PROTOCOL_MIN, current: PROTOCOL_CURRENT });
         }
-        let request: Option<Request> = packet.message();
-        let unknown_boot_allowed = boot == 0 && matches!(request, Some(Request::Hello));
-        if boot != self.boot && !unknown_boot_allowed {
-            self.refuse(id, &RequestError::Boot { current: self.boot });
-            return None;
+        let call: Option<Call> = packet.message();
+        let is_hello = call.as_ref().is_some_and(|call| call.request == Request::Hello);
+        if boot != self.boot && !(is_hello && boot == 0) {
+            return Err(RequestError::Boot { current: self.boot });
         }
-        let Some(request) = request else {
-            self.refuse(id, &RequestError::Malformed);
-            return None;
-        };
-        if request == Request::Hello
-            && self.answered.back().is_none_or(|last| (last.id, &last.request) != (id, &request))
-        {
-            self.answered.clear();
+        let Some(Call { session, request }) = call else { return Err(RequestError::Malformed) };
+        if is_hello {
+            return Ok(Some(Incoming { id, request }));
         }
+        let is_new = self.ids.is_new(id);
+        if request == Request::OpenSession && session != NO_SESSION {
+            if is_new {
+                self.number = session;
+                self.answered.clear();
+                self.ids.begin(id);
+            } else if session != self.number {
+                return Err(RequestError::IdNotNew { last: self.ids.last() });
+            }
+        } else if session != self.number || session == NO_SESSION {
+            return Err(RequestError::NotInSession);
+        }
+        if is_new {
+            self.ids.take(id);
+            self.heard = self.heard.wrapping_add(1);
+            return Ok(Some(Incoming { id, request }));
+        }
+        self.repeat(id, &request)?;
+        Ok(None)
+    }
+
+    /// Gives the remembered answer again.
+    fn repeat(&mut self, id: u32, request: &Request) -> Result<(), RequestError> {
         match self.answered.iter().find(|answered| answered.id == id) {
-            None => Some(Incoming { id, request }),
-            Some(answered) if answered.request == request => {
-                self.counters.repeated = self.counters.repeated.wrapping_add(1);
-                let _ = self.waiting.push_back(answered.reply.clone()); // not full, see above
-                None
+            Some(answered) if answered.request == *request => {
+                count(&mut self.counters.repeated);
+                self.heard = self.heard.wrapping_add(1);
+                let _ = self.waiting.push_back(answered.reply.clone()); // not full, see `take`
+                Ok(())
             }
-            Some(_) => {
-                self.refuse(id, &RequestError::IdReused);
-                None
-            }
+            Some(_) => Err(RequestError::IdReused),
+            None => Err(RequestError::IdNotNew { last: self.ids.last() }),
         }
     }
 
@@ -123,17 +189,13 @@ impl Session {
         // Every message fits a frame (the protocol crate tests it).
         let Some(reply) = reply else { return };
         let _ = self.waiting.push_back(reply.clone()); // there was room when the request was admitted
+        if incoming.request == Request::Hello {
+            return;
+        }
         if self.answered.is_full() {
             self.answered.pop_front();
         }
         let _ = self.answered.push_back(Answered { id: incoming.id, request: incoming.request, reply });
-    }
-
-    /// Refuses without remembering: nothing was done, and the same will be refused again.
-    fn refuse(&mut self, id: u32, error: &RequestError) {
-        if let Some(reply) = frame::encode(self.header(Kind::Error, id), error) {
-            let _ = self.waiting.push_back(reply); // not full, see `admit`
-        }
     }
 
     /// The header of a frame of this boot.
@@ -143,11 +205,20 @@ impl Session {
 
     /// The next answer to send.
     pub(crate) fn send(&mut self) -> Option<Encoded> {
-        self.waiting.pop_front()
+        if let Some(reply) = self.waiting.pop_front() {
+            return Some(reply);
+        }
+        let id = self.refused.pop_front()?;
+        let error = RequestError::QueueFull { outstanding: OUTSTANDING as u8 };
+        frame::encode(self.header(Kind::Error, id), &error)
     }
 
-    /// Whether answers wait to be sent.
+    /// Whether no answers wait to be sent.
     pub(crate) fn all_sent(&self) -> bool {
-        self.waiting.is_empty()
+        self.waiting.is_empty() && self.refused.is_empty()
     }
+}
+
+fn count(counter: &mut u32) {
+    *counter = counter.wrapping_add(1);
 }

@@ -1,7 +1,7 @@
 //! The host's silence: whoever moves things must stay in touch.
 //!
 //! Each request that moves something says for how long the host may say nothing. The shortest of those under way counts.
-//! Half-way the host is reminded, once; any good frame of it starts the time anew.
+//! Half-way the host is reminded, once; any request of the open session starts the time anew, and what others say does not.
 
 use farnear_protocol::{BoardMicros, Micros};
 
@@ -30,7 +30,7 @@ impl Silence {
         Self { heard: now, reminded: false }
     }
 
-    /// A good frame came.
+    /// The open session's host said something.
     pub(crate) const fn hear(&mut self, now: BoardMicros) {
         *self = Self::new(now);
     }

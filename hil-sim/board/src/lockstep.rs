@@ -12,7 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use farnear_protocol::{
-    Event, EventKind, Request, Response,
+    Call, Event, EventKind, Request, Response,
     frame::{Decoder, Kind, Packet},
 };
 
@@ -77,6 +77,7 @@ impl Work {
             Request::ResumeProgram => Self::Resume,
             Request::Reboot => Self::Reset,
             Request::Hello
+            | Request::OpenSession
             | Request::Status
             | Request::Stop
             | Request::Halt
@@ -117,7 +118,7 @@ impl Lockstep {
             let Some(Ok(packet)) = self.to_board.push(*byte) else { continue };
             if packet.header.kind == Kind::Request {
                 // What is not a request of this version is only refused.
-                let work = packet.message().map_or(Work::Done, |request| Work::of(&request));
+                let work = packet.message().map_or(Work::Done, |call: Call| Work::of(&call.request));
                 let asked = Asked { work, until_ns: now_ns + ANSWER_NS, body: packet.body.to_vec() };
                 self.asked.insert(packet.header.id, asked);
             }
@@ -158,8 +159,6 @@ impl Lockstep {
             Kind::Response => {
                 let work = self.asked.remove(&id).map(|asked| asked.work);
                 match packet.message::<Response>() {
-                    // A session begins, and with it the request ids.
-                    Some(Response::Hello(_)) => self.ended.clear(),
                     Some(Response::Accepted) if work == Some(Work::Long) && !self.ended.contains(&id) => {
                         self.running.insert(id, now_ns + WORK_NS);
                     }
@@ -220,6 +219,7 @@ impl Lockstep {
     pub fn reset(&mut self, now_ns: u64) {
         self.running.clear();
         self.asked.clear();
+        self.ended.clear();
         self.paused = None;
         self.waits_for_host = false;
         // One that is reset again and again before it has started is waited for only once.
@@ -255,6 +255,10 @@ mod tests {
         encode(Header { version: PROTOCOL_CURRENT, kind, id, boot: 1 }, message).expect("fits").to_vec()
     }
 
+    fn request(id: u32, request: Request) -> Vec<u8> {
+        frame(Kind::Request, id, &Call { session: 1, request })
+    }
+
     fn event(kind: EventKind) -> Vec<u8> {
         frame(Kind::Event, 0, &Event { time: BoardMicros(0), kind })
     }
@@ -273,7 +277,7 @@ mod tests {
         let asked = Nanometres(5);
         let silence = Micros(1_000_000);
         let body = Request::Move { axis: Axis::SensorFine, target: asked, silence };
-        let request = frame(Kind::Request, 7, &body);
+        let request = request(7, body);
         let accepted = frame(Kind::Response, 7, &Response::Accepted);
         lockstep.sent(&request, 10);
         assert!(lockstep.is_busy(11));
@@ -294,7 +298,7 @@ mod tests {
         let mut lockstep = started();
         lockstep.received(&event(EventKind::StillThere { request: 7 }), 5);
         assert!(lockstep.waits_for_host());
-        lockstep.sent(&frame(Kind::Request, 8, &Request::Status), 5);
+        lockstep.sent(&request(8, Request::Status), 5);
         assert!(!lockstep.waits_for_host());
     }
 
@@ -303,11 +307,11 @@ mod tests {
         let mut lockstep = started();
         let run = Request::RunProgram { silence: Micros(1_000_000) };
         let accepted = |id| frame(Kind::Response, id, &Response::Accepted);
-        lockstep.sent(&frame(Kind::Request, 3, &run), 0);
+        lockstep.sent(&request(3, run), 0);
         lockstep.received(&accepted(3), 1);
         lockstep.received(&event(EventKind::Paused { request: 3, index: 1 }), 2);
         assert!(!lockstep.is_busy(3));
-        lockstep.sent(&frame(Kind::Request, 4, &Request::ResumeProgram), 4);
+        lockstep.sent(&request(4, Request::ResumeProgram), 4);
         lockstep.received(&accepted(4), 5);
         assert!(lockstep.is_busy(6));
         lockstep.received(&event(EventKind::ProgramDone { request: 3, exposures: 2 }), 7);
@@ -317,7 +321,7 @@ mod tests {
     #[test]
     fn a_lost_request_is_given_up() {
         let mut lockstep = started();
-        lockstep.sent(&frame(Kind::Request, 1, &Request::Status), 0);
+        lockstep.sent(&request(1, Request::Status), 0);
         assert!(lockstep.is_busy(ANSWER_NS - 1) && !lockstep.is_busy(ANSWER_NS));
     }
 

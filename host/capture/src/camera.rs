@@ -59,6 +59,12 @@ pub enum CameraError {
         /// What the system says.
         reason: String,
     },
+    /// Another program has the camera.
+    #[error("the camera at {address} is in use by another program; end that program first")]
+    InUse {
+        /// The address.
+        address: String,
+    },
     /// What came is no image.
     #[error("the camera at {address} sends no images: {reason}")]
     Nonsense {

@@ -26,7 +26,7 @@ use crate::{
     log_stream::LogStream,
     owner::{Command, Connect, Listener, Owner, Session, nonsense},
     timing::{Pace, Timing},
-    transport::{SerialTransport, Transport},
+    transport::{Place, Transport},
 };
 
 /// From one attempt to reach a board that restarts to the next.
@@ -257,6 +257,6 @@ impl Client {
 }
 
 fn serial(port: &str) -> Connect {
-    let port = port.to_owned();
-    Box::new(move || Ok(Box::new(SerialTransport::open(&port)?) as Box<dyn Transport>))
+    let mut place = Place::new(port);
+    Box::new(move || Ok(Box::new(place.open()?) as Box<dyn Transport>))
 }

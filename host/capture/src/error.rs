@@ -78,6 +78,17 @@ pub enum ClientError {
         /// What the system says.
         source: Arc<std::io::Error>,
     },
+    /// Another host has opened a session with this board: what this one had begun there was stopped.
+    #[error(
+        "another program has taken the board on {port} over while {during}; what was moving has stopped; end that program, or \
+         connect again"
+    )]
+    TakenOver {
+        /// The port.
+        port: String,
+        /// What was being done.
+        during: String,
+    },
     /// No answer came in time, however often it was asked.
     #[error(
         "no answer from {port} while {during}: asked {attempts} times within {waited:?}{}",

@@ -1,4 +1,4 @@
-//! Hello: who is there, and which protocol version both speak.
+//! Hello: who is there, and which protocol version both speak; and the session that follows.
 
 use std::time::Duration;
 
@@ -14,6 +14,9 @@ use crate::{error::ClientError, link::Link, timing::Timing};
 /// may still be starting, and whether it is an emulated one is not known yet.
 const ATTEMPTS: u32 = 6;
 const DURING: &str = "asking the board who it is";
+/// The session of an emulated board: a number drawn at random would make the run another one. Two programs that use it one
+/// after the other are told apart by their request ids.
+const EMULATED_SESSION: u32 = 0x5eed_0001;
 
 /// Cleans the line, asks who is there and agrees on a version. A board that is known to be emulated is given its
 /// own time: hello asked twice, because this computer is slow, would make the run another one.
@@ -30,6 +33,40 @@ pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hell
     let hello = read_answer(&packet)?;
     let version = agree(&hello)?;
     Ok((hello, version))
+}
+
+/// Opens a session: what another host had begun on this board ends, and its requests are refused from now on.
+pub(crate) fn open_session(link: &mut Link, (hello, version): (&Hello, u8)) -> Result<(), ClientError> {
+    let during = "opening a session";
+    let number = if hello.emulated { EMULATED_SESSION } else { random_session() };
+    link.begin_session(number, hello.last_id);
+    let timing = if hello.emulated { Timing::EMULATED } else { Timing::REAL };
+    let waits = vec![timing.reply; timing.retries as usize + 1];
+    let address = (version, hello.boot);
+    // What the events say of the session before is nobody's business here.
+    let (_, packet) = link.ask(address, &Request::OpenSession, &waits, during, &mut |_| Ok(()))?;
+    if packet.header.kind == Kind::Response {
+        return Ok(());
+    }
+    let during = during.into();
+    Err(match packet.message() {
+        // It was reset between hello and this.
+        Some(RequestError::Boot { current }) => {
+            ClientError::Reset { during, was: hello.boot, now: current, cause: None }
+        }
+        Some(error) => ClientError::Refused { during, error },
+        None => ClientError::Nonsense { during, answer: format!("{:02x?}", packet.body.as_slice()) },
+    })
+}
+
+/// A number that no other host has: 0 means none.
+fn random_session() -> u32 {
+    // Where the system has no random numbers, the process and the time tell hosts apart as well.
+    let chance = getrandom::u32().unwrap_or_else(|_| {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        std::process::id() ^ now.subsec_nanos()
+    });
+    chance.max(1)
 }
 
 fn read_answer(packet: &Packet) -> Result<Hello, ClientError> {

@@ -1,6 +1,7 @@
 //! One question, one answer: frames over a [`Transport`], sent again until answered.
 //!
-//! Knows no session: which boot and version a request carries, and what an event means, is the caller's.
+//! Which boot and version a request carries, and what an event means, is the caller's; the session and its request ids are
+//! kept here, see [`Link::begin_session`].
 
 use std::{
     io::{self, ErrorKind},
@@ -9,8 +10,9 @@ use std::{
 };
 
 use farnear_protocol::{
-    Request,
+    Call, Request, RequestError,
     frame::{Decoder, Header, Kind, Packet, encode},
+    message::NO_SESSION,
 };
 
 use crate::{error::ClientError, transport::Transport};
@@ -22,14 +24,28 @@ const QUIET_AT_MOST: Duration = Duration::from_millis(500);
 /// Shortest time allowed for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 
+/// Throws away what comes until nothing comes any more, or for so long.
+fn until_quiet(transport: &mut dyn Transport, buffer: &mut [u8]) -> io::Result<()> {
+    transport.discard_input()?;
+    let until = Instant::now() + QUIET_AT_MOST;
+    while Instant::now() < until && transport.receive(buffer, QUIET)? > 0 {}
+    Ok(())
+}
+
+fn is_queue_full(packet: &Packet) -> bool {
+    matches!(packet.message(), Some(RequestError::QueueFull { .. }))
+}
+
 /// A transport with framing, request ids and retries.
 pub(crate) struct Link {
-    transport: Box<dyn Transport>,
+    /// `None` between an unplugging and the next connection.
+    transport: Option<Box<dyn Transport>>,
     port: String,
     decoder: Decoder,
     buffer: [u8; 512],
     /// Bytes of `buffer` that were received and not decoded yet.
     unread: std::ops::Range<usize>,
+    session: u32,
     next_id: u32,
     bytes: u64,
     bad_frames: u64,
@@ -38,22 +54,35 @@ pub(crate) struct Link {
 impl Link {
     pub(crate) fn new(transport: Box<dyn Transport>, port: &str) -> Self {
         Self {
-            transport,
+            transport: Some(transport),
             port: port.into(),
             decoder: Decoder::new(),
             buffer: [0; 512],
             unread: 0..0,
+            session: NO_SESSION,
             next_id: 1,
             bytes: 0,
             bad_frames: 0,
         }
     }
 
-    /// Goes on over another transport, after the first broke. Request ids go on counting.
+    /// From now on requests belong to this session, and their ids follow the last one that the board has seen.
+    pub(crate) fn begin_session(&mut self, number: u32, last_id: u32) {
+        self.session = number;
+        self.next_id = last_id.wrapping_add(1);
+    }
+
+    /// Goes on over another transport, after the first broke.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
-        self.transport = transport;
+        self.transport = Some(transport);
         self.decoder = Decoder::new();
         self.unread = 0..0;
+    }
+
+    /// Closes the port. As long as a program holds a port that has gone, the system gives the board that comes back another
+    /// name.
+    pub(crate) fn close(&mut self) {
+        self.transport = None;
     }
 
     pub(crate) fn port(&self) -> &str {
@@ -73,9 +102,9 @@ impl Link {
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1).max(1);
         let header = Header { version, kind: Kind::Request, id, boot };
-        let frame = encode(header, request).ok_or_else(|| ClientError::Nonsense {
-            during: during.into(),
-            answer: "the request does not fit a frame".into(),
+        let session = if *request == Request::Hello { NO_SESSION } else { self.session };
+        let frame = encode(header, &Call { session, request: request.clone() }).ok_or_else(|| {
+            ClientError::Nonsense { during: during.into(), answer: "the request does not fit a frame".into() }
         })?;
         let begin = Instant::now();
         let (bytes, bad_frames) = (self.bytes, self.bad_frames);
@@ -88,6 +117,8 @@ impl Link {
             let until = Instant::now() + *wait;
             while let Some(packet) = self.receive(until, during)? {
                 match packet.header.kind {
+                    // The board had no room for it and asks to be asked again.
+                    Kind::Error if packet.header.id == id && is_queue_full(&packet) => {}
                     Kind::Response | Kind::Error if packet.header.id == id => return Ok((id, packet)),
                     Kind::Event | Kind::Log => on_other(&packet)?,
                     // The late answer to an earlier attempt.
@@ -119,7 +150,11 @@ impl Link {
             if left.is_zero() {
                 return Ok(None);
             }
-            match self.transport.receive(&mut self.buffer, left) {
+            let received = match &mut self.transport {
+                Some(transport) => transport.receive(&mut self.buffer, left),
+                None => Err(ErrorKind::NotConnected.into()),
+            };
+            match received {
                 Ok(count) => {
                     self.bytes += count as u64;
                     self.unread = 0..count;
@@ -131,22 +166,22 @@ impl Link {
 
     /// Reads until the line is quiet, so that no answer meant for an earlier program is taken for ours.
     pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
-        self.transport.discard_input().map_err(|source| self.gone(source, during))?;
-        let until = Instant::now() + QUIET_AT_MOST;
-        while Instant::now() < until {
-            match self.transport.receive(&mut self.buffer, QUIET) {
-                Ok(0) => break,
-                Ok(_) => {}
-                Err(source) => return Err(self.gone(source, during)),
-            }
-        }
+        let drained = match &mut self.transport {
+            Some(transport) => until_quiet(transport.as_mut(), &mut self.buffer),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        drained.map_err(|source| self.gone(source, during))?;
         self.unread = 0..0;
         self.decoder = Decoder::new();
         Ok(())
     }
 
     fn send(&mut self, bytes: &[u8], wait: Duration, during: &str) -> Result<(), ClientError> {
-        match self.transport.send(bytes, wait.max(SEND_AT_LEAST)) {
+        let sent = match &mut self.transport {
+            Some(transport) => transport.send(bytes, wait.max(SEND_AT_LEAST)),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        match sent {
             // Nobody takes the bytes; the missing answer will tell.
             Err(error) if error.kind() == ErrorKind::TimedOut => Ok(()),
             result => result.map_err(|source| self.gone(source, during)),

@@ -24,7 +24,7 @@ use farnear_protocol::{
 use crate::{
     error::{ClientError, PortError},
     events::{Events, is_under_way, request_of},
-    handshake::shake_hands,
+    handshake::{open_session, shake_hands},
     link::Link,
     log_stream::{LogPart, Readers},
     timing::Timing,
@@ -38,6 +38,8 @@ pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Se
 const ALERT: Duration = Duration::from_millis(1);
 /// Longest wait for a command while nobody awaits an event.
 const IDLE: Duration = Duration::from_millis(50);
+/// A board that does not answer so many polls in a row, each asked as often as any request, is dead.
+const UNANSWERED_POLLS: u32 = 2;
 /// Longest look for bytes between two commands.
 const GLANCE: Duration = Duration::from_millis(1);
 /// From one attempt to reach the board again to the next.
@@ -55,7 +57,18 @@ pub(crate) struct Session {
 #[derive(Clone, Debug)]
 pub(crate) enum Break {
     Gone(Arc<io::Error>),
-    Reset { was: u32, now: u32, cause: Option<ResetCause> },
+    /// Another host has opened a session.
+    TakenOver,
+    /// The port is there, and nobody answers: asked so often, for so long.
+    Silent {
+        attempts: u32,
+        waited: Duration,
+    },
+    Reset {
+        was: u32,
+        now: u32,
+        cause: Option<ResetCause>,
+    },
 }
 
 impl Break {
@@ -63,6 +76,10 @@ impl Break {
         let during = during.into();
         match self.clone() {
             Self::Gone(source) => ClientError::Gone { port: port.into(), during, source },
+            Self::Silent { attempts, waited } => {
+                ClientError::Silent { port: port.into(), during, attempts, waited, bad_frames: 0, bytes: 0 }
+            }
+            Self::TakenOver => ClientError::TakenOver { port: port.into(), during },
             Self::Reset { was, now, cause } => ClientError::Reset { during, was, now, cause },
         }
     }
@@ -121,6 +138,8 @@ pub(crate) struct Owner {
     next_log: Option<u32>,
     still_there: bool,
     last_heard: Instant,
+    /// Polls in a row that nobody answered.
+    unanswered: u32,
 }
 
 impl Owner {
@@ -134,6 +153,7 @@ impl Owner {
     ) -> Result<Self, ClientError> {
         let mut link = Link::new(connect()?, port);
         let (hello, version) = shake_hands(&mut link, emulated)?;
+        open_session(&mut link, (&hello, version))?;
         let timing = timing(&hello);
         let events = Events { boot: hello.boot, ..Events::default() };
         let session = Session { number: 1, hello: Arc::new(hello), version };
@@ -153,6 +173,7 @@ impl Owner {
             next_log: None,
             still_there: false,
             last_heard: now,
+            unanswered: 0,
         };
         owner.join_events()?;
         Ok(owner)
@@ -257,6 +278,11 @@ impl Owner {
                 self.break_off(&error);
                 error
             }
+            RequestError::NotInSession => {
+                let error = ClientError::TakenOver { port: self.link.port().into(), during: during.into() };
+                self.break_off(&error);
+                error
+            }
             error => ClientError::Refused { during: during.into(), error },
         })
     }
@@ -275,24 +301,38 @@ impl Owner {
             ClientError::Reset { was, now, cause, .. } => {
                 Break::Reset { was: *was, now: *now, cause: *cause }
             }
+            ClientError::TakenOver { .. } => Break::TakenOver,
             _ => return,
         };
+        self.end_session(broken);
+    }
+
+    fn end_session(&mut self, broken: Break) {
         for (_, work) in std::mem::take(&mut self.works) {
             let _ = work.notes.send(Note::Broken(broken.clone()));
         }
+        if matches!(broken, Break::Gone(_)) {
+            self.link.close();
+        }
         self.events.arrived.clear();
         self.still_there = false;
+        self.unanswered = 0;
         // A board that was reset is there; one that was unplugged takes a while.
-        let pause = if matches!(broken, Break::Gone(_)) { RECONNECT } else { Duration::ZERO };
+        let is_there = matches!(broken, Break::Reset { .. } | Break::TakenOver);
+        let pause = if is_there { Duration::ZERO } else { RECONNECT };
         self.next_attempt = Instant::now() + pause;
         self.last_break = Some(broken.clone());
         self.broken = Some(broken);
     }
 
     fn try_again_when_due(&mut self) {
-        // The port of a simulator that has ended may be anybody's next.
-        let nobodys = matches!(self.broken, Some(Break::Gone(_))) && self.session.hello.emulated;
-        if !nobodys && Instant::now() >= self.next_attempt {
+        // The port of a simulator that has ended may be anybody's next, unless it has a name of its own (a link).
+        let gone = matches!(self.broken, Some(Break::Gone(_)));
+        let named = std::fs::symlink_metadata(self.link.port()).is_ok_and(|found| found.is_symlink());
+        let nobodys = gone && self.session.hello.emulated && !named;
+        // Whoever has taken the board over keeps it, until somebody here asks for it.
+        let taken = matches!(self.broken, Some(Break::TakenOver));
+        if !nobodys && !taken && Instant::now() >= self.next_attempt {
             // It is tried again, for as long as anybody holds a handle.
             let _ = self.reconnect();
         }
@@ -333,6 +373,8 @@ impl Owner {
             self.break_off(&ClientError::Reset { during: "saying hello".into(), was, now, cause });
             self.broken = None;
         }
+        let opened = open_session(&mut self.link, (&hello, version));
+        opened.inspect_err(|error| self.break_off(error))?;
         self.session.number += 1;
         self.events = Events { boot: hello.boot, ..Events::default() };
         self.next_log = None;
@@ -449,7 +491,20 @@ impl Owner {
             return;
         }
         self.last_heard = Instant::now();
-        let Ok(status) = self.status("asking for events that got lost") else { return };
+        let begin = Instant::now();
+        let status = match self.status("asking for events that got lost") {
+            Ok(status) => status,
+            Err(ClientError::Silent { attempts, .. }) => {
+                self.unanswered += 1;
+                if self.unanswered >= UNANSWERED_POLLS {
+                    let attempts = attempts * UNANSWERED_POLLS;
+                    self.end_session(Break::Silent { attempts, waited: begin.elapsed() });
+                }
+                return;
+            }
+            Err(_) => return,
+        };
+        self.unanswered = 0;
         if !self.events.arrived.is_empty() {
             return;
         }

@@ -4,13 +4,17 @@ use std::time::Duration;
 
 use farnear_protocol::{
     Request, RequestError, Response,
-    message::{AlarmRecord, Counters, Setting, SettingKey, SunAnswer, SunQuery},
+    message::{AlarmRecord, Axis, Counters, Setting, SettingKey, SunAnswer, SunQuery},
 };
 
 use crate::{client::Client, error::ClientError, owner::nonsense};
 
 /// Longest wait for a reset board to answer again.
 const RESTART: Duration = Duration::from_secs(5);
+/// Longest a healthy stepper brakes, also from the fastest that settings allow.
+const BRAKING: Duration = Duration::from_secs(3);
+/// From one look whether the rig stands to the next.
+const LOOK: Duration = Duration::from_millis(10);
 
 impl Client {
     /// Stops all motion along the ramps and ends a running program; positions stay known.
@@ -19,6 +23,25 @@ impl Client {
     /// [`ClientError`].
     pub fn stop(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Stop, "stopping")
+    }
+
+    /// Waits until no axis moves any more: after a stop steppers brake along their ramps.
+    ///
+    /// # Errors
+    /// [`ClientError`]; [`ClientError::Overdue`] where something still moves after longer than any ramp takes.
+    pub fn wait_until_it_stands(&self) -> Result<(), ClientError> {
+        let allowed = self.timing().allowance(BRAKING);
+        let until = std::time::Instant::now() + allowed;
+        loop {
+            let status = self.status()?;
+            if !Axis::ALL.iter().any(|axis| status.axis(*axis).moving) {
+                return Ok(());
+            }
+            if std::time::Instant::now() >= until {
+                return Err(ClientError::Overdue { during: "braking".into(), allowed });
+            }
+            std::thread::sleep(LOOK);
+        }
     }
 
     /// Emergency stop: the last step comes within a millisecond, what moved has lost its position, and the alarm has to

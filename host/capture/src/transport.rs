@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serialport::{ClearBuffer, SerialPort};
+use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 
 use crate::error::PortError;
 
@@ -41,6 +41,52 @@ impl SerialTransport {
             .open()
             .map_err(|error| explain(path, error))?;
         Ok(Self { port })
+    }
+}
+
+/// Where a board is found again after it was unplugged: by the serial number of its USB adapter, where it has one, for the
+/// system may give the port another name; else by the name.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    name: String,
+    usb_serial: Option<String>,
+}
+
+impl Place {
+    /// A port as the user named it.
+    pub(crate) fn new(name: &str) -> Self {
+        Self { name: name.into(), usb_serial: None }
+    }
+
+    /// Opens the port, and remembers whose it is.
+    pub(crate) fn open(&mut self) -> Result<SerialTransport, PortError> {
+        let present = serialport::available_ports().unwrap_or_default();
+        let name = self.find(&present).unwrap_or(&self.name).to_owned();
+        let opened = SerialTransport::open(&name)?;
+        if self.usb_serial.is_none() {
+            let port = present.iter().find(|port| port.port_name == name);
+            self.usb_serial = port.and_then(usb_serial).map(str::to_owned);
+        }
+        Ok(opened)
+    }
+
+    /// The port that the board has now, as far as its serial number tells.
+    fn find<'a>(&self, present: &'a [SerialPortInfo]) -> Option<&'a str> {
+        let wanted = self.usb_serial.as_deref()?;
+        let mut found = present.iter().filter(|port| usb_serial(port) == Some(wanted));
+        // An adapter with several ports has one number for all of them: then the name decides.
+        let (first, another) = (found.next()?, found.next());
+        if another.is_some() && present.iter().any(|port| port.port_name == self.name) {
+            return None;
+        }
+        Some(&first.port_name)
+    }
+}
+
+fn usb_serial(port: &SerialPortInfo) -> Option<&str> {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().filter(|number| !number.is_empty()),
+        _ => None,
     }
 }
 
@@ -124,6 +170,30 @@ mod tests {
         let error = SerialTransport::open("/dev/farnear-no-such-port").err().unwrap();
         assert!(matches!(error, PortError::Absent { .. }), "{error:?}");
         assert!(error.to_string().contains("/dev/farnear-no-such-port"), "{error}");
+    }
+
+    #[test]
+    fn a_board_that_comes_back_under_another_name_is_found_by_its_serial_number() {
+        let port = |name: &str, serial: Option<&str>| SerialPortInfo {
+            port_name: name.into(),
+            port_type: serial.map_or(SerialPortType::Unknown, |serial| {
+                SerialPortType::UsbPort(serialport::UsbPortInfo {
+                    vid: 0x0483,
+                    pid: 0x374b,
+                    serial_number: Some(serial.into()),
+                    manufacturer: None,
+                    product: None,
+                })
+            }),
+        };
+        let board = Place { name: "/dev/ttyACM0".into(), usb_serial: Some("066AFF".into()) };
+        let others = [port("/dev/ttyACM0", Some("077BEE")), port("/dev/ttyS0", None)];
+        assert_eq!(board.find(&others), None, "another board has its name now");
+        let back = [&others[..], &[port("/dev/ttyACM1", Some("066AFF"))]].concat();
+        assert_eq!(board.find(&back), Some("/dev/ttyACM1"));
+        let two = [port("/dev/ttyACM0", Some("066AFF")), port("/dev/ttyACM1", Some("066AFF"))];
+        assert_eq!(board.find(&two), None, "two ports of one adapter: the name decides");
+        assert_eq!(Place::new("/dev/ttyACM0").find(&back), None, "a board without a number");
     }
 
     #[cfg(unix)]

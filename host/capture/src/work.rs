@@ -43,6 +43,7 @@ pub struct Moved {
 pub struct Work {
     client: Client,
     id: u32,
+    request: Request,
     during: String,
     notes: Receiver<Note>,
     /// What the owner of the port holds weakly.
@@ -169,6 +170,10 @@ impl Work {
                 return Err(ClientError::NoEnd { during: during() });
             }
         };
+        if !belongs(&kind, &self.request) {
+            let answer = format!("{kind:?} to {:?}", self.request);
+            return Err(self.stop_with(ClientError::Nonsense { during: during(), answer }));
+        }
         match kind {
             EventKind::Failed { axis, reason, .. } => {
                 self.over = true;
@@ -199,7 +204,8 @@ impl Work {
 
     fn stop_with(&mut self, error: ClientError) -> ClientError {
         self.over = true;
-        match self.client.stop() {
+        // What is said of a rig that was stopped is true when it stands: until then it brakes.
+        match self.client.stop().and_then(|()| self.client.wait_until_it_stands()) {
             Ok(()) => error,
             Err(failed) => failed,
         }
@@ -230,6 +236,7 @@ impl Client {
         Ok(Work {
             client: self.clone(),
             id,
+            request: request.clone(),
             during,
             notes: receiver,
             _held: held,
@@ -372,6 +379,30 @@ impl Client {
                 Step::Done(other) => return Err(wrong_end("running the exposure program", &other).into()),
             }
         }
+    }
+}
+
+/// Whether an event that bears the request's id can be about it: the same axis and the same target.
+fn belongs(kind: &EventKind, request: &Request) -> bool {
+    match (kind, request) {
+        (EventKind::Homed { axis, .. }, Request::Home { axis: asked, .. }) => axis == asked,
+        (EventKind::MoveDone { axis, asked, .. }, Request::Move { axis: of, target, .. }) => {
+            (axis, asked) == (of, target)
+        }
+        (
+            EventKind::Failed { axis: Some(axis), .. },
+            Request::Home { axis: of, .. } | Request::Move { axis: of, .. },
+        ) => axis == of,
+        (EventKind::ProgramDone { .. }, Request::RunProgram { .. })
+        | (EventKind::Calibrated { .. }, Request::Calibrate { .. }) => true,
+        (
+            EventKind::Homed { .. }
+            | EventKind::MoveDone { .. }
+            | EventKind::ProgramDone { .. }
+            | EventKind::Calibrated { .. },
+            _,
+        ) => false,
+        _ => true,
     }
 }
 

@@ -1,8 +1,10 @@
 //! Files that are there whole or not at all: written aside, then renamed.
 
 use std::{
-    fs, io,
+    fs::{self, File},
+    io,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 /// A result could not be put in place.
@@ -30,6 +32,10 @@ impl StagingError {
     }
 }
 
+/// In the name of everything that is not whole yet.
+const PARTIAL: &str = ".partial-";
+/// A folder this young may belong to a program that is just about to lock it.
+const JUST_BEGUN: Duration = Duration::from_secs(10);
 /// Folders that killed programs left behind under one name, before the user is asked to look.
 const LEFT_BEHIND_MAX: u32 = 100;
 
@@ -38,6 +44,8 @@ const LEFT_BEHIND_MAX: u32 = 100;
 #[derive(Debug)]
 pub struct Staging {
     folder: PathBuf,
+    /// Locked as long as this process lives, so that others see that somebody works on the folder.
+    _in_use: Option<File>,
     target: PathBuf,
     /// Whether the folder that files go into was made for them.
     made_target: bool,
@@ -79,8 +87,10 @@ impl Staging {
             }
             free = folder.with_added_extension(number.to_string());
         }
+        sweep(folder.parent().unwrap_or(Path::new(".")));
         fs::create_dir(&free).map_err(StagingError::at(&target))?;
-        Ok(Self { folder: free, target, made_target })
+        let in_use = File::open(&free).ok().filter(|folder| folder.try_lock().is_ok());
+        Ok(Self { folder: free, _in_use: in_use, target, made_target })
     }
 
     /// Where a file is to be written for the time being.
@@ -142,9 +152,25 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     })
 }
 
+/// Removes what killed programs left half-written in a folder. Whoever still writes holds a lock, which the system takes away
+/// from the dead; on systems without such locks on folders, and where something cannot be removed, everything stays.
+fn sweep(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let partial = name.to_str().is_some_and(|name| name.starts_with('.') && name.contains(PARTIAL));
+        let left = |path: &Path| -> io::Result<bool> {
+            let age = fs::metadata(path)?.modified()?.elapsed().unwrap_or_default();
+            Ok(path.is_dir() && age >= JUST_BEGUN && File::open(path)?.try_lock().is_ok())
+        };
+        if partial && left(&entry.path()).unwrap_or(false) {
+            let _ = fs::remove_dir_all(entry.path()); // it is in nobody's way
+        }
+    }
+}
+
 /// Hidden, and another name for each process, so that two that write the same result do not mix.
 fn partial_name(name: &str) -> String {
-    format!(".{name}.partial-{}", std::process::id())
+    format!(".{name}{PARTIAL}{}", std::process::id())
 }
 
 fn occupied(path: &Path) -> bool {
@@ -193,6 +219,34 @@ mod tests {
         staged.write("a", b"1").unwrap();
         staged.finish().unwrap();
         assert_eq!(names(&target), ["a"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_a_killed_program_left_is_swept_and_what_a_living_one_writes_is_not() {
+        let root = tempfile::tempdir().unwrap();
+        let old = |path: &Path| {
+            let folder = File::open(path).unwrap();
+            folder.set_modified(std::time::SystemTime::now() - 2 * JUST_BEGUN).unwrap();
+        };
+        let living = Staging::new_folder(&root.path().join("living")).unwrap();
+        // Nobody holds its lock, as after a kill; another one has only just been made.
+        let dead = root.path().join(".dead.partial-1");
+        fs::create_dir(&dead).unwrap();
+        fs::write(dead.join("half"), b"1").unwrap();
+        let young = root.path().join(".young.partial-2");
+        fs::create_dir(&young).unwrap();
+        let bystander = root.path().join("of the user");
+        fs::create_dir(&bystander).unwrap();
+        for path in [&living.folder, &dead, &bystander] {
+            old(path);
+        }
+        let staged = Staging::new_folder(&root.path().join("new")).unwrap();
+        assert!(!dead.exists());
+        assert!(living.folder.exists() && young.exists() && bystander.exists());
+        staged.finish().unwrap();
+        living.finish().unwrap();
+        assert!(root.path().join("living").exists());
     }
 
     #[test]

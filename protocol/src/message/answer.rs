@@ -53,7 +53,7 @@ pub enum RequestError {
     },
     /// The body is no request of this version.
     Malformed,
-    /// This id was used for another request in this session.
+    /// This id was used for another request.
     IdReused,
     /// The position lies outside the axis' limits.
     OutOfRange {
@@ -146,4 +146,16 @@ pub enum RequestError {
     },
     /// The calibration routine is not possible on this axis.
     NoSuchRoutine,
+    /// The request's session is not the one that is open: another host has opened one since, or none is open yet.
+    NotInSession,
+    /// The id is not new, and its answer, where there was one, is no longer remembered. Nothing was done now.
+    IdNotNew {
+        /// The largest id so far. New ids go on from here, by at most [`super::ID_STEP_MAX`] at a time.
+        last: u32,
+    },
+    /// More requests wait for their answers than the board can hold. This one was not looked at: repeat it.
+    QueueFull {
+        /// How many may wait.
+        outstanding: u8,
+    },
 }

@@ -32,6 +32,10 @@ pub struct Hello {
     pub capabilities: Capabilities,
     /// How far and how much.
     pub limits: Limits,
+    /// The largest request id of this boot, 0 where there was none; ids of a new session go on from it.
+    pub last_id: u32,
+    /// How many requests may wait for their answers at a time.
+    pub outstanding: u8,
 }
 
 /// What a board can do; all `true` for the rig of `docs/rig.md`.
@@ -195,4 +199,8 @@ pub struct LinkCounters {
     pub bad_frames: u32,
     /// Repeated requests answered from memory.
     pub repeated: u32,
+    /// Requests refused because they belong to no open session, or are older than what is remembered.
+    pub stale: u32,
+    /// Requests that found no room: [`super::RequestError::QueueFull`], also where there was no room for that answer.
+    pub overflowed: u32,
 }

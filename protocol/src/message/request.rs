@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 use super::{Axis, Codes, CoefficientBits, CorrectionInfo, Routine, SettingKey, Shot, SunQuery};
 use crate::units::{Micros, Nanometres};
 
-/// What the host can ask. Each request carries an id; the board answers a repeated id with the remembered
-/// answer and does not act again.
+/// What the host can ask. Each request carries an id, larger than all before it; the board answers a repeated id with
+/// the remembered answer and does not act again.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 pub enum Request {
-    /// Who are you? Opens a session: the board forgets the request ids it remembers. The only request that may
+    /// Who are you? Changes nothing, needs no session and no new id. The only request that may
     /// carry boot number 0 ("I do not know yet"). Answer: [`super::Response::Hello`].
     Hello,
     /// How are you? Answer: [`super::Response::Status`].
@@ -31,8 +31,8 @@ pub enum Request {
         /// Where to; outside the limits of [`super::Hello::limits`] it is refused, never clamped.
         target: Nanometres,
         /// How long the host may say nothing while this is under way, within [`super::Limits::silence_min`] and
-        /// [`super::Limits::silence_max`]. After half of it the board says [`super::EventKind::StillThere`]; any good frame answers
-        /// that. After all of it everything stops with [`super::Alarm::HostSilence`].
+        /// [`super::Limits::silence_max`]. After half of it the board says [`super::EventKind::StillThere`]; any request of
+        /// the session answers that. After all of it everything stops with [`super::Alarm::HostSilence`].
         silence: Micros,
     },
     /// Stop all motion along the ramps and end a running program. Answer: [`super::Response::Accepted`], also when nothing moves; what
@@ -163,4 +163,8 @@ pub enum Request {
         /// How many, at most [`super::CODES_MAX`].
         count: u8,
     },
+    /// Open the session whose number the frame carries, any number but 0, best drawn at random; its id must be new, see
+    /// [`super::Hello::last_id`]. What the session before had begun ends as by [`Request::Stop`], and its requests are
+    /// refused from now on. Answer: [`super::Response::Accepted`].
+    OpenSession,
 }

@@ -8,7 +8,7 @@ use farnear_protocol::{
 use proptest::{collection::vec, prelude::*};
 
 fn header(kind: Kind, id: u32, boot: u32) -> Header {
-    Header { version: 2, kind, id, boot }
+    Header { version: 3, kind, id, boot }
 }
 
 fn request(id: u32, request: &Request) -> Encoded {
@@ -99,7 +99,7 @@ fn a_frame_without_a_delimiter_is_too_long_once_and_the_next_is_read() {
 fn a_body_too_large_for_a_frame_is_refused_and_the_largest_fits() {
     let largest = [1u8; BODY_MAX];
     let encoded = encode(header(Kind::Event, 1, 1), &Raw(&largest)).expect("the largest body fits");
-    assert!(encoded.len() <= FRAME_MAX);
+    assert_eq!(encoded.len(), FRAME_MAX, "a frame of exactly 256 bytes");
     let packet = decode(&encoded[..encoded.len() - 1]).expect("it decodes");
     assert_eq!(packet.body.as_slice(), largest);
     assert_eq!(encode(header(Kind::Event, 1, 1), &Raw(&[1u8; BODY_MAX + 1])), None);
@@ -126,6 +126,29 @@ fn bytes_left_over_make_a_body_no_message() {
     assert_eq!(packet.message::<Request>(), Some(Request::Status));
     packet.body.push(0).expect("room");
     assert_eq!(packet.message::<Request>(), None);
+}
+
+#[test]
+fn frames_of_up_to_256_bytes_are_read_and_one_more_is_too_long() {
+    let header = header(Kind::Request, 5, 7);
+    for length in [1, BODY_MAX - 1, BODY_MAX] {
+        for byte in [0, 1, 0xff] {
+            let body = vec![byte; length];
+            let Some(encoded) = encode(header, &Raw(&body)) else {
+                panic!("{length} bytes {byte} do not fit");
+            };
+            let packets = feed(&mut Decoder::new(), &encoded);
+            assert!(
+                matches!(&packets[..], [Ok(packet)] if packet.body.as_slice() == body),
+                "{length} of {byte}"
+            );
+        }
+    }
+    // No zero anywhere: a run of 254 bytes, behind which COBS need not say more.
+    let header = Header { id: 0x0101_0101, boot: 0x0101_0101, ..header };
+    let encoded = encode(header, &Raw(&[2; BODY_MAX])).expect("it fits");
+    assert_eq!((encoded.len(), encoded.last()), (FRAME_MAX, Some(&0)));
+    assert!(matches!(&feed(&mut Decoder::new(), &encoded)[..], [Ok(packet)] if packet.header == header));
 }
 
 proptest! {

@@ -2,7 +2,13 @@
 
 use std::{fs, path::Path};
 
-use crate::frozen_wire::requests;
+use farnear_protocol::{
+    PROTOCOL_CURRENT,
+    frame::{BODY_MAX, FRAME_MAX},
+    message::ID_STEP_MAX,
+};
+
+use crate::frozen_wire::{BY_HAND, requests};
 
 #[test]
 fn the_document_tells_of_every_request() {
@@ -12,5 +18,27 @@ fn the_document_tells_of_every_request() {
         let name = format!("{request:?}");
         let name = name.split([' ', '(', '{']).next().expect("a name");
         assert!(page.contains(name), "docs/protocol.md says nothing of {name}");
+    }
+}
+
+#[test]
+fn the_documents_frame_by_hand_is_the_frozen_one() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/protocol.md");
+    let page = fs::read_to_string(&page).expect("the page lies beside the crate");
+    let wire = page.lines().find_map(|line| line.strip_prefix("wire ")).expect("the frame by hand");
+    assert_eq!(wire.replace(' ', ""), BY_HAND);
+}
+
+#[test]
+fn the_document_states_the_numbers_of_the_code() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/protocol.md");
+    let page = fs::read_to_string(&page).expect("the page lies beside the crate");
+    let step = format!("{},{:03}", ID_STEP_MAX / 1000, ID_STEP_MAX % 1000);
+    for stated in [
+        format!("Version {PROTOCOL_CURRENT}."),
+        format!("at most {FRAME_MAX} bytes with its ending 0, a body at most {BODY_MAX} bytes"),
+        format!("by at most {step} at a time"),
+    ] {
+        assert!(page.contains(&stated), "docs/protocol.md does not say {stated:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The bytes of protocol version 2: every message and every variant.
+//! The bytes of protocol version 3: every message and every variant.
 //!
 //! Do not change an expectation here: a message whose bytes differ is another protocol, so either the change is
 //! a mistake or `PROTOCOL_CURRENT` grows and a new folder freezes the new version. Messages may be appended.
@@ -20,9 +20,12 @@ use farnear_protocol::{
 use serde::{Serialize, de::DeserializeOwned};
 
 fn wire<T: Serialize>(kind: Kind, id: u32, message: &T) -> String {
-    let header = Header { version: 2, kind, id, boot: 0x0102_0304 };
+    let header = Header { version: 3, kind, id, boot: 0x0102_0304 };
     encode(header, message).expect("fits").iter().map(|byte| format!("{byte:02x}")).collect()
 }
+
+/// The session that the frozen requests belong to.
+const SESSION: u32 = 0x0506_0708;
 
 fn check(found: &[String], frozen: &[&str]) {
     for (index, (found, frozen)) in found.iter().zip(frozen).enumerate() {
@@ -49,19 +52,20 @@ fn lists_every_variant<T: Serialize + DeserializeOwned>(table: &[T]) {
 
 #[test]
 fn by_hand() {
-    // version 2, kind 1, id 5, boot 0x01020304, body 03 00 02 c0 84 3d (Move, SensorCoarse, zigzag varint of 1,
-    // varint of 1,000,000), CRC-32/ISO-HDLC of these = 0x38c276fe (zlib.crc32), little-endian; then COBS and the
-    // delimiter.
-    let message =
+    // version 3, kind 1, id 5, boot 0x01020304, body 08 07 06 05 (session 0x05060708) 03 00 02 c0 84 3d (Move,
+    // SensorCoarse, zigzag varint of 1, varint of 1,000,000), CRC-32/ISO-HDLC of these = 0x43e3a354 (zlib.crc32),
+    // little-endian; then COBS and the delimiter.
+    let request =
         Request::Move { axis: Axis::SensorCoarse, target: Nanometres(1), silence: Micros(1_000_000) };
-    assert_eq!(wire(Kind::Request, 5, &message), BY_HAND);
+    assert_eq!(wire(Kind::Request, 5, &Call { session: SESSION, request }), BY_HAND);
 }
 
-const BY_HAND: &str = "0402010501010604030201030902c0843dfe76c23800";
+/// A move, see [`by_hand`].
+pub const BY_HAND: &str = "0403010501010a0403020108070605030902c0843d54a3e34300";
 
 #[test]
 fn the_schema_key_changes_only_with_the_table() {
-    assert_eq!(format!("{SCHEMA_KEY:016x}"), "5b6b740412940472");
+    assert_eq!(format!("{SCHEMA_KEY:016x}"), "3e9cc73ea3f7e69f");
 }
 
 #[test]
@@ -69,7 +73,7 @@ fn log() {
     let bytes = [0x00, 0x07, 0xff, 0x00].as_slice().try_into().expect("it fits");
     check(
         &[wire(Kind::Log, 3, &Log { bytes }), wire(Kind::Log, 4, &Log::default())],
-        &["0402050301010604030201040307ff05816977aa00", "040205040101050403020105647e847500"],
+        &["0403050301010604030201040307ff0569b28c1300", "040305040101050403020105a4a10ab400"],
     );
 }
 

@@ -15,11 +15,12 @@ use std::{
 
 use farnear_capture::Transport;
 use farnear_protocol::{
-    Event, Log, Request, RequestError, Response,
+    Call, Event, Log, PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response,
     frame::{Decoder, Header, Kind, Packet, encode},
     message::{
         Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
-        LinkCounters, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot, Status,
+        LinkCounters, NO_SESSION, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot,
+        Status,
     },
     units::{BoardMicros, Micros, Nanometres},
 };
@@ -64,6 +65,8 @@ pub struct Faults {
     pub fails_with: Option<Failure>,
     /// Work ends with this alarm.
     pub alarm_at_work: Option<Alarm>,
+    /// After a stop it brakes for so many looks at its status.
+    pub brakes_for: u32,
     /// The board refuses every version but this.
     pub other_version: Option<u8>,
 }
@@ -118,14 +121,29 @@ pub struct Board {
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
     pub still_there: u32,
+    /// Connections that are open at the host's end.
+    pub connections: usize,
     /// The line is broken: nothing arrives and nothing can be opened.
     pub gone: bool,
     active: Option<(u32, Request)>,
+    /// Looks at its status until it stands.
+    pub braking: u32,
     asking: u32,
     logs: u32,
+    /// The number of the open session.
+    pub session: u32,
     remembered: BTreeMap<u32, (Kind, Vec<u8>)>,
     decoder: Decoder,
     out: VecDeque<u8>,
+}
+
+/// An open connection to a board.
+struct Connection(Peer);
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.0.board().connections -= 1;
+    }
 }
 
 /// The host's end of the line.
@@ -154,8 +172,8 @@ impl Peer {
             row_pixels_max: 1024,
         };
         let hello = Hello {
-            protocol_min: 2,
-            protocol_current: 2,
+            protocol_min: PROTOCOL_MIN,
+            protocol_current: PROTOCOL_CURRENT,
             schema_key: SCHEMA_KEY,
             board: "scripted".try_into().unwrap(),
             firmware: "0.0.1".try_into().unwrap(),
@@ -172,6 +190,8 @@ impl Peer {
                 emergency_stop: true,
             },
             limits,
+            last_id: 0,
+            outstanding: 8,
         };
         let started = Event { time: BoardMicros(0), kind: EventKind::Started { cause: ResetCause::PowerOn } };
         Self(Arc::new(Mutex::new(Board {
@@ -199,10 +219,13 @@ impl Peer {
             emergency_stop: false,
             counters: Counters { boots: 7, ..Counters::default() },
             still_there: 0,
+            connections: 0,
             gone: false,
             active: None,
+            braking: 0,
             asking: 0,
             logs: 0,
+            session: NO_SESSION,
             remembered: BTreeMap::new(),
             decoder: Decoder::new(),
             out: VecDeque::new(),
@@ -217,8 +240,14 @@ impl Peer {
                 let (port, present) = ("scripted".into(), Vec::new());
                 return Err(farnear_capture::PortError::Absent { port, present });
             }
-            Ok(Box::new(peer.clone()) as Box<dyn Transport>)
+            Ok(Box::new(peer.connection()) as Box<dyn Transport>)
         })
+    }
+
+    /// One more connection to this board.
+    fn connection(&self) -> Connection {
+        self.board().connections += 1;
+        Connection(self.clone())
     }
 
     /// The board, to look at it or to change it.
@@ -230,9 +259,9 @@ impl Peer {
     }
 }
 
-impl Transport for Peer {
+impl Transport for Connection {
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let mut board = self.board();
+        let mut board = self.0.board();
         if board.gone {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
@@ -249,7 +278,7 @@ impl Transport for Peer {
     }
 
     fn send(&mut self, bytes: &[u8], _: Duration) -> io::Result<()> {
-        let mut board = self.board();
+        let mut board = self.0.board();
         if board.gone {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
@@ -262,14 +291,14 @@ impl Transport for Peer {
     }
 
     fn discard_input(&mut self) -> io::Result<()> {
-        self.board().out.clear();
+        self.0.board().out.clear();
         Ok(())
     }
 }
 
 impl Board {
     fn put<T: Serialize>(&mut self, kind: Kind, id: u32, message: &T) {
-        let header = Header { version: 2, kind, id, boot: self.hello.boot };
+        let header = Header { version: PROTOCOL_CURRENT, kind, id, boot: self.hello.boot };
         let frame = encode(header, message).unwrap();
         let garbage = self.faults.garbage.clone();
         self.out.extend(garbage);
@@ -289,6 +318,11 @@ impl Board {
         if !self.faults.lose_events.contains(&number) {
             self.put(Kind::Event, number, &event);
         }
+    }
+
+    /// Says that something happened, whether or not it did.
+    pub fn say(&mut self, kind: EventKind) {
+        self.event(kind);
     }
 
     fn answer(&mut self, id: u32, answer: Result<Response, RequestError>) {
@@ -323,17 +357,29 @@ impl Board {
             let error = RequestError::Version { min: version, current: version };
             return self.put(Kind::Error, id, &error);
         }
-        let request: Request = packet.message().unwrap();
+        let Call { session, request } = packet.message().unwrap();
         if request == Request::Hello {
-            self.remembered.clear();
-            return self.answer(id, Ok(Response::Hello(self.hello.clone())));
+            self.answer(id, Ok(Response::Hello(self.hello.clone())));
+            self.remembered.remove(&id);
+            return;
         }
         if packet.header.boot != self.hello.boot {
             let error = RequestError::Boot { current: self.hello.boot };
             return self.put(Kind::Error, id, &error);
         }
+        if request != Request::OpenSession && session != self.session {
+            return self.put(Kind::Error, id, &RequestError::NotInSession);
+        }
         if self.remembered.contains_key(&id) {
             return self.resend(id);
+        }
+        if id <= self.hello.last_id {
+            return self.put(Kind::Error, id, &RequestError::IdNotNew { last: self.hello.last_id });
+        }
+        self.hello.last_id = id;
+        if request == Request::OpenSession {
+            self.session = session;
+            self.remembered.clear();
         }
         self.carry_out(id, request);
     }
@@ -341,8 +387,13 @@ impl Board {
     fn carry_out(&mut self, id: u32, request: Request) {
         match request {
             Request::Hello => {}
+            Request::OpenSession => {
+                self.answer(id, Ok(Response::Accepted));
+                self.end_by_stop();
+            }
             Request::Status => {
                 let status = self.status();
+                self.braking = self.braking.saturating_sub(1);
                 self.answer(id, Ok(Response::Status(status)));
                 self.hear_from_host();
             }
@@ -356,10 +407,9 @@ impl Board {
             }
             Request::Stop => {
                 self.stops += 1;
+                self.braking = self.faults.brakes_for;
                 self.answer(id, Ok(Response::Accepted));
-                if let Some((request, _)) = self.active.take() {
-                    self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
-                }
+                self.end_by_stop();
             }
             Request::Reboot => {
                 self.answer(id, Ok(Response::Accepted));
@@ -374,6 +424,12 @@ impl Board {
             | Request::PauseProgram
             | Request::ResumeProgram => self.prepare(id, request),
             other => self.keep(id, other),
+        }
+    }
+
+    fn end_by_stop(&mut self) {
+        if let Some((request, _)) = self.active.take() {
+            self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
         }
     }
 
@@ -403,6 +459,8 @@ impl Board {
         self.armed = 0;
         self.active = None;
         self.remembered.clear();
+        self.hello.last_id = 0;
+        self.session = NO_SESSION;
         self.events.clear();
         self.faults.reset_at_move = false;
         if self.faults.silent_reset {
@@ -440,7 +498,7 @@ impl Board {
         let state = if self.armed > 0 { ProgramState::Armed } else { ProgramState::Idle };
         Status {
             time: BoardMicros(self.time),
-            coarse: AxisStatus { request: active, ..axis(self.homed, self.coarse) },
+            coarse: AxisStatus { request: active, moving: self.braking > 0, ..axis(self.homed, self.coarse) },
             fine: axis(true, self.fine),
             lens: axis(self.lens_homed, self.lens),
             home_switch: self.switches[0],
@@ -460,5 +518,5 @@ impl Board {
 }
 
 fn postcard_frame<T: Serialize>(boot: u32, kind: Kind, id: u32, message: &T) -> Vec<u8> {
-    encode(Header { version: 2, kind, id, boot }, message).unwrap().to_vec()
+    encode(Header { version: PROTOCOL_CURRENT, kind, id, boot }, message).unwrap().to_vec()
 }

@@ -25,7 +25,7 @@ pub fn plug_in(faults: Faults) -> (String, Peer) {
     let near_end = File::options().read(true).write(true).open(&port).expect("the other end");
     let mut far_end = File::from(far_end);
     let peer = Peer::new(faults);
-    let mut board = peer.clone();
+    let mut board = peer.connection();
     thread::spawn(move || {
         let _near_end = near_end; // held, so that clients may come and go
         let mut bytes = [0; 512];

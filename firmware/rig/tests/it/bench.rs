@@ -7,14 +7,19 @@ pub mod hardware;
 pub mod motor;
 
 use self::hardware::Hardware;
-use farnear_protocol::frame::{self, Decoder, Header, Kind, Packet};
+use farnear_protocol::frame::{self, Decoder, Encoded, Header, Kind, Packet};
 use farnear_protocol::message::{Alarm, Axis, Event, EventKind, Failure, Hello, ResetCause, Status};
-use farnear_protocol::{BoardMicros, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response};
+use farnear_protocol::{
+    BoardMicros, Call, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
+};
 use farnear_rig::io::{MEMORY_BYTES, Outputs, TICK_US};
 use farnear_rig::{Identity, Rig};
 
 /// Boot number of the bench.
 pub const BOOT: u32 = 7;
+
+/// The session that the bench opens.
+pub const SESSION: u32 = 0x5e55_1001;
 
 /// Silence that the bench's requests allow: longer than any of its work.
 pub const SILENCE: Micros = Micros(60_000_000);
@@ -72,7 +77,7 @@ impl Bench {
     /// A rig whose memory holds something.
     pub fn with_memory(position_um: f64, memory: Box<[u8; MEMORY_BYTES]>) -> Self {
         let rig = Rig::new(identity(BOOT, ResetCause::Pin), Some(&memory), BoardMicros(0));
-        Self {
+        let mut bench = Self {
             boot: rig.boot(),
             rig,
             hardware: Hardware::new(position_um),
@@ -80,13 +85,23 @@ impl Bench {
             tear: None,
             torn: false,
             now: 0,
-            next_id: 100,
+            next_id: 1,
             decoder: Decoder::new(),
             answers: Vec::new(),
             events: Vec::new(),
             reset_at: None,
             deaf: false,
-        }
+        };
+        bench.open_session();
+        bench
+    }
+
+    /// Opens the bench's session, in no time.
+    pub fn open_session(&mut self) {
+        let id = self.next_id;
+        self.send_as(id, self.boot, &Request::OpenSession);
+        self.collect();
+        assert_eq!(self.answers.pop(), Some((id, Ok(Response::Accepted))));
     }
 
     /// The power goes and comes: `boot` is what retained RAM proposes, 1 where it lost that.
@@ -96,6 +111,7 @@ impl Bench {
         (self.boot, self.now, self.reset_at) = (self.rig.boot(), 0, None);
         self.events.clear();
         self.answers.clear();
+        self.open_session();
     }
 
     /// Stage A homed and ready.
@@ -201,15 +217,13 @@ impl Bench {
 
     /// Sends a request under an id, as it is made for `boot`.
     pub fn send_as(&mut self, id: u32, boot: u32, request: &Request) {
-        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
-        let frame = frame::encode(header, request).expect("every request fits");
-        self.send_bytes(&frame);
+        self.send_bytes(&request_frame(id, boot, SESSION, request));
+        self.next_id = self.next_id.max(id + 1);
     }
 
     /// Asks, and gives the id and the answer.
     pub fn ask(&mut self, request: &Request) -> (u32, Answer) {
         let id = self.next_id;
-        self.next_id += 1;
         (id, self.ask_as(id, self.boot, request))
     }
 
@@ -238,7 +252,7 @@ impl Bench {
         }
     }
 
-    /// A hello that opens a session.
+    /// Who the board is.
     pub fn hello(&mut self) -> Hello {
         match self.ask(&Request::Hello).1 {
             Ok(Response::Hello(hello)) => hello,
@@ -262,6 +276,12 @@ impl Bench {
         let id = self.accepted(request);
         self.end_of(id)
     }
+}
+
+/// The frame of a request.
+pub fn request_frame(id: u32, boot: u32, session: u32, request: &Request) -> Encoded {
+    let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
+    frame::encode(header, &Call { session, request: request.clone() }).expect("every request fits")
 }
 
 /// Who the bench's board is.

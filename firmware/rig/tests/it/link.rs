@@ -1,6 +1,6 @@
 //! The link through the rig's public face: who may ask what, what acts twice (nothing), what is remembered.
 
-use crate::bench::{self, BOOT, Bench};
+use crate::bench::{self, BOOT, Bench, SESSION};
 use farnear_protocol::frame::{self, Header, Kind};
 use farnear_protocol::message::{Axis, EventKind, Failure, ResetCause, SCHEMA_KEY};
 use farnear_protocol::{
@@ -16,7 +16,7 @@ fn fine(nm: i32) -> Request {
 fn hello_tells_who_it_is() {
     let mut bench = Bench::new(0.0);
     assert!(
-        matches!(bench.ask_as(1, 0, &Request::Hello), Ok(Response::Hello(_))),
+        matches!(bench.ask_as(2, 0, &Request::Hello), Ok(Response::Hello(_))),
         "the boot need not be known"
     );
     let hello = bench.hello();
@@ -34,7 +34,7 @@ fn hello_tells_who_it_is() {
 fn requests_for_another_boot_or_version_are_refused() {
     let mut bench = Bench::new(0.0);
     for (id, boot, request) in
-        [(1, BOOT + 1, fine(20_000)), (2, 0, fine(20_000)), (3, BOOT - 1, Request::Hello)]
+        [(2, BOOT + 1, fine(20_000)), (3, 0, fine(20_000)), (4, BOOT - 1, Request::Hello)]
     {
         assert_eq!(bench.ask_as(id, boot, &request), Err(RequestError::Boot { current: BOOT }));
     }
@@ -60,7 +60,7 @@ fn garbage_is_counted_and_malformed_bodies_are_told() {
     bench.tick();
     assert_eq!(bench.answers, [(5, Err(RequestError::Malformed))]);
     let link = bench.status().link;
-    assert_eq!((link.frames, link.bad_frames, link.repeated), (2, 4, 0));
+    assert_eq!((link.frames, link.bad_frames, link.repeated), (3, 4, 0));
 }
 
 #[test]
@@ -93,25 +93,12 @@ fn refusals_are_remembered_too() {
 #[test]
 fn the_last_eight_answers_are_remembered() {
     let mut bench = Bench::new(0.0);
-    let answers: Vec<_> = (1..=9).map(|id| (id, bench.ask_as(id, BOOT, &Request::Status))).collect();
+    let answers: Vec<_> = (2..=10).map(|id| (id, bench.ask_as(id, BOOT, &Request::Status))).collect();
     for (id, answer) in &answers[1..] {
         assert_eq!(&bench.ask_as(*id, BOOT, &Request::Status), answer, "the same time, so the same answer");
     }
-    assert_ne!(bench.ask_as(1, BOOT, &Request::Status), answers[0].1, "the ninth before is gone");
-}
-
-#[test]
-fn hello_opens_a_session_and_its_retry_does_not() {
-    let mut bench = Bench::new(0.0);
-    let hello = bench.ask_as(1, 0, &Request::Hello);
-    assert_eq!(bench.ask_as(1, 0, &Request::Hello), hello);
-    assert_eq!(bench.ask_as(2, BOOT, &fine(20_000)), Ok(Response::Accepted));
-    bench.end_of(2);
-    // Another program, which counts from 1 too: its requests are its own.
-    assert_eq!(bench.ask_as(1, 0, &Request::Hello), hello);
-    assert_eq!(bench.ask_as(2, BOOT, &fine(20_000)), Ok(Response::Accepted));
-    bench.events.clear();
-    assert!(matches!(bench.end_of(2), EventKind::MoveDone { .. }), "it acted");
+    let gone = RequestError::IdNotNew { last: 10 };
+    assert_eq!(bench.ask_as(2, BOOT, &Request::Status), Err(gone), "the ninth before");
 }
 
 #[test]
@@ -135,18 +122,30 @@ fn events_are_numbered_and_can_be_read_again() {
 #[test]
 fn a_host_that_does_not_listen_loses_events_but_no_answers() {
     let mut bench = Bench::new(0.0);
+    let outstanding = u32::from(bench.hello().outstanding);
+    bench.answers.clear();
     bench.deaf = true;
-    for id in 1..=40 {
+    let first = bench.next_id;
+    for id in first..first + 80 {
         bench.send_as(id, BOOT, &fine(20_000 + id as i32));
         bench.run_ms(15);
     }
     bench.deaf = false;
     bench.run_ms(1);
-    // Four answers fit; what came later was dropped before it acted, and the retry acts.
-    assert_eq!(bench.answers.iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 2, 3, 4]);
-    assert_eq!(bench.status().fine.asked, Nanometres(20_004));
-    assert_eq!(bench.ask_as(5, BOOT, &fine(20_005)), Ok(Response::Accepted));
-    assert!(matches!(bench.end_of(5), EventKind::MoveDone { .. }));
+    // As many as were promised are answered; then as many refusals as wait; what came later was counted.
+    let full = Err(RequestError::QueueFull { outstanding: outstanding as u8 });
+    let ids: Vec<u32> = bench.answers.iter().map(|(id, _)| *id).collect();
+    assert_eq!(ids, (first..first + outstanding + 64).collect::<Vec<_>>());
+    for (id, answer) in &bench.answers {
+        let admitted = *id < first + outstanding;
+        assert_eq!(*answer, if admitted { Ok(Response::Accepted) } else { full.clone() }, "{id}");
+    }
+    let status = bench.status();
+    assert_eq!(status.link.overflowed, 80 - outstanding);
+    assert_eq!(status.fine.asked, Nanometres(20_000 + (first + outstanding - 1) as i32));
+    let next = bench.next_id;
+    assert_eq!(bench.ask_as(next, BOOT, &fine(20_005)), Ok(Response::Accepted));
+    assert!(matches!(bench.end_of(next), EventKind::MoveDone { .. }));
 }
 
 #[test]
@@ -172,7 +171,7 @@ fn a_reboot_stops_answers_and_then_resets() {
 fn a_reboot_does_not_wait_for_a_dead_host() {
     let mut bench = Bench::new(0.0);
     bench.deaf = true;
-    bench.send_as(1, BOOT, &Request::Reboot);
+    bench.send_as(2, BOOT, &Request::Reboot);
     bench.run_ms(900);
     assert_eq!(bench.reset_at, None);
     bench.run_ms(150);
@@ -201,10 +200,11 @@ proptest! {
         bench.deaf = true;
         let mut decoder = frame::Decoder::new();
         let first_event = bench.events.last().map_or(0, |(number, _)| number + 1);
-        for (id, next_event) in (1_000..1_250u32).zip(first_event..) {
+        for next_event in first_event..first_event + 250 {
+            let id = bench.next_id;
+            bench.next_id += 1;
             let request = fine(20_000 + (id % 7) as i32);
-            let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot: BOOT };
-            let bytes = frame::encode(header, &request).expect("it fits");
+            let bytes = bench::request_frame(id, BOOT, SESSION, &request);
             let mut answered = false;
             for _try in 0..6 {
                 bench.send_bytes(&noisy(&bytes));
@@ -257,6 +257,6 @@ fn a_million_random_byte_strings_do_nothing() {
     bench.run_ms(20);
     assert!(bench.answers.is_empty(), "nobody guesses a CRC-32 in a million tries: {:?}", bench.answers);
     let status = bench.status();
-    assert!(status.link.bad_frames > 900_000 && status.link.frames == 1);
+    assert!(status.link.bad_frames > 900_000 && status.link.frames == 2);
     assert_eq!((bench.hardware.coarse.edges, bench.hardware.dac), (0, 0));
 }

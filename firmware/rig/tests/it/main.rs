@@ -10,3 +10,4 @@ mod maths;
 mod program;
 mod requests;
 mod safety;
+mod sessions;

@@ -1,15 +1,18 @@
 //! A host that speaks the protocol to the rig in this process.
 
 use farnear_protocol::{
-    Event, EventKind, Log, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
+    Call, Event, EventKind, Log, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
     frame::{Header, Kind, Packet, encode},
-    message::{Alarm, AlarmRecord, Axis, Hello, Shot, Status, TriggerMode},
+    message::{Alarm, AlarmRecord, Axis, Hello, NO_SESSION, Shot, Status, TriggerMode},
 };
 use farnear_sim::{EmulatedRig, Report, RigAccess, RigConfig};
 use object::{Object, ObjectSymbol, Symbol, SymbolKind};
 
 /// Long enough that no test's host is silent for so long, unless silence is what it tests.
 pub const SILENCE: Micros = Micros(60_000_000);
+
+/// The session that the tests' hosts open.
+pub const SESSION: u32 = 0x1234_5678;
 
 /// A rig and a host that keeps count of its requests.
 pub struct Bench {
@@ -25,9 +28,9 @@ pub type Answer = Result<Response, RequestError>;
 
 /// The frame of a request.
 pub fn request_frame(id: u32, boot: u32, request: &Request) -> Vec<u8> {
-    encode(Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot }, request)
-        .expect("requests fit")
-        .to_vec()
+    let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
+    let session = if *request == Request::Hello { NO_SESSION } else { SESSION };
+    encode(header, &Call { session, request: request.clone() }).expect("requests fit").to_vec()
 }
 
 /// The answer that a frame carries, if it is one.
@@ -53,12 +56,14 @@ impl Bench {
         bench
     }
 
-    /// Says hello; from now on requests carry the board's boot number.
+    /// Says hello and opens a session; from now on requests carry the board's boot number.
     pub fn say_hello(&mut self) -> Hello {
         self.boot = 0;
         match self.ask(&Request::Hello) {
             Ok(Response::Hello(hello)) => {
                 self.boot = hello.boot;
+                self.next = self.next.max(hello.last_id);
+                assert_eq!(self.ask(&Request::OpenSession), Ok(Response::Accepted));
                 hello
             }
             other => panic!("no hello but {other:?}"),

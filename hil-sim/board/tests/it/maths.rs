@@ -37,7 +37,7 @@ impl Here {
             last_words: None,
         };
         let mut here = Self { rig: Rig::new(identity, None, BoardMicros(0)), now: 0, id: 0 };
-        let _ = here.ask(&Request::Hello);
+        assert_eq!(here.ask(&Request::OpenSession), Ok(Response::Accepted));
         here
     }
 

@@ -81,9 +81,10 @@ impl Client {
             .expect("the pty opens");
         let mut client = Self { port, decoder: Decoder::new(), rest: VecDeque::new(), boot: 0, next: 0 };
         match client.ask(&Request::Hello) {
-            Ok(Response::Hello(hello)) => client.boot = hello.boot,
+            Ok(Response::Hello(hello)) => (client.boot, client.next) = (hello.boot, hello.last_id),
             other => panic!("no hello but {other:?}"),
         }
+        assert_eq!(client.ask(&Request::OpenSession), Ok(Response::Accepted));
         client
     }
 

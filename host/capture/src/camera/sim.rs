@@ -10,7 +10,7 @@ use std::{
 };
 
 use farnear_protocol::{
-    camera::{Control, FRAME_HEADER, FREE_RUNNING, FrameHeader},
+    camera::{Control, FRAME_HEADER, FREE_RUNNING, FrameHeader, IN_USE},
     message::{ShotRecord, TriggerMode},
     units::Micros,
 };
@@ -218,6 +218,9 @@ fn read_frame(input: &mut impl Read, address: &str) -> Result<Frame, CameraError
     let nonsense = |reason: String| CameraError::Nonsense { address: address.into(), reason };
     let mut length = [0; 4];
     input.read_exact(&mut length).map_err(gone)?;
+    if u32::from_le_bytes(length) == IN_USE {
+        return Err(CameraError::InUse { address: address.into() });
+    }
     let mut header = [0; FRAME_HEADER];
     input.read_exact(&mut header).map_err(gone)?;
     let length = u32::from_le_bytes(length);
@@ -259,6 +262,8 @@ mod tests {
         assert!(matches!(reading(frame_bytes(1, 12, &[0])), CameraError::Nonsense { .. }));
         assert!(matches!(reading(frame_bytes(0, 12, &[4096])), CameraError::Nonsense { .. }));
         assert!(matches!(reading(frame_bytes(0, 7, &[1])), CameraError::Nonsense { .. }));
+        let refused = reading(IN_USE.to_le_bytes().to_vec());
+        assert!(refused.to_string().contains("another program"), "{refused}");
         let mut cut = frame_bytes(0, 8, &[1, 2]);
         cut.pop();
         assert!(matches!(reading(cut), CameraError::Gone { .. }));

@@ -18,6 +18,15 @@ pub fn refusal_text(error: &RequestError) -> String {
         RequestError::IdReused => {
             "the request's id was already used: does another program talk to the board?".into()
         }
+        RequestError::NotInSession => "another program has opened a session with it since".into(),
+        RequestError::IdNotNew { last } => {
+            format!(
+                "the request is older than its last one ({last}): does another program talk to the board?"
+            )
+        }
+        RequestError::QueueFull { outstanding } => {
+            format!("more than {outstanding} requests wait for their answers: ask again")
+        }
         RequestError::OutOfRange { axis, asked, min, max } => format!(
             "{:.3} um is outside the limits of the {}, {:.3} to {:.3} um",
             um(*asked),

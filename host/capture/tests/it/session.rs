@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use farnear_capture::{Client, ClientError};
+use farnear_capture::{Client, ClientError, Timing};
 use farnear_protocol::{
-    message::{Axis, ResetCause},
+    message::{Axis, EventKind, ResetCause},
     units::Nanometres,
 };
 use farnear_scripted_board::{Faults, Peer};
@@ -16,7 +16,7 @@ fn hello_gives_the_board_and_its_boot() {
     let (client, _) = connect(Faults::default());
     assert_eq!(client.hello().boot, 7);
     assert_eq!(client.hello().board.as_str(), "scripted");
-    assert_eq!(client.protocol(), 2);
+    assert_eq!(client.protocol(), 3);
 }
 
 #[test]
@@ -59,6 +59,72 @@ fn a_board_that_was_unplugged_is_found_again() {
 }
 
 #[test]
+fn the_work_of_a_program_that_died_is_not_taken_for_this_ones() {
+    // The first program dies in mid-move: its work goes on, and its ids were the smallest there are.
+    let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
+    let died = Client::connect(peer.connect(), "scripted").unwrap();
+    let old = died.start_home(Axis::SensorCoarse).unwrap();
+    let (old_id, old_session) = (old.id(), peer.board().session);
+    std::mem::forget(old); // a killed program says nothing
+    let client = Client::connect(peer.connect(), "scripted").unwrap();
+    client.set_timing(SHORT);
+    assert_ne!(peer.board().session, old_session);
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    assert!(work.id() > old_id);
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Overdue { .. }), "the old work's end is not this one's: {error:?}");
+    // The first one's next words are refused, and it is told why.
+    let error = died.status().err().unwrap();
+    assert!(matches!(error, ClientError::TakenOver { .. }), "{error:?}");
+}
+
+#[test]
+fn an_end_on_another_axis_or_at_another_place_is_not_believed() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let work = client.start_move(Axis::SensorFine, Nanometres(5_000)).unwrap();
+    let (request, measured) = (work.id(), Nanometres(5_000));
+    peer.board().say(EventKind::MoveDone { request, axis: Axis::Lens, asked: measured, measured });
+    let error = work.moved().err().unwrap();
+    assert!(matches!(error, ClientError::Nonsense { .. }), "{error:?}");
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
+fn a_board_that_dies_in_mid_move_is_told() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    client.set_timing(Timing { work_slack: Duration::from_secs(3600), ..SHORT });
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    // The power goes and does not come back; the adapter stays where it is.
+    peer.board().faults.lose_requests = u32::MAX;
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Silent { attempts: 8, .. }), "{error:?}");
+    assert!(error.to_string().starts_with("no answer from scripted while homing"), "{error}");
+    peer.board().faults.lose_requests = 0;
+    let mut client = client;
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    client.stop().unwrap();
+}
+
+#[test]
+fn the_old_port_is_closed_before_the_board_is_looked_for() {
+    let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
+    let mut client = Client::connect(peer.connect(), "scripted").unwrap();
+    client.set_timing(SHORT);
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().gone = true;
+    assert!(matches!(work.homed().err().unwrap(), ClientError::Gone { .. }));
+    assert!(client.reopen().is_err());
+    assert_eq!(
+        peer.board().connections,
+        0,
+        "whoever holds a port that has gone makes the board come back under another name"
+    );
+    peer.board().gone = false;
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    assert_eq!(peer.board().connections, 1);
+}
+
+#[test]
 fn a_reset_while_nothing_is_asked_has_to_be_understood() {
     let (mut client, peer) = connect(Faults::default());
     client.home(Axis::SensorCoarse).unwrap();
@@ -98,18 +164,18 @@ fn a_reboot_happens_once_though_its_answer_is_lost() {
 
 #[test]
 fn a_board_of_another_protocol_is_refused_with_both_versions() {
-    let error = connect_error(Faults { other_version: Some(3), ..Faults::default() }, |_| {});
-    assert!(matches!(error, ClientError::Version { board_min: 3, host_current: 2, .. }), "{error:?}");
+    let error = connect_error(Faults { other_version: Some(4), ..Faults::default() }, |_| {});
+    assert!(matches!(error, ClientError::Version { board_min: 4, host_current: 3, .. }), "{error:?}");
     assert!(
-        error.to_string().contains("protocol 3 to 3, this program 2 to 2; use a newer farnear"),
+        error.to_string().contains("protocol 4 to 4, this program 3 to 3; use a newer farnear"),
         "{error}"
     );
 
     let error = connect_error(Faults::default(), |board| {
-        board.hello.protocol_min = 3;
+        board.hello.protocol_min = 4;
         board.hello.protocol_current = 5;
     });
-    assert!(matches!(error, ClientError::Version { board_min: 3, board_current: 5, .. }), "{error:?}");
+    assert!(matches!(error, ClientError::Version { board_min: 4, board_current: 5, .. }), "{error:?}");
 }
 
 #[test]
@@ -118,7 +184,7 @@ fn a_newer_board_that_still_speaks_our_version_is_welcome_whatever_its_key() {
     peer.board().hello.protocol_current = 9;
     peer.board().hello.schema_key ^= 1;
     let client = Client::connect(peer.connect(), "scripted").unwrap();
-    assert_eq!(client.protocol(), 2);
+    assert_eq!(client.protocol(), 3);
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn work_that_does_not_end_is_stopped_at_its_deadline() {
 
 #[test]
 fn an_interruption_stops_the_rig() {
-    let (mut client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let (mut client, peer) = connect(Faults { never_ends: true, brakes_for: 12, ..Faults::default() });
     let flag = Arc::new(AtomicBool::new(false));
     client.interrupt_by(flag.clone());
     client.set_timing(Timing { work_slack: Duration::from_secs(60), ..SHORT });
@@ -77,7 +77,8 @@ fn an_interruption_stops_the_rig() {
     let error = client.home(Axis::SensorCoarse).err().unwrap();
     interrupter.join().unwrap();
     assert!(matches!(error, ClientError::Interrupted { .. }), "{error:?}");
-    assert_eq!(peer.board().stops, 1);
+    let board = peer.board();
+    assert_eq!((board.stops, board.braking), (1, 0), "it is told when it stands");
 }
 
 #[test]

@@ -98,7 +98,7 @@ fn noise_without_a_board_behind_it_is_told_from_silence() {
     capture_fails(&name, &["no answer", &name, "broken frames came", "right port"]);
 }
 
-/// Answers every request as a board does that speaks protocol 3 to 4 only.
+/// Answers every request as a board does that speaks protocol 4 to 5 only.
 fn board_of_the_future(mut line: Line) {
     let mut decoder = Decoder::new();
     let mut bytes = [0; 64];
@@ -109,7 +109,7 @@ fn board_of_the_future(mut line: Line) {
         for byte in &bytes[..count] {
             let Some(Ok(packet)) = decoder.push(*byte) else { continue };
             let header = Header { kind: Kind::Error, ..packet.header };
-            let answer = encode(header, &RequestError::Version { min: 3, current: 4 }).expect("it fits");
+            let answer = encode(header, &RequestError::Version { min: 4, current: 5 }).expect("it fits");
             line.far_end.write_all(&answer).expect("a line");
         }
     }
@@ -120,7 +120,7 @@ fn a_board_of_another_protocol_version_is_told_with_both_versions() {
     let line = Line::new();
     let name = line.name();
     std::thread::spawn(move || board_of_the_future(line));
-    let phrases = ["the board speaks protocol 3 to 4, this program 2 to 2", "use a newer farnear"];
+    let phrases = ["the board speaks protocol 4 to 5, this program 3 to 3", "use a newer farnear"];
     fails(&mut farnear(&["rig", "info", "--port", &name]), 1, &phrases);
     capture_fails(&name, &phrases);
 }

@@ -1,7 +1,7 @@
 //! Every message at its largest fits a frame.
 
 use farnear_protocol::{
-    BoardMicros, Event, EventKind, LOG_BYTES_MAX, Log, Micros, Nanometres, Request, Response,
+    BoardMicros, Call, Event, EventKind, LOG_BYTES_MAX, Log, Micros, Nanometres, Request, Response,
     frame::{BODY_MAX, FRAME_MAX, Header, Kind, encode},
     message::*,
 };
@@ -25,17 +25,22 @@ fn length<T: Serialize>(kind: Kind, message: &T) -> usize {
     frame.len()
 }
 
+/// The same of a request.
+#[track_caller]
+fn asked_length(request: Request) -> usize {
+    length(Kind::Request, &Call { session: u32::MAX, request })
+}
+
 #[test]
 fn rows_and_coefficients_fill_a_frame_and_do_not_burst_it() {
     let codes = Codes::from_slice(&[i16::MIN; CODES_MAX]).expect("that many");
     let bits = CoefficientBits::from_slice(&[i32::MIN; COEFFICIENTS_MAX]).expect("that many");
     let (row, first, step, truth) = (u16::MAX, u16::MAX, u16::MAX, i16::MIN);
-    let samples =
-        length(Kind::Request, &Request::FitSamples { row, first, step, truth, codes: codes.clone() });
+    let samples = asked_length(Request::FitSamples { row, first, step, truth, codes: codes.clone() });
     // One more code could be three bytes longer, and would no longer be sure to fit.
     assert!(samples + 3 > BODY_MAX, "{samples}: the message could take more codes");
-    length(Kind::Request, &Request::PutRow { first, codes: codes.clone() });
-    length(Kind::Request, &Request::PutCoefficients { first: 255, bits: bits.clone() });
+    asked_length(Request::PutRow { first, codes: codes.clone() });
+    asked_length(Request::PutCoefficients { first: 255, bits: bits.clone() });
     length(Kind::Response, &Response::Row(codes));
     length(Kind::Response, &Response::Coefficients(bits));
     let bytes = heapless::Vec::from_slice(&[0xff; LOG_BYTES_MAX]).expect("that many");
@@ -70,7 +75,13 @@ fn the_long_answers_fit() {
             next_event: u32::MAX,
             triggers: u32::MAX,
             steps: u64::MAX,
-            link: LinkCounters { frames: u32::MAX, bad_frames: u32::MAX, repeated: u32::MAX },
+            link: LinkCounters {
+                frames: u32::MAX,
+                bad_frames: u32::MAX,
+                repeated: u32::MAX,
+                stale: u32::MAX,
+                overflowed: u32::MAX,
+            },
             ..status()
         }),
     );
@@ -101,6 +112,8 @@ fn the_long_answers_fit() {
             firmware: name(),
             boot: u32::MAX,
             limits,
+            last_id: u32::MAX,
+            outstanding: u8::MAX,
             ..hello()
         }),
     );
@@ -164,7 +177,7 @@ fn the_long_questions_fit() {
         longitude_e7: i32::MIN,
         shadow: Some(shadow),
     };
-    length(Kind::Request, &Request::Sun(sun));
+    asked_length(Request::Sun(sun));
     let correction = CorrectionInfo {
         width: u16::MAX,
         height: u16::MAX,
@@ -172,7 +185,7 @@ fn the_long_questions_fit() {
         half_span_um: i32::MIN,
         ..CORRECTION
     };
-    length(Kind::Request, &Request::OpenCorrection(correction));
+    asked_length(Request::OpenCorrection(correction));
     let shot = Shot {
         axis: Axis::Lens,
         target: NM,
@@ -182,5 +195,5 @@ fn the_long_questions_fit() {
         repeat: u16::MAX,
         mode: TriggerMode::FreeRunning,
     };
-    length(Kind::Request, &Request::LoadShot { index: 255, shot });
+    asked_length(Request::LoadShot { index: 255, shot });
 }

@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use farnear_protocol::{
-    BoardMicros, Event, EventKind, Micros, Nanometres, PROTOCOL_CURRENT, Request,
+    BoardMicros, Call, Event, EventKind, Micros, Nanometres, PROTOCOL_CURRENT, Request,
     frame::{Decoder, Header, Kind, encode},
     message::{Axis, ResetCause},
 };
@@ -149,7 +149,10 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let rig = Rig::with_parts(identity(), WITHOUT_MEMORY, None, BoardMicros(0));
-        Self { rig, now: 0, id: 0, coarse: Motor::new(), lens: Motor::new(), piezo: 0, longest: 0 }
+        let (coarse, lens) = (Motor::new(), Motor::new());
+        let mut bench = Self { rig, now: 0, id: 0, coarse, lens, piezo: 0, longest: 0 };
+        bench.ask(&Request::OpenSession);
+        bench
     }
 
     fn tick(&mut self) {
@@ -175,7 +178,7 @@ impl Bench {
     fn ask(&mut self, request: &Request) -> u32 {
         self.id += 1;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.id, boot: 1 };
-        let Some(bytes) = encode(header, request) else { fail() };
+        let Some(bytes) = encode(header, &Call { session: 1, request: request.clone() }) else { fail() };
         let now = BoardMicros(self.now);
         let mut last = 0;
         for byte in bytes {

@@ -2,13 +2,13 @@
 
 use std::collections::VecDeque;
 
-use farnear_protocol::frame::{Encoded, Header, Kind, encode};
-use farnear_protocol::{BoardMicros, Log, PROTOCOL_CURRENT, Request};
+use farnear_protocol::frame::Encoded;
+use farnear_protocol::{BoardMicros, Log, Request};
 use farnear_rig::control::{Board, Note};
 use farnear_rig::io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges, TICK_US};
 
-use crate::bench::BOOT;
 use crate::bench::hardware::Hardware;
+use crate::bench::{BOOT, SESSION, request_frame};
 
 /// What the loop did.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -84,9 +84,12 @@ impl Fake {
 
     /// Puts a request on the line.
     pub fn ask(&mut self, request: &Request) {
-        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.next_id, boot: BOOT };
+        if self.next_id == 1 {
+            self.received.extend(request_frame(1, BOOT, SESSION, &Request::OpenSession));
+            self.next_id = 2;
+        }
+        self.received.extend(request_frame(self.next_id, BOOT, SESSION, request));
         self.next_id += 1;
-        self.received.extend(encode(header, request).expect("every request fits"));
     }
 
     /// Time passes until the next tick.
