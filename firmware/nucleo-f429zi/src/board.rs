@@ -4,7 +4,6 @@ use defmt::{error, info};
 use embassy_stm32::{
     Peri, Peripherals,
     gpio::{Input, Pull},
-    pac,
     peripherals::{IWDG, PB0, TIM1, TIM3, TIM4, TIM8},
     usart::{BufferedUartTx, ConfigError},
     wdg::IndependentWatchdog,
@@ -69,12 +68,12 @@ impl Nucleo {
             memory: Some(Memory::new(p.SPI4, p.PE2, p.PE5, p.PE6, p.PE4)),
             coarse: Axis {
                 stepper: Stepper::new(p.TIM1, coarse),
-                encoder: Encoder::new(p.TIM4, p.PD12, p.PD13, pac::TIM4),
+                encoder: Encoder::new(p.TIM4, p.PD12, p.PD13),
                 switches: Switches::new(p.PG0, p.PG1),
             },
             lens: Axis {
                 stepper: Stepper::new(p.TIM8, lens),
-                encoder: Encoder::new(p.TIM3, p.PB4, p.PB5, pac::TIM3),
+                encoder: Encoder::new(p.TIM3, p.PB4, p.PB5),
                 switches: Switches::new(p.PG2, p.PG3),
             },
             piezo: Piezo::new(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD0, p.PD1),

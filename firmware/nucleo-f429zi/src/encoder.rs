@@ -1,11 +1,9 @@
 //! An axis' incremental encoder: the timer counts all four edges of a quadrature period, 16 bits, extended
-//! here. Its inputs take a level for new after eight samples of the 84 MHz clock: spikes below 95 ns, as a chopper makes them,
-//! are kept out. Read at least once per 32,767 counts (0.6 s at 6.25 mm/s; the control loop reads every 200 us).
+//! here. Read at least once per 32,767 counts (0.6 s at 6.25 mm/s; the control loop reads every 200 us).
 
 use embassy_stm32::{
     Peri,
     gpio::Pull,
-    pac::timer::{TimGp16, vals::FilterValue},
     timer::{
         Ch1, Ch2, GeneralInstance4Channel, TimerPin,
         qei::{Config, Qei},
@@ -20,19 +18,14 @@ pub struct Encoder<T: GeneralInstance4Channel> {
 }
 
 impl<T: GeneralInstance4Channel> Encoder<T> {
-    /// Starts counting at 0, wherever the axis is; `registers` are the timer's.
+    /// Starts counting at 0, wherever the axis is.
     pub fn new(
         timer: Peri<'static, T>,
         a: Peri<'static, impl TimerPin<T, Ch1>>,
         b: Peri<'static, impl TimerPin<T, Ch2>>,
-        registers: TimGp16,
     ) -> Self {
         let pulled_up = Config { ch1_pull: Pull::Up, ch2_pull: Pull::Up, ..Config::default() };
         let timer = Qei::new::<Ch1, Ch2>(timer, a, b, pulled_up);
-        registers.ccmr_input(0).modify(|inputs| {
-            inputs.set_icf(0, FilterValue::FCK_INT_N8);
-            inputs.set_icf(1, FilterValue::FCK_INT_N8);
-        });
         let last = timer.count();
         Self { timer, last, counts: 0 }
     }

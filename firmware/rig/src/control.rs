@@ -7,7 +7,7 @@
 //! 2. Bytes from the link go to the rig, stamped with the tick's first look at the clock. Then the rest of the hardware is read. The emergency stop comes after the step timers: its circuit stops them by itself, and one
 //!    that opens between the two readings must not look like a timer that ran dry.
 //! 3. The rig decides, and its outputs are carried out.
-//! 4. The link is given what there is to say: answers and events first, then the log.
+//! 4. The link is given a frame of what there is to say: answers and events first, then the log.
 //! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
 //!
 //! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
@@ -135,12 +135,12 @@ impl<'r> Control<'r> {
     }
 
     fn speak(&mut self, board: &mut impl Board) {
-        while board.has_room()
+        // One frame a tick: to make one takes a tenth of a tick, and the line takes longer for any.
+        if board.has_room()
             && let Some(frame) = self.rig.transmit()
         {
             board.send(frame);
-        }
-        if board.has_room()
+        } else if board.has_room()
             && let Some((id, log)) = board.take_log()
         {
             let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };

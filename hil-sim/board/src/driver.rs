@@ -188,7 +188,7 @@ impl Driver {
         work(&mut RigAccess { session, host, stop, plant: &self.plant, wiring: &mut self.wiring });
         self.note_resets(session, stop.at);
         self.wiring.put(&mut session.board_mut().chip, stop.at);
-        session.pause_at(self.wiring.next_ns(stop.at.0).map(VirtualNanos));
+        session.pause_at(self.wiring.next_ns().map(VirtualNanos));
     }
 
     /// Lets happen what is due.
@@ -291,7 +291,7 @@ impl emulator::Driver<RigBoard> for Driver {
         };
         self.note_resets(session, at);
         self.wiring.look(&mut session.board_mut().chip, at, written);
-        session.pause_at(self.wiring.next_ns(at.0).map(VirtualNanos));
+        session.pause_at(self.wiring.next_ns().map(VirtualNanos));
     }
 
     fn on_stop(

@@ -48,8 +48,9 @@ struct StageWires {
     name: StageName,
     step: bool,
     driver: DriverWires,
-    /// Home and far switch.
+    /// Home and far switch, and when the wire of one of them changes by itself.
     contacts: [Contact; 2],
+    due_ns: u64,
     counts: i64,
     step_edges: u64,
     last_step_ns: u64,
@@ -136,6 +137,7 @@ impl StageWires {
             step: false,
             driver,
             contacts: [contact(purposes[0], home), contact(purposes[1], far)],
+            due_ns: 0,
             counts,
             step_edges: 0,
             last_step_ns: 0,
@@ -147,6 +149,9 @@ impl StageWires {
     fn look(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos, driver_written: bool) {
         if driver_written {
             self.driver.look(chip, self.name, (at.0, self.last_step_ns));
+        }
+        if driver_written || self.due_ns <= at.0 {
+            self.put(plant, chip, at);
         }
         let (pin, timer, function) = pins(self.name).step;
         let step = is_high(chip, pin, function, |chip| {
@@ -191,12 +196,8 @@ impl StageWires {
         for (contact, (pin, actuated)) in self.contacts.iter_mut().zip(wires) {
             chip.drive_pin(at, pin, Level::from(contact.level(at.0, actuated, driven)));
         }
-    }
-
-    /// When a switch's wire may change by itself.
-    fn next_ns(&self, now_ns: u64) -> u64 {
-        let driven = self.driver.enabled_ns.is_some();
-        self.contacts.iter().map(|contact| contact.next_ns(now_ns, driven)).min().unwrap_or(u64::MAX)
+        let due = self.contacts.iter().map(|contact| contact.next_ns(at.0, driven)).min();
+        self.due_ns = due.unwrap_or(u64::MAX);
     }
 
     /// Quadrature: A leads B when the count rises.
@@ -275,8 +276,8 @@ impl Wiring {
     }
 
     /// When the camera or a switch needs attention next.
-    pub fn next_ns(&self, now_ns: u64) -> Option<u64> {
-        let switches_ns = self.stages.iter().map(|stage| stage.next_ns(now_ns)).min();
+    pub fn next_ns(&self) -> Option<u64> {
+        let switches_ns = self.stages.iter().map(|stage| stage.due_ns).min();
         self.camera.next_ns().into_iter().chain(switches_ns).min().filter(|at| *at < u64::MAX)
     }
 

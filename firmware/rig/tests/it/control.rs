@@ -16,7 +16,7 @@ use self::fake::{Call, Fake};
 use crate::bench::{self, BOOT};
 
 /// All that happens in a tick in which there is an event and a line of the log to send.
-const TICK: [Call; 15] = [
+const TICK: [Call; 13] = [
     Call::Gauge,
     Call::Now,
     Call::Receive,
@@ -28,8 +28,6 @@ const TICK: [Call; 15] = [
     Call::Exposure,
     Call::Strobe,
     Call::Apply,
-    Call::Send,
-    Call::TakeLog,
     Call::Send,
     Call::FeedWatchdog,
 ];
