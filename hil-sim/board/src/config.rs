@@ -12,7 +12,7 @@ pub enum Pace {
     Told,
     /// While the board owes an answer or an event, and when told to.
     Lockstep,
-    /// With the wall clock.
+    /// With the wall clock, while the board is at work or has just been spoken to.
     Realtime,
 }
 
@@ -27,6 +27,9 @@ pub struct RigConfig {
     pub faults: Faults,
     /// How time passes.
     pub pace: Pace,
+    /// What the board's memory holds at power-on, and where it is kept when the rig ends; a new one is made where there is
+    /// none. `None`: a blank memory, which is forgotten.
+    pub memory: Option<PathBuf>,
     /// Where to write what the plant really did, as CSV.
     pub trace: Option<PathBuf>,
 }
@@ -34,6 +37,13 @@ pub struct RigConfig {
 impl Default for RigConfig {
     /// Seed 1, no faults, time only when told.
     fn default() -> Self {
-        Self { firmware: None, seed: 1, faults: Faults::default(), pace: Pace::Told, trace: None }
+        Self {
+            firmware: None,
+            seed: 1,
+            faults: Faults::default(),
+            pace: Pace::Told,
+            memory: None,
+            trace: None,
+        }
     }
 }

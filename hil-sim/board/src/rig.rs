@@ -26,7 +26,7 @@ use crate::{
     config::RigConfig,
     driver::Driver,
     error::SimError,
-    firmware,
+    firmware, kept_memory,
     lockstep::BOOT_NS,
     plant::Plant,
     report::Report,
@@ -160,6 +160,12 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
     let plant = SharedPlant::new(Plant::new(config.seed).into());
     let line = Line::default();
     let mut board = RigBoard::new(&plant, line.clone(), config.seed).map_err(|error| emulator(&error))?;
+    if let Some(file) = &config.memory
+        && let Some(contents) = kept_memory::read(file)?
+        && let Some(memory) = board.chip.memory()
+    {
+        memory.set_contents(&contents);
+    }
     let wiring = Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip);
     let trace = config.trace.as_deref().map(Trace::create).transpose()?;
     let (commands, receiver) = mpsc::channel();
