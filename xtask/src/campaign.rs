@@ -19,9 +19,12 @@ pub struct Arguments {
     /// STEP pulses at 40 kHz on both axes together.
     #[arg(long, default_value_t = 1_000_000)]
     steps: u32,
-    /// Wall-clock seconds for which each rig's link is fuzzed.
-    #[arg(long, default_value_t = 60)]
-    fuzz_seconds: u64,
+    /// Frames with which each rig's link is fuzzed.
+    #[arg(long, default_value_t = 20_000)]
+    fuzz_frames: u64,
+    /// Hostile frames (replays, bursts, noise, other hosts) for the rig's behaviour without the emulator, once for all seeds.
+    #[arg(long, default_value_t = 1_000_000)]
+    hostile_frames: u64,
 }
 
 /// Runs it.
@@ -37,8 +40,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .env("FARNEAR_SEED", seed.to_string())
             .env("FARNEAR_MOVES", arguments.moves.to_string())
             .env("FARNEAR_STEPS", arguments.steps.to_string())
-            .env("FARNEAR_FUZZ_SECONDS", arguments.fuzz_seconds.to_string());
+            .env("FARNEAR_FUZZ_FRAMES", arguments.fuzz_frames.to_string());
         finish(&mut command)?;
     }
-    Ok(())
+    step("campaign, hostile frames");
+    let mut command = cargo(["test", "--locked", "--package", "farnear-rig", "--test", "it"]);
+    command
+        .args(["--", "hostile::", "--nocapture"])
+        .env("FARNEAR_HOSTILE_FRAMES", arguments.hostile_frames.to_string());
+    finish(&mut command)
 }

@@ -26,7 +26,7 @@ use rigless::{
         st::tim::{BreakInput, BreakSource, Channel},
         stm32f427::{
             Stm32f427,
-            generated::{flash::optcr::BOR_LEV, rcc},
+            generated::{flash::optcr::BOR_LEV, rcc, tim3},
             peripherals::{gpio::Pin, spi::Select},
         },
     },
@@ -211,8 +211,11 @@ impl Chip {
     fn put_input(&mut self, at: VirtualNanos, timer: usize, channel: Channel, level: Level) {
         self.part.drive_timer(at, timer, |tim, registers, context| {
             tim.drive_input(channel, level, registers, context);
-            // The emulator looks at what an input did to the interrupts only at an event.
-            context.schedule(at);
+            // The emulator looks at what an input did to the interrupts only at an event. A timer that asks for none only
+            // counts: no need to stop for each edge of an encoder.
+            if registers.get(tim3::Register::Dier) != 0 {
+                context.schedule(at);
+            }
         });
     }
 

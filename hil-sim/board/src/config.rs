@@ -12,7 +12,7 @@ pub enum Pace {
     Told,
     /// While the board owes an answer or an event, and when told to.
     Lockstep,
-    /// With the wall clock.
+    /// With the wall clock, while the board is at work or has just been spoken to.
     Realtime,
 }
 
@@ -31,6 +31,9 @@ pub struct RigConfig {
     pub faults: Faults,
     /// How time passes.
     pub pace: Pace,
+    /// What the board's memory holds at power-on, and where it is kept when the rig ends; a new one is made where there is
+    /// none. `None`: a blank memory, which is forgotten.
+    pub memory: Option<PathBuf>,
     /// Where to write what the plant really did, as CSV.
     pub trace: Option<PathBuf>,
 }
@@ -45,6 +48,7 @@ impl Default for RigConfig {
             costs_by_kind: false,
             faults: Faults::default(),
             pace: Pace::Told,
+            memory: None,
             trace: None,
         }
     }

@@ -1,7 +1,7 @@
 //! Joins the emulator to the plant and to the outside: what happens whenever the firmware touches a pin, and at each
 //! moment at which the emulator stops.
 
-use std::sync::mpsc::Receiver;
+use std::{path::PathBuf, sync::mpsc::Receiver};
 
 use rigless::{
     emulator::{self, AccessKind, Host, Settled, Stop},
@@ -17,6 +17,7 @@ use crate::{
     config::RigConfig,
     error::SimError,
     faults::{Faults, Happening, NoisyLine},
+    kept_memory,
     memory::MemoryChip,
     pacing::Pacing,
     plant::StageName,
@@ -43,6 +44,8 @@ pub struct Driver {
     /// What is still to happen.
     happens: Vec<Happening>,
     trace: Option<Trace>,
+    /// Where the memory's contents are kept at the end, and what they are then.
+    memory: Option<(PathBuf, Vec<u8>)>,
     /// Bytes for the board that came while time passes on request.
     held: Vec<u8>,
     resets: usize,
@@ -74,6 +77,7 @@ impl Driver {
             faults: config.faults.clone(),
             happens: config.faults.happens.clone(),
             trace,
+            memory: config.memory.clone().map(|path| (path, Vec::new())),
             held: Vec::new(),
             resets: 0,
             powered: true,
@@ -95,6 +99,9 @@ impl Driver {
     /// What went wrong during the run.
     pub fn finish(self) -> Result<(), SimError> {
         self.trace.map_or(Ok(()), Trace::finish)?;
+        if let Some((path, contents)) = self.memory.filter(|(_, contents)| !contents.is_empty()) {
+            kept_memory::write(&path, &contents)?;
+        }
         self.failed.map_or(Ok(()), Err)
     }
 
@@ -160,6 +167,7 @@ impl Driver {
         host: &mut dyn Host,
     ) -> bool {
         let now_ns = stop.at.0;
+        self.pacing.hear();
         match command {
             Command::Bytes(bytes) => {
                 // What comes while time passes on request comes after it, however fast the host is.
@@ -206,7 +214,7 @@ impl Driver {
 
     /// Puts on the line what came for the board, unless time passes on request.
     fn send_held(&mut self, now_ns: u64) {
-        if self.held.is_empty() || self.pacing.is_told(now_ns) {
+        if self.held.is_empty() || self.pacing.is_told(now_ns) || self.comes_to_rest(now_ns) {
             return;
         }
         let mut bytes = std::mem::take(&mut self.held);
@@ -220,6 +228,20 @@ impl Driver {
             self.to_board.carry(&mut bytes);
             self.line.send(&bytes);
         }
+    }
+
+    /// Whether time passes for a motor alone, which brakes behind the end of its work. What the host says meanwhile comes when
+    /// it stands, however fast the host is: else no two runs would be the same.
+    fn comes_to_rest(&mut self, now_ns: u64) -> bool {
+        self.pacing.is_lockstep()
+            && self.wiring.is_stepping(now_ns)
+            && !self.line.is_sending()
+            && !self.pacing.lockstep.is_busy(now_ns)
+    }
+
+    /// Whether something is to happen by itself: an exposure, or what was asked of the faults.
+    fn is_awaited(&self) -> bool {
+        self.wiring.next_ns().is_some() || !self.happens.is_empty() || self.faults.unplug_after_ms.is_some()
     }
 
     /// Whether the chip was reset since the last look.
@@ -243,15 +265,18 @@ impl Driver {
                 }
             }
             self.send_held(now_ns);
-            let is_sending = self.line.is_sending();
-            let waiting = self.pacing.take_waiting(now_ns, is_sending);
+            // Its time goes on until what it was sent has arrived and what moves has come to rest, also when its host has gone.
+            let at_work = self.line.is_sending()
+                || self.wiring.is_stepping(now_ns)
+                || self.pacing.is_realtime() && self.is_awaited();
+            let waiting = self.pacing.take_waiting(now_ns, at_work);
             if !waiting.is_empty() {
                 let report = self.report(now_ns);
                 for done in waiting {
                     let _ = done.send(report); // whoever asked may have gone
                 }
             }
-            let command = if self.pacing.may_pass(now_ns, is_sending) {
+            let command = if self.pacing.may_pass(now_ns, at_work) {
                 let Some(command) = self.pacing.keep_pace(now_ns, &self.commands) else { return true };
                 command
             } else {
@@ -309,6 +334,12 @@ impl emulator::Driver<RigBoard> for Driver {
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.board_mut().chip.join_breaks(stop.at);
         self.happen(session, stop, host);
-        self.serve(session, stop, host).then(|| VirtualNanos(self.pacing.next_look_ns(stop.at.0)))
+        if self.serve(session, stop, host) {
+            return Some(VirtualNanos(self.pacing.next_look_ns(stop.at.0)));
+        }
+        if let (Some((_, kept)), Some(memory)) = (&mut self.memory, session.board_mut().chip.memory()) {
+            *kept = memory.contents().to_vec();
+        }
+        None
     }
 }

@@ -1,7 +1,7 @@
 //! The camera endpoint: loopback TCP that hands out frames and takes control messages.
 //!
-//! One client at a time; a new one takes the place of the old one. Frames without a client wait, the newest 32 of
-//! them; each frame is handed out once.
+//! One client at a time; a second one is told so ([`IN_USE`]) and sent away. Frames without a client wait, the newest 32
+//! of them; each frame is handed out once.
 
 use std::{
     collections::VecDeque,
@@ -9,9 +9,10 @@ use std::{
     net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream},
     sync::{Arc, Condvar, Mutex, PoisonError, mpsc::Receiver},
     thread,
+    time::Duration,
 };
 
-use farnear_protocol::camera::Control;
+use farnear_protocol::camera::{Control, IN_USE};
 
 use crate::error::SimError;
 
@@ -19,11 +20,14 @@ use crate::error::SimError;
 const WAITING: usize = 32;
 /// Longest control message: far more than any has.
 const CONTROL_MAX: u32 = 64;
+/// A client that has just gone may still look as if it were there, to the one that follows it.
+const FAREWELL: Duration = Duration::from_millis(500);
 
 #[derive(Default)]
 struct State {
     frames: VecDeque<Vec<u8>>,
-    client: Option<TcpStream>,
+    /// The client, with a number of its own: of a connection that was reset the system no longer says whose it was.
+    client: Option<(u64, TcpStream)>,
 }
 
 type Shared = Arc<(Mutex<State>, Condvar)>;
@@ -60,15 +64,40 @@ pub fn open(
 }
 
 fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) + Send + Clone + 'static)) {
-    for stream in listener.incoming() {
+    for (number, stream) in (0..).zip(listener.incoming()) {
         let Ok(stream) = stream else { continue };
         let (Ok(reader), Ok(())) = (stream.try_clone(), stream.set_nodelay(true)) else { continue };
-        let control = control.clone();
-        // Without a thread to listen to it, the client still gets its frames.
-        let _ = thread::Builder::new().name("camera control".into()).spawn(move || listen(reader, &control));
-        if let Some(old) = lock(shared).client.replace(stream) {
-            let _ = old.shutdown(Shutdown::Both); // it may have gone already
+        let taken = |state: &mut State| state.client.is_some();
+        let waited = shared.1.wait_timeout_while(lock(shared), FAREWELL, taken);
+        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        if state.client.is_some() {
+            drop(state);
+            refuse(stream);
+            continue;
         }
+        state.client = Some((number, stream));
+        drop(state);
+        shared.1.notify_all();
+        let (control, shared) = (control.clone(), shared.clone());
+        // Without a thread to listen to it, the client still gets its frames.
+        let _ = thread::Builder::new().name("camera control".into()).spawn(move || {
+            listen(reader, &control);
+            forget(&shared, number);
+        });
+    }
+}
+
+/// Tells a client that another one has the camera.
+fn refuse(mut stream: TcpStream) {
+    let _ = stream.write_all(&IN_USE.to_le_bytes()); // it may have gone already
+    let _ = stream.shutdown(Shutdown::Both);
+}
+
+/// A client has gone, unless the present one is another.
+fn forget(shared: &Shared, gone: u64) {
+    let mut state = lock(shared);
+    if state.client.as_ref().is_some_and(|(number, _)| *number == gone) {
+        state.client = None;
         shared.1.notify_all();
     }
 }
@@ -114,17 +143,13 @@ fn send(shared: &Shared) {
             state = shared.1.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         let frame = state.frames.pop_front();
-        let client = state.client.as_ref().and_then(|client| client.try_clone().ok());
+        let client = state.client.as_ref().map(|(number, client)| (*number, client.try_clone()));
         drop(state);
-        let (Some(frame), Some(mut client)) = (frame, client) else { continue };
+        let (Some(frame), Some((number, Ok(mut client)))) = (frame, client) else { continue };
         if client.write_all(&frame).is_err() {
             // That client has gone; the frame waits for the next, unless that one is here already.
-            let mut state = lock(shared);
-            state.frames.push_front(frame);
-            let gone = client.peer_addr().ok();
-            if state.client.as_ref().is_some_and(|current| current.peer_addr().ok() == gone) {
-                state.client = None;
-            }
+            lock(shared).frames.push_front(frame);
+            forget(shared, number);
         }
     }
 }
@@ -153,11 +178,19 @@ mod tests {
         client.write_all(body).expect("open");
         assert_eq!(hear.recv(), Ok(Control::AdvanceMicros(1234)));
 
-        // A second client takes over.
+        // A second client is told that it is one, and the first goes on.
         let mut second = TcpStream::connect(address).expect("loopback");
-        assert_eq!(client.read(&mut bytes).expect("closed in order"), 0);
+        second.read_exact(&mut bytes).expect("a refusal");
+        assert_eq!(u32::from_le_bytes(bytes), IN_USE);
+        assert_eq!(second.read(&mut bytes).expect("closed in order"), 0);
         frames.send(vec![9]).expect("open");
-        second.read_exact(&mut bytes[..1]).expect("the frame");
+        client.read_exact(&mut bytes[..1]).expect("the frame");
         assert_eq!(bytes[0], 9);
+        // Once it has gone the next may come.
+        drop(client);
+        let mut third = TcpStream::connect(address).expect("loopback");
+        frames.send(vec![7]).expect("open");
+        third.read_exact(&mut bytes[..1]).expect("the frame");
+        assert_eq!(bytes[0], 7);
     }
 }

@@ -7,6 +7,16 @@ use thiserror::Error;
 /// Why the emulated rig cannot start or go on.
 #[derive(Debug, Error)]
 pub enum SimError {
+    /// The memory's file is not one.
+    #[error("{} has {length} bytes, the board's memory {expected}: name a file that an earlier run wrote, or a new one", path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        length: usize,
+        /// What it should be.
+        expected: usize,
+    },
     /// No firmware where it was looked for.
     #[error("no firmware at {}: run `cargo xtask firmware` to build it, or name an ELF with --firmware", .0.display())]
     NoFirmware(PathBuf),

@@ -204,5 +204,13 @@ mod tests {
             .filter_map(|line| line.strip_prefix("//! | `")?.split('`').next());
         let told: Vec<&str> = rows.skip(1).collect();
         assert_eq!(told, KINDS.map(|kind| kind.name));
+        let page = include_str!("../../../docs/hil.md");
+        for kind in KINDS {
+            assert!(
+                page.contains(&format!("| `{}` |", kind.name)),
+                "docs/hil.md does not tell of {}",
+                kind.name
+            );
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! - [`rig`]: the emulated rig in this process, for tests; [`config`], [`command`], [`report`]: what it is made of, what
 //!   it can be asked and what it answers.
 //! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client.
-//! - [`board`], [`chips`], [`memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
+//! - [`board`], [`chips`], [`memory`], [`kept_memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
 //! - [`camera`], [`imager`]: when the camera exposes, and its images.
 //! - [`driver`]: what happens whenever the emulator stops; [`pacing`], [`lockstep`]: when virtual time passes.
 //! - [`mod@count`]: instructions of the on-board routines.
@@ -32,6 +32,7 @@ pub mod error;
 pub mod faults;
 pub mod firmware;
 pub mod imager;
+pub mod kept_memory;
 pub mod lockstep;
 pub mod memory;
 pub mod pacing;

@@ -1,7 +1,7 @@
 //! When virtual time may pass.
 //!
 //! In lockstep it runs only while the board owes something: an answer to a request, the terminal event of a move,
-//! a homing, a calibration or a program, or its first event after a reset. Otherwise it stands still, however long the
+//! a homing, a calibration or a program, its first event after a reset, or the rest of a motor that still brakes. Otherwise it stands still, however long the
 //! host takes, so a run repeats to the byte. It also stands while the board waits for its host: after "still there?", and
 //! after "trigger your camera". All of it is decided from the frames that cross the line; a request that
 //! is lost on the way is given up after a while of virtual time, and the host asks again.

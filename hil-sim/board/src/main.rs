@@ -69,6 +69,13 @@ struct Run {
     /// the board owes an answer or an event, and a run repeats to the byte.
     #[arg(long)]
     paced: bool,
+    /// Keep the board's memory (settings, alarms, counters, programs) in this file between runs; it is made where it is
+    /// missing, and written when the rig ends.
+    #[arg(long, value_name = "FILE")]
+    memory: Option<PathBuf>,
+    /// Give the serial port this name too, a link that is removed at the end: a client finds a rig again that was started anew.
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
     /// Write what the mechanics really did to this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -116,9 +123,12 @@ fn serve(run: &Run) -> Result<()> {
         costs_by_kind: false,
         faults: run.faults.as_deref().map(Faults::read).transpose()?.unwrap_or_default(),
         pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
+        memory: run.memory.clone(),
         trace: run.trace.clone(),
     };
     let rig = ServedRig::start(&config, imager)?;
+    let link = run.link.as_deref().map(|path| Link::new(path, &rig.port)).transpose()?;
+    let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());
     ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
     let stop = rig.stopper();
     if stdin_is_a_pipe() {
@@ -129,10 +139,31 @@ fn serve(run: &Run) -> Result<()> {
         });
     }
     let mut stdout = std::io::stdout();
-    writeln!(stdout, "{{\"port\": \"{}\", \"camera\": \"{}\"}}", rig.port, rig.camera)?;
+    writeln!(stdout, "{{\"port\": \"{port}\", \"camera\": \"{}\"}}", rig.camera)?;
     stdout.flush()?;
     rig.wait()?;
     Ok(())
+}
+
+/// Another name of the pty, which goes with this value.
+struct Link(PathBuf);
+
+impl Link {
+    /// Makes the link. One that leads nowhere any more, left by a rig that was killed, is replaced; anything else stays.
+    fn new(path: &Path, port: &str) -> Result<Self> {
+        if path.is_symlink() && !path.exists() {
+            std::fs::remove_file(path).with_context(|| format!("cannot replace {}", path.display()))?;
+        }
+        std::os::unix::fs::symlink(port, path)
+            .with_context(|| format!("cannot make the link {} to {port}", path.display()))?;
+        Ok(Self(path.into()))
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0); // somebody may have removed it
+    }
 }
 
 /// Whether somebody holds the other end of the standard input (a terminal or /dev/null has no such end).

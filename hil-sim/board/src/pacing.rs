@@ -13,6 +13,9 @@ const QUANTUM_NS: u64 = 100_000;
 const REALTIME_QUANTUM_NS: u64 = 1_000_000;
 /// So long by the wall clock time stands for a host that the board waits for; then it is taken for gone.
 const HOST_PATIENCE: Duration = Duration::from_secs(1);
+/// With the wall clock time passes for so long after somebody has said something, and as long as the board is at work; then
+/// a rig that nobody asks anything takes no processor time.
+const AWAKE: Duration = Duration::from_millis(200);
 /// A machine that is this far behind follows the wall clock from where it is.
 const BEHIND: Duration = Duration::from_millis(100);
 
@@ -29,6 +32,8 @@ pub struct Pacing {
     settling: Vec<Sender<Report>>,
     /// A moment of the wall clock, and the virtual one that goes with it.
     wall: Option<(Instant, u64)>,
+    /// When somebody said something, by the wall clock.
+    spoken: Instant,
 }
 
 impl Pacing {
@@ -41,7 +46,18 @@ impl Pacing {
             told: Vec::new(),
             settling: Vec::new(),
             wall: None,
+            spoken: Instant::now(),
         }
+    }
+
+    /// Time follows the wall clock.
+    pub fn is_realtime(&self) -> bool {
+        self.pace == Pace::Realtime
+    }
+
+    /// Somebody has said something.
+    pub fn hear(&mut self) {
+        self.spoken = Instant::now();
     }
 
     /// Time passes only while the board owes something.
@@ -65,35 +81,37 @@ impl Pacing {
         now_ns < self.told_ns
     }
 
-    /// Whether the board owes something. `is_sending`: bytes are on their way to it.
-    fn is_busy(&mut self, now_ns: u64, is_sending: bool) -> bool {
-        self.lockstep.is_busy(now_ns) || is_sending
+    /// Whether the board owes something. `at_work`: bytes are on their way to it, or a motor is.
+    fn is_busy(&mut self, now_ns: u64, at_work: bool) -> bool {
+        self.lockstep.is_busy(now_ns) || at_work
     }
 
     /// Who has waited for this moment, to be told how the rig is now.
-    pub fn take_waiting(&mut self, now_ns: u64, is_sending: bool) -> Vec<Sender<Report>> {
+    pub fn take_waiting(&mut self, now_ns: u64, at_work: bool) -> Vec<Sender<Report>> {
         let mut waiting = Vec::new();
         if !self.is_told(now_ns) {
             waiting.append(&mut self.told);
         }
-        if !self.settling.is_empty() && !self.is_busy(now_ns, is_sending) {
+        if !self.settling.is_empty() && !self.is_busy(now_ns, at_work) {
             waiting.append(&mut self.settling);
         }
         waiting
     }
 
     /// Whether time may pass.
-    pub fn may_pass(&mut self, now_ns: u64, is_sending: bool) -> bool {
+    pub fn may_pass(&mut self, now_ns: u64, at_work: bool) -> bool {
         self.is_told(now_ns)
             || match self.pace {
-                Pace::Told => !self.settling.is_empty() && self.is_busy(now_ns, is_sending),
-                Pace::Lockstep => self.is_busy(now_ns, is_sending) && !self.lockstep.waits_for_host(),
-                Pace::Realtime => true,
+                Pace::Told => !self.settling.is_empty() && self.is_busy(now_ns, at_work),
+                Pace::Lockstep => self.is_busy(now_ns, at_work) && !self.lockstep.waits_for_host(),
+                Pace::Realtime => self.is_busy(now_ns, at_work) || self.spoken.elapsed() < AWAKE,
             }
     }
 
     /// Waits for a command while time stands; `None` where the host has let the board wait for too long.
     pub fn wait(&mut self, commands: &Receiver<Command>) -> Option<Command> {
+        // When time passes again, the clock on the wall is followed from then on.
+        self.wall = None;
         // Nobody left who could command: end.
         if !self.lockstep.waits_for_host() {
             return Some(commands.recv().unwrap_or(Command::End));
@@ -110,7 +128,7 @@ impl Pacing {
 
     /// Where time follows the wall clock: waits until that has caught up; a command ends the wait.
     pub fn keep_pace(&mut self, now_ns: u64, commands: &Receiver<Command>) -> Option<Command> {
-        if self.pace != Pace::Realtime || self.is_told(now_ns) {
+        if !self.is_realtime() || self.is_told(now_ns) {
             return None;
         }
         let (wall, virtual_ns) = *self.wall.get_or_insert((Instant::now(), now_ns));
@@ -132,7 +150,7 @@ impl Pacing {
 
     /// Until when the emulator may run before it is asked again.
     pub fn next_look_ns(&self, now_ns: u64) -> u64 {
-        let quantum = if self.pace == Pace::Realtime { REALTIME_QUANTUM_NS } else { QUANTUM_NS };
+        let quantum = if self.is_realtime() { REALTIME_QUANTUM_NS } else { QUANTUM_NS };
         let until = now_ns + quantum;
         if self.is_told(now_ns) { until.min(self.told_ns) } else { until }
     }

@@ -78,28 +78,39 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Vec<u8
     }
 }
 
+/// Of noise without a delimiter so much goes to the board; the rest of it is left out, up to the next delimiter, as an adapter
+/// does whose buffer is full. It cannot be part of a frame, and a megabyte of it would hold the line for five seconds.
+const NOISE_MAX: usize = 4096;
+
 /// Cuts a stream of bytes into frames, delimiter included, and garbage into pieces.
 ///
 /// A delimiter alone, with which hosts end what the line may have made of an earlier frame, travels in front of the
 /// frame that follows: by itself it would let time pass until it is on the board, and how much of that had passed
 /// when the frame came would be up to the host's threads.
 #[derive(Debug, Default)]
-pub struct FrameCutter(Vec<u8>);
+pub struct FrameCutter {
+    piece: Vec<u8>,
+    /// Bytes since the last delimiter.
+    run: usize,
+}
 
 impl FrameCutter {
     /// The whole frames that these bytes complete.
     pub fn cut(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
         for byte in bytes {
-            let in_frame = self.0.iter().any(|before| *before != 0);
-            if *byte == 0 && !in_frame {
-                self.0 = vec![0];
+            if *byte == 0 && self.run == 0 {
+                self.piece = vec![0];
                 continue;
             }
-            self.0.push(*byte);
+            self.run = if *byte == 0 { 0 } else { self.run + 1 };
+            if self.run > NOISE_MAX {
+                continue;
+            }
+            self.piece.push(*byte);
             // What is longer than a frame and the delimiter before it is none and need not wait for its end.
-            if *byte == 0 || self.0.len() > FRAME_MAX {
-                frames.push(std::mem::take(&mut self.0));
+            if *byte == 0 || self.piece.len() > FRAME_MAX {
+                frames.push(std::mem::take(&mut self.piece));
             }
         }
         frames
@@ -117,6 +128,19 @@ mod tests {
         assert_eq!(cutter.cut(&[3, 0, 4, 0, 5]), [vec![1, 2, 3, 0], vec![4, 0]]);
         let long = cutter.cut(&[7; FRAME_MAX]);
         assert_eq!((long.len(), long[0].len()), (1, FRAME_MAX + 1));
+    }
+
+    #[test]
+    fn noise_without_a_delimiter_does_not_hold_the_line_and_its_end_is_not_kept_back() {
+        for length in [1, FRAME_MAX, FRAME_MAX + 1, 2 * (FRAME_MAX + 1), 14_000, 1_000_000] {
+            let mut cutter = FrameCutter::default();
+            let noise: usize = cutter.cut(&vec![7; length]).iter().map(Vec::len).sum();
+            assert!(noise <= NOISE_MAX, "{noise} of {length} bytes");
+            // A request behind it, which the noise spoils, and its repeat: both travel at once.
+            let pieces = cutter.cut(&[1, 2, 0]);
+            assert_eq!(pieces.concat().last(), Some(&0), "{length}");
+            assert_eq!(cutter.cut(&[0, 1, 2, 0]), [[0, 1, 2, 0]], "{length}");
+        }
     }
 
     #[test]

@@ -26,7 +26,7 @@ use crate::{
     config::RigConfig,
     driver::Driver,
     error::SimError,
-    firmware,
+    firmware, kept_memory,
     lockstep::BOOT_NS,
     plant::Plant,
     processor::Costs,
@@ -167,6 +167,12 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
     };
     let mut board = RigBoard::new(&plant, line.clone(), config.seed, &config.parts, costs)
         .map_err(|error| emulator(&error))?;
+    if let Some(file) = &config.memory
+        && let Some(contents) = kept_memory::read(file)?
+        && let Some(memory) = board.chip.memory()
+    {
+        memory.set_contents(&contents);
+    }
     let wiring =
         Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip, (config.seed, &config.parts));
     let trace = config.trace.as_deref().map(Trace::create).transpose()?;

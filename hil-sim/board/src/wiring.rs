@@ -26,6 +26,9 @@ const WATCHED: [std::ops::Range<u64>; 3] = [0x4000_0000..0x4000_0400, 0x4001_000
 /// Port F, on which DIR and EN of both drivers are.
 const DRIVER_PORT: std::ops::Range<u64> = 0x4002_1400..0x4002_1800;
 
+/// A motor without a step for this long stands. The first step of the slowest ramp that settings allow comes after 10 ms.
+const STANDS_NS: u64 = 20_000_000;
+
 /// One exposure, as it really was.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
@@ -307,6 +310,11 @@ impl Wiring {
     /// When the last of them was.
     pub fn last_step_ns(&self, name: StageName) -> u64 {
         self.stage(name).last_step_ns
+    }
+
+    /// Whether a motor is on its way: the slowest steps of a ramp are nearer to each other than [`STANDS_NS`].
+    pub fn is_stepping(&self, now_ns: u64) -> bool {
+        self.stages.iter().any(|stage| stage.step_edges > 0 && now_ns < stage.last_step_ns + STANDS_NS)
     }
 
     /// Begins to note when each STEP edge comes.

@@ -5,6 +5,7 @@ mod calibration;
 mod coarse;
 mod control;
 mod faults;
+mod hostile;
 mod link;
 mod maths;
 mod program;

@@ -1,7 +1,5 @@
 //! Anything may come over the link: the board answers what is a request, stays alive, and never leaves its limits.
 
-use std::time::{Duration, Instant};
-
 use crate::bench::{Bench, amount, fine_shot, request_frame};
 use farnear_protocol::{
     Micros, Nanometres, Request, Response,
@@ -12,8 +10,10 @@ use farnear_protocol::{
 };
 use farnear_sim::plant::Noise;
 
-/// By the wall clock; the campaign fuzzes for a minute.
-const SECONDS: u64 = 5;
+/// Frames; the campaign sends more. About 600 in a second of the board's time.
+const FRAMES: u64 = 1_000;
+/// Good frames that are kept to be sent again.
+const KEPT: usize = 256;
 /// Most positions and durations are wild, some are near the limits, some sensible.
 const EDGES: [i32; 12] =
     [0, 1, -1, i32::MIN, i32::MAX, 13_000_000, 13_000_001, 5_000, 195_000, 100_000, 500_000, 6_000_000];
@@ -22,6 +22,8 @@ struct Fuzz {
     noise: Noise,
     boot: u32,
     id: u32,
+    /// What was said before, and may come again.
+    said: Vec<Vec<u8>>,
 }
 
 impl Fuzz {
@@ -53,8 +55,9 @@ impl Fuzz {
     fn request(&mut self) -> Request {
         let (axis, silence) = (self.axis(), self.silence());
         let small = self.below(256) as u8;
-        match self.below(26) {
+        match self.below(27) {
             0 => Request::Hello,
+            25 => Request::OpenSession,
             1 => Request::Status,
             2 => Request::Home { axis, silence },
             3..=5 => Request::Move { axis, target: Nanometres(self.number()), silence },
@@ -143,7 +146,7 @@ impl Fuzz {
         self.id += 1;
         let request = self.request();
         let mut frame = request_frame(self.id, self.boot, &request);
-        match self.below(8) {
+        match self.below(10) {
             0 => {
                 let place = self.below(frame.len() as u64) as usize;
                 frame[place] ^= 1 << self.below(8);
@@ -153,7 +156,20 @@ impl Fuzz {
                 let count = self.below(600);
                 frame = (0..count).map(|_| self.noise.bits() as u8).collect();
             }
-            _ => {}
+            3 if !self.said.is_empty() => {
+                let place = self.below(self.said.len() as u64) as usize;
+                frame = self.said[place].clone();
+            }
+            4 => {
+                let burst = (0..30).map(|_| self.below(self.said.len().max(1) as u64) as usize);
+                let places: Vec<usize> = burst.collect();
+                frame.extend(places.iter().filter_map(|place| self.said.get(*place)).flatten());
+            }
+            _ if self.said.len() < KEPT => self.said.push(frame.clone()),
+            _ => {
+                let place = self.below(KEPT as u64) as usize;
+                self.said[place] = frame.clone();
+            }
         }
         frame
     }
@@ -162,10 +178,11 @@ impl Fuzz {
 #[test]
 fn nothing_on_the_link_stops_the_board() {
     let mut bench = Bench::new(amount("FARNEAR_SEED", 1));
-    let mut fuzz = Fuzz { noise: Noise::new(amount("FARNEAR_SEED", 1), "fuzz"), boot: bench.boot, id: 1_000 };
-    let until = Instant::now() + Duration::from_secs(amount("FARNEAR_FUZZ_SECONDS", SECONDS));
+    let noise = Noise::new(amount("FARNEAR_SEED", 1), "fuzz");
+    let mut fuzz = Fuzz { noise, boot: bench.boot, id: 1_000, said: Vec::new() };
+    let frames = amount("FARNEAR_FUZZ_FRAMES", FRAMES);
     let mut sent = 0u64;
-    while Instant::now() < until {
+    while sent < frames {
         for _ in 0..20 {
             let bytes = fuzz.bytes();
             bench.rig.send(&bytes).expect("runs");

@@ -5,6 +5,7 @@ use farnear_protocol::{
     EventKind, Request, RequestError, Response,
     message::{Alarm, Axis, PositionState, RecordName, SettingKey},
 };
+use farnear_sim::RigConfig;
 
 const KEY: SettingKey = SettingKey::CoarseBacklashNm;
 
@@ -20,6 +21,17 @@ fn write(bench: &mut Bench, value: i32) {
     let answer = bench.ask(&Request::WriteSetting { key: KEY, value });
     assert!(matches!(answer, Ok(Response::Setting(setting)) if setting.value == value), "{answer:?}");
     bench.rig.advance_us(20_000).expect("runs");
+}
+
+#[test]
+fn the_memory_is_kept_between_two_runs_where_it_is_asked_to() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = RigConfig { memory: Some(folder.path().join("fram.bin")), ..RigConfig::default() };
+    let mut bench = Bench::with(&config);
+    write(&mut bench, 7_000);
+    bench.rig.stop().expect("it ends in order");
+    let mut bench = Bench::with(&config);
+    assert_eq!((read(&mut bench), bench.boot), (7_000, 2));
 }
 
 fn power_cycle(bench: &mut Bench) {

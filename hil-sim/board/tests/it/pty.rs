@@ -21,14 +21,14 @@ use serialport::SerialPort;
 /// Far longer than anything here takes, so that a hang fails instead of hanging.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-struct Program {
+pub struct Program {
     child: Child,
-    port: String,
+    pub port: String,
     camera: String,
 }
 
 impl Program {
-    fn start(arguments: &[&str]) -> Self {
+    pub fn start(arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
             .arg("run")
             .args(arguments)
