@@ -16,7 +16,9 @@ use farnear_depth::kernel::Kernel;
 use farnear_depth::operators::{Design, Family, Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
 use farnear_depth::pipeline::{Backend, Processor, Settings};
+use farnear_depth::prepare::{Align, Balance, PrepareSettings, prepare};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
+use farnear_depth::windowed::{Bank, Window, WindowSettings, estimate};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -110,6 +112,28 @@ fn side_by_side(threads: usize, rounds: usize, chain: impl Fn(&mut dyn FnMut()) 
     assert!(times.len() >= rounds, "{} rounds", times.len());
     times.sort_by(f64::total_cmp);
     [times[0], times[times.len() / 2]]
+}
+
+/// Alignment and balance of a pair, and adaptive windows; on all threads.
+fn real_pair(optics: &Optics, [prepare_name, windowed_name]: [&str; 2], size: (usize, usize), runs: usize) {
+    let texture = random_image(size.0 + 2, size.1 + 2, 3);
+    let part = |dy: usize, dx: usize| texture.slice(ndarray::s![dy..dy + size.0, dx..dx + size.1]).to_owned();
+    let [far, near] = [part(0, 0), part(1, 2) * 1.1];
+    let settings = PrepareSettings {
+        align: Align::Similarity,
+        balance: Balance::Local,
+        limits: Some([0.0, 255.0]),
+        ..PrepareSettings::default()
+    };
+    let threads = rayon::current_num_threads();
+    let run = || prepare(far.view(), near.view(), optics, None, &settings).unwrap();
+    report(prepare_name, None, threads, time(runs, run), None);
+    let pair = run();
+    let bank = Bank::whitened(optics).unwrap();
+    let of_windows =
+        WindowSettings { window: Window::Adaptive, median_px: 3, noise: pair.noise, backend: None };
+    let windowed = || estimate(pair.far.view(), pair.near.view(), &bank, optics, &of_windows).unwrap();
+    report(windowed_name, Some(Backend::best()), threads, time(runs, windowed), None);
 }
 
 fn main() {
@@ -220,6 +244,12 @@ fn main() {
         for threads in [1, 4] {
             let settings = Settings { threads, ..Settings::default() };
             report("chain_4000x3000", Some(Backend::best()), threads, chain(9, &large, &settings), None);
+        }
+    }
+    for (name, height, width, runs) in [("640x480", 480, 640, 20), ("4000x3000", 3000, 4000, 3)] {
+        let (prepare_name, windowed_name) = (format!("prepare_{name}"), format!("windowed_{name}"));
+        if wanted(&prepare_name) || wanted(&windowed_name) {
+            real_pair(&optics_pill, [&prepare_name, &windowed_name], (height, width), runs);
         }
     }
     let designs = [
