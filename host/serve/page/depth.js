@@ -21,7 +21,7 @@ export function make(host, remember) {
   const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
   const layers = h("div", { class: "group", role: "group", "aria-label": "What is shown" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
   const tools = h("div", { class: "group", role: "group", "aria-label": "Tool" }, [["pan", "Probe"], ["line", "Profile"], ["region", "Region"]].map(([name, text]) => button(text, () => use(name), { "data-tool": name })));
-  const legend = h("canvas", { class: "legend-bar", role: "img" });
+  const legend = h("canvas", { class: "legend-bar", role: "img", "aria-label": "colours, without a map yet" });
   const [low, high] = [h("span", {}), h("span", {})];
   const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "distribution of the values" });
   const empty = h("p", { class: "empty" }, "No depth yet. Capture a pair in Live, or compute one here.");

@@ -1,6 +1,6 @@
 // The page: views, the way to the rig, who drives, alarms, the job under way.
 import { act, drives, on, open, stop, store } from "./link.js";
-import { h, ask, button, notice } from "./ui.js";
+import { h, ask, button, keep, notice } from "./ui.js";
 import { help, key, listen } from "./keys.js";
 import * as rig from "./rig.js";
 import * as live from "./live.js";
@@ -73,13 +73,13 @@ function showSeats(state) {
   const who = $("who");
   const { driver, asking, count } = state.seats;
   const watchers = count > 1 ? ` · ${count} browsers` : "";
-  if (drives()) who.replaceChildren(`you drive${watchers}`);
-  else if (!store.seat) who.replaceChildren("");
-  else {
-    const waits = asking === store.seat.seat;
-    who.replaceChildren(h("span", {}, driver ? "another browser drives" : "nobody drives"),
-      button(waits ? "asked …" : "Ask for controls", () => act("/api/seat/ask"), { disabled: waits, class: "quiet" }));
-  }
+  const [seat, mine, waits] = [store.seat?.seat, drives(), asking != null && asking === store.seat?.seat];
+  keep(who, [seat, mine, waits, driver, count], () => {
+    if (mine) return [`you drive${watchers}`];
+    if (!seat) return [""];
+    return [h("span", {}, driver ? "another browser drives" : "nobody drives"),
+      button(waits ? "asked …" : "Ask for controls", () => act("/api/seat/ask"), { disabled: waits, class: "quiet" })];
+  });
 }
 
 let asked = null;
@@ -110,13 +110,16 @@ function showJob(state, before) {
   const running = [state.job, state.computation].filter((job) => job?.phase === "running");
   place.hidden = !running.length;
   const line = (job) => {
-    const part = job.progress?.total ? job.progress.done / job.progress.total : null;
-    const bar = h("progress", part == null ? {} : { value: part, max: 1 });
-    bar.setAttribute("aria-label", job.title);
     const cancel = job === state.computation ? button("Cancel", () => act("/api/cancel")) : button("Stop", stop, { class: "stop small" });
-    return h("div", { class: "job-line" }, h("strong", {}, job.title), h("span", { class: "said" }, job.said ?? ""), bar, cancel);
+    return h("div", { class: "job-line" }, h("strong", {}, job.title), h("span", { class: "said" }), h("progress", { max: 1, "aria-label": job.title }), cancel);
   };
-  place.replaceChildren(...running.map(line));
+  keep(place, running.map((job) => [job.id, job.kind]), () => running.map(line));
+  running.forEach((job, at) => {
+    const [, said, bar] = place.children[at].children;
+    said.textContent = job.said ?? "";
+    if (job.progress?.total) bar.value = job.progress.done / job.progress.total;
+    else bar.removeAttribute("value");
+  });
   for (const lane of ["job", "computation"]) ended(state[lane], before?.[lane]);
 }
 

@@ -1,6 +1,6 @@
 // The rig: how it is, and moving it. Always in reach.
 import { act, call, drives, get, on, store } from "./link.js";
-import { h, button, choice, notice, number, rows } from "./ui.js";
+import { h, button, choice, keep, notice, number, rows } from "./ui.js";
 import { draw } from "./stages.js";
 import { key } from "./keys.js";
 
@@ -17,15 +17,19 @@ export function mount(host) {
     button("Far focus", () => act("/api/rig/goto", { focus: "far" }), { title: "F", "data-needs": "drive" }),
     button("Near focus", () => act("/api/rig/goto", { focus: "near" }), { title: "N", "data-needs": "drive" }),
     button("Find focus", () => act("/api/rig/focus", {}), { title: "Searches for the sharpest image", "data-needs": "drive" }));
-  const more = h("details", {}, h("summary", {}, "More"), h("div", { class: "details" }));
+  const facts = h("div", {});
+  const more = h("details", {}, h("summary", {}, "More"), h("div", { class: "details" }, facts, h("div", { class: "buttons" },
+    button("Bring-up checklist", () => act("/api/rig/check"), { "data-needs": "drive" }),
+    button("Reset the board", () => act("/api/rig/reset"), { "data-needs": "drive" }),
+    button("Emergency stop", () => act("/api/halt"), { class: "danger" }))));
   host.append(h("h2", { class: "visually-hidden" }, "Rig"), phase, stages, whole, axes, more);
 
   const show = (state) => {
     const { rig } = state;
-    phase.replaceChildren(...phaseWords(rig));
+    keep(phase, [rig.phase, rig.name, rig.error, rig.emulated], () => phaseWords(rig));
     if (rig.info) draw(stages, rig.info, range);
     stages.hidden = !rig.info;
-    if (more.open) more.lastElementChild.replaceChildren(details(rig));
+    if (more.open) facts.replaceChildren(details(rig));
     const able = drives() && rig.phase === "ready";
     for (const control of host.querySelectorAll("[data-needs=drive]")) control.disabled = !able;
   };
@@ -87,14 +91,11 @@ function step(name, sign) {
 function details({ info }) {
   if (!info) return h("p", {}, "–");
   const yes = (value) => (value ? "yes" : "no");
-  return h("div", {}, rows([
+  return rows([
     ["board", `${info.board}, firmware ${info.firmware}`], ["protocol", info.protocol], ["boot", `${info.boot}, ${info.reset_cause}`],
     ["datum", number(info.datum_mm, 3, "mm")], ["program", info.program],
     ["home switch", yes(info.home_switch)], ["far switch", yes(info.far_switch)],
     ["emergency stop", info.emergency_stop ? "pressed" : "released"], ["supply", info.supply_low ? "low" : "good"],
     ["bad frames", info.link_bad_frames],
-  ]), h("div", { class: "buttons" },
-    button("Bring-up checklist", () => act("/api/rig/check"), { disabled: !drives() }),
-    button("Reset the board", () => act("/api/rig/reset"), { disabled: !drives() }),
-    button("Emergency stop", () => act("/api/halt"), { class: "danger" })));
+  ]);
 }

@@ -86,3 +86,11 @@ export function ask(question, { text = false, yes = "Continue", no = "Cancel" } 
     dialog.showModal();
   });
 }
+
+/** Fills a place anew only when `key` changes: a button that is replaced under a click is not pressed. */
+export function keep(host, key, build) {
+  const text = JSON.stringify(key);
+  if (host.dataset.key === text) return;
+  host.dataset.key = text;
+  host.replaceChildren(...[build()].flat());
+}

@@ -44,7 +44,7 @@ impl Seats {
         Ok(seat)
     }
 
-    /// A seat is left; gives whether it drove. Who asked for it has it now.
+    /// A seat is left; gives whether it drove. Who asked for it has it now, or who is left alone.
     pub fn leave(&mut self, number: u32) -> bool {
         self.seats.retain(|seat| seat.number != number);
         if self.asking == Some(number) {
@@ -52,7 +52,9 @@ impl Seats {
         }
         let drove = self.driver == Some(number);
         if drove {
-            self.driver = self.asking.take();
+            // A page that is loaded again may come before its old socket has gone: who is left alone drives.
+            let alone = <[Seat; 1]>::try_from(self.seats.clone()).ok().map(|[seat]| seat.number);
+            self.driver = self.asking.take().or(alone);
         }
         drove
     }
@@ -136,6 +138,16 @@ mod tests {
         let third = seats.join().unwrap();
         assert!(seats.drives(&third.secret));
         assert!(!seats.ask("made up"));
+    }
+
+    #[test]
+    fn who_is_left_alone_drives_and_of_several_nobody_does() {
+        let mut seats = Seats::default();
+        let [first, second, third] = [0; 3].map(|_| seats.join().unwrap());
+        assert!(seats.leave(first.number));
+        assert_eq!(seats.driver(), None);
+        assert!(seats.ask(&second.secret) && seats.leave(second.number));
+        assert!(seats.drives(&third.secret));
     }
 
     #[test]

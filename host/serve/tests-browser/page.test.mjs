@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { mkdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { after, afterEach, before, test } from "node:test";
 import { Validator } from "@seriousme/openapi-schema-validator";
 import { browser as launch, open, serve } from "./server.mjs";
 
@@ -21,6 +21,11 @@ before(async () => {
 after(async () => {
   await browser?.close();
   assert.equal(await server?.close(), 0, "Ctrl-C ends it well");
+});
+
+// A test that failed leaves no browser behind that drives.
+afterEach(async () => {
+  for (const context of browser.contexts()) await context.close();
 });
 
 const state = () => server.ask("/api/state");
@@ -69,7 +74,7 @@ test("the depth of the capture is that of the staircase", async () => {
   await page.locator("[data-layer=depth][aria-pressed=true]").waitFor();
   await page.locator("canvas[data-layer=depth]").waitFor();
   await page.getByRole("button", { name: "Region" }).click();
-  const box = await page.locator(".viewer canvas").first().boundingBox();
+  const box = await page.locator("#view-depth .viewer canvas").boundingBox();
   await page.waitForFunction(() => document.querySelector(".legend span").textContent.includes("mm"));
   await page.mouse.move(box.x + box.width * 0.4, box.y + box.height * 0.4);
   await page.mouse.down();

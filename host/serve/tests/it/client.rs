@@ -75,12 +75,19 @@ impl Served {
         Self { address, session, cancel, thread: Some(thread), _folder: folder, _board: board }
     }
 
-    /// Sends these bytes and gives all that comes back.
+    /// Sends these bytes and nothing more, and gives all that comes back.
     pub fn raw(&self, bytes: &[u8]) -> Vec<u8> {
+        self.exchange(bytes, true)
+    }
+
+    /// A server takes the end of what is sent for a client that has gone, and gives up what it was doing.
+    fn exchange(&self, bytes: &[u8], ends: bool) -> Vec<u8> {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let _ = stream.write_all(bytes); // it may refuse to hear more
-        let _ = stream.shutdown(std::net::Shutdown::Write);
+        if ends {
+            let _ = stream.shutdown(std::net::Shutdown::Write);
+        }
         let mut answer = Vec::new();
         let _ = stream.read_to_end(&mut answer); // a connection that is reset has answered as well
         answer
@@ -99,7 +106,7 @@ impl Served {
             let _ = write!(request, "content-type: application/json\r\ncontent-length: {}\r\n", body.len());
         }
         let _ = write!(request, "\r\n{body}");
-        Answer::parse(&self.raw(request.as_bytes()))
+        Answer::parse(&self.exchange(request.as_bytes(), false))
     }
 
     pub fn get(&self, path: &str) -> Answer {

@@ -30,7 +30,10 @@ impl Dice {
     fn spoiled(&mut self, request: &str) -> Vec<u8> {
         let mut bytes = request.as_bytes().to_vec();
         for _ in 0..=self.below(4) {
-            let at = self.below(bytes.len());
+            let at = self.below(bytes.len().max(1));
+            if bytes.is_empty() {
+                break;
+            }
             match self.below(4) {
                 0 => bytes[at] = self.below(256) as u8,
                 1 => drop(bytes.remove(at)),
