@@ -6,6 +6,7 @@
 //! keyboard or listens for a signal.
 //!
 //! - [`rig`]: connecting, and all that a rig does; [`simulator`]: starting the emulated one.
+//! - [`camera`]: cameras without a rig: which there are, what they can, pictures to keep and to look at.
 //! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
 //! - [`calibrate`]: learning the point spread function and corrections.
@@ -54,6 +55,7 @@
 
 pub mod activity;
 pub mod calibrate;
+pub mod camera;
 pub mod clock;
 pub mod compare;
 pub mod context;
