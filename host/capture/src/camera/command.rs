@@ -219,7 +219,7 @@ impl Camera for CommandCamera {
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(mut image) = self.take(wait)? else { return Ok(None) };
-        loop {
+        for _ in 0..QUEUE {
             match self.frames.try_recv() {
                 Ok(Ok(newer)) => image = newer,
                 Ok(Err(reason)) => self.ended = Some(reason),

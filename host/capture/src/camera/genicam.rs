@@ -463,15 +463,16 @@ impl Camera for GenicamCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
-        let mut newest = self.take(wait)?;
-        while newest.is_some() {
-            // A frame that is broken does not take away the whole one before it.
-            match self.take(Duration::ZERO) {
-                Ok(Some(newer)) => newest = Some(newer),
-                _ => break,
+        // Older frames are not looked into: where that takes longer than an exposure there would be no end of them.
+        if let Some(stream) = &self.stream {
+            let waiting = stream.n_buffers().1;
+            for _ in 1..waiting {
+                if let Some(older) = stream.try_pop_buffer() {
+                    stream.push_buffer(older);
+                }
             }
         }
-        Ok(newest)
+        self.take(wait)
     }
 }
 

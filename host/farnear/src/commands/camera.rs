@@ -101,7 +101,7 @@ struct GrabArguments {
 /// Look through a camera: frame rate, focus, brightness and saturation, a line a second, until interrupted.
 #[derive(Args)]
 #[command(
-    after_help = "Example: farnear camera live --camera \"command:ffmpeg -v error -re -f lavfi -i testsrc -f yuv4mpegpipe -\""
+    after_help = "Example: farnear camera live --camera \"command:ffmpeg -v error -re -f lavfi -i testsrc -pix_fmt gray -f yuv4mpegpipe -\""
 )]
 struct LiveArguments {
     #[command(flatten)]

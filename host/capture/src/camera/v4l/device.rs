@@ -316,8 +316,10 @@ impl Camera for V4lCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
-        let mut newest = self.take(wait)?;
-        while newest.is_some() {
+        let Some(first) = self.take(wait)? else { return Ok(None) };
+        let mut newest = Some(first);
+        // No more than may wait: where looking into a frame takes longer than an exposure there would be no end of them.
+        for _ in 1..BUFFERS {
             match self.take(Duration::ZERO)? {
                 Some(newer) => newest = Some(newer),
                 None => break,
