@@ -8,11 +8,25 @@ use farnear_protocol::{
 };
 use ndarray::Array2;
 
+pub mod command;
+pub mod controls;
 pub mod folder;
+#[cfg(feature = "genicam")]
+pub mod genicam;
+pub mod pairing;
+pub mod pixels;
 pub mod sim;
+pub mod v4l;
 
+pub use command::CommandCamera;
+pub use controls::{Control, Range, Setting};
 pub use folder::FolderCamera;
+#[cfg(feature = "genicam")]
+pub use genicam::GenicamCamera;
+pub use pairing::Stamp;
 pub use sim::SimCamera;
+#[cfg(all(feature = "v4l2", target_os = "linux"))]
+pub use v4l::V4lCamera;
 
 /// One exposure as the camera delivers it.
 #[derive(Clone, PartialEq, Debug)]
@@ -21,6 +35,15 @@ pub struct Image {
     pub pixels: Array2<u16>,
     /// Bits that carry the picture, 8 to 16.
     pub bits: u8,
+}
+
+/// A picture as it came, to look at.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Frame {
+    /// The picture.
+    pub image: Image,
+    /// What the camera says of it.
+    pub stamp: Stamp,
 }
 
 /// Something that takes an image at each trigger.
@@ -38,6 +61,35 @@ pub trait Camera {
     /// The image of this exposure, waiting at most `wait` for it. Called for each exposure, in order; after
     /// [`CameraError::Late`] it may be called for the same exposure again.
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
+
+    /// Called after the last image of a program: tells of pictures that no exposure accounts for, because then it is not
+    /// certain of any which exposure it belongs to.
+    fn finish(&mut self) -> Result<(), CameraError> {
+        Ok(())
+    }
+
+    /// What can be set, with its range, and what can be read.
+    fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
+        Ok(Vec::new())
+    }
+
+    /// Sets something, until it is set again; what is out of range is refused, never brought into it.
+    fn set(&mut self, setting: &Setting) -> Result<(), CameraError> {
+        let expected = format!("a camera of the kind `{}` has nothing to set", self.kind());
+        Err(CameraError::Setting { name: setting.name(), value: setting.value(), expected })
+    }
+
+    /// Takes pictures without a board from now on, as many as the camera can, until it is armed.
+    fn watch(&mut self) -> Result<(), CameraError> {
+        let reason = "this kind gives pictures to a rig only".into();
+        Err(CameraError::Unusable { camera: self.kind().into(), reason })
+    }
+
+    /// The newest picture since [`Self::watch`] that was not given yet, waiting at most `wait` for it; `None` when time is up.
+    /// An error when nothing more can come.
+    fn newest(&mut self, _wait: Duration) -> Result<Option<Frame>, CameraError> {
+        Ok(None)
+    }
 }
 
 /// A camera did not deliver.
@@ -114,5 +166,55 @@ pub enum CameraError {
         path: PathBuf,
         /// What is wrong.
         reason: String,
+    },
+    /// What a frame says of itself contradicts what the board says of the exposure.
+    #[error(
+        "the picture for exposure {wanted} cannot be told from others ({camera}): {reason}; does the camera take one picture \
+         for each trigger, and is its strobe wired to the board?"
+    )]
+    Mispaired {
+        /// The camera.
+        camera: String,
+        /// Which exposure was due.
+        wanted: u32,
+        /// What does not agree.
+        reason: String,
+    },
+    /// More pictures than triggers.
+    #[error(
+        "the camera gave a picture more than it was triggered ({camera}), so none is certain to belong to its exposure; it \
+         must take one picture for each trigger and not run freely"
+    )]
+    Surplus {
+        /// The camera.
+        camera: String,
+    },
+    /// A frame that did not come whole.
+    #[error("frame {frame} of {camera} came incomplete: {reason}")]
+    Incomplete {
+        /// The camera.
+        camera: String,
+        /// Its number, as the camera counts.
+        frame: u64,
+        /// What is missing.
+        reason: String,
+    },
+    /// A device or program that cannot be used.
+    #[error("{camera} cannot be used as a camera: {reason}")]
+    Unusable {
+        /// The device, or the program.
+        camera: String,
+        /// Why, and what to do.
+        reason: String,
+    },
+    /// A value that cannot be set.
+    #[error("{name} {value}: {expected}")]
+    Setting {
+        /// What was to be set.
+        name: &'static str,
+        /// To what.
+        value: String,
+        /// What was expected.
+        expected: String,
     },
 }

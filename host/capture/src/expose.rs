@@ -110,7 +110,7 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     if told != asked {
         return Err(CaptureError::Count { told, asked }.into());
     }
-    Ok(())
+    Ok(camera.finish().map_err(camera_failed)?)
 }
 
 fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), CaptureError> {

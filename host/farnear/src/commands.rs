@@ -2,6 +2,7 @@
 
 pub mod activity;
 pub mod calibrate;
+pub mod camera;
 pub mod compare;
 pub mod completions;
 pub mod correct;

@@ -6,6 +6,7 @@
 //! keyboard or listens for a signal.
 //!
 //! - [`rig`]: connecting, and all that a rig does; [`simulator`]: starting the emulated one.
+//! - [`camera`]: cameras without a rig: which there are, what they can, pictures to keep and to look at.
 //! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
 //! - [`measure`]: figures of a map: a region with its plane, a profile, a difference; [`picture`]: figures of an image;
@@ -56,6 +57,7 @@
 
 pub mod activity;
 pub mod calibrate;
+pub mod camera;
 pub mod camera_frames;
 pub mod clock;
 pub mod compare;

@@ -34,6 +34,23 @@ pub fn declare_emulated_rig() {
     }
 }
 
+/// For build scripts: the configuration `name` is set where the program is on the PATH. A test that starts it bears
+/// `#[cfg_attr(not(NAME), ignore = "needs PROGRAM")]`.
+pub fn declare_program(name: &str, program: &str) {
+    println!("cargo::rustc-check-cfg=cfg({name})");
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed=PATH");
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let places: Vec<PathBuf> = std::env::split_paths(&path).map(|folder| folder.join(program)).collect();
+    for place in &places {
+        // A place that is missing counts as changed, so that a program that is installed later is found.
+        println!("cargo::rerun-if-changed={}", place.display());
+    }
+    if places.iter().any(|place| place.is_file()) {
+        println!("cargo::rustc-cfg={name}");
+    }
+}
+
 /// A file or folder of the data, e.g. `breakfast/far.png`.
 pub fn path(name: &str) -> PathBuf {
     folder().join(name)

@@ -8,13 +8,13 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 
-use farnear_files::image_file::{GreyImage, Samples, decode_grey};
+use farnear_files::image_file::decode_grey;
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
     units::Micros,
 };
 
-use super::{Camera, CameraError, Image};
+use super::{Camera, CameraError, Frame, Image, Stamp, pixels::of_picture};
 use crate::describe::trigger_name;
 
 const POLL: Duration = Duration::from_millis(20);
@@ -67,6 +67,40 @@ impl FolderCamera {
     }
 }
 
+impl FolderCamera {
+    /// The next image; `None` when time is up.
+    fn next(&mut self, wait: Duration) -> Result<Option<Image>, CameraError> {
+        let until = Instant::now() + wait;
+        loop {
+            if let Some((_, path)) = self.fresh()?.into_iter().next() {
+                let bytes = fs::read(&path).unwrap_or_default();
+                match &self.candidate {
+                    // The same bytes twice: it is no longer being written (half a JPEG would decode, too).
+                    Some((same, content, since)) if *same == path && *content == bytes => {
+                        match decode_grey(&bytes) {
+                            Ok(picture) => {
+                                self.used.insert(path.clone());
+                                return of_picture(picture)
+                                    .map(Some)
+                                    .map_err(|reason| CameraError::File { path, reason });
+                            }
+                            Err(reason) if since.elapsed() > QUIET => {
+                                return Err(CameraError::File { path, reason });
+                            }
+                            Err(_) => {}
+                        }
+                    }
+                    _ => self.candidate = Some((path, bytes, Instant::now())),
+                }
+            }
+            if Instant::now() >= until {
+                return Ok(None);
+            }
+            std::thread::sleep(POLL);
+        }
+    }
+}
+
 impl Camera for FolderCamera {
     fn kind(&self) -> &'static str {
         "folder"
@@ -85,44 +119,18 @@ impl Camera for FolderCamera {
     }
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
-        let until = Instant::now() + wait;
-        loop {
-            if let Some((_, path)) = self.fresh()?.into_iter().next() {
-                let bytes = fs::read(&path).unwrap_or_default();
-                match &self.candidate {
-                    // The same bytes twice: it is no longer being written (half a JPEG would decode, too).
-                    Some((same, content, since)) if *same == path && *content == bytes => {
-                        match decode_grey(&bytes) {
-                            Ok(picture) => {
-                                self.used.insert(path.clone());
-                                return to_image(picture)
-                                    .map_err(|reason| CameraError::File { path, reason });
-                            }
-                            Err(reason) if since.elapsed() > QUIET => {
-                                return Err(CameraError::File { path, reason });
-                            }
-                            Err(_) => {}
-                        }
-                    }
-                    _ => self.candidate = Some((path, bytes, Instant::now())),
-                }
-            }
-            if Instant::now() >= until {
-                return Err(CameraError::Late {
-                    camera: format!("folder {}", self.folder.display()),
-                    trigger_number: shot.trigger_number,
-                    waited: wait,
-                });
-            }
-            std::thread::sleep(POLL);
-        }
+        self.next(wait)?.ok_or_else(|| CameraError::Late {
+            camera: format!("folder {}", self.folder.display()),
+            trigger_number: shot.trigger_number,
+            waited: wait,
+        })
     }
-}
 
-fn to_image(picture: GreyImage) -> Result<Image, String> {
-    let Samples::Integer(bits) = picture.samples else {
-        return Err("a camera's image has integer pixels, this one has float".into());
-    };
-    let full_scale = f32::from(((1u32 << bits) - 1) as u16);
-    Ok(Image { pixels: picture.pixels.mapv(|value| (value * full_scale).round() as u16), bits })
+    fn watch(&mut self) -> Result<(), CameraError> {
+        self.forget_what_is_there()
+    }
+
+    fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
+        Ok(self.next(wait)?.map(|image| Frame { image, stamp: Stamp::default() }))
+    }
 }

@@ -16,7 +16,7 @@ use farnear_protocol::{
 };
 use ndarray::Array2;
 
-use super::{Camera, CameraError, Image};
+use super::{Camera, CameraError, Frame as Picture, Image, Stamp};
 
 const CONNECT: Duration = Duration::from_secs(5);
 /// Images that wait to be fetched; a full queue holds the sender back, and memory stays bounded.
@@ -25,6 +25,8 @@ const QUEUE: usize = 8;
 const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// An image belongs to the exposure whose strobe began when the camera says that it began, within this.
 const SAME_MOMENT_US: u64 = 50;
+/// How long each picture is exposed that is only looked at.
+const WATCH_EXPOSURE: Micros = Micros(5_000);
 
 /// A connection to the camera endpoint of `farnear-sim`.
 pub struct SimCamera {
@@ -131,6 +133,20 @@ impl SimCamera {
         self.control(&Control::AdvanceMicros(micros))
     }
 
+    fn image_of(&self, frame: Frame) -> Result<Image, CameraError> {
+        let FrameHeader { width, height, bits, .. } = frame.header;
+        let size = (usize::from(height), usize::from(width));
+        let pixels = Array2::from_shape_vec(size, frame.pixels).map_err(|error| CameraError::Nonsense {
+            address: self.address.clone(),
+            reason: error.to_string(),
+        })?;
+        Ok(Image { pixels, bits })
+    }
+
+    fn ended(&self) -> CameraError {
+        CameraError::Gone { address: self.address.clone(), reason: "the stream has ended".into() }
+    }
+
     fn control(&mut self, control: &Control) -> Result<(), CameraError> {
         let gone = |reason: String| CameraError::Gone { address: self.address.clone(), reason };
         let mut buffer = [0; 32];
@@ -175,12 +191,9 @@ impl Camera for SimCamera {
                         waited: wait,
                     });
                 }
-                Err(()) => {
-                    let reason = "the stream has ended".into();
-                    return Err(CameraError::Gone { address: self.address.clone(), reason });
-                }
+                Err(()) => return Err(self.ended()),
             };
-            let FrameHeader { shot_id, exposure, width, height, bits } = frame.header;
+            let FrameHeader { shot_id, exposure, .. } = frame.header;
             let later = if shot_id == FREE_RUNNING {
                 let apart = exposure.0.abs_diff(shot.strobe_start.0) > SAME_MOMENT_US;
                 i32::from(apart) * if exposure < shot.strobe_start { -1 } else { 1 }
@@ -189,16 +202,26 @@ impl Camera for SimCamera {
             };
             match later {
                 ..0 => {}
-                0 => {
-                    let size = (usize::from(height), usize::from(width));
-                    let pixels = Array2::from_shape_vec(size, frame.pixels).map_err(|error| {
-                        CameraError::Nonsense { address: self.address.clone(), reason: error.to_string() }
-                    })?;
-                    return Ok(Image { pixels, bits });
-                }
+                0 => return self.image_of(frame),
                 _ => return Err(CameraError::Skipped { wanted, came: shot_id }),
             }
         }
+    }
+
+    fn watch(&mut self) -> Result<(), CameraError> {
+        self.arm(TriggerMode::FreeRunning, WATCH_EXPOSURE)
+    }
+
+    fn newest(&mut self, wait: Duration) -> Result<Option<Picture>, CameraError> {
+        // Where nothing is under way virtual time stands still: as much of it as one picture takes.
+        self.advance(u64::from(WATCH_EXPOSURE.0 + BETWEEN_EXPOSURES_US))?;
+        let frame = match self.queue.pop(Instant::now() + wait) {
+            Ok(Some(frame)) => frame?,
+            Ok(None) => return Ok(None),
+            Err(()) => return Err(self.ended()),
+        };
+        let time = Some(Duration::from_micros(frame.header.exposure.0));
+        Ok(Some(Picture { image: self.image_of(frame)?, stamp: Stamp { count: None, time } }))
     }
 }
 

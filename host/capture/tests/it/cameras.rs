@@ -17,7 +17,7 @@ use farnear_protocol::{
 };
 use ndarray::Array2;
 
-fn shot(trigger_number: u32) -> ShotRecord {
+pub fn shot(trigger_number: u32) -> ShotRecord {
     ShotRecord {
         index: 0,
         repeat: 0,

@@ -2,6 +2,9 @@
 #![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 
 mod cameras;
+mod command_camera;
+#[cfg(feature = "genicam")]
+mod genicam_camera;
 mod line;
 mod pair;
 mod requests;

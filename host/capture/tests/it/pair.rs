@@ -108,6 +108,34 @@ fn a_port_that_goes_away_leaves_no_folder() {
     assert_eq!(names(root.path()), Vec::<String>::new());
 }
 
+/// Gives a picture for each exposure, and has one more at the end.
+struct OneTooMany;
+
+impl Camera for OneTooMany {
+    fn kind(&self) -> &'static str {
+        "one too many"
+    }
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
+        Numbered.image(shot, wait)
+    }
+    fn finish(&mut self) -> Result<(), CameraError> {
+        Err(CameraError::Surplus { camera: self.kind().into() })
+    }
+}
+
+#[test]
+fn a_picture_that_no_exposure_accounts_for_makes_the_pair_an_error() {
+    let (client, _peer) = client();
+    let error = capture_pair(&client, &mut OneTooMany, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
+    assert!(matches!(error, CaptureError::Camera(CameraError::Surplus { .. })), "{error:?}");
+}
+
 #[test]
 fn a_camera_that_gives_nothing_stops_the_rig() {
     let (client, peer) = client();

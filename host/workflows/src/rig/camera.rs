@@ -7,7 +7,7 @@ use std::{
 };
 
 use farnear_capture::{
-    camera::{Camera, FolderCamera, SimCamera},
+    camera::{Camera, CommandCamera, FolderCamera, SimCamera, command::CommandLine},
     record::Circumstances,
 };
 use farnear_depth::psf::Psf;
@@ -30,7 +30,16 @@ pub enum CameraAddress {
     Endpoint(String),
     /// A folder in which images appear.
     Folder(PathBuf),
+    /// A program that writes pictures to its standard output.
+    Command(CommandLine),
+    /// A Video4Linux device.
+    V4l(PathBuf),
+    /// A GigE Vision or USB3 Vision camera, by its identification; the first where it is empty.
+    Genicam(String),
 }
+
+/// What an address looks like.
+pub const ADDRESSES: &str = "sim, HOST:PORT, folder:DIR, command:\"PROGRAM ...\", v4l:DEVICE or genicam:ID";
 
 impl FromStr for CameraAddress {
     type Err = WorkflowError;
@@ -39,14 +48,65 @@ impl FromStr for CameraAddress {
         if text == "sim" {
             return Ok(Self::Emulated);
         }
-        if let Some(folder) = text.strip_prefix("folder:") {
-            return Ok(Self::Folder(folder.into()));
+        match text.split_once(':') {
+            Some(("folder", folder)) => Ok(Self::Folder(folder.into())),
+            Some(("command", line)) => {
+                let wrong = |reason| WorkflowError::parameter("camera", text, reason);
+                line.parse().map(Self::Command).map_err(wrong)
+            }
+            Some(("v4l", device)) => Ok(Self::V4l(device.into())),
+            Some(("genicam", id)) => Ok(Self::Genicam(id.into())),
+            Some(_) => Ok(Self::Endpoint(text.into())),
+            None if text == "genicam" => Ok(Self::Genicam(String::new())),
+            None => Err(WorkflowError::parameter("camera", text, format!("expected {ADDRESSES}"))),
         }
-        if !text.contains(':') {
-            return Err(WorkflowError::parameter("camera", text, "expected sim, HOST:PORT or folder:DIR"));
-        }
-        Ok(Self::Endpoint(text.into()))
     }
+}
+
+impl CameraAddress {
+    /// Opens the camera; `None` for the one that comes with the emulated rig.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Camera`], [`WorkflowError::Parameter`] for a kind that this program was built without.
+    pub fn open(&self) -> Result<Option<Box<dyn Camera>>> {
+        Ok(Some(match self {
+            Self::Emulated => return Ok(None),
+            Self::Endpoint(address) => Box::new(SimCamera::connect(address)?),
+            Self::Folder(folder) => Box::new(FolderCamera::watch(folder)?),
+            Self::Command(line) => Box::new(CommandCamera::start(line)?),
+            Self::V4l(device) => open_v4l(device)?,
+            Self::Genicam(id) => open_genicam(id)?,
+        }))
+    }
+}
+
+#[cfg(all(feature = "v4l2", target_os = "linux"))]
+fn open_v4l(device: &Path) -> Result<Box<dyn Camera>> {
+    Ok(Box::new(farnear_capture::camera::V4lCamera::open(device)?))
+}
+
+#[cfg(not(all(feature = "v4l2", target_os = "linux")))]
+fn open_v4l(device: &Path) -> Result<Box<dyn Camera>> {
+    farnear_capture::camera::v4l::check_path(device)?; // what is wrong with the device itself is said first
+    Err(not_built("v4l", device.display(), "v4l2"))
+}
+
+#[cfg(feature = "genicam")]
+fn open_genicam(id: &str) -> Result<Box<dyn Camera>> {
+    Ok(Box::new(farnear_capture::camera::GenicamCamera::open(id)?))
+}
+
+#[cfg(not(feature = "genicam"))]
+fn open_genicam(id: &str) -> Result<Box<dyn Camera>> {
+    Err(not_built("genicam", id, "genicam"))
+}
+
+#[cfg(not(all(feature = "v4l2", feature = "genicam", target_os = "linux")))]
+fn not_built(kind: &str, address: impl std::fmt::Display, feature: &str) -> WorkflowError {
+    let expected = format!(
+        "this program was built without it; build farnear with the cargo feature `{feature}` (docs/cameras.md)"
+    );
+    WorkflowError::parameter("camera", format!("{kind}:{address}"), expected)
 }
 
 /// A camera and how it exposes.
@@ -87,27 +147,18 @@ impl CameraSettings {
     /// # Errors
     /// [`WorkflowError::Parameter`] for the emulated rig's camera with another rig, [`WorkflowError::Camera`].
     pub fn open_early(&self, rig: &RigAddress) -> Result<EarlyCamera> {
-        let camera: Option<Box<dyn Camera>> = match (&self.address, rig) {
-            (CameraAddress::Emulated, RigAddress::Emulated(_)) => None,
-            (CameraAddress::Emulated, RigAddress::Open(open)) if open.is_emulated() => None,
-            (CameraAddress::Emulated, RigAddress::Open(open)) => {
-                return Err(WorkflowError::parameter(
-                    "camera",
-                    "sim",
-                    format!("{OF_THE_EMULATED_RIG}; {} needs HOST:PORT or folder:DIR", open.name()),
-                ));
+        let other = match (&self.address, rig) {
+            (CameraAddress::Emulated, RigAddress::Open(open)) if !open.is_emulated() => {
+                Some(open.name().to_owned())
             }
-            (CameraAddress::Emulated, RigAddress::Port(port)) => {
-                return Err(WorkflowError::parameter(
-                    "camera",
-                    "sim",
-                    format!("{OF_THE_EMULATED_RIG}; {port} needs HOST:PORT or folder:DIR"),
-                ));
-            }
-            (CameraAddress::Folder(folder), _) => Some(Box::new(FolderCamera::watch(folder)?)),
-            (CameraAddress::Endpoint(address), _) => Some(Box::new(SimCamera::connect(address)?)),
+            (CameraAddress::Emulated, RigAddress::Port(port)) => Some(port.to_string()),
+            _ => None,
         };
-        Ok(EarlyCamera(camera))
+        if let Some(rig) = other {
+            let expected = format!("{OF_THE_EMULATED_RIG}; {rig} needs one of {ADDRESSES} but sim");
+            return Err(WorkflowError::parameter("camera", "sim", expected));
+        }
+        Ok(EarlyCamera(self.address.open()?))
     }
 }
 

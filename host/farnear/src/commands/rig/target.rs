@@ -96,7 +96,8 @@ impl Target {
 /// Which camera, and how it exposes.
 #[derive(Args, Clone)]
 pub struct CameraArguments {
-    /// Camera: sim (with --port sim), HOST:PORT of a farnear-sim, or folder:DIR where images appear.
+    /// Camera: sim (with --port sim), HOST:PORT of a farnear-sim, folder:DIR where images appear, command:"PROGRAM ...",
+    /// v4l:/dev/videoN or genicam:ID (docs/cameras.md).
     #[arg(long, value_name = "CAMERA", default_value = "sim")]
     camera: String,
     /// Exposure time in microseconds.

@@ -1,0 +1,483 @@
+//! GigE Vision and USB3 Vision cameras through Aravis, by the standard feature names of GenICam's SFNC. Behind the cargo feature
+//! `genicam`, because the library (Debian: `libaravis-dev`) is not everywhere.
+
+use std::{
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+
+use aravis::{
+    AcquisitionMode, Aravis, Auto, Buffer, BufferStatus, GvStream, PixelFormat, Stream, glib::object::Cast,
+    prelude::*,
+};
+use farnear_protocol::{
+    message::{ShotRecord, TriggerMode},
+    units::Micros,
+};
+
+use super::{
+    Camera, CameraError, Control, Frame, Image, Range, Setting, Stamp,
+    pairing::{Belongs, Pairing},
+    pixels::Layout,
+};
+use crate::describe::trigger_name;
+
+/// Frames that the library may fill while nobody fetches them.
+const BUFFERS: usize = 16;
+/// After the last picture of a program of exposures nothing may come for so long.
+const QUIET: Duration = Duration::from_millis(200);
+/// Ticks of a GigE Vision camera's clock in a second where it does not say.
+const USUAL_TICKS: i64 = 1_000_000_000;
+/// The trigger source that is a command.
+const SOFTWARE: &str = "Software";
+
+/// A camera that answers.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct FoundCamera {
+    /// By which it is opened.
+    pub id: String,
+    /// Maker, model, and how it is reached.
+    pub about: String,
+}
+
+/// Asks all networks and USB for cameras; takes about a second.
+pub fn devices() -> Vec<FoundCamera> {
+    static LIBRARY: Mutex<Option<Aravis>> = Mutex::new(None);
+    let mut library = LIBRARY.lock().unwrap_or_else(PoisonError::into_inner);
+    if library.is_none() {
+        *library = Aravis::initialize().ok(); // may be had once, and stays
+    }
+    let text = |text: &std::ffi::CStr| text.to_string_lossy().into_owned();
+    let found = library.as_ref().map(Aravis::get_device_list).unwrap_or_default();
+    found
+        .iter()
+        .map(|device| FoundCamera {
+            id: text(&device.id),
+            about: format!(
+                "{} {} ({} at {})",
+                text(&device.vendor),
+                text(&device.model),
+                text(&device.protocol),
+                text(&device.address)
+            ),
+        })
+        .collect()
+}
+
+/// A camera that is open.
+pub struct GenicamCamera {
+    id: String,
+    camera: aravis::Camera,
+    stream: Option<Stream>,
+    chunks: Option<aravis::ChunkParser>,
+    ticks_per_second: i64,
+    pairing: Pairing,
+    /// Which line triggers; the first of the camera's where none was set.
+    trigger_source: Option<String>,
+    lost: Arc<AtomicBool>,
+}
+
+impl GenicamCamera {
+    /// Opens the camera of this identification, as [`devices`] lists it; the first one where it is empty.
+    ///
+    /// # Errors
+    /// [`CameraError::Unusable`] for one that is absent, or that another program holds.
+    pub fn open(id: &str) -> Result<Self, CameraError> {
+        let found = devices();
+        let there = |found: &[FoundCamera]| {
+            let names: Vec<&str> = found.iter().map(|camera| camera.id.as_str()).collect();
+            match names.is_empty() {
+                true => "no GigE Vision or USB3 Vision camera answers: is it powered, is the cable in, do both lie in one subnet?".into(),
+                false => format!("it does not answer; there are {}", names.join(", ")),
+            }
+        };
+        let known = found.iter().any(|camera| camera.id == id) || (id.is_empty() && !found.is_empty());
+        if !known {
+            return Err(unusable(id, there(&found)));
+        }
+        let camera = aravis::Camera::new(Some(id).filter(|id| !id.is_empty())).map_err(|error| {
+            unusable(id, format!("{error}; another program may hold it, or your user may not use it (USB3 Vision: a udev rule)"))
+        })?;
+        let id = camera.device_id().map_or_else(|_| id.to_owned(), |id| id.to_string());
+        let lost = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&lost);
+        let device = camera.device();
+        if let Some(device) = &device {
+            device.connect_control_lost(move |_| told.store(true, Ordering::Relaxed));
+        }
+        let ticks = camera.integer("GevTimestampTickFrequency").ok().filter(|ticks| *ticks > 0);
+        let mut camera = Self {
+            id,
+            camera,
+            stream: None,
+            chunks: None,
+            ticks_per_second: ticks.unwrap_or(USUAL_TICKS),
+            pairing: Pairing::default(),
+            trigger_source: None,
+            lost,
+        };
+        camera.ask_for_chunks();
+        Ok(camera)
+    }
+
+    /// Allows the camera's time stamps to differ by so much from the strobe: for one whose clock is a computer's, as Aravis' fake camera.
+    #[must_use]
+    pub fn with_jitter(mut self, jitter: Duration) -> Self {
+        self.pairing = Pairing::with_jitter(jitter);
+        self
+    }
+
+    /// Lets the camera add its own number and time to each frame, where it can.
+    fn ask_for_chunks(&mut self) {
+        if self.camera.set_chunk_mode(true).is_err() {
+            return;
+        }
+        // By SFNC; a camera that lacks one of them still has what GigE Vision puts before each frame.
+        for chunk in ["Timestamp", "FrameID"] {
+            let _ = self.camera.set_chunk_state(chunk, true);
+        }
+        self.chunks = self.camera.create_chunk_parser();
+    }
+
+    fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
+        |error| match self.lost.load(Ordering::Relaxed) {
+            true => self.gone(),
+            false => unusable(&self.id, error.to_string()),
+        }
+    }
+
+    fn gone(&self) -> CameraError {
+        let reason = "it does not answer any more; is it powered, is the cable in?".into();
+        CameraError::Gone { address: self.id.clone(), reason }
+    }
+
+    fn stop(&mut self) -> Result<(), CameraError> {
+        if self.stream.take().is_some() {
+            self.camera.stop_acquisition().map_err(self.failed())?;
+        }
+        Ok(())
+    }
+
+    /// Starts with nothing from before.
+    fn start(&mut self) -> Result<(), CameraError> {
+        let stream = self.streaming().map_err(self.failed())?;
+        self.stream = Some(stream);
+        self.pairing.begin();
+        Ok(())
+    }
+
+    fn streaming(&self) -> Result<Stream, aravis::glib::Error> {
+        self.camera.set_acquisition_mode(AcquisitionMode::Continuous)?;
+        let bytes = self.camera.payload()? as usize;
+        let stream = self.camera.create_stream()?;
+        for _ in 0..BUFFERS {
+            stream.push_buffer(Buffer::new_allocate(bytes));
+        }
+        self.camera.start_acquisition()?;
+        Ok(stream)
+    }
+
+    /// The line that triggers.
+    fn line(&self) -> Result<String, CameraError> {
+        if let Some(source) = &self.trigger_source {
+            return Ok(source.clone());
+        }
+        let sources = self.camera.dup_available_trigger_sources().map_err(self.failed())?;
+        let line = sources.iter().find(|source| source.starts_with("Line"));
+        line.map(ToString::to_string)
+            .ok_or_else(|| unusable(&self.id, "it has no input line for a trigger".into()))
+    }
+
+    /// The next frame; `None` when time is up.
+    fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
+        let Some(stream) = &self.stream else { return Ok(None) };
+        let micros = u64::try_from(wait.as_micros()).unwrap_or(u64::MAX).max(1);
+        let Some(buffer) = stream.timeout_pop_buffer(micros) else {
+            return if self.lost.load(Ordering::Relaxed) { Err(self.gone()) } else { Ok(None) };
+        };
+        let frame = self.frame(&buffer, stream);
+        stream.push_buffer(buffer);
+        frame.map(Some)
+    }
+
+    fn frame(&self, buffer: &Buffer, stream: &Stream) -> Result<Frame, CameraError> {
+        let stamp = self.stamp(buffer);
+        let incomplete = |reason: String| CameraError::Incomplete {
+            camera: self.id.clone(),
+            frame: stamp.count.unwrap_or_else(|| buffer.frame_id()),
+            reason,
+        };
+        match buffer.status() {
+            BufferStatus::Success => {}
+            BufferStatus::MissingPackets | BufferStatus::Timeout => {
+                return Err(incomplete(format!("packets were lost{}", packets(stream))));
+            }
+            BufferStatus::SizeMismatch => return Err(incomplete("it is larger than was announced".into())),
+            other => return Err(incomplete(format!("{other:?}"))),
+        }
+        let (width, height) = (buffer.image_width().max(0) as usize, buffer.image_height().max(0) as usize);
+        let format = buffer.image_pixel_format();
+        let layout = layout_of(format).ok_or_else(|| {
+            unusable(
+                &self.id,
+                format!("its pixel format 0x{:08x} is not read: set one of Mono8 to Mono16", format.raw()),
+            )
+        })?;
+        let image =
+            layout.decode(&buffer.image_data(), width, height).map_err(|bad| incomplete(bad.to_string()))?;
+        Ok(Frame { image, stamp })
+    }
+
+    /// The camera's own number and time: of the chunks where there are some, else of the frame's leader.
+    fn stamp(&self, buffer: &Buffer) -> Stamp {
+        let chunk = |name| {
+            let parser = self.chunks.as_ref().filter(|_| buffer.has_chunks())?;
+            u64::try_from(parser.integer_value(buffer, name).ok()?).ok()
+        };
+        let count = chunk("ChunkFrameID").unwrap_or_else(|| buffer.frame_id());
+        let by_chunk = chunk("ChunkTimestamp").map(|ticks| {
+            Duration::from_nanos((u128::from(ticks) * 1_000_000_000 / self.ticks_per_second as u128) as u64)
+        });
+        let by_leader = Some(buffer.timestamp()).filter(|time| *time > 0).map(Duration::from_nanos);
+        Stamp { count: Some(count), time: by_chunk.or(by_leader) }
+    }
+
+    fn set_number(&self, setting: &Setting, value: f64) -> Result<(), CameraError> {
+        let wrong = |expected: String| CameraError::Setting {
+            name: setting.name(),
+            value: setting.value(),
+            expected,
+        };
+        let range = self.range(setting).ok_or_else(|| wrong(format!("{} has no such feature", self.id)))?;
+        if !range.has(value) {
+            return Err(wrong(format!("expected {range}")));
+        }
+        // What the camera would do by itself is turned off; a camera without it needs nothing.
+        let set = match setting {
+            Setting::ExposureUs(_) => {
+                let _ = self.camera.set_exposure_time_auto(Auto::Off);
+                self.camera.set_exposure_time(value)
+            }
+            Setting::Gain(_) => {
+                let _ = self.camera.set_gain_auto(Auto::Off);
+                self.camera.set_gain(value)
+            }
+            _ => self.camera.set_black_level(value),
+        };
+        set.map_err(self.failed())
+    }
+
+    /// The range of a number, where the camera has it.
+    fn range(&self, setting: &Setting) -> Option<Range> {
+        let camera = &self.camera;
+        let (bounds, unit) = match setting {
+            Setting::ExposureUs(_) => (camera.exposure_time_bounds(), "us"),
+            Setting::Gain(_) if camera.is_gain_available().ok()? => (camera.gain_bounds(), ""),
+            Setting::BlackLevel(_) if self.has_black_level() => (camera.black_level_bounds(), ""),
+            _ => return None,
+        };
+        let (min, max) = bounds.ok()?;
+        Some(Range::Number { min, max, unit })
+    }
+
+    /// By name, because the bindings' own question says yes to whatever is absent without an error.
+    fn has_black_level(&self) -> bool {
+        ["BlackLevel", "BlackLevelRaw"]
+            .iter()
+            .any(|name| self.camera.is_feature_available(name).unwrap_or(false))
+    }
+
+    fn set_region(&self, setting: &Setting, region: [u32; 4]) -> Result<(), CameraError> {
+        let (width, height) = self.camera.sensor_size().map_err(self.failed())?;
+        let inside = |first: u32, length: u32, side: i32| {
+            length > 0 && u64::from(first) + u64::from(length) <= u64::try_from(side).unwrap_or(0)
+        };
+        if !inside(region[0], region[2], width) || !inside(region[1], region[3], height) {
+            let expected = format!("expected a part of the sensor's {width}x{height} px");
+            return Err(CameraError::Setting { name: setting.name(), value: setting.value(), expected });
+        }
+        let [column, row, width, height] = region.map(|side| i32::try_from(side).unwrap_or(i32::MAX));
+        self.camera.set_region(column, row, width, height).map_err(self.failed())
+    }
+
+    fn choice(
+        &self,
+        setting: &Setting,
+        asked: &str,
+        known: &[aravis::glib::GString],
+    ) -> Result<(), CameraError> {
+        if known.iter().any(|name| name == asked) {
+            return Ok(());
+        }
+        let names: Vec<&str> = known.iter().map(|name| name.as_str()).collect();
+        let expected = format!("expected one of {}", names.join(", "));
+        Err(CameraError::Setting { name: setting.name(), value: setting.value(), expected })
+    }
+}
+
+/// What is known of lost packets.
+fn packets(stream: &Stream) -> String {
+    stream.downcast_ref::<GvStream>().map_or_else(String::new, |stream| {
+        let (resent, missing) = stream.statistics();
+        format!(" ({missing} missing and {resent} sent again since the start)")
+    })
+}
+
+fn layout_of(format: PixelFormat) -> Option<Layout> {
+    /// PFNC: 10 and 12 bits in a stream of bits; the bindings have no names for them.
+    const MONO_10P: u32 = 0x010a_0046;
+    const MONO_12P: u32 = 0x010c_0047;
+    match format {
+        PixelFormat::MONO_8 => Some(Layout::Grey8 { colour_twelfths: 0 }),
+        PixelFormat::MONO_10 => Some(Layout::Grey16 { bits: 10 }),
+        PixelFormat::MONO_12 => Some(Layout::Grey16 { bits: 12 }),
+        PixelFormat::MONO_14 => Some(Layout::Grey16 { bits: 14 }),
+        PixelFormat::MONO_16 => Some(Layout::Grey16 { bits: 16 }),
+        PixelFormat::MONO_12_PACKED => Some(Layout::GigePacked12),
+        other if other.raw() == MONO_10P => Some(Layout::Packed10),
+        other if other.raw() == MONO_12P => Some(Layout::Packed12),
+        _ => None,
+    }
+}
+
+fn unusable(id: &str, reason: String) -> CameraError {
+    CameraError::Unusable { camera: format!("genicam:{id}"), reason }
+}
+
+impl Camera for GenicamCamera {
+    fn kind(&self) -> &'static str {
+        "genicam"
+    }
+
+    fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
+        self.stop()?;
+        let source = match mode {
+            TriggerMode::Hardware => self.line()?,
+            TriggerMode::Software => SOFTWARE.into(),
+            // Of a camera that runs freely nobody could tell which frame belongs to which exposure.
+            TriggerMode::FreeRunning => {
+                return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
+            }
+        };
+        if exposure.0 > 0 {
+            self.set(&Setting::ExposureUs(f64::from(exposure.0)))?;
+        }
+        self.camera.set_trigger(&source).map_err(self.failed())?;
+        self.start()
+    }
+
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        self.camera.software_trigger().map_err(self.failed())
+    }
+
+    fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
+        let wanted = shot.trigger_number;
+        while let Some(frame) = self.take(wait)? {
+            match self.pairing.judge(&self.id, frame.stamp, shot)? {
+                Belongs::Here => return Ok(frame.image),
+                Belongs::Earlier => {}
+                Belongs::Later(by) => {
+                    let by = u32::try_from(by).unwrap_or(u32::MAX);
+                    return Err(CameraError::Skipped { wanted, came: wanted.wrapping_add(by) });
+                }
+            }
+        }
+        Err(CameraError::Late { camera: self.id.clone(), trigger_number: wanted, waited: wait })
+    }
+
+    fn finish(&mut self) -> Result<(), CameraError> {
+        match self.take(QUIET)? {
+            Some(_) => Err(CameraError::Surplus { camera: self.id.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
+        let failed = self.failed();
+        let camera = &self.camera;
+        let mut controls = Vec::new();
+        let mut add =
+            |name: &str, value: String, range| controls.push(Control { name: name.into(), value, range });
+        let numbers = [
+            (Setting::ExposureUs(0.0), camera.exposure_time()),
+            (Setting::Gain(0.0), camera.gain()),
+            (Setting::BlackLevel(0.0), camera.black_level()),
+        ];
+        for (setting, value) in numbers {
+            if let (Some(range), Ok(value)) = (self.range(&setting), value) {
+                add(setting.name(), value.to_string(), range);
+            }
+        }
+        let names = |names: Vec<aravis::glib::GString>| {
+            Range::Choice(names.iter().map(ToString::to_string).collect())
+        };
+        let formats = camera.dup_available_pixel_formats_as_strings().map_err(&failed)?;
+        add("pixel_format", camera.pixel_format_as_string().map_err(&failed)?.to_string(), names(formats));
+        let (column, row, width, height) = camera.region().map_err(&failed)?;
+        add("region", format!("{column},{row},{width},{height}"), Range::Fixed);
+        if let (Ok(source), Ok(sources)) = (camera.trigger_source(), camera.dup_available_trigger_sources()) {
+            add("trigger_source", source.to_string(), names(sources));
+        }
+        if let Ok((width, height)) = camera.sensor_size() {
+            add("sensor", format!("{width}x{height}"), Range::Fixed);
+        }
+        for (name, value) in [("vendor", camera.vendor_name()), ("model", camera.model_name())] {
+            if let Ok(value) = value {
+                add(name, value.to_string(), Range::Fixed);
+            }
+        }
+        Ok(controls)
+    }
+
+    fn set(&mut self, setting: &Setting) -> Result<(), CameraError> {
+        match setting {
+            Setting::ExposureUs(value) | Setting::Gain(value) | Setting::BlackLevel(value) => {
+                self.set_number(setting, *value)
+            }
+            Setting::PixelFormat(name) => {
+                let known = self.camera.dup_available_pixel_formats_as_strings().map_err(self.failed())?;
+                self.choice(setting, name, &known)?;
+                self.stop()?; // the size of a frame changes
+                self.camera.set_pixel_format_from_string(name).map_err(self.failed())
+            }
+            Setting::Region(region) => {
+                self.stop()?;
+                self.set_region(setting, *region)
+            }
+            Setting::TriggerSource(name) => {
+                let known = self.camera.dup_available_trigger_sources().map_err(self.failed())?;
+                self.choice(setting, name, &known)?;
+                self.trigger_source = Some(name.clone());
+                Ok(())
+            }
+        }
+    }
+
+    fn watch(&mut self) -> Result<(), CameraError> {
+        self.stop()?;
+        self.camera.clear_triggers().map_err(self.failed())?;
+        self.start()
+    }
+
+    fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
+        // Older frames are not looked into: where that takes longer than an exposure there would be no end of them.
+        if let Some(stream) = &self.stream {
+            let waiting = stream.n_buffers().1;
+            for _ in 1..waiting {
+                if let Some(older) = stream.try_pop_buffer() {
+                    stream.push_buffer(older);
+                }
+            }
+        }
+        self.take(wait)
+    }
+}
+
+impl Drop for GenicamCamera {
+    fn drop(&mut self) {
+        let _ = self.stop(); // a camera that is gone streams no more
+    }
+}

@@ -1,0 +1,309 @@
+//! Pixels as cameras deliver them, made grey values of 16 bits: one function for all kinds of cameras.
+//!
+//! Names are those of the field: Video4Linux and ffmpeg for what programs and webcams send, GenICam's PFNC for what machine-vision
+//! cameras send. Colour gives its luma (YUV) or is averaged (MJPEG), as when a picture file is read. Cost: one pass over the bytes.
+
+use std::{fmt, str::FromStr};
+
+use farnear_files::image_file::{GreyImage, Samples, decode_grey};
+use ndarray::Array2;
+
+use super::Image;
+
+/// How the pixels of a frame lie in its bytes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Layout {
+    /// One byte per pixel: GREY, gray, Mono8; also the luma of planar YUV, whose colour follows and is passed over.
+    Grey8 {
+        /// Bytes that follow each picture, in twelfths of its pixels: 0 for grey, 6 for 4:2:0, 12 for 4:2:2, 24 for 4:4:4.
+        colour_twelfths: u8,
+    },
+    /// Two bytes per pixel, the lower first, of which so many bits carry the picture: Y10, Y12, Y16, gray12le, Mono12.
+    Grey16 {
+        /// Bits, 9 to 16.
+        bits: u8,
+    },
+    /// Ten bits per pixel in a stream of bits, the lowest first: Mono10p.
+    Packed10,
+    /// Twelve bits per pixel in a stream of bits, the lowest first: Mono12p.
+    Packed12,
+    /// Two pixels of 12 bits in three bytes as GigE Vision packs them: Mono12Packed. The middle byte has the low bits of both.
+    GigePacked12,
+    /// Two pixels in four bytes, luma first: YUYV, yuyv422.
+    Yuyv,
+    /// A JPEG per frame.
+    Jpeg,
+}
+
+/// The names by which a user tells the layout of raw frames, as ffmpeg's `-pix_fmt` writes them.
+const RAW_NAMES: [(&str, Layout); 8] = [
+    ("gray", Layout::Grey8 { colour_twelfths: 0 }),
+    ("gray10le", Layout::Grey16 { bits: 10 }),
+    ("gray12le", Layout::Grey16 { bits: 12 }),
+    ("gray14le", Layout::Grey16 { bits: 14 }),
+    ("gray16le", Layout::Grey16 { bits: 16 }),
+    ("yuv420p", Layout::Grey8 { colour_twelfths: 6 }),
+    ("yuv422p", Layout::Grey8 { colour_twelfths: 12 }),
+    ("yuyv422", Layout::Yuyv),
+];
+
+impl FromStr for Layout {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        RAW_NAMES.iter().find(|(name, _)| *name == text).map(|(_, layout)| *layout).ok_or_else(|| {
+            format!(
+                "`{text}` is not a format of raw frames: expected {}",
+                RAW_NAMES.map(|(name, _)| name).join(", ")
+            )
+        })
+    }
+}
+
+/// Bytes that are no frame of the size and layout that were announced.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct BadFrame(pub String);
+
+impl fmt::Display for BadFrame {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(&self.0)
+    }
+}
+
+impl Layout {
+    /// Bits that carry the picture. Of a JPEG 8.
+    pub fn bits(self) -> u8 {
+        match self {
+            Self::Grey16 { bits } => bits,
+            Self::Packed10 => 10,
+            Self::Packed12 | Self::GigePacked12 => 12,
+            Self::Grey8 { .. } | Self::Yuyv | Self::Jpeg => 8,
+        }
+    }
+
+    /// Bytes of a frame of so many pixels; `None` where each frame has another length (JPEG) or the size is beyond memory.
+    pub fn frame_bytes(self, width: usize, height: usize) -> Option<usize> {
+        let pixels = width.checked_mul(height)?;
+        let halves = |side: usize| side.div_ceil(2);
+        match self {
+            Self::Grey8 { colour_twelfths: 0 } => Some(pixels),
+            Self::Grey8 { colour_twelfths: 6 } => {
+                pixels.checked_add(2 * halves(width).checked_mul(halves(height))?)
+            }
+            Self::Grey8 { colour_twelfths: 12 } => pixels.checked_add(2 * halves(width).checked_mul(height)?),
+            Self::Grey8 { .. } => pixels.checked_mul(3),
+            Self::Grey16 { .. } | Self::Yuyv => pixels.checked_mul(2),
+            Self::Packed10 => Some(pixels.checked_mul(10)?.div_ceil(8)),
+            Self::Packed12 | Self::GigePacked12 => Some(pixels.checked_mul(12)?.div_ceil(8)),
+            Self::Jpeg => None,
+        }
+    }
+
+    /// A frame's bytes without the padding at the end of each row, where rows are `stride` bytes apart.
+    ///
+    /// # Errors
+    /// [`BadFrame`] for too few bytes.
+    pub fn without_padding(
+        self,
+        bytes: &[u8],
+        width: usize,
+        height: usize,
+        stride: usize,
+    ) -> Result<Vec<u8>, BadFrame> {
+        let row = match self {
+            Self::Grey8 { .. } => width,
+            Self::Grey16 { .. } | Self::Yuyv => 2 * width,
+            Self::Packed10 | Self::Packed12 | Self::GigePacked12 | Self::Jpeg => return Ok(bytes.to_vec()),
+        };
+        if stride <= row {
+            return Ok(bytes.to_vec());
+        }
+        let rows: Vec<&[u8]> =
+            bytes.chunks(stride).take(height).filter_map(|chunk| chunk.get(..row)).collect();
+        if rows.len() < height {
+            let came = bytes.len();
+            return Err(BadFrame(format!(
+                "{came} bytes where {height} rows of {stride} bytes were announced"
+            )));
+        }
+        Ok(rows.concat())
+    }
+
+    /// The picture in a frame's bytes; what follows the picture in a longer buffer is passed over.
+    ///
+    /// # Errors
+    /// [`BadFrame`] for too few bytes, a value above what the bits allow, a JPEG that is broken or of another size.
+    pub fn decode(self, bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
+        if self == Self::Jpeg {
+            return jpeg(bytes, width, height);
+        }
+        let due = self
+            .frame_bytes(width, height)
+            .ok_or_else(|| BadFrame(format!("{width}x{height} px are more than there is memory for")))?;
+        if bytes.len() < due {
+            let came = bytes.len();
+            return Err(BadFrame(format!("{came} bytes where a frame of {width}x{height} px has {due}")));
+        }
+        let pixels = width * height;
+        let values: Vec<u16> = match self {
+            Self::Grey8 { .. } => bytes[..pixels].iter().map(|byte| u16::from(*byte)).collect(),
+            Self::Grey16 { .. } => {
+                bytes[..due].chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect()
+            }
+            Self::Yuyv => bytes[..due].iter().step_by(2).map(|byte| u16::from(*byte)).collect(),
+            Self::Packed10 => bit_stream(bytes, pixels, 10),
+            Self::Packed12 => bit_stream(bytes, pixels, 12),
+            Self::GigePacked12 => gige_packed_12(bytes, pixels),
+            Self::Jpeg => Vec::new(),
+        };
+        let bits = self.bits();
+        if let Some(value) = values.iter().find(|value| u32::from(**value) >> bits != 0) {
+            return Err(BadFrame(format!("a pixel of {value} in a picture of {bits} bits")));
+        }
+        let pixels =
+            Array2::from_shape_vec((height, width), values).map_err(|error| BadFrame(error.to_string()))?;
+        Ok(Image { pixels, bits })
+    }
+}
+
+/// Values of `bits` bits each, the lowest bit first; `bytes` has enough of them.
+fn bit_stream(bytes: &[u8], pixels: usize, bits: u32) -> Vec<u16> {
+    let mut bytes = bytes.iter();
+    let (mut waiting, mut count) = (0_u32, 0);
+    (0..pixels)
+        .map(|_| {
+            while count < bits {
+                waiting |= u32::from(bytes.next().copied().unwrap_or(0)) << count;
+                count += 8;
+            }
+            let value = waiting & ((1 << bits) - 1);
+            (waiting, count) = (waiting >> bits, count - bits);
+            value as u16
+        })
+        .collect()
+}
+
+fn gige_packed_12(bytes: &[u8], pixels: usize) -> Vec<u16> {
+    (0..pixels)
+        .map(|index| {
+            let group = index / 2 * 3;
+            let middle = bytes.get(group + 1).copied().unwrap_or(0);
+            let (high, low) = match index % 2 {
+                0 => (bytes[group], middle & 0xf),
+                _ => (bytes[group + 2], middle >> 4),
+            };
+            u16::from(high) << 4 | u16::from(low)
+        })
+        .collect()
+}
+
+fn jpeg(bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
+    let image = of_picture(decode_grey(bytes).map_err(BadFrame)?).map_err(BadFrame)?;
+    let (came_height, came_width) = image.pixels.dim();
+    if (came_width, came_height) != (width, height) {
+        return Err(BadFrame(format!(
+            "{came_width}x{came_height} px where {width}x{height} px were announced"
+        )));
+    }
+    Ok(image)
+}
+
+/// A picture file as a camera's image.
+///
+/// # Errors
+/// In words, for floating-point pixels: no camera has them.
+pub fn of_picture(picture: GreyImage) -> Result<Image, String> {
+    let Samples::Integer(bits) = picture.samples else {
+        return Err("a camera's image has integer pixels, this one has float".into());
+    };
+    let full_scale = f32::from(((1u32 << bits) - 1) as u16);
+    Ok(Image { pixels: picture.pixels.mapv(|value| (value * full_scale).round() as u16), bits })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+    use proptest::prelude::*;
+
+    #[test]
+    fn each_layout_gives_the_grey_values_that_its_definition_says() {
+        let grey = Layout::Grey8 { colour_twelfths: 0 };
+        assert_eq!(grey.decode(&[1, 2, 3, 4], 2, 2).unwrap().pixels, array![[1, 2], [3, 4]]);
+        let y10 = Layout::Grey16 { bits: 10 }.decode(&[0xff, 0x03, 1, 0], 2, 1).unwrap();
+        assert_eq!((y10.pixels, y10.bits), (array![[1023, 1]], 10));
+        // Luma, blue, luma, red.
+        assert_eq!(Layout::Yuyv.decode(&[10, 99, 20, 98], 2, 1).unwrap().pixels, array![[10, 20]]);
+        // 4:2:0 of 3x1 px: three of luma, two and two of colour.
+        let planar = Layout::Grey8 { colour_twelfths: 6 };
+        assert_eq!(planar.frame_bytes(3, 1), Some(7));
+        assert_eq!(planar.decode(&[7, 8, 9, 0, 0, 0, 0], 3, 1).unwrap().pixels, array![[7, 8, 9]]);
+        // PFNC: Mono12p puts the low byte of the first pixel first, Mono12Packed its high byte.
+        let bytes = [0xbc, 0x3a, 0x12];
+        assert_eq!(Layout::Packed12.decode(&bytes, 2, 1).unwrap().pixels, array![[0xabc, 0x123]]);
+        let bytes = [0xab, 0x3c, 0x12];
+        assert_eq!(Layout::GigePacked12.decode(&bytes, 2, 1).unwrap().pixels, array![[0xabc, 0x123]]);
+        // 0x155, 0x2aa, 0x3ff, 0x001 in forty bits, the lowest first.
+        let bytes = [0x55, 0xa9, 0xfa, 0x7f, 0x00];
+        assert_eq!(Layout::Packed10.decode(&bytes, 4, 1).unwrap().pixels, array![[0x155, 0x2aa, 0x3ff, 1]]);
+    }
+
+    #[test]
+    fn a_jpeg_is_decoded_and_its_size_is_checked() {
+        let mut jpeg = Vec::new();
+        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 100)
+            .encode(&[128; 64], 8, 8, image::ExtendedColorType::L8)
+            .unwrap();
+        let image = Layout::Jpeg.decode(&jpeg, 8, 8).unwrap();
+        // An even picture survives JPEG to the last step of its quantisation, which is 1 at quality 100.
+        assert!(image.pixels.iter().all(|value| value.abs_diff(128) <= 1), "{:?}", image.pixels);
+        let other = Layout::Jpeg.decode(&jpeg, 16, 8).unwrap_err().to_string();
+        assert!(other.contains("8x8 px where 16x8"), "{other}");
+        assert!(Layout::Jpeg.decode(&jpeg[..20], 8, 8).is_err());
+    }
+
+    #[test]
+    fn what_is_too_short_or_too_bright_is_refused() {
+        let short = Layout::Grey16 { bits: 12 }.decode(&[0; 7], 2, 2).unwrap_err().to_string();
+        assert!(short.contains("7 bytes where a frame of 2x2 px has 8"), "{short}");
+        let bright = Layout::Grey16 { bits: 12 }.decode(&[0, 0x10], 1, 1).unwrap_err().to_string();
+        assert!(bright.contains("a pixel of 4096 in a picture of 12 bits"), "{bright}");
+        assert!("gray13le".parse::<Layout>().unwrap_err().contains("gray12le"));
+    }
+
+    #[test]
+    fn padded_rows_lose_their_padding() {
+        let y16 = Layout::Grey16 { bits: 16 };
+        let padded = [1, 0, 2, 0, 99, 99, 3, 0, 4, 0]; // the last row may lack it
+        assert_eq!(y16.without_padding(&padded, 2, 2, 6).unwrap(), [1, 0, 2, 0, 3, 0, 4, 0]);
+        assert!(y16.without_padding(&padded, 2, 3, 6).is_err());
+        assert_eq!(Layout::Yuyv.without_padding(&[1, 2, 3, 4], 2, 1, 4).unwrap(), [1, 2, 3, 4]);
+    }
+
+    fn any_layout() -> impl Strategy<Value = Layout> {
+        prop_oneof![
+            Just(Layout::Packed10),
+            Just(Layout::Packed12),
+            Just(Layout::GigePacked12),
+            Just(Layout::Yuyv),
+            Just(Layout::Jpeg),
+            (9_u8..=16).prop_map(|bits| Layout::Grey16 { bits }),
+            prop_oneof![Just(0_u8), Just(6), Just(12), Just(24)]
+                .prop_map(|colour_twelfths| Layout::Grey8 { colour_twelfths }),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_it_panic(
+            layout in any_layout(),
+            bytes in prop::collection::vec(any::<u8>(), 0..200),
+            width in 0_usize..20,
+            height in 0_usize..20,
+        ) {
+            if let Ok(image) = layout.decode(&bytes, width, height) {
+                prop_assert_eq!(image.pixels.dim(), (height, width));
+            }
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Programs as cameras: ffmpeg, and small ones of the tests' own in the shell's language.
+#![cfg(unix)]
+
+use std::{
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use farnear_capture::camera::{Camera, CameraError, CommandCamera};
+use farnear_protocol::{message::TriggerMode, units::Micros};
+
+use super::cameras::shot;
+
+const WAIT: Duration = Duration::from_secs(20);
+
+fn start(line: &str) -> Result<CommandCamera, CameraError> {
+    CommandCamera::start(&line.parse().unwrap())
+}
+
+/// A program that runs this script.
+fn script(text: &str) -> Result<CommandCamera, CameraError> {
+    assert!(!text.contains('"'));
+    start(&format!("sh -c \"{text}\""))
+}
+
+/// Opens the camera, waits for an image, and gives what went wrong.
+fn failure(camera: Result<CommandCamera, CameraError>) -> String {
+    let failed = |mut camera: CommandCamera| camera.image(&shot(1), WAIT).map(|_| ());
+    camera.and_then(failed).unwrap_err().to_string()
+}
+
+/// A camera with a trigger: each file `go-N` that appears in the folder releases a Y4M frame of 2x1 px.
+fn triggered(folder: &Path) -> Result<CommandCamera, CameraError> {
+    script(&format!(
+        "printf 'YUV4MPEG2 W2 H1 F25:1 Cmono\\n'; n=1; while sleep 0.02; do \
+         if [ -e {0}/go-$n ]; then printf 'FRAME\\nA'; printf $n; n=$((n+1)); fi; done",
+        folder.display()
+    ))
+}
+
+#[test]
+fn each_trigger_gives_its_picture_and_one_too_many_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut camera = triggered(folder.path()).unwrap();
+    let trigger = |number: u32| fs::write(folder.path().join(format!("go-{number}")), "").unwrap();
+    trigger(1);
+    camera.image(&shot(0), WAIT).unwrap();
+    // Armed anew, what came before does not count.
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    for number in [2, 3] {
+        trigger(number);
+        let image = camera.image(&shot(number), WAIT).unwrap();
+        assert_eq!((image.pixels[[0, 0]], image.pixels[[0, 1]], image.bits), (65, 48 + number as u16, 8));
+    }
+    camera.finish().unwrap();
+    let late = camera.image(&shot(4), Duration::from_millis(30)).unwrap_err();
+    assert!(matches!(late, CameraError::Late { trigger_number: 4, .. }), "{late:?}");
+    trigger(4);
+    let surplus = camera.finish().unwrap_err();
+    assert!(matches!(surplus, CameraError::Surplus { .. }), "{surplus:?}");
+}
+
+#[test]
+fn a_program_that_runs_freely_is_found_out() {
+    let mut camera =
+        script("printf 'YUV4MPEG2 W1 H1 Cmono\\n'; while sleep 0.02; do printf 'FRAME\\nA'; done").unwrap();
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    camera.image(&shot(1), WAIT).unwrap();
+    assert!(matches!(camera.finish().unwrap_err(), CameraError::Surplus { .. }));
+    let free = camera.arm(TriggerMode::FreeRunning, Micros(1)).unwrap_err();
+    assert!(matches!(free, CameraError::Trigger { camera: "command", .. }), "{free:?}");
+    // To look at, it is good enough.
+    camera.watch().unwrap();
+    assert_eq!(camera.newest(WAIT).unwrap().unwrap().image.pixels[[0, 0]], 65);
+}
+
+#[test]
+fn what_is_wrong_with_a_program_is_said() {
+    let absent = failure(start("farnear-no-such-program --x"));
+    assert!(absent.contains("farnear-no-such-program") && absent.contains("no such program"), "{absent}");
+    let dies = failure(script("echo the lens cap is on >&2; exit 3"));
+    assert!(dies.contains("exit status: 3") && dies.contains("the lens cap is on"), "{dies}");
+    let garbage = failure(script("echo GIF89a; sleep 30"));
+    assert!(garbage.contains("not Y4M") && garbage.contains("GIF89a"), "{garbage}");
+    let cut = failure(script("printf 'YUV4MPEG2 W4 H4 Cmono\\nFRAME\\nABC'"));
+    assert!(cut.contains("ended") || cut.contains("frame 1"), "{cut}");
+    let colours = failure(script("printf 'YUV4MPEG2 W4 H4 C411\\n'"));
+    assert!(colours.contains("colour space"), "{colours}");
+}
+
+#[test]
+fn raw_frames_have_the_size_that_they_are_said_to_have() {
+    let mut camera = start("2x1:gray12le:printf '\\001\\000\\377\\017'").unwrap();
+    // The frame came before it was armed, and the program has ended.
+    let image = camera.image(&shot(1), Duration::from_millis(10));
+    assert!(image.is_err() || image.unwrap().bits == 12);
+    let mut camera = start("2x1:gray12le:sh -c \"sleep 0.5; printf '\\001\\000\\377\\017'\"").unwrap();
+    let image = camera.image(&shot(1), WAIT).unwrap();
+    assert_eq!((image.pixels[[0, 0]], image.pixels[[0, 1]], image.bits), (1, 4095, 12));
+    let size = failure(start("4x4:gray:sh -c 'sleep 0.5; printf ABC'"));
+    assert!(size.contains("3 of 16 bytes") && size.contains("4x4 px"), "{size}");
+    let bright = failure(start("1x1:gray10le:sh -c 'sleep 0.5; printf ABC'"));
+    assert!(bright.contains("a pixel of") && bright.contains("10 bits"), "{bright}");
+}
+
+#[test]
+fn no_child_and_no_grandchild_stays_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let pids = folder.path().join("pids");
+    let camera = script(&format!(
+        "sleep 600 & echo $$ $! > {0}.new; mv {0}.new {0}; printf 'YUV4MPEG2 W1 H1 Cmono\\n'; wait",
+        pids.display()
+    ))
+    .unwrap();
+    let until = Instant::now() + WAIT;
+    while !pids.exists() {
+        assert!(Instant::now() < until);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let pids = fs::read_to_string(pids).unwrap();
+    let pids: Vec<&str> = pids.split_whitespace().collect();
+    drop(camera);
+    // Reaped: not even a zombie is left of the child. The grandchild is killed with it and adopted by another process.
+    assert!(!Path::new("/proc").join(pids[0]).exists());
+    let until = Instant::now() + WAIT;
+    loop {
+        let status = fs::read_to_string(Path::new("/proc").join(pids[1]).join("status")).unwrap_or_default();
+        let state = status.lines().find(|line| line.starts_with("State:")).unwrap_or("gone");
+        if state == "gone" || state.contains('Z') || state.contains('X') {
+            break;
+        }
+        assert!(Instant::now() < until, "{state}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+#[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
+fn ffmpegs_test_picture_comes_as_y4m_and_as_raw_frames() {
+    let source = "ffmpeg -v error -re -f lavfi -i testsrc=size=64x48:rate=25";
+    let mut camera = start(&format!("{source} -pix_fmt gray -f yuv4mpegpipe -")).unwrap();
+    camera.watch().unwrap();
+    let y4m = camera.newest(WAIT).unwrap().unwrap().image;
+    assert_eq!((y4m.pixels.dim(), y4m.bits), ((48, 64), 8));
+    let mut camera = start(&format!("64x48:gray16le:{source} -pix_fmt gray16le -f rawvideo -")).unwrap();
+    camera.watch().unwrap();
+    let raw = camera.newest(WAIT).unwrap().unwrap().image;
+    assert_eq!((raw.pixels.dim(), raw.bits), ((48, 64), 16));
+    // The same colour bars, once in 8 and once in 16 bits: ffmpeg's grey is full range in both. Its moving parts are left out: the
+    // ramp and the counter lie below the upper third. Converted by way of different YUV, they agree to a few steps of 8 bits.
+    for column in (4..64).step_by(8) {
+        let (eight, sixteen) =
+            (f64::from(y4m.pixels[[2, column]]), f64::from(raw.pixels[[2, column]]) / 257.0);
+        assert!((eight - sixteen).abs() <= 3.0, "column {column}: {eight} and {sixteen}");
+    }
+}

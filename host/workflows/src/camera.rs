@@ -1,0 +1,198 @@
+//! Cameras without a rig: which there are, what can be set, pictures to keep ([`grab`]) and to look at ([`live`]).
+
+pub mod grab;
+pub mod live;
+
+use farnear_capture::camera::{Camera, Setting, v4l};
+use serde::Serialize;
+
+use crate::{
+    error::{Result, WorkflowError},
+    rig::camera::CameraAddress,
+};
+
+/// A kind of camera.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Kind {
+    /// Its name.
+    pub kind: &'static str,
+    /// How one of it is named.
+    pub address: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Whether this program was built with it.
+    pub built_in: bool,
+}
+
+/// All kinds.
+pub const KINDS: [Kind; 5] = [
+    Kind {
+        kind: "sim",
+        address: "sim, or HOST:PORT",
+        about: "the emulated rig's own; HOST:PORT of a farnear-sim that runs already",
+        built_in: true,
+    },
+    Kind {
+        kind: "folder",
+        address: "folder:DIR",
+        about: "each image file that appears in a folder",
+        built_in: true,
+    },
+    Kind {
+        kind: "command",
+        address: "command:\"PROGRAM ...\", or command:\"WIDTHxHEIGHT:FORMAT:PROGRAM ...\"",
+        about: "a program that writes Y4M, or raw frames of a size and format, to its standard output",
+        built_in: true,
+    },
+    Kind {
+        kind: "v4l",
+        address: "v4l:/dev/videoN",
+        about: "Video4Linux: webcams, and sensors with a driver",
+        built_in: cfg!(all(feature = "v4l2", target_os = "linux")),
+    },
+    Kind {
+        kind: "genicam",
+        address: "genicam:ID",
+        about: "GigE Vision and USB3 Vision",
+        built_in: cfg!(feature = "genicam"),
+    },
+];
+
+/// A camera that was found.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Found {
+    /// By which it is named.
+    pub address: String,
+    /// What it says it is.
+    pub about: String,
+}
+
+/// What cameras there are.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct ListFigures {
+    /// Those that were found now.
+    pub found: Vec<Found>,
+    /// The kinds that could be.
+    pub kinds: Vec<Kind>,
+}
+
+/// Looks for cameras; with GenICam that takes about a second.
+pub fn list() -> ListFigures {
+    let video = |device: v4l::FoundDevice| Found {
+        address: format!("v4l:{}", device.path.display()),
+        about: device.name,
+    };
+    let mut found: Vec<Found> = v4l::devices().into_iter().map(video).collect();
+    found.extend(genicam());
+    ListFigures { found, kinds: KINDS.to_vec() }
+}
+
+#[cfg(feature = "genicam")]
+fn genicam() -> Vec<Found> {
+    let found = farnear_capture::camera::genicam::devices();
+    found
+        .into_iter()
+        .map(|camera| Found { address: format!("genicam:{}", camera.id), about: camera.about })
+        .collect()
+}
+
+#[cfg(not(feature = "genicam"))]
+fn genicam() -> Vec<Found> {
+    Vec::new()
+}
+
+/// A camera, and what is set before it is used.
+#[derive(Clone, PartialEq, Debug)]
+pub struct CameraChoice {
+    /// Which.
+    pub address: CameraAddress,
+    /// What is set, in this order.
+    pub settings: Vec<Setting>,
+}
+
+impl CameraChoice {
+    /// Opens it and sets what is to be set.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`] for the emulated rig's camera, which needs the rig; [`WorkflowError::Camera`].
+    pub fn open(&self) -> Result<Box<dyn Camera>> {
+        let Some(mut camera) = self.address.open()? else {
+            let expected =
+                "the emulated rig's camera comes with the rig; start farnear-sim and name its HOST:PORT";
+            return Err(WorkflowError::parameter("camera", "sim", expected));
+        };
+        for setting in &self.settings {
+            camera.set(setting)?;
+        }
+        Ok(camera)
+    }
+}
+
+/// What can be set.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct ControlFigures {
+    /// Its name.
+    pub name: String,
+    /// Its value now.
+    pub value: String,
+    /// What it may be; `fixed` where it can only be read.
+    pub range: String,
+}
+
+/// A camera's controls.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct ShowFigures {
+    /// Its kind.
+    pub kind: &'static str,
+    /// What can be set or read; nothing for kinds that leave it to others.
+    pub controls: Vec<ControlFigures>,
+}
+
+/// Shows a camera's controls, after what is to be set has been set.
+///
+/// # Errors
+/// As [`CameraChoice::open`].
+pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
+    let mut camera = choice.open()?;
+    Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })
+}
+
+fn controls_of(camera: &mut dyn Camera) -> Result<Vec<ControlFigures>> {
+    let figures = |control: farnear_capture::camera::Control| ControlFigures {
+        name: control.name,
+        value: control.value,
+        range: control.range.to_string(),
+    };
+    Ok(camera.controls()?.into_iter().map(figures).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_emulated_rigs_camera_and_bad_addresses_are_refused() {
+        let open = |text: &str| {
+            let address = text.parse::<CameraAddress>()?;
+            CameraChoice { address, settings: Vec::new() }.open().map(|_| ())
+        };
+        for (text, phrase) in [
+            ("sim", "HOST:PORT"),
+            ("nothing", "genicam:ID"),
+            ("command:a 'b", "quotes"),
+            ("command:", "expected a program"),
+            ("v4l:/dev/video4711", "no such device"),
+        ] {
+            let error = open(text).unwrap_err().to_string();
+            assert!(error.contains(phrase), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    #[cfg(not(feature = "genicam"))]
+    fn a_kind_that_was_not_built_in_says_how_to_build_it() {
+        let address: CameraAddress = "genicam:Aravis-Fake-GV01".parse().unwrap();
+        let error = address.open().err().unwrap();
+        assert!(error.is_usage() && error.to_string().contains("feature `genicam`"), "{error}");
+    }
+}

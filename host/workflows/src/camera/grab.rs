@@ -1,0 +1,155 @@
+//! Pictures of a camera that runs freely, kept in a folder with a record.
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use farnear_capture::camera::{CameraError, Frame};
+use farnear_files::{
+    image_file::{encode_png, encode_tiff},
+    staging::Staging,
+};
+use serde::Serialize;
+
+use super::{CameraChoice, ControlFigures, controls_of};
+use crate::{
+    MADE_BY, clock,
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// Name of the record.
+pub const GRAB_FILE: &str = "grab.toml";
+/// Longest single wait, so that an interruption is seen soon.
+const SLICE: Duration = Duration::from_millis(200);
+
+/// How pictures are written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PictureFormat {
+    /// PNG, values of more than 8 bits shifted up to 16.
+    Png,
+    /// TIFF, values as the camera gave them.
+    Tiff,
+}
+
+/// What is grabbed, and where to.
+#[derive(Clone, PartialEq, Debug)]
+pub struct GrabSettings {
+    /// The camera.
+    pub camera: CameraChoice,
+    /// How many pictures.
+    pub frames: usize,
+    /// How they are written.
+    pub format: PictureFormat,
+    /// Longest wait for one.
+    pub wait: Duration,
+    /// The new folder.
+    pub out: PathBuf,
+}
+
+/// What there is to say of it.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct GrabFigures {
+    /// Pictures.
+    pub frames: usize,
+    /// Pixels across the last one.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Bits that carry the picture.
+    pub bits: u8,
+    /// Pictures that the camera counted between the first and the last and that were not kept: lost, or too fast for this computer. Where
+    /// the camera counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub passed_over: Option<u64>,
+}
+
+/// The record beside the pictures.
+#[derive(Serialize)]
+struct GrabRecord {
+    made_by: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<String>,
+    camera: &'static str,
+    control: Vec<ControlFigures>,
+    frame: Vec<FrameRecord>,
+}
+
+#[derive(Serialize)]
+struct FrameRecord {
+    image: String,
+    width: usize,
+    height: usize,
+    bits: u8,
+    /// As the camera counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    count: Option<u64>,
+    /// By the camera's clock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_us: Option<u64>,
+}
+
+/// Takes pictures. The folder appears when everything is in it.
+///
+/// # Errors
+/// Parameters, folder, camera: in this order; [`CameraError::Late`] where no picture comes.
+pub fn grab(settings: &GrabSettings, context: &Context<'_>) -> Result<GrabFigures> {
+    if settings.frames == 0 {
+        return Err(WorkflowError::parameter("frames", 0, "it takes no pictures, expected 1 or more"));
+    }
+    let staged = Staging::new_folder(&settings.out)?;
+    let mut camera = settings.camera.open()?;
+    let mut record = GrabRecord {
+        made_by: MADE_BY,
+        time: clock::now_rfc3339(),
+        camera: camera.kind(),
+        control: controls_of(camera.as_mut())?,
+        frame: Vec::new(),
+    };
+    camera.watch()?;
+    for number in 0..settings.frames {
+        let until = Instant::now() + settings.wait;
+        let frame = loop {
+            context.cancel.check("taking pictures")?;
+            if let Some(frame) = camera.newest(SLICE.min(settings.wait))? {
+                break frame;
+            }
+            if Instant::now() >= until {
+                let (camera, waited) = (camera.kind().to_owned(), settings.wait);
+                return Err(CameraError::Late { camera, trigger_number: number as u32, waited }.into());
+            }
+        };
+        record.frame.push(write(&staged, number, &frame, settings.format)?);
+        context.progress.advance("pictures", number + 1, Some(settings.frames));
+    }
+    staged.write(GRAB_FILE, toml::to_string(&record)?.as_bytes())?;
+    staged.finish()?;
+    context.say(&format!("wrote {}", settings.out.display()));
+    figures(&record).ok_or_else(|| WorkflowError::parameter("frames", 0, "expected 1 or more"))
+}
+
+fn write(staged: &Staging, number: usize, frame: &Frame, format: PictureFormat) -> Result<FrameRecord> {
+    let (pixels, bits) = (frame.image.pixels.view(), frame.image.bits);
+    let (bytes, ending) = match format {
+        PictureFormat::Png => (encode_png(pixels, bits)?, "png"),
+        PictureFormat::Tiff => (encode_tiff(pixels, bits)?, "tiff"),
+    };
+    let image = format!("frame-{number:04}.{ending}");
+    staged.write(&image, &bytes)?;
+    let (height, width) = pixels.dim();
+    let time_us = frame.stamp.time.and_then(|time| u64::try_from(time.as_micros()).ok());
+    Ok(FrameRecord { image, width, height, bits, count: frame.stamp.count, time_us })
+}
+
+fn figures(record: &GrabRecord) -> Option<GrabFigures> {
+    let (first, last) = (record.frame.first()?, record.frame.last()?);
+    let counted = first.count.zip(last.count).map(|(first, last)| last.wrapping_sub(first));
+    Some(GrabFigures {
+        frames: record.frame.len(),
+        width: last.width,
+        height: last.height,
+        bits: last.bits,
+        passed_over: counted.and_then(|counted| counted.checked_sub(record.frame.len() as u64 - 1)),
+    })
+}

@@ -1,0 +1,126 @@
+//! What a camera sees now, in numbers: frame rate, focus, brightness, saturation.
+
+use std::time::{Duration, Instant};
+
+use farnear_capture::camera::Image;
+use farnear_depth::focus_measure::FocusMeasure;
+use serde::Serialize;
+
+use super::CameraChoice;
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
+
+/// Longest single wait, so that an interruption is seen soon.
+const SLICE: Duration = Duration::from_millis(100);
+
+/// What is looked at, and for how long.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LiveSettings {
+    /// The camera.
+    pub camera: CameraChoice,
+    /// What is largest when the picture is sharpest.
+    pub measure: FocusMeasure,
+    /// From one line to the next.
+    pub every: Duration,
+    /// End after this time; without it, when it is cancelled.
+    pub seconds: Option<f64>,
+}
+
+/// The last picture of a while.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct LiveFigures {
+    /// Pictures in a second that arrived and were looked at.
+    pub frames_per_s: f64,
+    /// Focus measure; nothing of a picture that is dark or smaller than 8x8 px.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focus: Option<f64>,
+    /// Mean grey value, in per cent of full scale.
+    pub mean_percent: f64,
+    /// Pixels at full scale, in per cent.
+    pub saturated_percent: f64,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Bits that carry the picture.
+    pub bits: u8,
+}
+
+/// Looks through a camera until time is up or it is cancelled, which is no error, and gives figures from time to time. A while without a
+/// picture gives none, and is said. Gives the number of pictures.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`], [`WorkflowError::Camera`], or what `line` gives as [`WorkflowError::Sink`].
+pub fn live(
+    settings: &LiveSettings,
+    line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,
+    context: &Context<'_>,
+) -> Result<usize> {
+    if let Some(seconds) = settings.seconds.filter(|seconds| !(0.0..1e9).contains(seconds)) {
+        return Err(WorkflowError::parameter("seconds", seconds, "expected a positive time"));
+    }
+    let mut camera = settings.camera.open()?;
+    camera.watch()?;
+    let begin = Instant::now();
+    let until = settings.seconds.map(|seconds| begin + Duration::from_secs_f64(seconds));
+    let (mut all, mut since, mut frames, mut last) = (0, begin, 0_usize, None);
+    while until.is_none_or(|until| Instant::now() < until) && !context.cancel.is_cancelled() {
+        if let Some(frame) = camera.newest(SLICE)? {
+            (frames, last) = (frames + 1, Some(frame.image));
+        }
+        let passed = since.elapsed();
+        if passed < settings.every {
+            continue;
+        }
+        match last.take() {
+            Some(image) => {
+                let rate = frames as f64 / passed.as_secs_f64();
+                line(&figures(&image, settings.measure, rate))
+                    .map_err(|source| WorkflowError::Sink { source })?;
+            }
+            None => context.say("no picture came"),
+        }
+        (all, since, frames) = (all + frames, Instant::now(), 0);
+    }
+    Ok(all + frames)
+}
+
+fn figures(image: &Image, measure: FocusMeasure, frames_per_s: f64) -> LiveFigures {
+    let full = u16::MAX >> (16 - u32::from(image.bits.clamp(1, 16)));
+    let count = image.pixels.len().max(1) as f64;
+    let sum: f64 = image.pixels.iter().map(|value| f64::from(*value)).sum();
+    let saturated = image.pixels.iter().filter(|value| **value >= full).count() as f64;
+    let (height, width) = image.pixels.dim();
+    let scaled = image.pixels.mapv(|value| f32::from(value) / f32::from(full));
+    LiveFigures {
+        frames_per_s: rounded(frames_per_s, 2),
+        focus: measure.of(scaled.view()).ok().map(|focus| rounded(focus, 6)),
+        mean_percent: rounded(100.0 * sum / count / f64::from(full), 2),
+        saturated_percent: rounded(100.0 * saturated / count, 3),
+        width,
+        height,
+        bits: image.bits,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    #[test]
+    fn a_pictures_figures_follow_from_its_pixels() {
+        let mut pixels = Array2::from_elem((10, 20), 1000_u16);
+        pixels.row_mut(0).fill(4095);
+        let seen = figures(&Image { pixels, bits: 12 }, FocusMeasure::Tenengrad, 24.996);
+        assert_eq!((seen.frames_per_s, seen.saturated_percent), (25.0, 10.0));
+        // (20 * 4095 + 180 * 1000) / 200 / 4095
+        assert_eq!(seen.mean_percent, 31.98);
+        assert!(seen.focus.is_some_and(|focus| focus > 0.0), "{seen:?}");
+        let dark = figures(&Image { pixels: Array2::zeros((10, 20)), bits: 8 }, FocusMeasure::Tenengrad, 1.0);
+        assert_eq!((dark.focus, dark.mean_percent), (None, 0.0));
+    }
+}
