@@ -1,6 +1,6 @@
 //! A pair as an ordinary camera takes it, and depth with and without what farnear does about it.
 
-use std::{io::Cursor, ops::Range};
+use std::io::Cursor;
 
 use anyhow::Result;
 use farnear_depth::{
@@ -76,8 +76,6 @@ pub struct Taken {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
     pub truth: Array2<f32>,
-    /// Where something moved, if anything (rows, columns).
-    pub object: Option<[Range<usize>; 2]>,
     /// The pixels' response, if it is uneven.
     pub response: Option<Array2<f32>>,
 }
@@ -130,7 +128,7 @@ pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed
     }
     let [far, near] = images;
     let (far, near) = if disturbance.exchanged { (near, far) } else { (far, near) };
-    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), object, response })
+    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), response })
 }
 
 /// Gain and vignetting.
