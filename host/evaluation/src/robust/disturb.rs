@@ -1,6 +1,6 @@
 //! A pair as an ordinary camera takes it, and depth with and without what farnear does about it.
 
-use std::{io::Cursor, ops::Range};
+use std::io::Cursor;
 
 use anyhow::Result;
 use farnear_depth::{
@@ -76,8 +76,6 @@ pub struct Taken {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
     pub truth: Array2<f32>,
-    /// Where something moved, if anything (rows, columns).
-    pub object: Option<[Range<usize>; 2]>,
     /// The pixels' response, if it is uneven.
     pub response: Option<Array2<f32>>,
 }
@@ -94,15 +92,13 @@ pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed
     };
     let far = still.radiance(lens.sensor_far_mm)?;
     let mut near = other.clone().seen_by(disturbance.view).radiance(lens.sensor_near_mm)?;
-    let object = (disturbance.moved_px != 0.0).then(|| {
+    if disturbance.moved_px != 0.0 {
         let part = |n: usize| n / 3..n / 3 + 3 * n / 8;
-        [part(size.1), part(size.0)]
-    });
-    if let Some([rows, columns]) = &object {
+        let (rows, columns) = (part(size.1), part(size.0));
         let [x, y] = disturbance.view.shift_px;
         let view = View { shift_px: [x + disturbance.moved_px, y], ..disturbance.view };
         let moved = other.seen_by(view).radiance(lens.sensor_near_mm)?;
-        let area = ndarray::s![rows.clone(), columns.clone()];
+        let area = ndarray::s![rows, columns];
         near.slice_mut(area).assign(&moved.slice(area));
     }
     shade(&mut near, disturbance);
@@ -130,7 +126,7 @@ pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed
     }
     let [far, near] = images;
     let (far, near) = if disturbance.exchanged { (near, far) } else { (far, near) };
-    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), object, response })
+    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), response })
 }
 
 /// Gain and vignetting.

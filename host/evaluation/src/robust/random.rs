@@ -41,7 +41,7 @@ fn draw(seed: u64) -> (Disturbance, String) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut parts = Vec::new();
     let mut disturbance = Disturbance::default();
-    let mut sometimes = |random: &mut ChaCha8Rng| random.random_range(0..3) == 0;
+    let sometimes = |random: &mut ChaCha8Rng| random.random_range(0..3) == 0;
     let between = |random: &mut ChaCha8Rng, low: f64, high: f64| low + (high - low) * random.random::<f64>();
     if sometimes(&mut random) {
         disturbance.gain = between(&mut random, 0.67, 1.5);

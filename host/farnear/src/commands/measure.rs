@@ -19,12 +19,18 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum What {
     /// Mean, median, deviation and extremes of a region, with the mean's standard error.
+    #[command(after_help = "Example: farnear measure region depth/depth.npy --region 100,80,200,150 --json")]
     Region(OfMap),
     /// The plane through a region: depth, slopes and how far depths lie from it.
+    #[command(after_help = "Example: farnear measure plane depth/depth.npy --region 100,80,200,150 --json")]
     Plane(OfMap),
     /// Depth along a line, pixel by pixel.
+    #[command(
+        after_help = "Example: farnear measure profile depth/depth.npy --from 0,240 --to 639,240 --out profile.csv"
+    )]
     Profile(Profile),
     /// One map less another.
+    #[command(after_help = "Example: farnear measure difference a/depth.npy b/depth.npy --json")]
     Difference(Difference),
 }
 
