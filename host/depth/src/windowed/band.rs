@@ -13,6 +13,8 @@ use crate::simd::{self, Backend, Choice, CubicSums, Found, Plane, Weighing};
 const ROWS: usize = 128;
 /// Rows and columns over which the misfit is averaged.
 const MISFIT_PX: [usize; 2] = [7, 21];
+/// Rim in which filters and windows see reflections, which no model explains, px.
+const RIM_PX: usize = 14;
 /// How far windows must agree, in standard deviations.
 const GAMMA: f32 = 2.0;
 /// Part of the energy that counts as evidence at least.
@@ -335,6 +337,7 @@ impl Band<'_> {
         let [constant, per_unit] = self.scales.noise;
         let least = self.scales.least_noise;
         let mut sums = [0.0_f64; 3];
+        let (height, width) = self.far.dim();
         let own = self.top - from..self.top - from + rows;
         let residual = Array2::from_shape_fn(alpha.dim(), |(y, x)| {
             let at = (from + y - source.first, x);
@@ -344,7 +347,9 @@ impl Band<'_> {
             let brightness = source.products[5].as_ref().map_or(0.0, |b| b[at]);
             let noise = (constant + per_unit * brightness).max(least);
             let gain = polynomial(gain, a * a);
-            if own.contains(&y) && wide.is_none_or(|wide| !wide[at]) {
+            let inside = (RIM_PX..height.saturating_sub(RIM_PX)).contains(&(from + y))
+                && (RIM_PX..width.saturating_sub(RIM_PX)).contains(&x);
+            if inside && own.contains(&y) && wide.is_none_or(|wide| !wide[at]) {
                 let of_pixel = [left * left, gain * noise, rho[1] * rho[1]];
                 sums.iter_mut().zip(of_pixel).for_each(|(sum, value)| *sum += f64::from(value));
             }

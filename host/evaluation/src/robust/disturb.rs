@@ -92,15 +92,13 @@ pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed
     };
     let far = still.radiance(lens.sensor_far_mm)?;
     let mut near = other.clone().seen_by(disturbance.view).radiance(lens.sensor_near_mm)?;
-    let object = (disturbance.moved_px != 0.0).then(|| {
+    if disturbance.moved_px != 0.0 {
         let part = |n: usize| n / 3..n / 3 + 3 * n / 8;
-        [part(size.1), part(size.0)]
-    });
-    if let Some([rows, columns]) = &object {
+        let (rows, columns) = (part(size.1), part(size.0));
         let [x, y] = disturbance.view.shift_px;
         let view = View { shift_px: [x + disturbance.moved_px, y], ..disturbance.view };
         let moved = other.seen_by(view).radiance(lens.sensor_near_mm)?;
-        let area = ndarray::s![rows.clone(), columns.clone()];
+        let area = ndarray::s![rows, columns];
         near.slice_mut(area).assign(&moved.slice(area));
     }
     shade(&mut near, disturbance);

@@ -24,12 +24,15 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum What {
     /// Mean, deviation and fill rate of a region, and the plane through it.
+    #[command(after_help = "Example: farnear measure region pair1/ --region 100,80,200,150 --json")]
     Region(Region),
     /// The plane through a region: flatness and tilt.
+    #[command(after_help = "Example: farnear measure plane depth/depth.npy --region 100,80,200,150 --json")]
     Plane(Region),
     /// Depths along a line.
+    #[command(after_help = "Example: farnear measure profile pair1/ --from 0,240 --to 639,240 --json")]
     Profile {
-        /// The capture's folder with depth.npy.
+        /// The capture's folder with depth.npy, or a map.
         capture: PathBuf,
         /// Column and row of the begin.
         #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
@@ -42,6 +45,7 @@ enum What {
         json: bool,
     },
     /// The second capture's depth minus the first one's.
+    #[command(after_help = "Example: farnear measure difference pair1/ pair2/ --json")]
     Difference {
         /// The first capture's folder.
         first: PathBuf,
@@ -55,7 +59,7 @@ enum What {
 
 #[derive(Args)]
 struct Region {
-    /// The capture's folder with depth.npy.
+    /// The capture's folder with depth.npy, or a map.
     capture: PathBuf,
     /// Column, row, width and height in pixels [default: the whole map].
     #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>)]

@@ -98,7 +98,10 @@ fn windows_and_confidence_are_asked_for() {
 fn a_camera_is_calibrated_and_used() {
     let folder = Folder::new();
     render(&folder, "plane:905", "pair");
-    let response = |y: usize, x: usize| 1.0 + 0.04 * (((y * 131 + x * 71) % 17) as f32 / 8.0 - 1.0);
+    let response = |y: usize, x: usize| {
+        let hash = ((y * 7919 + x * 104_729) as u32 ^ 0x9e37).wrapping_mul(2_654_435_761);
+        1.0 + 0.05 * ((hash ^ (hash >> 15)).wrapping_mul(0x2c1b_3c6d) as f32 / 2_147_483_648.0 - 1.0)
+    };
     let uneven = |name: &str| {
         let image = read_grey(&folder.path(&format!("pair/{name}"))).expect("an image").pixels;
         let seen = Array2::from_shape_fn(image.dim(), |(y, x)| image[(y, x)] * response(y, x));

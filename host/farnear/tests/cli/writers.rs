@@ -20,8 +20,16 @@ fn a_map_is_written_as_asked() {
         let out = folder.text(out);
         succeeds(farnear(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out]).args(more));
     };
-    let usual =
-        ["confidence.npy", "depth.npy", "depth.png", "depth.tiff", "depth.toml", "mesh.ply", "view.png"];
+    let usual = [
+        "confidence.npy",
+        "depth.npy",
+        "depth.png",
+        "depth.tiff",
+        "depth.toml",
+        "mesh.ply",
+        "reason.png",
+        "view.png",
+    ];
     depth("usual", &[]);
     assert_eq!(written(&folder, "usual"), usual);
     depth("all", &["--write", "npy,tiff,png,mesh,view,exr"]);
