@@ -130,9 +130,9 @@ pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
         return Err(missing(COUNTS));
     }
     let image = Image::read(path, None).map_err(|error| unusable(error.to_string()))?;
-    let mut parts = Parts::default();
     // Instructions are what is counted here, not cycles.
-    parts.processor = ProcessorParts { cycles_per_instruction: 1.0, without_accelerator: 1.0 };
+    let processor = ProcessorParts { cycles_per_instruction: 1.0, without_accelerator: 1.0 };
+    let parts = Parts { processor, ..Parts::default() };
     let plant = SharedPlant::new(Plant::new(1, &parts).into());
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
     let costs = Costs::Average(parts.processor);

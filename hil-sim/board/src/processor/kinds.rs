@@ -98,13 +98,7 @@ const fn short(first: u16) -> u64 {
     match first >> 11 {
         // Loads: of a constant, by register, by offset, from the stack.
         0b01001 | 0b01101 | 0b01111 | 0b10001 | 0b10011 => 2,
-        0b01010 | 0b01011 => {
-            if first & 0x0800 != 0 || first & 0x0e00 == 0x0600 {
-                2
-            } else {
-                1
-            }
-        }
+        0b01010 | 0b01011 if (first & 0x0800 != 0 || first & 0x0e00 == 0x0600) => 2,
         // PUSH and POP, STM and LDM.
         0b10110 if first & 0xfe00 == 0xb400 => 1 + (first & 0x1ff).count_ones() as u64,
         0b10111 if first & 0xfe00 == 0xbc00 => 1 + (first & 0x1ff).count_ones() as u64,
@@ -127,21 +121,9 @@ const fn long(first: u16, second: u16) -> u64 {
         // Coprocessor: the floating-point unit.
         0b0110 | 0b0111 | 0b1110 | 0b1111 => floating(first, second),
         // Loads and stores of one word: 1111 100x.
-        0b1100 => {
-            if first & 0x0010 != 0 {
-                2
-            } else {
-                1
-            }
-        }
+        0b1100 if first & 0x0010 != 0 => 2,
         // 1111 1011: multiplications and divisions.
-        0b1101 if first & 0xff80 == 0xfb80 => {
-            if second & 0x00f0 == 0x00f0 {
-                12
-            } else {
-                1
-            }
-        }
+        0b1101 if first & 0xff80 == 0xfb80 && second & 0x00f0 == 0x00f0 => 12,
         0b1101 if first & 0xff80 == 0xfb00 => {
             // With an addition: one more.
             if second & 0xf000 == 0xf000 { 1 } else { 2 }
