@@ -221,12 +221,10 @@ impl Taken {
     /// The pixels that count.
     pub fn counted(&self) -> impl Iterator<Item = (usize, usize)> {
         let (height, width) = self.truth.dim();
+        let row = height / 2;
+        let step = |x: usize| (self.truth[(row, x + 1)] - self.truth[(row, x)]).abs() > 1.0;
         let smooth: Vec<bool> = (0..width)
-            .map(|x| {
-                let here = self.truth[(height / 2, x)];
-                let near = x.saturating_sub(STEP_PX)..(x + STEP_PX + 1).min(width);
-                near.into_iter().all(|other| (self.truth[(height / 2, other)] - here).abs() < 3.0)
-            })
+            .map(|x| !(x.saturating_sub(STEP_PX)..(x + STEP_PX).min(width - 1)).any(step))
             .collect();
         (RIM_PX..height - RIM_PX)
             .flat_map(move |y| (RIM_PX..width - RIM_PX).map(move |x| (y, x)))

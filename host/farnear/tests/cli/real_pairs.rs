@@ -97,7 +97,8 @@ fn windows_and_confidence_are_asked_for() {
 #[test]
 fn a_camera_is_calibrated_and_used() {
     let folder = Folder::new();
-    render(&folder, "plane:905", "pair");
+    // Far from the middle of the range, where an uneven response counts: in the middle it cancels between the images.
+    render(&folder, "plane:928", "pair");
     let response = |y: usize, x: usize| {
         let hash = ((y * 7919 + x * 104_729) as u32 ^ 0x9e37).wrapping_mul(2_654_435_761);
         1.0 + 0.05 * ((hash ^ (hash >> 15)).wrapping_mul(0x2c1b_3c6d) as f32 / 2_147_483_648.0 - 1.0)

@@ -40,7 +40,10 @@ fn a_map_is_written_as_asked() {
         assert!(bytes("usual") == bytes("all"), "{name}");
     }
     depth("some", &["--write", "mesh, tiff"]);
-    assert_eq!(written(&folder, "some"), ["confidence.npy", "depth.tiff", "depth.toml", "mesh.ply"]);
+    assert_eq!(
+        written(&folder, "some"),
+        ["confidence.npy", "depth.tiff", "depth.toml", "mesh.ply", "reason.png"]
+    );
     let record = |out: &str| std::fs::read_to_string(folder.path(&format!("{out}/depth.toml"))).unwrap();
     assert!(record("some").contains("write = \"tiff,mesh\"") && !record("some").contains("[png]"));
     assert!(!record("usual").contains("write = ") && record("usual").contains("[png]"));
