@@ -1,6 +1,6 @@
 //! The link's session: bytes in, requests out; answers in, frames out.
 //!
-//! A request acts once. Ids only grow, over the whole boot ([`ids`]); with the last [`REMEMBERED`] requests their
+//! A request acts once. Ids only grow, over the whole boot (`ids`); with the last [`REMEMBERED`] requests their
 //! answers are remembered: the same again is answered from memory, the same id with another request is refused, and so is
 //! everything older. A request also names its host's session: one that belongs to another session than the one that is
 //! open is refused, so that of two hosts only the one that came last is heard. Hello belongs to none and changes nothing.

@@ -5,8 +5,8 @@
 //!
 //! - By the average: an instruction takes [`ProcessorParts::cycles_per_instruction`] cycles, and more while the flash
 //!   accelerator is not wholly on (the firmware's writes to FLASH_ACR are watched). Costs nothing.
-//! - By kind: each instruction takes what the Cortex-M4's manual says for its kind ([`kinds`]), its fetch what the flash with
-//!   its wait states, instruction cache and prefetch takes ([`flash`]), and a peripheral's register its bus. For that
+//! - By kind: each instruction takes what the Cortex-M4's manual says for its kind (`kinds`), its fetch what the flash with
+//!   its wait states, instruction cache and prefetch takes (`flash`), and a peripheral's register its bus. For that
 //!   the processor goes step by step, some hundred times slower, so it is for measuring.
 
 mod flash;

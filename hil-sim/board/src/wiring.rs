@@ -312,7 +312,7 @@ impl Wiring {
         self.stage(name).last_step_ns
     }
 
-    /// Whether a motor is on its way: the slowest steps of a ramp are nearer to each other than [`STANDS_NS`].
+    /// Whether a motor is on its way: the slowest steps of a ramp are nearer to each other than `STANDS_NS`.
     pub fn is_stepping(&self, now_ns: u64) -> bool {
         self.stages.iter().any(|stage| stage.step_edges > 0 && now_ns < stage.last_step_ns + STANDS_NS)
     }

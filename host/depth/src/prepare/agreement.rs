@@ -1,10 +1,10 @@
 //! Where both images show the same: what moved between the exposures, and pairs that are none.
 //!
-//! In the band that defocus leaves to both images ([`band`](super::band)) these are correlated by nearly 1 wherever they show
+//! In the band that defocus leaves to both images (`band`) these are correlated by nearly 1 wherever they show
 //! the same surface, less what noise takes. A window in which they are not, although both have detail far above the noise,
 //! shows something else in each: it moved.
 //!
-//! Cost: six box sums per pixel of the level that is looked at, at most [`FINEST_PX`] pixels.
+//! Cost: six box sums per pixel of the level that is looked at, at most `FINEST_PX` pixels.
 
 use ndarray::{Array2, ArrayView2, Zip};
 

@@ -1,12 +1,12 @@
 //! Finds how the near-focused image lies on the far-focused one: shift, magnification and rotation, or any affine map.
 //!
-//! Both images are brought to the band that they share ([`band`](super::band)), from coarse to fine. On the coarsest level
+//! Both images are brought to the band that they share (`band`), from coarse to fine. On the coarsest level
 //! every shift is tried; from there Gauss-Newton steps minimise the squared difference (Lucas & Kanade 1981, in the inverse
 //! compositional form of Baker & Matthews 2004: the far image's gradients serve all steps), with Cauchy's weights, so that
 //! what moved between the exposures has little say. A symmetric point spread function moves nothing, so the minimum lies
 //! where the images belong however different their blur.
 //!
-//! Cost: about 8 ms for 640x480 on two cores, 0.15 s for 12 megapixels, of which no more than [`FINEST_PX`] pixels are
+//! Cost: about 8 ms for 640x480 on two cores, 0.15 s for 12 megapixels, of which no more than `FINEST_PX` pixels are
 //! looked at on the finest level.
 
 use nalgebra::{DMatrix, DVector};
