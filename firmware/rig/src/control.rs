@@ -4,10 +4,12 @@
 //! [`crate::io::TICK_HZ`] times a second. The order is here, once for all boards:
 //!
 //! 1. The strain gauge is sampled, so that its samples come evenly whatever else a tick has to do.
-//! 2. Bytes from the link go to the rig, stamped with the tick's first look at the clock. Then the rest of the hardware is read. The emergency stop comes after the step timers: its circuit stops them by itself, and one
-//!    that opens between the two readings must not look like a timer that ran dry.
+//! 2. Bytes from the link go to the rig, stamped with the tick's first look at the clock. Then the rest of the hardware is read. The
+//!    emergency stop comes after the step timers: its circuit stops them by itself, and one that opens between the two
+//!    readings must not look like a timer that ran dry.
 //! 3. The rig decides, and its outputs are carried out.
-//! 4. The link is given a frame of what there is to say: answers and events first, then the log.
+//! 4. The link is given a frame of what there is to say: answers and events first, then the log, which a host that asks without
+//!    a pause does not keep waiting for ever.
 //! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
 //!
 //! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
@@ -19,6 +21,8 @@ use crate::Rig;
 use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, StrobeEdges};
 use crate::motion::since;
 
+/// Answers and events after which the log has a turn.
+const FRAMES_BEFORE_LOG: u8 = 8;
 /// A reset waits so long for the last frame: the longest takes 1.3 ms on the wire, and one may wait before it.
 pub const LAST_FRAME: Micros = Micros(10_000);
 
@@ -96,12 +100,14 @@ pub struct Control<'r> {
     dry: bool,
     /// Since when the board is about to be reset.
     leaving: Option<BoardMicros>,
+    /// Frames since the log had its turn.
+    frames_before_log: u8,
 }
 
 impl<'r> Control<'r> {
     /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
-        Self { rig, dry: false, leaving: None }
+        Self { rig, dry: false, leaving: None, frames_before_log: 0 }
     }
 
     /// One tick.
@@ -136,18 +142,30 @@ impl<'r> Control<'r> {
 
     fn speak(&mut self, board: &mut impl Board) {
         // One frame a tick: to make one takes a tenth of a tick, and the line takes longer for any.
-        if board.has_room()
-            && let Some(frame) = self.rig.transmit()
-        {
-            board.send(frame);
-        } else if board.has_room()
-            && let Some((id, log)) = board.take_log()
-        {
-            let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };
-            if let Some(frame) = encode(header, &log) {
-                board.send(frame);
-            }
+        if !board.has_room() {
+            return;
         }
+        let log_is_due = self.frames_before_log >= FRAMES_BEFORE_LOG;
+        if log_is_due && self.speak_log(board) {
+            return;
+        }
+        if let Some(frame) = self.rig.transmit() {
+            self.frames_before_log = self.frames_before_log.saturating_add(1);
+            board.send(frame);
+        } else {
+            self.speak_log(board);
+        }
+    }
+
+    /// Sends a piece of the log; says whether there was one.
+    fn speak_log(&mut self, board: &mut impl Board) -> bool {
+        let Some((id, log)) = board.take_log() else { return false };
+        self.frames_before_log = 0;
+        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };
+        if let Some(frame) = encode(header, &log) {
+            board.send(frame);
+        }
+        true
     }
 }
 

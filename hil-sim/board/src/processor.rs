@@ -434,7 +434,8 @@ mod tests {
         let mut meter = Meter { counted: 0, cycles: 0, each: fixed(1.0) };
         assert_eq!((meter.at(100), meter.fitting(50)), (100, 50));
         meter.note(100, 7, fixed(1.9));
-        assert_eq!((meter.at(100), meter.at(110)), (107, 126));
+        // 7 and 10 times 1.9, which in binary lies a little below: rounded down.
+        assert_eq!((meter.at(100), meter.at(110)), (107, 125));
         assert_eq!((meter.fitting(19), meter.fitting(1)), (10, 1));
     }
 

@@ -351,6 +351,7 @@ fn homing_and_the_piezos_routines_are_kept_apart_as_far_as_they_go() {
 fn a_board_without_memory_works_and_says_so() {
     let mut bench = Bench::new(700.0);
     bench.rig = farnear_rig::Rig::new(*bench.rig.identity(), None, farnear_protocol::BoardMicros(0));
+    bench.open_session();
     assert!(!bench.hello().capabilities.memory);
     assert_eq!(bench.alarm(), Some(Alarm::MemoryMissing));
     bench.clear();

@@ -15,7 +15,7 @@ fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
 fn info_says_who_is_there_and_that_it_is_emulated() {
     let mut command = on_the_rig(&["info", "--json"]);
     let info = figures(&mut command);
-    assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &2.into(), &1.into()));
+    assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &3.into(), &1.into()));
     assert_eq!(info["board"], "nucleo-f429zi");
     assert_eq!(info["coarse"]["state"], "unknown");
     let (_, said) = succeeds(&mut on_the_rig(&["info"]));
@@ -90,6 +90,7 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
             "/far.png",
             "/mesh.ply",
             "/near.png",
+            "/reason.png",
             "/view.png"
         ]
     );

@@ -74,7 +74,7 @@ fn settings_and_counters_are_read_and_changed() {
         command
     };
     let list = figures(&mut settings(&["list"]));
-    assert_eq!(list["settings"].as_array().map(Vec::len), Some(23), "{list}");
+    assert_eq!(list["settings"].as_array().map(Vec::len), Some(25), "{list}");
     let set = figures(&mut settings(&["set", "coarse_backlash_nm", "4000"]));
     assert_eq!((number(&set, "value"), number(&set, "default")), (4000.0, 1000.0));
     assert_eq!(number(&figures(&mut settings(&["get", "coarse_backlash_nm"])), "value"), 4000.0);

@@ -35,6 +35,7 @@ fn calibrations() -> Vec<Calibration> {
         Calibration::Travel { axis: Axis::SensorCoarse, length: Nanometres(13_600_000) },
         Calibration::Backlash { axis: Axis::Lens, backlash: Nanometres(4_125), spread: Nanometres(250) },
         Calibration::Piezo { gain_pm_per_code: 3_052, hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000 },
+        Calibration::Gauge { gain_ppm: 1_019_600, offset: Nanometres(-784) },
     ]
 }
 
@@ -104,6 +105,7 @@ fn events() {
             "0403040701010a04030201c0843d060701098094fc0cec4f200700",
             "0403040701011404030201c0843d06070102ba40f40399ddccfb00",
             "0403040701011204030201c0843d060702ec17c0a907987504e4d57700",
+            "0403040701011404030201c0843d060703a0bb7c9f0c0864983f00",
             "0403040701010e04030201c0843d070c22c0843d0570fdda8f00",
             "0403040701011304030201c0843d070c22c0843d01e6cdddf800",
             "0403040701011404030201c0843d070c22c0843d0202e247b05e00",
@@ -120,6 +122,7 @@ fn events() {
             "0403040701011304030201c0843d070c22c0843d0dcd816bf100",
             "0403040701010f04030201c0843d070c22c0843d0e05c2690b1c00",
             "0403040701011404030201c0843d070c22c0843d0f033909199c00",
+            "0403040701011304030201c0843d070c22c0843d1014ed6d9200",
             "0403040701010e04030201c0843d080ce90d234b00",
             "0403040701010e04030201c0843d0908b1f8555500",
             "0403040701011604030201c0843d0a0901ac02f0a2048827f99d758700",

@@ -89,7 +89,7 @@ pub const SHADOW: ShadowQuery = ShadowQuery {
     },
 };
 
-pub const ALARMS: [Alarm; 16] = [
+pub const ALARMS: [Alarm; 17] = [
     Alarm::EmergencyStop,
     Alarm::Halt,
     Alarm::DriverFault { axis: Axis::Lens },
@@ -106,6 +106,7 @@ pub const ALARMS: [Alarm; 16] = [
     Alarm::QueueOverflow,
     Alarm::MotionInterrupted { axis: Axis::SensorCoarse },
     Alarm::RecordLost { record: RecordName::Program },
+    Alarm::MemoryMissing,
 ];
 
 pub fn alarm(alarm: Alarm) -> AlarmRecord {

@@ -32,6 +32,7 @@ pub fn table() -> Vec<Request> {
         Request::Calibrate { routine: Routine::Travel { axis: Axis::Lens }, silence },
         Request::Calibrate { routine: Routine::Backlash { axis: Axis::SensorCoarse }, silence },
         Request::Calibrate { routine: Routine::Piezo, silence },
+        Request::Calibrate { routine: Routine::Gauge, silence },
         Request::ReadAlarm { number: 12 },
         Request::ClearAlarm { number: 12 },
         Request::ReadSetting { key: SettingKey::DatumNm },
@@ -63,6 +64,7 @@ fn requests() {
         Routine::Travel { axis: Axis::Lens },
         Routine::Backlash { axis: Axis::Lens },
         Routine::Piezo,
+        Routine::Gauge,
     ]);
     let call = |request| Call { session: SESSION, request };
     let found: Vec<_> =
@@ -86,6 +88,7 @@ fn requests() {
             "1003010d0c0b0a04030201080706050d090280897a6c75f8eb00",
             "1103010d0c0b0a04030201080706050d010880897a5794917c00",
             "1803010d0c0b0a04030201080706050d0280897a133ce74400",
+            "1803010d0c0b0a04030201080706050d0380897a765b5bfc00",
             "1503010d0c0b0a04030201080706050e0cfc2327fc00",
             "1503010d0c0b0a04030201080706050f0cbd123ce500",
             "1003010d0c0b0a040302010807060510050850d02100",
