@@ -291,7 +291,7 @@ mod tests {
         let map = Array2::from_shape_fn((100, 120), |(y, x)| 900.0 + 0.1 * x as f32 - 0.05 * y as f32);
         std::fs::write(&file, farnear_files::npy::write(map.view())).unwrap();
         let found = region(&file, "10,20,40,30".parse().ok()).unwrap();
-        assert!((found.mean_mm - f64::from(900.0 + 0.1 * 29.5 - 0.05 * 34.5)).abs() < 1e-3, "{found:?}");
+        assert!((found.mean_mm - (900.0 + 0.1 * 29.5 - 0.05 * 34.5)).abs() < 1e-3, "{found:?}");
         assert!(region(&file, "100,20,40,30".parse().ok()).unwrap_err().is_usage());
         let same = difference(&file, &file, None).unwrap();
         assert_eq!((same.mean_mm, same.rms_mm), (0.0, 0.0));

@@ -303,8 +303,8 @@ fn sums(level: &Level, model: Model, warp: &Warp, scale: f64, centre: [f64; 2], 
                 for i in 0..n {
                     let weighted = weight * jacobian[i];
                     sums.right[i] += weighted * difference;
-                    for j in 0..n {
-                        sums.normal[i][j] += weighted * jacobian[j];
+                    for (sum, j) in sums.normal[i].iter_mut().zip(&jacobian[..n]) {
+                        *sum += weighted * j;
                     }
                 }
                 sums.squares += weight * difference * difference;

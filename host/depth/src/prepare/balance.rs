@@ -79,7 +79,7 @@ impl Gain {
         // The brighter block is the better known one: noise and what spreads over its border count less.
         let weights: Vec<f64> = blocks.iter().map(|block| block.far * block.near).collect();
         let ratios: Vec<f64> = blocks.iter().map(|block| block.near / block.far).collect();
-        let flat = Fit::new(&[ratios.clone()], &weights, |_| vec![1.0], &blocks)?;
+        let flat = Fit::new(std::slice::from_ref(&ratios), &weights, |_| vec![1.0], &blocks)?;
         let terms = |at: [f64; 2]| exponents().map(|(i, j)| at[0].powi(i) * at[1].powi(j)).collect();
         let reciprocals: Vec<f64> = ratios.iter().map(|ratio| ratio.recip()).collect();
         let curved = Fit::new(&[ratios, reciprocals], &weights, terms, &blocks)?;

@@ -184,7 +184,7 @@ mod tests {
         let dark = Array2::from_shape_fn((60, 80), |(y, x)| 0.01 + 0.002 * ((y + x) % 3) as f32);
         let mut flat = Array2::from_shape_fn((60, 80), |(y, x)| 0.5 * response(y, x)) + &dark;
         flat[(20, 30)] = 0.02;
-        let frames = CameraFrames::learn(&[dark.clone()], &[flat.clone()]).unwrap();
+        let frames = CameraFrames::learn(std::slice::from_ref(&dark), std::slice::from_ref(&flat)).unwrap();
         assert_eq!(frames.bad_count(), 1);
         assert!(frames.bad().unwrap()[(20, 30)]);
         let seen = frames.apply(flat.view());

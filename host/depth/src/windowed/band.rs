@@ -402,7 +402,7 @@ impl Columns {
     fn advance(&mut self, source: &Source, y: usize) {
         let r = (self.side / 2) as isize;
         let row = |d: isize| reflect(y as isize + d, self.height) - source.first;
-        let anew = self.next != Some(y) || y % 16 == 0;
+        let anew = self.next != Some(y) || y.is_multiple_of(16);
         for (sums, product) in self.sums.iter_mut().zip(&source.products) {
             let Some(product) = product else {
                 *sums = None;
