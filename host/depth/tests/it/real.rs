@@ -101,7 +101,7 @@ fn adaptive_windows_take_most_of_the_noise() {
                 let predicted = found.judgement.deviation_mm.iter().filter(|d| d.is_finite());
                 let (squares, n) =
                     predicted.fold((0.0, 0.0), |(s, n), d| (s + f64::from(*d).powi(2), n + 1.0));
-                ratios[usize::from(window == Window::Adaptive)] += (squares / n as f64).sqrt() / mm / 5.0;
+                ratios[usize::from(window == Window::Adaptive)] += (squares / n).sqrt() / mm / 5.0;
             }
         }
         let [fixed, adaptive] = all.map(f64::sqrt);
