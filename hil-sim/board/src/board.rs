@@ -282,7 +282,13 @@ impl Chip {
     pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
         let (interface, nth) = match chip {
             SpiChip::Dac => (SPI3, 0),
-            SpiChip::Gauge => (SPI3, 1),
+            SpiChip::Gauge => {
+                // A silent chip of the emulator's bus reads as zeros; this line has a pull-up.
+                if let Some(converter) = self.gauge_converter() {
+                    converter.cut(cut);
+                }
+                return;
+            }
             SpiChip::Memory => (SPI4, 0),
         };
         // It says whether such a chip is there; all are, since `RigBoard::new`.

@@ -79,17 +79,23 @@ pub struct GaugeConverter {
     /// What is shifted out, most significant bit first, and ones after it; `None` until it is read.
     shift: Option<u64>,
     without_indicator: u64,
+    cut: bool,
 }
 
 impl GaugeConverter {
     /// The chip, sampling the plant's gauge.
     pub fn new(plant: SharedPlant, parts: ConverterParts) -> Self {
-        Self { plant, parts, sampled_ns: 0, low_ns: 0, result: 0, shift: None, without_indicator: 0 }
+        Self { plant, parts, sampled_ns: 0, low_ns: 0, result: 0, shift: None, without_indicator: 0, cut: false }
     }
 
     /// Conversions that were read without a busy indicator, because CNV was high for too long.
     pub fn without_indicator(&self) -> u64 {
         self.without_indicator
+    }
+
+    /// Cuts its data line, which the pull-up then holds high, or mends it.
+    pub const fn cut(&mut self, cut: bool) {
+        self.cut = cut;
     }
 
     /// What comes out when the first bit is read at this moment.
@@ -110,6 +116,9 @@ impl GaugeConverter {
 
 impl Peer for GaugeConverter {
     fn transfer(&mut self, _mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        if self.cut {
+            return u32::MAX >> (32 - u32::from(bits));
+        }
         let shift = match self.shift {
             Some(shift) => shift,
             None => self.output(context.now().0),
