@@ -85,7 +85,16 @@ pub struct GaugeConverter {
 impl GaugeConverter {
     /// The chip, sampling the plant's gauge.
     pub fn new(plant: SharedPlant, parts: ConverterParts) -> Self {
-        Self { plant, parts, sampled_ns: 0, low_ns: 0, result: 0, shift: None, without_indicator: 0, cut: false }
+        Self {
+            plant,
+            parts,
+            sampled_ns: 0,
+            low_ns: 0,
+            result: 0,
+            shift: None,
+            without_indicator: 0,
+            cut: false,
+        }
     }
 
     /// Conversions that were read without a busy indicator, because CNV was high for too long.
