@@ -157,8 +157,12 @@ impl<'r> Control<'r> {
         }
     }
 
-    /// Sends a piece of the log; says whether there was one.
+    /// Sends a piece of the log; says whether there was one. What was logged at the start waits for the first session: a host
+    /// that connects throws away what came before.
     fn speak_log(&mut self, board: &mut impl Board) -> bool {
+        if !self.rig.has_session() {
+            return false;
+        }
         let Some((id, log)) = board.take_log() else { return false };
         self.frames_before_log = 0;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };

@@ -121,6 +121,11 @@ impl Rig {
         }
     }
 
+    /// Whether a host has opened a session since the start.
+    pub(crate) const fn has_session(&self) -> bool {
+        self.session.is_open()
+    }
+
     /// Says, before anything else is done, how the last boot ended and what the memory held.
     fn begin(&mut self, now: BoardMicros) {
         let Some(Untold { found, in_motion }) = self.untold.take() else { return };

@@ -63,6 +63,11 @@ pub(crate) struct Session {
 }
 
 impl Session {
+    /// Whether a host has opened a session since the start.
+    pub(crate) const fn is_open(&self) -> bool {
+        self.number != NO_SESSION
+    }
+
     pub(crate) const fn new(boot: u32) -> Self {
         let counters = LinkCounters { frames: 0, bad_frames: 0, repeated: 0, stale: 0, overflowed: 0 };
         Self {

@@ -7,7 +7,7 @@ export function make(host) {
   const pairs = h("input", { type: "number", value: 5, min: 2, max: 50 });
   const distance = h("input", { type: "number", step: "any", placeholder: "not known" });
   const results = h("div", { class: "quality" });
-  const records = h("div", { class: "scroll" });
+  const records = h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Record of depth quality" });
   const start = button("Measure", measure, { class: "primary", "data-quality": "" });
   host.append(h("div", { class: "split" },
     h("div", { class: "stage scroll" }, panel("Last measurement", results), panel("Record", records)),

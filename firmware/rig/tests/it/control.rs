@@ -144,11 +144,27 @@ fn the_log_takes_the_room_that_is_left() {
     fake.room = 1;
     run(&mut control, &mut fake, 1);
     assert_eq!((fake.sent.len(), fake.logs.len()), (1, 1), "the event goes first");
-    run(&mut control, &mut fake, 1);
+    run(&mut control, &mut fake, 3);
+    assert_eq!((fake.sent.len(), fake.logs.len()), (1, 1), "the log waits for a session");
+    fake.ask(&Request::Status);
+    run(&mut control, &mut fake, 4);
     let kinds: Vec<Kind> = packets(&fake).iter().map(|packet| packet.header.kind).collect();
-    assert_eq!(kinds, [Kind::Event, Kind::Log]);
+    assert_eq!(kinds, [Kind::Event, Kind::Response, Kind::Response, Kind::Log]);
     let packet = packets(&fake).pop().expect("the log");
     assert_eq!((packet.header.id, packet.header.boot, packet.message()), (0, BOOT, Some(log())));
+}
+
+#[test]
+fn a_host_that_asks_without_a_pause_gets_the_log_too() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    fake.logs.push_back(log());
+    for _ in 0..20 {
+        fake.room = 1;
+        fake.ask(&Request::Status);
+        run(&mut control, &mut fake, 1);
+    }
+    assert!(packets(&fake).iter().any(|packet| packet.header.kind == Kind::Log));
 }
 
 /// Runs a board that is asked to reboot and whose last frame takes its time; gives the microseconds from the order to
