@@ -128,6 +128,7 @@ test("a second browser watches, asks, and is given the controls", async () => {
   await second.getByRole("button", { name: "Ask for controls" }).click();
   await first.getByRole("button", { name: "Give" }).click();
   await second.locator("#who", { hasText: "you drive" }).waitFor();
+  await first.locator("#who", { hasText: "another browser drives" }).waitFor();
   assert.ok(await first.getByRole("button", { name: "Home", exact: true }).isDisabled());
   await first.context().close();
   await second.context().close();
