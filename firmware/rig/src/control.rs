@@ -100,6 +100,8 @@ pub struct Control<'r> {
     dry: bool,
     /// Since when the board is about to be reset.
     leaving: Option<BoardMicros>,
+    /// Something has been said since the start.
+    spoken: bool,
     /// Frames since the log had its turn.
     frames_before_log: u8,
 }
@@ -107,7 +109,7 @@ pub struct Control<'r> {
 impl<'r> Control<'r> {
     /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
-        Self { rig, dry: false, leaving: None, frames_before_log: 0 }
+        Self { rig, dry: false, leaving: None, spoken: false, frames_before_log: 0 }
     }
 
     /// One tick.
@@ -151,7 +153,7 @@ impl<'r> Control<'r> {
         }
         if let Some(frame) = self.rig.transmit() {
             self.frames_before_log = self.frames_before_log.saturating_add(1);
-            board.send(frame);
+            self.send(board, frame);
         } else {
             self.speak_log(board);
         }
@@ -167,9 +169,19 @@ impl<'r> Control<'r> {
         self.frames_before_log = 0;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };
         if let Some(frame) = encode(header, &log) {
-            board.send(frame);
+            self.send(board, frame);
         }
         true
+    }
+
+    /// Sends a frame. The first one begins with a delimiter: it ends what a reset has cut off, which would spoil this frame too.
+    fn send(&mut self, board: &mut impl Board, mut frame: Encoded) {
+        if !self.spoken {
+            self.spoken = true;
+            // There is no room in a frame of full length only; what the board says first is short.
+            let _ = frame.insert(0, 0);
+        }
+        board.send(frame);
     }
 }
 

@@ -5,9 +5,10 @@
 //! after a reset or an unplugging. A new hello begins a new *session*: what belongs to the old one, a handle or running
 //! work, gets an error and has to decide for itself, because the rig may have lost its position.
 
+mod session;
+
 use std::{
     collections::BTreeMap,
-    io,
     sync::{
         Arc, Mutex, PoisonError, Weak,
         mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender},
@@ -18,7 +19,7 @@ use std::{
 use farnear_protocol::{
     Log, Request, RequestError, Response,
     frame::{Kind, Packet},
-    message::{EventKind, Hello, ResetCause, Status},
+    message::{EventKind, Hello, Status},
 };
 
 use crate::{
@@ -31,6 +32,8 @@ use crate::{
     transport::Transport,
 };
 
+pub(crate) use session::{Break, Session};
+
 /// Opens the line to the board, the first time and after it broke.
 pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Send>;
 
@@ -42,48 +45,6 @@ const IDLE: Duration = Duration::from_millis(50);
 const UNANSWERED_POLLS: u32 = 2;
 /// Longest look for bytes between two commands.
 const GLANCE: Duration = Duration::from_millis(1);
-/// From one attempt to reach the board again to the next.
-const RECONNECT: Duration = Duration::from_millis(500);
-/// A board between two hellos.
-#[derive(Clone)]
-pub(crate) struct Session {
-    /// Counts the sessions of this owner.
-    pub number: u32,
-    pub hello: Arc<Hello>,
-    pub version: u8,
-}
-
-/// What ended a session.
-#[derive(Clone, Debug)]
-pub(crate) enum Break {
-    Gone(Arc<io::Error>),
-    /// Another host has opened a session.
-    TakenOver,
-    /// The port is there, and nobody answers: asked so often, for so long.
-    Silent {
-        attempts: u32,
-        waited: Duration,
-    },
-    Reset {
-        was: u32,
-        now: u32,
-        cause: Option<ResetCause>,
-    },
-}
-
-impl Break {
-    pub(crate) fn error(&self, port: &str, during: &str) -> ClientError {
-        let during = during.into();
-        match self.clone() {
-            Self::Gone(source) => ClientError::Gone { port: port.into(), during, source },
-            Self::Silent { attempts, waited } => {
-                ClientError::Silent { port: port.into(), during, attempts, waited, bad_frames: 0, bytes: 0 }
-            }
-            Self::TakenOver => ClientError::TakenOver { port: port.into(), during },
-            Self::Reset { was, now, cause } => ClientError::Reset { during, was, now, cause },
-        }
-    }
-}
 
 /// What running work is told.
 pub(crate) enum Note {
@@ -239,15 +200,6 @@ impl Owner {
         Ok((id, response))
     }
 
-    /// Why a handle of this session may not go on.
-    fn break_of(&self, session: u32) -> Option<Break> {
-        if self.broken.is_some() {
-            return self.broken.clone();
-        }
-        // The board is back, but the handle has not been told yet.
-        self.last_break.clone().filter(|_| session != self.session.number)
-    }
-
     /// Sends a request until its answer comes.
     fn ask(&mut self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
         let timing = self.timing();
@@ -292,102 +244,6 @@ impl Owner {
             (_, Response::Status(status)) => Ok(status),
             (_, other) => Err(nonsense(during, &other)),
         }
-    }
-
-    /// Ends the session where the error does.
-    fn break_off(&mut self, error: &ClientError) {
-        let broken = match error {
-            ClientError::Gone { source, .. } => Break::Gone(Arc::clone(source)),
-            ClientError::Reset { was, now, cause, .. } => {
-                Break::Reset { was: *was, now: *now, cause: *cause }
-            }
-            ClientError::TakenOver { .. } => Break::TakenOver,
-            _ => return,
-        };
-        self.end_session(broken);
-    }
-
-    fn end_session(&mut self, broken: Break) {
-        for (_, work) in std::mem::take(&mut self.works) {
-            let _ = work.notes.send(Note::Broken(broken.clone()));
-        }
-        if matches!(broken, Break::Gone(_)) {
-            self.link.close();
-        }
-        self.events.arrived.clear();
-        self.still_there = false;
-        self.unanswered = 0;
-        // A board that was reset is there; one that was unplugged takes a while.
-        let is_there = matches!(broken, Break::Reset { .. } | Break::TakenOver);
-        let pause = if is_there { Duration::ZERO } else { RECONNECT };
-        self.next_attempt = Instant::now() + pause;
-        self.last_break = Some(broken.clone());
-        self.broken = Some(broken);
-    }
-
-    fn try_again_when_due(&mut self) {
-        // The port of a simulator that has ended may be anybody's next, unless it has a name of its own (a link).
-        let gone = matches!(self.broken, Some(Break::Gone(_)));
-        let named = std::fs::symlink_metadata(self.link.port()).is_ok_and(|found| found.is_symlink());
-        let nobodys = gone && self.session.hello.emulated && !named;
-        // Whoever has taken the board over keeps it, until somebody here asks for it.
-        let taken = matches!(self.broken, Some(Break::TakenOver));
-        if !nobodys && !taken && Instant::now() >= self.next_attempt {
-            // It is tried again, for as long as anybody holds a handle.
-            let _ = self.reconnect();
-        }
-    }
-
-    fn join(&mut self, known: u32) -> Result<Session, ClientError> {
-        if self.broken.is_some() {
-            self.reconnect()?;
-        } else if known == self.session.number {
-            self.say_hello()?;
-        }
-        Ok(self.session.clone())
-    }
-
-    fn reconnect(&mut self) -> Result<(), ClientError> {
-        if matches!(self.broken, Some(Break::Gone(_))) {
-            let opened = (self.connect)();
-            self.next_attempt = Instant::now() + RECONNECT;
-            self.link.replace(opened?);
-        }
-        let result = self.say_hello();
-        self.next_attempt = Instant::now() + RECONNECT;
-        result
-    }
-
-    fn say_hello(&mut self) -> Result<(), ClientError> {
-        let before = self.session.hello.boot;
-        let shaken = shake_hands(&mut self.link, self.session.hello.emulated);
-        let (hello, version) = shaken.inspect_err(|error| self.break_off(error))?;
-        let was_broken = self.broken.take().is_some();
-        self.session.version = version;
-        if hello.boot == before && !was_broken {
-            self.session.hello = Arc::new(hello);
-            return Ok(()); // the same session: work goes on, and events that were drained are fetched
-        }
-        if !was_broken {
-            let (was, now, cause) = (before, hello.boot, Some(hello.reset_cause));
-            self.break_off(&ClientError::Reset { during: "saying hello".into(), was, now, cause });
-            self.broken = None;
-        }
-        let opened = open_session(&mut self.link, (&hello, version));
-        opened.inspect_err(|error| self.break_off(error))?;
-        self.session.number += 1;
-        self.events = Events { boot: hello.boot, ..Events::default() };
-        self.next_log = None;
-        self.session.hello = Arc::new(hello);
-        self.join_events()
-    }
-
-    /// Events count from now on.
-    fn join_events(&mut self) -> Result<(), ClientError> {
-        let due = self.status("reading the status")?.next_event;
-        self.events.due = due;
-        self.events.arrived.retain(|number, _| *number >= due);
-        Ok(())
     }
 
     /// Takes what has arrived by itself.

@@ -15,8 +15,8 @@ use std::{
 
 use farnear_capture::Transport;
 use farnear_protocol::{
-    Call, Event, Log, PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response,
-    frame::{Decoder, Header, Kind, Packet, encode},
+    Event, Log, PROTOCOL_CURRENT, PROTOCOL_MIN, Request, Response,
+    frame::{Decoder, Kind},
     message::{
         Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
         LinkCounters, NO_SESSION, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot,
@@ -26,6 +26,7 @@ use farnear_protocol::{
 };
 use serde::Serialize;
 
+mod answers;
 mod keep;
 #[cfg(target_os = "linux")]
 mod port;
@@ -132,7 +133,7 @@ pub struct Board {
     logs: u32,
     /// The number of the open session.
     pub session: u32,
-    remembered: BTreeMap<u32, (Kind, Vec<u8>)>,
+    remembered: BTreeMap<u32, Vec<u8>>,
     decoder: Decoder,
     out: VecDeque<u8>,
 }
@@ -298,11 +299,14 @@ impl Transport for Connection {
 
 impl Board {
     fn put<T: Serialize>(&mut self, kind: Kind, id: u32, message: &T) {
-        let header = Header { version: PROTOCOL_CURRENT, kind, id, boot: self.hello.boot };
-        let frame = encode(header, message).unwrap();
-        let garbage = self.faults.garbage.clone();
-        self.out.extend(garbage);
-        self.out.extend(frame.iter());
+        let frame = answers::frame(self.hello.boot, kind, id, message);
+        self.send(&frame);
+    }
+
+    /// A frame, behind whatever garbage the line adds.
+    fn send(&mut self, frame: &[u8]) {
+        self.out.extend(&self.faults.garbage);
+        self.out.extend(frame);
     }
 
     /// Something that another program left on the line.
@@ -323,114 +327,6 @@ impl Board {
     /// Says that something happened, whether or not it did.
     pub fn say(&mut self, kind: EventKind) {
         self.event(kind);
-    }
-
-    fn answer(&mut self, id: u32, answer: Result<Response, RequestError>) {
-        let (kind, frame) = match &answer {
-            Ok(response) => (Kind::Response, postcard_frame(self.hello.boot, Kind::Response, id, response)),
-            Err(error) => (Kind::Error, postcard_frame(self.hello.boot, Kind::Error, id, error)),
-        };
-        self.remembered.insert(id, (kind, frame));
-        self.resend(id);
-    }
-
-    fn resend(&mut self, id: u32) {
-        if self.faults.lose_answers > 0 {
-            self.faults.lose_answers -= 1;
-            return;
-        }
-        let (_, frame) = self.remembered[&id].clone();
-        for _ in 0..1 + u8::from(self.faults.duplicate_answers) {
-            let garbage = self.faults.garbage.clone();
-            self.out.extend(garbage);
-            self.out.extend(frame.iter());
-        }
-    }
-
-    fn receive(&mut self, packet: &Packet) {
-        if self.faults.lose_requests > 0 {
-            self.faults.lose_requests -= 1;
-            return;
-        }
-        let id = packet.header.id;
-        if let Some(version) = self.faults.other_version {
-            let error = RequestError::Version { min: version, current: version };
-            return self.put(Kind::Error, id, &error);
-        }
-        let Call { session, request } = packet.message().unwrap();
-        if request == Request::Hello {
-            self.answer(id, Ok(Response::Hello(self.hello.clone())));
-            self.remembered.remove(&id);
-            return;
-        }
-        if packet.header.boot != self.hello.boot {
-            let error = RequestError::Boot { current: self.hello.boot };
-            return self.put(Kind::Error, id, &error);
-        }
-        if request != Request::OpenSession && session != self.session {
-            return self.put(Kind::Error, id, &RequestError::NotInSession);
-        }
-        if self.remembered.contains_key(&id) {
-            return self.resend(id);
-        }
-        if id <= self.hello.last_id {
-            return self.put(Kind::Error, id, &RequestError::IdNotNew { last: self.hello.last_id });
-        }
-        self.hello.last_id = id;
-        if request == Request::OpenSession {
-            self.session = session;
-            self.remembered.clear();
-        }
-        self.carry_out(id, request);
-    }
-
-    fn carry_out(&mut self, id: u32, request: Request) {
-        match request {
-            Request::Hello => {}
-            Request::OpenSession => {
-                self.answer(id, Ok(Response::Accepted));
-                self.end_by_stop();
-            }
-            Request::Status => {
-                let status = self.status();
-                self.braking = self.braking.saturating_sub(1);
-                self.answer(id, Ok(Response::Status(status)));
-                self.hear_from_host();
-            }
-            Request::ReadEvent { number } => {
-                let next = self.events.len() as u32;
-                let answer = match self.events.get(number as usize) {
-                    Some(event) if !self.faults.forgetful => Ok(Response::Event(event.clone())),
-                    _ => Err(RequestError::EventGone { oldest: next, next }),
-                };
-                self.answer(id, answer);
-            }
-            Request::Stop => {
-                self.stops += 1;
-                self.braking = self.faults.brakes_for;
-                self.answer(id, Ok(Response::Accepted));
-                self.end_by_stop();
-            }
-            Request::Reboot => {
-                self.answer(id, Ok(Response::Accepted));
-                self.reset(ResetCause::Software);
-            }
-            Request::Home { .. }
-            | Request::Move { .. }
-            | Request::RunProgram { .. }
-            | Request::Calibrate { .. } => self.work(id, request),
-            Request::LoadShot { .. }
-            | Request::ArmProgram { .. }
-            | Request::PauseProgram
-            | Request::ResumeProgram => self.prepare(id, request),
-            other => self.keep(id, other),
-        }
-    }
-
-    fn end_by_stop(&mut self) {
-        if let Some((request, _)) = self.active.take() {
-            self.event(EventKind::Failed { request, axis: None, reason: Failure::Stopped });
-        }
     }
 
     /// The coarse axis lands where a screw lands: near the place asked for.
@@ -515,8 +411,4 @@ impl Board {
             link: LinkCounters::default(),
         }
     }
-}
-
-fn postcard_frame<T: Serialize>(boot: u32, kind: Kind, id: u32, message: &T) -> Vec<u8> {
-    encode(Header { version: PROTOCOL_CURRENT, kind, id, boot }, message).unwrap().to_vec()
 }

@@ -55,7 +55,6 @@ fn leaves_an_alarm(
     alarm: Alarm,
 ) {
     let mut bench = Bench::new(1);
-    finish_frame(&mut bench);
     bench.access(happen);
     // The watchdog bites within 0.19 s.
     bench.rig.advance_us(250_000).expect("runs");
@@ -100,16 +99,9 @@ fn a_brown_out_is_told() {
     leaves_an_alarm(|rig| rig.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
 }
 
-/// The log of the start leaves: a frame that a reset cuts off spoils the next one too, which says that the board has started.
-fn finish_frame(bench: &mut Bench) {
-    bench.rig.advance_us(5_000).expect("runs");
-    bench.settle();
-}
-
 /// Lets the program's next step be this code, as a stray pointer in the right place would.
 fn astray(code: &'static [u16], alarm: Alarm) {
     let mut bench = Bench::new(1);
-    finish_frame(&mut bench);
     let resets = bench.report().resets;
     let task = bench.variable("__embassy_main");
     let functions: HashSet<u64> =
