@@ -1,111 +1,192 @@
-//! The serial link: USART3 on the ST-LINK's virtual COM port, 2 Mbaud, 8N1.
+//! The serial link: USART3 on the ST-LINK's virtual COM port, 2 Mbaud, 8N1, both directions by DMA.
 //!
-//! Received bytes wait in the driver's buffer until the next control tick takes them; frames to send wait in
-//! [`FRAMES`] for the sending task.
+//! No interrupt takes part. A circular transfer lays received bytes into a ring that each control tick empties; what the
+//! ticks write into a second ring is sent piece by piece. The HAL's buffered port is not used: at the end of each frame sent
+//! its handler writes back the status register it has read, and a byte received in between is lost, for a written zero
+//! clears RXNE (RM0090, USART_SR); of frames in both directions at a time that spoiled one in 2,000.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU8, Ordering, fence};
 
 use defmt::warn;
-use embassy_executor::task;
 use embassy_stm32::{
-    Peri, bind_interrupts,
+    Peri,
+    mode::Blocking,
+    pac::{
+        self,
+        dma::{
+            regs::Cr,
+            vals::{Dir, Pl},
+        },
+    },
     peripherals::{PD8, PD9, USART3},
-    usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx, ConfigError},
+    usart::{self, ConfigError, Uart},
 };
-use embassy_sync::{blocking_mutex::raw::ThreadModeRawMutex, channel::Channel};
-use embassy_time::{Duration, with_timeout};
-use embedded_io::{Read, ReadReady};
 use farnear_protocol::frame::{Encoded, FRAME_MAX};
-use static_cell::StaticCell;
 
 /// Speed of the link.
 pub const BAUD: u32 = 2_000_000;
 /// 5 ms of bytes, 25 control ticks.
-const RECEIVE_BUFFER: usize = 1024;
-/// A frame takes 1.3 ms on the wire; longer than this the hardware is stuck.
-const SEND_TIMEOUT: Duration = Duration::from_millis(10);
+const RECEIVE_RING: usize = 1024;
+/// Four of the longest frames.
+const SEND_RING: usize = 4 * FRAME_MAX;
 
-/// Frames on their way out.
-static FRAMES: Channel<ThreadModeRawMutex, Encoded, 4> = Channel::new();
-/// The sending task has a frame in its hands.
-static SENDING: AtomicBool = AtomicBool::new(false);
+/// Streams of DMA1 that serve USART3, and their channel (RM0090, table 42).
+const RECEIVE_STREAM: usize = 1;
+const SEND_STREAM: usize = 3;
+const CHANNEL: u8 = 4;
 
-bind_interrupts!(struct Interrupts {
-    USART3 => usart::BufferedInterruptHandler<USART3>;
-});
+// Atomic, for somebody else writes or reads them: the DMA.
+static RECEIVED: [AtomicU8; RECEIVE_RING] = [const { AtomicU8::new(0) }; RECEIVE_RING];
+static TO_SEND: [AtomicU8; SEND_RING] = [const { AtomicU8::new(0) }; SEND_RING];
 
-/// The link's two ends on the board.
+/// The link's end on the board.
 pub struct Link {
-    receiver: BufferedUartRx<'static>,
-}
-
-/// Sets the port up; gives the receiving end, and the sending end for [`send`].
-pub fn open(
-    port: Peri<'static, USART3>,
-    tx: Peri<'static, PD8>,
-    rx: Peri<'static, PD9>,
-) -> Result<(Link, BufferedUartTx<'static>), ConfigError> {
-    static SEND: StaticCell<[u8; FRAME_MAX]> = StaticCell::new();
-    static RECEIVE: StaticCell<[u8; RECEIVE_BUFFER]> = StaticCell::new();
-    let mut config = usart::Config::default();
-    config.baudrate = BAUD;
-    let send = SEND.init([0; FRAME_MAX]);
-    let receive = RECEIVE.init([0; RECEIVE_BUFFER]);
-    let (sender, receiver) = BufferedUart::new(port, rx, tx, send, receive, Interrupts, config)?.split();
-    Ok((Link { receiver }, sender))
+    /// Keeps pins and clock.
+    _port: Uart<'static, Blocking>,
+    /// The next byte to take from [`RECEIVED`].
+    taken: usize,
+    /// In [`TO_SEND`]: from here on places are in use.
+    sent: usize,
+    /// In [`TO_SEND`]: up to here the transfer under way sends.
+    handed_over: usize,
+    /// In [`TO_SEND`]: up to here frames are written.
+    written: usize,
 }
 
 impl Link {
-    /// Hands over what has come in; `true` where the buffer was full, so that bytes may have been lost.
+    /// Sets the port up and begins to receive.
+    pub fn open(
+        port: Peri<'static, USART3>,
+        tx: Peri<'static, PD8>,
+        rx: Peri<'static, PD9>,
+    ) -> Result<Self, ConfigError> {
+        let mut config = usart::Config::default();
+        config.baudrate = BAUD;
+        let port = Uart::new_blocking(port, rx, tx, config)?;
+        pac::RCC.ahb1enr().modify(|w| w.set_dma1en(true));
+        pac::USART3.cr3().modify(|w| {
+            w.set_dmar(true);
+            w.set_dmat(true);
+        });
+        start(RECEIVE_STREAM, &RECEIVED, |cr| {
+            cr.set_dir(Dir::PERIPHERAL_TO_MEMORY);
+            cr.set_circ(true);
+            // A received byte is lost after 5 us, a sent one can wait.
+            cr.set_pl(Pl::VERY_HIGH);
+        });
+        Ok(Self { _port: port, taken: 0, sent: 0, handed_over: 0, written: 0 })
+    }
+
+    /// Hands over what has come in; `true` where the ring was full, so that bytes were lost. Once per tick, also for what waits
+    /// to be sent.
     pub fn drain(&mut self, mut take: impl FnMut(u8)) -> bool {
-        let mut bytes = [0; 64];
-        let mut taken = 0;
-        // What comes meanwhile waits for the next tick: a sender without a pause must not hold this one up.
-        while taken < RECEIVE_BUFFER
-            && let Ok(true) = self.receiver.read_ready()
-        {
-            let Ok(count) = self.receiver.read(&mut bytes) else { break };
-            bytes[..count].iter().for_each(|byte| take(*byte));
-            taken += count;
+        self.hand_over();
+        let (end, lapped) = received();
+        // Only where the transfer went once round and past what was not taken yet.
+        let full = lapped && end >= self.taken;
+        if full {
+            self.taken = end;
         }
-        // The ring keeps one place free to tell full from empty.
-        taken >= RECEIVE_BUFFER - 1
+        while self.taken != end {
+            take(RECEIVED[self.taken].load(Ordering::Relaxed));
+            self.taken = (self.taken + 1) % RECEIVE_RING;
+        }
+        full
     }
 
     /// Whether another frame can be queued.
-    pub fn has_room(&self) -> bool {
-        !FRAMES.is_full()
+    pub const fn has_room(&self) -> bool {
+        // One place stays free to tell full from empty.
+        (self.sent + SEND_RING - self.written - 1) % SEND_RING >= FRAME_MAX
     }
 
     /// Queues a frame. Only after [`Link::has_room`]; else it is dropped, and the host asks again.
-    pub fn send(&self, frame: Encoded) {
-        if FRAMES.try_send(frame).is_err() {
+    pub fn send(&mut self, frame: Encoded) {
+        if !self.has_room() {
             warn!("a frame was dropped: no room");
+            return;
         }
+        for byte in &frame {
+            TO_SEND[self.written].store(*byte, Ordering::Relaxed);
+            self.written = (self.written + 1) % SEND_RING;
+        }
+        self.hand_over();
     }
 
     /// Everything has left the board.
     pub fn is_idle(&self) -> bool {
-        FRAMES.is_empty() && !SENDING.load(Ordering::Relaxed)
+        self.handed_over == self.written && !is_running(SEND_STREAM) && pac::USART3.sr().read().tc()
+    }
+
+    /// Gives the DMA what is written, up to the ring's end, where it has nothing to do.
+    fn hand_over(&mut self) {
+        if is_running(SEND_STREAM) {
+            return;
+        }
+        self.sent = self.handed_over;
+        if self.sent == self.written {
+            return;
+        }
+        let end = if self.written > self.sent { self.written } else { SEND_RING };
+        // "Sent to the last bit" is forgotten by a zero in its place and ones in all others, which change nothing.
+        pac::USART3.sr().write(|w| {
+            w.0 = 0x3ff;
+            w.set_tc(false);
+        });
+        start(SEND_STREAM, &TO_SEND[self.sent..end], |cr| cr.set_dir(Dir::MEMORY_TO_PERIPHERAL));
+        self.handed_over = end % SEND_RING;
     }
 }
 
-/// Sends the queued frames, each to its last bit before the next: the driver's buffer holds just one, and its
-/// writer does not wait for room.
-#[task]
-pub async fn send(mut port: BufferedUartTx<'static>) -> ! {
-    use embedded_io_async::Write;
+/// Starts a stream between the port's data register and bytes.
+fn start(stream: usize, bytes: &'static [AtomicU8], set: impl FnOnce(&mut Cr)) {
+    clear(stream);
+    let registers = pac::DMA1.st(stream);
+    registers.par().write_value(pac::USART3.dr().as_ptr() as u32);
+    registers.m0ar().write_value(bytes.as_ptr() as u32);
+    // The rings are shorter than the counter's 65,535.
+    registers.ndtr().write(|w| w.set_ndt(bytes.len() as u16));
+    // What was written before is in the memory when the transfer reads it.
+    fence(Ordering::Release);
+    registers.cr().write(|w| {
+        w.set_chsel(CHANNEL);
+        w.set_minc(true);
+        set(w);
+        w.set_en(true);
+    });
+}
+
+/// Forgets the stream's events: it cannot be started before.
+fn clear(stream: usize) {
+    pac::DMA1.ifcr(stream / 4).write(|w| {
+        w.set_tcif(stream % 4, true);
+        w.set_htif(stream % 4, true);
+        w.set_teif(stream % 4, true);
+        w.set_dmeif(stream % 4, true);
+        w.set_feif(stream % 4, true);
+    });
+}
+
+/// The hardware stops a stream at its end.
+fn is_running(stream: usize) -> bool {
+    pac::DMA1.st(stream).cr().read().en()
+}
+
+/// Up to where bytes were received, and whether the ring's end was passed since the last look.
+fn received() -> (usize, bool) {
+    let left = || usize::from(pac::DMA1.st(RECEIVE_STREAM).ndtr().read().ndt());
     loop {
-        FRAMES.ready_to_receive().await;
-        SENDING.store(true, Ordering::Relaxed);
-        let frame = FRAMES.receive().await;
-        let sent = with_timeout(SEND_TIMEOUT, async {
-            port.write_all(&frame).await?;
-            port.flush().await
-        });
-        if !matches!(sent.await, Ok(Ok(()))) {
-            warn!("a frame was not sent");
+        let before = left();
+        let lapped = pac::DMA1.isr(RECEIVE_STREAM / 4).read().tcif(RECEIVE_STREAM % 4);
+        // The count falls; where it has risen, the end was passed in between, and the flag may be the one or the other.
+        if left() <= before {
+            if lapped {
+                clear(RECEIVE_STREAM);
+            }
+            // An error flag is cleared by reading it, and then, as the DMA does, the data.
+            let _ = pac::USART3.sr().read();
+            fence(Ordering::Acquire);
+            return ((RECEIVE_RING - before) % RECEIVE_RING, lapped);
         }
-        SENDING.store(false, Ordering::Relaxed);
     }
 }

@@ -219,10 +219,10 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
         }
         5 => {
             // By rank 2, 3, 3, 3, 2 of the band: 8 to begin with, 5 to come.
-            largest::<L, SIDE, 2>(&ranks[0], &mut kept, 0);
-            smallest::<L, SIDE, 2>(&ranks[4], &mut kept, 2);
-            without_least::<L, SIDE, 2>(&ranks[1], &mut kept, 4);
-            without_most::<L, SIDE, 2>(&ranks[3], &mut rest, 0);
+            keep::<L, SIDE, 2, LARGEST>(&ranks[0], &mut kept, 0);
+            keep::<L, SIDE, 2, SMALLEST>(&ranks[4], &mut kept, 2);
+            without::<L, SIDE, 2, SMALLEST>(&ranks[1], &mut kept, 4);
+            without::<L, SIDE, 2, LARGEST>(&ranks[3], &mut rest, 0);
             kept[7] = rest[0];
             let middle = without_extremes(&ranks[2]);
             [rest[0], rest[3], rest[4]] = [middle[1], middle[2], middle[3]];
@@ -230,12 +230,12 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
         }
         _ => {
             // By rank 3, 4, 5, 5, 5, 4, 3 of the band: 16 to begin with, 13 to come.
-            largest::<L, SIDE, 3>(&ranks[0], &mut kept, 0);
-            smallest::<L, SIDE, 3>(&ranks[6], &mut kept, 3);
-            without_least::<L, SIDE, 3>(&ranks[1], &mut kept, 6);
-            without_most::<L, SIDE, 3>(&ranks[5], &mut kept, 10);
-            without_least::<L, SIDE, 2>(&ranks[2], &mut rest, 0);
-            without_most::<L, SIDE, 2>(&ranks[4], &mut rest, 5);
+            keep::<L, SIDE, 3, LARGEST>(&ranks[0], &mut kept, 0);
+            keep::<L, SIDE, 3, SMALLEST>(&ranks[6], &mut kept, 3);
+            without::<L, SIDE, 3, SMALLEST>(&ranks[1], &mut kept, 6);
+            without::<L, SIDE, 3, LARGEST>(&ranks[5], &mut kept, 10);
+            without::<L, SIDE, 2, SMALLEST>(&ranks[2], &mut rest, 0);
+            without::<L, SIDE, 2, LARGEST>(&ranks[4], &mut rest, 5);
             [kept[14], kept[15]] = [rest[8], rest[9]];
             let middle = without_extremes(&ranks[3]);
             rest[8..13].copy_from_slice(&middle[1..6]);
@@ -258,9 +258,13 @@ fn extremes_to_ends<L: Lanes, const N: usize>(values: &mut [L; 16]) {
     }
 }
 
-/// Writes the `KEEP` largest to `output` from `at` on, by insertion.
+/// Which end of a sorted column is kept or dropped.
+const LARGEST: bool = true;
+const SMALLEST: bool = false;
+
+/// Writes the `KEEP` largest, or smallest, to `output` from `at` on, by insertion.
 #[inline(always)]
-fn largest<L: Lanes, const SIDE: usize, const KEEP: usize>(
+fn keep<L: Lanes, const SIDE: usize, const KEEP: usize, const END: bool>(
     values: &[L; SIDE],
     output: &mut [L; 16],
     at: usize,
@@ -269,8 +273,8 @@ fn largest<L: Lanes, const SIDE: usize, const KEEP: usize>(
         let mut value = values[i];
         for place in 0..KEEP.min(i) {
             let kept = output[at + place];
-            output[at + place] = kept.max(value);
-            value = kept.min(value);
+            let (least, most) = (kept.min(value), kept.max(value));
+            (output[at + place], value) = if END == LARGEST { (most, least) } else { (least, most) };
         }
         if i < KEEP {
             output[at + i] = value;
@@ -278,55 +282,17 @@ fn largest<L: Lanes, const SIDE: usize, const KEEP: usize>(
     }
 }
 
-/// As [`largest`] for the smallest.
+/// Writes all but the `DROP` smallest, or largest, to `output` from `at` on.
 #[inline(always)]
-fn smallest<L: Lanes, const SIDE: usize, const KEEP: usize>(
-    values: &[L; SIDE],
-    output: &mut [L; 16],
-    at: usize,
-) {
-    for i in 0..SIDE {
-        let mut value = values[i];
-        for place in 0..KEEP.min(i) {
-            let kept = output[at + place];
-            output[at + place] = kept.min(value);
-            value = kept.max(value);
-        }
-        if i < KEEP {
-            output[at + i] = value;
-        }
-    }
-}
-
-/// Writes all but the `DROP` smallest to `output` from `at` on.
-#[inline(always)]
-fn without_least<L: Lanes, const SIDE: usize, const DROP: usize>(
+fn without<L: Lanes, const SIDE: usize, const DROP: usize, const END: bool>(
     values: &[L; SIDE],
     output: &mut [L; 16],
     at: usize,
 ) {
     let mut values = *values;
-    for least in 0..DROP {
-        for i in least + 1..SIDE {
-            order(&mut values, least, i);
-        }
-    }
-    for i in DROP..SIDE {
-        output[at + i - DROP] = values[i];
-    }
-}
-
-/// As [`without_least`] without the largest.
-#[inline(always)]
-fn without_most<L: Lanes, const SIDE: usize, const DROP: usize>(
-    values: &[L; SIDE],
-    output: &mut [L; 16],
-    at: usize,
-) {
-    let mut values = *values;
-    for most in 0..DROP {
-        for i in most + 1..SIDE {
-            order(&mut values, i, most);
+    for dropped in 0..DROP {
+        for i in dropped + 1..SIDE {
+            if END == LARGEST { order(&mut values, i, dropped) } else { order(&mut values, dropped, i) }
         }
     }
     for i in DROP..SIDE {
