@@ -184,6 +184,8 @@ fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
     let face = Face { app, place };
     let context = Context { progress: &face, questions: &face, cancel };
     let ended = work(app, &context);
+    // The rig may have told of the stop before the work saw the wish.
+    let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();
     lane.free();
     if let Err(error) = &ended {
         app.note(format!("{}: {error}", job.title));
@@ -197,7 +199,7 @@ fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
                 job.result = Some(result);
             }
             Err(error) => {
-                job.phase = if error.is_cancelled() { JobPhase::Stopped } else { JobPhase::Failed };
+                job.phase = if stopped(&error) { JobPhase::Stopped } else { JobPhase::Failed };
                 job.hint = failure::hint(&error).map(Into::into);
                 job.error = Some(error.to_string());
             }
