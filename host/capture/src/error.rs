@@ -20,6 +20,18 @@ pub enum PortError {
         /// What the system lists.
         present: Vec<String>,
     },
+    /// No port was named, and none belongs to a board.
+    #[error("no board was found: no ST-LINK has a serial port; {}", present_ports(present))]
+    NoBoard {
+        /// What the system lists.
+        present: Vec<String>,
+    },
+    /// No port was named, and more than one belongs to a board.
+    #[error("several boards are plugged in: {}", ports.join(", "))]
+    SeveralBoards {
+        /// Theirs.
+        ports: Vec<String>,
+    },
     /// The path leads to something else.
     #[error("{port} is not a serial port")]
     NoPort {

@@ -40,6 +40,7 @@ pub mod describe;
 pub mod error;
 mod events;
 pub mod expose;
+pub mod find;
 pub mod focus;
 mod handshake;
 mod link;

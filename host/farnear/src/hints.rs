@@ -1,7 +1,8 @@
 //! What to type next: the workflows' errors carry facts, the command line knows the commands that mend them.
 
 use farnear_capture::{
-    ClientError, board_correction::BoardCorrectionError, expose::CaptureError, focus::FocusSearchError,
+    ClientError, PortError, board_correction::BoardCorrectionError, expose::CaptureError,
+    focus::FocusSearchError,
 };
 use farnear_protocol::RequestError;
 use farnear_workflows::{
@@ -73,6 +74,9 @@ fn of_client(error: &ClientError) -> Option<String> {
         ClientError::Failed { alarm: Some(record), .. } => Some(clear(record.number)),
         ClientError::Version { .. } | ClientError::Schema { .. } => {
             Some("`cargo xtask firmware` builds the firmware of these sources".into())
+        }
+        ClientError::Port(PortError::NoBoard { .. } | PortError::SeveralBoards { .. }) => {
+            Some("name its port with --port or in FARNEAR_PORT; `--port sim` starts the emulated rig".into())
         }
         _ => None,
     }

@@ -32,7 +32,7 @@ pub mod targets;
 
 use std::{path::Path, sync::Arc};
 
-use farnear_capture::Client;
+use farnear_capture::{Client, ClientError, find};
 use farnear_depth::psf::Psf;
 
 use crate::{
@@ -54,6 +54,14 @@ pub enum RigAddress {
 }
 
 impl RigAddress {
+    /// The board that is plugged in, where nobody names its port.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Client`] where there is none, or more than one.
+    pub fn found() -> Result<Self> {
+        Ok(Self::Port(find::board_port().map_err(ClientError::Port)?))
+    }
+
     /// Whether the rig is the emulated one that is started for this.
     pub fn is_emulated(&self) -> bool {
         matches!(self, Self::Emulated(_))

@@ -45,6 +45,19 @@ fn an_absent_port_is_named_with_those_that_are_there() {
 }
 
 #[test]
+fn the_environment_names_the_port_where_no_flag_does() {
+    let absent = |name: &str| format!("there is no port {name}");
+    let named = |args: &[&str]| {
+        let mut command = farnear(args);
+        command.env("FARNEAR_PORT", "/dev/farnear-absent");
+        command
+    };
+    fails(&mut named(&["rig", "info"]), 1, &[&absent("/dev/farnear-absent")]);
+    fails(&mut named(&["rig", "info", "--port", "/dev/farnear-other"]), 1, &[&absent("/dev/farnear-other")]);
+    fails(&mut named(&["rig", "info", "--seed", "3"]), 2, &["--seed goes with --port sim only"]);
+}
+
+#[test]
 fn a_file_and_a_folder_are_no_ports() {
     capture_fails(rig_optics(), &["rig.toml is not a serial port"]);
     capture_fails(env!("CARGO_TARGET_TMPDIR"), &["is not a serial port"]);

@@ -17,9 +17,10 @@ use crate::report::Usage;
 /// Which rig.
 #[derive(Args, Clone)]
 pub struct Target {
-    /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig.
-    #[arg(long, value_name = "PORT|sim")]
-    pub port: String,
+    /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig. Without it the only NUCLEO that is
+    /// plugged in.
+    #[arg(long, value_name = "PORT|sim", env = "FARNEAR_PORT")]
+    port: Option<String>,
     #[command(flatten)]
     scenery: SceneryArguments,
 }
@@ -80,16 +81,27 @@ impl SceneryArguments {
 impl Target {
     /// The rig's address.
     pub fn address(&self) -> Result<RigAddress> {
-        if self.port == "sim" {
+        let Some(port) = &self.port else {
+            self.without_scenery("a real rig")?;
+            return Ok(RigAddress::found()?);
+        };
+        if port == "sim" {
             let SceneryArguments { scene, psf, noise, seed, firmware, faults, trace, paced } =
                 self.scenery.clone();
             let scenery = Scenery { scene, psf, noise, seed, firmware, faults, trace, paced };
             return Ok(RigAddress::Emulated(scenery));
         }
-        if let Some(flag) = self.scenery.given() {
-            bail!(Usage(format!("{flag} goes with --port sim only; {} has a world of its own", self.port)));
+        self.without_scenery(port)?;
+        Ok(RigAddress::Port(port.clone()))
+    }
+
+    fn without_scenery(&self, rig: &str) -> Result<()> {
+        match self.scenery.given() {
+            Some(flag) => {
+                bail!(Usage(format!("{flag} goes with --port sim only; {rig} has a world of its own")))
+            }
+            None => Ok(()),
         }
-        Ok(RigAddress::Port(self.port.clone()))
     }
 }
 

@@ -1,0 +1,68 @@
+//! Which port has the board, where nobody names one.
+
+use serialport::{SerialPortInfo, SerialPortType};
+
+use crate::error::PortError;
+
+/// STMicroelectronics' number as a maker of USB devices.
+const ST: u16 = 0x0483;
+/// The ST-LINKs that have a serial port: V2-1 and V3, with and without a disk and a second port.
+const ST_LINKS: [u16; 7] = [0x374b, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754, 0x3757];
+
+/// The port of the only ST-LINK, as every NUCLEO has one. Nothing is sent to find out: other instruments would hear it too.
+///
+/// # Errors
+/// [`PortError::NoBoard`] without any, [`PortError::SeveralBoards`] where a choice would be a guess.
+pub fn board_port() -> Result<String, PortError> {
+    only(&serialport::available_ports().unwrap_or_default())
+}
+
+fn only(present: &[SerialPortInfo]) -> Result<String, PortError> {
+    let names: Vec<String> = present.iter().map(|port| port.port_name.clone()).collect();
+    let mut boards: Vec<String> =
+        present.iter().filter(|port| is_board(port)).map(|port| port.port_name.clone()).collect();
+    // macOS lists each port twice; the one for calling out does not wait for a modem.
+    boards.retain(|name| {
+        !name.strip_prefix("/dev/tty.").is_some_and(|of| names.contains(&format!("/dev/cu.{of}")))
+    });
+    match boards.as_mut_slice() {
+        [] => Err(PortError::NoBoard { present: names }),
+        [one] => Ok(std::mem::take(one)),
+        _ => Err(PortError::SeveralBoards { ports: boards }),
+    }
+}
+
+fn is_board(port: &SerialPortInfo) -> bool {
+    matches!(&port.port_type, SerialPortType::UsbPort(usb) if usb.vid == ST && ST_LINKS.contains(&usb.pid))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serialport::UsbPortInfo;
+
+    fn port(name: &str, vid: u16, pid: u16) -> SerialPortInfo {
+        let usb = UsbPortInfo { vid, pid, serial_number: None, manufacturer: None, product: None };
+        SerialPortInfo { port_name: name.into(), port_type: SerialPortType::UsbPort(usb) }
+    }
+
+    #[test]
+    fn the_only_st_link_is_the_board_and_two_are_a_question() {
+        let modem = port("/dev/ttyUSB0", 0x0403, 0x6001);
+        let built_in = SerialPortInfo { port_name: "/dev/ttyS0".into(), port_type: SerialPortType::Unknown };
+        let board = port("/dev/ttyACM0", ST, 0x374b);
+        let others = [modem, built_in];
+        let none = only(&others).unwrap_err().to_string();
+        assert!(none.contains("/dev/ttyUSB0, /dev/ttyS0"), "{none}");
+        let with = |more: &[SerialPortInfo]| only(&[&others, more].concat());
+        assert_eq!(with(std::slice::from_ref(&board)).unwrap(), "/dev/ttyACM0");
+        let two = with(&[board, port("/dev/ttyACM1", ST, 0x3754)]).unwrap_err().to_string();
+        assert!(two.contains("/dev/ttyACM0, /dev/ttyACM1"), "{two}");
+    }
+
+    #[test]
+    fn a_port_that_macos_lists_twice_is_one() {
+        let twice = [port("/dev/tty.usbmodem3", ST, 0x374e), port("/dev/cu.usbmodem3", ST, 0x374e)];
+        assert_eq!(only(&twice).unwrap(), "/dev/cu.usbmodem3");
+    }
+}
