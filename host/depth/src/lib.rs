@@ -40,6 +40,7 @@ mod depth_of_alpha;
 pub mod fill;
 pub mod filter;
 pub mod focus_measure;
+pub mod focus_stack;
 pub mod fourier;
 pub mod hankel;
 pub mod judge;

@@ -13,7 +13,7 @@
 pub mod agreement;
 pub mod align;
 pub mod balance;
-mod band;
+pub(crate) mod band;
 mod camera;
 mod defects;
 pub mod noise;

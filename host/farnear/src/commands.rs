@@ -7,6 +7,7 @@ pub mod compare;
 pub mod completions;
 pub mod correct;
 pub mod depth;
+pub mod focus_stack;
 pub mod measure;
 pub mod operators;
 pub mod optics;

@@ -27,21 +27,30 @@ const FAINTEST: f32 = 0.15;
 ///
 /// `confidence` (0 to 1, same shape) decides how much of its colour a pixel keeps.
 pub fn view_png(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
+    view_png_in("mm", depth_mm, confidence)
+}
+
+/// The same of a map in another unit, which the scale names.
+pub fn view_png_in(
+    unit: &str,
+    depth: ArrayView2<f32>,
+    confidence: ArrayView2<f32>,
+) -> Result<Vec<u8>, EncodeError> {
     let mut png = Cursor::new(Vec::new());
-    draw(depth_mm, confidence)?
+    draw(unit, depth, confidence)?
         .write_to(&mut png, image::ImageFormat::Png)
         .map_err(EncodeError::of("view.png"))?;
     Ok(png.into_inner())
 }
 
-fn draw(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage, EncodeError> {
+fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage, EncodeError> {
     let (rows, columns) = depth_mm.dim();
     let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).max(1) as u32;
     let (width, height) = (columns as u32 * zoom, rows as u32 * zoom);
     let range = Range::of(depth_mm);
     // Text grows with the picture: 4 % of its height between sensible bounds.
     let mut writer = Writer::new((height as f32 * 0.035).clamp(13.0, 60.0))?;
-    let label_width = writer.width("0000.0 mm");
+    let label_width = writer.width(&format!("0000.0 {unit}"));
     let bar_left = MARGIN_PX * 2 + width;
     let canvas_width = bar_left + BAR_PX + 14 + label_width + MARGIN_PX;
     let mut canvas = RgbImage::from_pixel(canvas_width, height + 2 * MARGIN_PX, BACKGROUND);
@@ -74,7 +83,7 @@ fn draw(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbIma
             canvas.put_pixel(bar_left + BAR_PX + x, y, INK);
         }
         let top = y.saturating_sub(writer.height() / 2);
-        writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &format!("{tick:.decimals$} mm"), INK);
+        writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &format!("{tick:.decimals$} {unit}"), INK);
         tick += step;
     }
     Ok(canvas)

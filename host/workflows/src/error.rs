@@ -21,6 +21,7 @@ use farnear_depth::{
     baselines::BaselineError,
     calibrate::CalibrationError,
     corrections::CorrectionError,
+    focus_stack::StackError,
     metrics::CompareError,
     operators::DesignError,
     optics::OpticsError,
@@ -165,6 +166,9 @@ pub enum WorkflowError {
     /// Images that give no point spread function.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// Images that are no focus stack.
+    #[error(transparent)]
+    Stack(#[from] StackError),
     /// Maps that cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),

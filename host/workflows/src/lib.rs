@@ -68,6 +68,7 @@ mod counter;
 pub mod depth;
 pub mod error;
 pub mod figures;
+pub mod focus_stack;
 pub mod lens_table;
 pub mod measure;
 mod operator_cache;

@@ -1,10 +1,11 @@
-//! Two slices of focal stacks whose optics nobody knows: is nearer nearer?
+//! Focal stacks whose optics nobody knows, by two of their slices and by depth from focus over all: is nearer nearer?
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use farnear_activity::readers::matlab::{self, Array};
 use farnear_depth::{
+    focus_stack::{StackMap, StackSettings, depth_from_stack},
     operators::Operators,
     pipeline::{Settings, depth_from_pair},
 };
@@ -15,8 +16,8 @@ use rayon::prelude::*;
 use crate::{page::Page, rig};
 
 const STACK: usize = 30;
-/// Slices of the stack between which the working range lies: a quarter and three quarters of the way.
-const SLICES: [usize; 2] = [8, 23];
+/// Slices of the stack between which the working range lies, the far one first: the stacks run from near to far.
+const SLICES: [usize; 2] = [23, 8];
 /// Pixels are judged whose confidence is at least this.
 const LEAST_CONFIDENCE: f32 = 0.5;
 /// Optics are unknown; wide windows bridge their mismatch.
@@ -41,10 +42,9 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
         "Focal stacks of {STACK} slices made from the HCI 4D light fields (as published with Ashfaq & Mahmood, Pattern Recognition 170, 2026, 112112), of which \
          slices {} and {} are taken as a pair. Their optics and PSF are not known and the pair's blur is far beyond what the operators are made for, so \
          only the order of depths is judged: Spearman's rank correlation with the given depth over pixels of confidence {LEAST_CONFIDENCE} or \
-         more. Pill-box, smoothing 15, median 7. Neither the stacks nor the maps say which way they count, so it is measured: the last column is the rank \
-         correlation of the given map with the number of the slice in which each place is sharpest (variation over 15x15 pixels, all {STACK} slices, the same \
-         pixels). It is positive, so given values rise with the slice of best focus; later slices are taken as focused nearer, where depth in mm is less, and \
-         -1 would be perfect.",
+         more. Pill-box, smoothing 15, median 7. Early slices are focused near, as the pictures show, and given values rise with distance. Beside them depth from \
+         focus over all {STACK} slices (`farnear focus-stack --window 9`): over the same pixels, over all pixels, and over those whose reliability is at least \
+         {LEAST_CONFIDENCE}. A wall without texture, as behind Antinous and Greek, has no depth in any stack; over all pixels it is counted with whatever noise says.",
         SLICES[0], SLICES[1]
     ));
     let mut names: Vec<PathBuf> = std::fs::read_dir(folder)?
@@ -52,7 +52,7 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
         .filter(|path| path.is_dir())
         .collect();
     names.sort();
-    let rows = names
+    let scenes = names
         .par_iter()
         .map(|scene| {
             let name = scene.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -60,55 +60,84 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
             let depth = matlab_depth(&scene.join(format!("{name}D.mat")))?;
             let about = || format!("the stack {name}");
             let judged = judge(&slice(SLICES[0]), &slice(SLICES[1]), &depth).with_context(about)?;
-            let sharpest = sharpest((1..=STACK).map(|number| (number, slice(number)))).with_context(about)?;
-            let reference = judged.against(&sharpest, &depth);
-            Ok(vec![
+            let stack = from_focus((1..=STACK).map(slice)).with_context(about)?;
+            let reliable = stack.reliability.mapv(|reliability| reliability >= LEAST_CONFIDENCE);
+            let everywhere = Array2::from_elem(depth.dim(), true);
+            Ok(Scene {
                 name,
-                format!("{:.3}", judged.rank),
-                format!("{:.1}", 100.0 * judged.part),
-                format!("{reference:.3}"),
-            ])
+                figures: [
+                    judged.rank,
+                    100.0 * judged.part,
+                    rank_over(&judged.confident, &stack.place, &depth),
+                    rank_over(&everywhere, &stack.place, &depth),
+                    rank_over(&reliable, &stack.place, &depth),
+                    100.0 * reliable.iter().filter(|reliable| **reliable).count() as f64 / depth.len() as f64,
+                ],
+            })
         })
-        .collect::<Result<Vec<_>>>()?;
-    page.table(1, &["scene", "rank correlation", "pixels judged, %", "given map with sharpest slice"], &rows);
+        .collect::<Result<Vec<Scene>>>()?;
+    let mut rows: Vec<Vec<String>> = scenes.iter().map(|scene| row(&scene.name, scene.figures)).collect();
+    let column = |at: usize| -> Vec<f64> { scenes.iter().map(|scene| scene.figures[at]).collect() };
+    rows.push(row("mean", std::array::from_fn(|at| column(at).iter().sum::<f64>() / scenes.len() as f64)));
+    rows.push(row(
+        "median",
+        std::array::from_fn(|at| {
+            let mut values = column(at);
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        }),
+    ));
+    page.table(
+        1,
+        &[
+            "scene",
+            "pair",
+            "judged, %",
+            "stack, same pixels",
+            "stack, all pixels",
+            "stack, reliable",
+            "reliable, %",
+        ],
+        &rows,
+    );
     Ok(())
+}
+
+/// A scene and its figures, in the table's order.
+struct Scene {
+    name: String,
+    figures: [f64; 6],
+}
+
+fn row(name: &str, figures: [f64; 6]) -> Vec<String> {
+    let decimals = [3, 1, 3, 3, 3, 1];
+    let texts = figures.iter().zip(decimals).map(|(figure, decimals)| format!("{figure:.decimals$}"));
+    std::iter::once(name.to_owned()).chain(texts).collect()
+}
+
+/// Depth from focus with the usual settings, every pixel with a value.
+fn from_focus(slices: impl Iterator<Item = PathBuf>) -> Result<StackMap> {
+    let images: Vec<Array2<f32>> = slices.map(|path| Ok(read_grey(&path)?.pixels)).collect::<Result<_>>()?;
+    let views: Vec<_> = images.iter().map(|image| image.view()).collect();
+    let settings = StackSettings { min_reliability: 0.0, ..StackSettings::default() };
+    Ok(depth_from_stack(&views, &settings)?)
 }
 
 fn measure_phone(page: &mut Page, folder: &Path) -> Result<()> {
     const PHONE_STACK: usize = 25;
-    const PHONE_SLICES: [usize; 2] = [10, 16];
+    const PHONE_SLICES: [usize; 2] = [16, 10];
     page.heading("Phone focal stack");
     let slice = |number: usize| folder.join(format!("{number}.jpg"));
-    let reference = sharpest((1..=PHONE_STACK).map(|number| (number, slice(number))))?;
+    let reference = from_focus((1..=PHONE_STACK).map(slice))?.place;
     let Judged { rank, part, .. } = judge(&slice(PHONE_SLICES[0]), &slice(PHONE_SLICES[1]), &reference)?;
     page.paragraph(&format!(
         "{PHONE_STACK} slices of a hand-held phone (github.com/iSarmad/Depth-From-Defocus-Matlab), neither telecentric nor aligned and without a given depth. \
-         Slices {} and {} as a pair against depth from focus, the slice in which each place is sharpest (variation over 15x15 pixels): rank correlation \
-         {rank:.3} (later slices are focused nearer, so -1 is right) over {:.1} % of the pixels.",
+         Slices {} and {} as a pair against depth from focus over all slices: rank correlation {rank:.3} over {:.1} % of the pixels.",
         PHONE_SLICES[0],
         PHONE_SLICES[1],
         100.0 * part
     ));
     Ok(())
-}
-
-/// For each place the number of the slice in which it is sharpest.
-fn sharpest(slices: impl Iterator<Item = (usize, PathBuf)>) -> Result<Array2<f32>> {
-    let mut best: Option<(Array2<f32>, Array2<f32>)> = None;
-    for (number, path) in slices {
-        let sharpness = sharpness(&read_grey(&path)?.pixels);
-        let Some((most, index)) = &mut best else {
-            let first = Array2::from_elem(sharpness.dim(), number as f32);
-            best = Some((sharpness, first));
-            continue;
-        };
-        Zip::from(most).and(index).and(&sharpness).for_each(|most, index, sharpness| {
-            if sharpness > most {
-                (*most, *index) = (*sharpness, number as f32);
-            }
-        });
-    }
-    Ok(best.context("a stack without slices")?.1)
 }
 
 /// How a pair's depth agrees with a given one.
@@ -121,12 +150,10 @@ struct Judged {
     confident: Array2<bool>,
 }
 
-impl Judged {
-    /// Rank correlation of two other maps over the same pixels.
-    fn against(&self, a: &Array2<f32>, b: &Array2<f32>) -> f64 {
-        let both = a.iter().zip(b).zip(&self.confident).filter(|(_, confident)| **confident);
-        rank_correlation(&both.map(|((a, b), _)| (*a, *b)).collect::<Vec<_>>())
-    }
+/// Rank correlation of two maps over some pixels.
+fn rank_over(pixels: &Array2<bool>, a: &Array2<f32>, b: &Array2<f32>) -> f64 {
+    let both = a.iter().zip(b).zip(pixels).filter(|(_, judged)| **judged);
+    rank_correlation(&both.map(|((a, b), _)| (*a, *b)).collect::<Vec<_>>())
 }
 
 fn judge(far: &Path, near: &Path, given: &Array2<f32>) -> Result<Judged> {
@@ -142,9 +169,8 @@ fn judge(far: &Path, near: &Path, given: &Array2<f32>) -> Result<Judged> {
             *confidence >= LEAST_CONFIDENCE && depth.is_finite() && given.is_finite()
         });
     let count = confident.iter().filter(|confident| **confident).count();
-    let mut judged = Judged { rank: f64::NAN, part: count as f64 / given.len() as f64, confident };
-    judged.rank = judged.against(&map.depth_mm, given);
-    Ok(judged)
+    let rank = rank_over(&confident, &map.depth_mm, given);
+    Ok(Judged { rank, part: count as f64 / given.len() as f64, confident })
 }
 
 /// The first map of a MATLAB file.
@@ -160,30 +186,6 @@ fn matlab_depth(path: &Path) -> Result<Array2<f32>> {
         }
     }
     bail!("{} holds no map", path.display())
-}
-
-/// Sum of squared differences of neighbours over 15x15 pixels.
-fn sharpness(image: &Array2<f32>) -> Array2<f32> {
-    const HALF: usize = 7;
-    let (height, width) = image.dim();
-    // Sums over all pixels above and to the left.
-    let mut sums = Array2::<f64>::zeros((height + 1, width + 1));
-    for row in 0..height {
-        let mut line = 0.0;
-        for column in 0..width {
-            let here = image[(row, column)];
-            let right = image[(row, (column + 1).min(width - 1))] - here;
-            let below = image[((row + 1).min(height - 1), column)] - here;
-            line += f64::from(right * right + below * below);
-            sums[(row + 1, column + 1)] = sums[(row, column + 1)] + line;
-        }
-    }
-    Array2::from_shape_fn((height, width), |(row, column)| {
-        let (top, bottom) = (row.saturating_sub(HALF), (row + HALF + 1).min(height));
-        let (left, right) = (column.saturating_sub(HALF), (column + HALF + 1).min(width));
-        let sum = sums[(bottom, right)] - sums[(top, right)] - sums[(bottom, left)] + sums[(top, left)];
-        (sum / ((bottom - top) * (right - left)) as f64) as f32
-    })
 }
 
 /// Spearman's rank correlation; equal values share their mean rank.

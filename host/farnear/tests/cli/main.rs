@@ -14,6 +14,7 @@ mod camera;
 mod captures;
 mod emulated_rig;
 mod emulated_work;
+mod focus_stack;
 mod maps;
 mod markers;
 mod outputs;

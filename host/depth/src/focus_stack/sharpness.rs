@@ -1,0 +1,350 @@
+//! How sharp each place of an image is: the focus measures of Pertuz, Puig & Garcia's survey (Analysis of focus measure
+//! operators for shape-from-focus, Pattern Recognition 46, 2013), by the method's name; their short names beside them.
+//!
+//! Each is a value per pixel, from its neighbours, and a mean or a variance over a window around it. Borders are reflected.
+//! Cost: 10 to 60 operations a pixel, whatever the window, but for the range (twice the window's side).
+
+use std::{fmt, str::FromStr};
+
+use ndarray::{Array2, ArrayView2, Zip};
+
+use crate::{border::reflect, prepare::band::box_mean};
+
+/// Standard deviation of the Gaussian whose derivatives are taken, px.
+const SIGMA_PX: f64 = 1.0;
+/// Directions that steerable filters try.
+const DIRECTIONS: usize = 8;
+/// Keeps quotients finite where a picture is black, part of full scale.
+const DARK: f32 = 1e-3;
+
+macro_rules! measures {
+    ($($(#[doc = $about:literal])* $name:ident = $text:literal;)+) => {
+        /// A focus measure.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Sharpness {
+            $($(#[doc = $about])* $name,)+
+        }
+
+        impl Sharpness {
+            /// All there are.
+            pub const ALL: &[Self] = &[$(Self::$name,)+];
+
+            /// Its name, as users write it.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$name => $text,)+ }
+            }
+        }
+    };
+}
+
+measures! {
+    /// Sum of the magnitudes of both second differences (LAPM; Nayar & Nakagawa 1994).
+    ModifiedLaplacian = "modified-laplacian";
+    /// The same with the diagonals (LAPD; Thelen et al. 2009).
+    DiagonalLaplacian = "diagonal-laplacian";
+    /// Square of the Laplacian (LAPE; Subbarao et al. 1992).
+    LaplacianEnergy = "laplacian-energy";
+    /// Variance of the Laplacian (LAPV; Pech-Pacheco et al. 2000).
+    LaplacianVariance = "laplacian-variance";
+    /// Squared Sobel gradient (TENG; Krotkov 1987).
+    Tenengrad = "tenengrad";
+    /// Variance of the Sobel gradient's magnitude (TENV; Pech-Pacheco et al. 2000).
+    TenengradVariance = "tenengrad-variance";
+    /// Squared differences to the right and below (GRAE; Subbarao et al. 1992).
+    GradientEnergy = "gradient-energy";
+    /// Larger of the magnitudes of both differences (GRAT; Santos et al. 1997).
+    AbsoluteGradient = "absolute-gradient";
+    /// Squared difference to the right (GRAS; Eskicioglu & Fisher 1995).
+    SquaredGradient = "squared-gradient";
+    /// Squared difference to the next but one, the larger of both directions (BREN; Brenner et al. 1976).
+    Brenner = "brenner";
+    /// Squared gradient of the smoothed image (GDER; Geusebroek et al. 2000).
+    GaussianDerivative = "gaussian-derivative";
+    /// Largest derivative over directions of the smoothed image (SFIL; Minhas et al. 2009).
+    Steerable = "steerable";
+    /// Root of the mean squared differences of rows and columns (SFRQ; Eskicioglu & Fisher 1995).
+    SpatialFrequency = "spatial-frequency";
+    /// Variance of the grey values (GLVA; Krotkov & Martin 1986).
+    GreyVariance = "grey-variance";
+    /// The same divided by the mean (GLVN; Santos et al. 1997).
+    NormalisedVariance = "normalised-variance";
+    /// Variance of the local variance (GLLV; Pech-Pacheco et al. 2000).
+    VarianceOfVariance = "variance-of-variance";
+    /// Correlation with the next pixel less that with the next but one (VOLA; Vollath 1987).
+    Vollath = "vollath";
+    /// Magnitudes of the differences to all eight neighbours (CONT; Nanda & Cutler 2001).
+    Contrast = "contrast";
+    /// Magnitudes of the coefficients of a quadratic surface (CURV; Helmli & Scherer 2001).
+    Curvature = "curvature";
+    /// Quotient of pixel and mean, whichever way it is above 1 (HELM; Helmli & Scherer 2001).
+    MeanQuotient = "mean-quotient";
+    /// Largest less smallest grey value (HISR; Firestone et al. 1991).
+    Range = "range";
+}
+
+/// A name that no measure has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no focus measure: expected one of {names}", names = names())]
+pub struct UnknownSharpness(String);
+
+fn names() -> String {
+    Sharpness::ALL.iter().map(|measure| measure.name()).collect::<Vec<_>>().join(", ")
+}
+
+impl fmt::Display for Sharpness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Sharpness {
+    type Err = UnknownSharpness;
+
+    fn from_str(text: &str) -> Result<Self, UnknownSharpness> {
+        let known = Self::ALL.iter().find(|measure| measure.name() == text.trim());
+        known.copied().ok_or_else(|| UnknownSharpness(text.to_owned()))
+    }
+}
+
+/// Rows of a pixel's neighbourhood.
+type Around = [[f32; 3]; 3];
+
+impl Sharpness {
+    /// Pixels beyond the window that a value depends on.
+    pub(super) const REACH_PX: usize = 4;
+
+    /// The measure around each pixel of an image of (height, width), over a window of odd side.
+    pub fn of(self, image: ArrayView2<f32>, window_px: usize) -> Array2<f32> {
+        let mean = |map: Array2<f32>| box_mean(map.view(), window_px);
+        let around = |f: fn(&Around) -> f32| neighbourhoods(image, f);
+        match self {
+            Self::ModifiedLaplacian => mean(around(|a| second(a).iter().map(|d| d.abs()).sum())),
+            Self::DiagonalLaplacian => mean(around(|a| {
+                let straight: f32 = second(a).iter().map(|d| d.abs()).sum();
+                let across =
+                    (2.0 * a[1][1] - a[0][0] - a[2][2]).abs() + (2.0 * a[1][1] - a[0][2] - a[2][0]).abs();
+                straight + across * std::f32::consts::FRAC_1_SQRT_2
+            })),
+            Self::LaplacianEnergy => mean(around(|a| laplacian(a).powi(2))),
+            Self::LaplacianVariance => variance(around(laplacian), window_px),
+            Self::Tenengrad => mean(around(|a| sobel(a).iter().map(|d| d * d).sum())),
+            Self::TenengradVariance => variance(around(|a| sobel(a)[0].hypot(sobel(a)[1])), window_px),
+            Self::GradientEnergy => mean(around(|a| first(a).iter().map(|d| d * d).sum())),
+            Self::AbsoluteGradient => mean(around(|a| first(a)[0].abs().max(first(a)[1].abs()))),
+            Self::SquaredGradient => mean(around(|a| first(a)[0].powi(2))),
+            Self::Brenner => {
+                let [across, down] = [[0, 2], [2, 0]].map(|to| moved(image, to));
+                mean(
+                    Zip::from(image)
+                        .and(&across)
+                        .and(&down)
+                        .map_collect(|here, across, down| (across - here).powi(2).max((down - here).powi(2))),
+                )
+            }
+            Self::GaussianDerivative => {
+                let [x, y] = derivatives(image);
+                mean(Zip::from(&x).and(&y).map_collect(|x, y| x * x + y * y))
+            }
+            Self::Steerable => mean(steered(image)),
+            Self::SpatialFrequency => {
+                mean(around(|a| first(a).iter().map(|d| d * d).sum())).mapv_into(f32::sqrt)
+            }
+            Self::GreyVariance => variance(image.to_owned(), window_px),
+            Self::NormalisedVariance => {
+                let mut quotient = variance(image.to_owned(), window_px);
+                quotient.zip_mut_with(&mean(image.to_owned()), |variance, mean| {
+                    *variance /= mean.abs().max(DARK)
+                });
+                quotient
+            }
+            Self::VarianceOfVariance => variance(variance(image.to_owned(), 3), window_px),
+            Self::Vollath => {
+                let products = |by: usize| &image * &moved(image, [0, by]);
+                let mut difference = mean(products(1) - products(2));
+                difference.mapv_inplace(|v| v.max(0.0));
+                difference
+            }
+            Self::Contrast => mean(around(|a| a.iter().flatten().map(|v| (v - a[1][1]).abs()).sum())),
+            Self::Curvature => mean(around(quadratic)),
+            Self::MeanQuotient => mean_quotient(image, window_px),
+            Self::Range => range(image, window_px),
+        }
+    }
+}
+
+/// What `f` makes of each pixel's neighbourhood.
+fn neighbourhoods(image: ArrayView2<f32>, f: impl Fn(&Around) -> f32) -> Array2<f32> {
+    let (height, width) = image.dim();
+    let mut result = Array2::zeros((height, width));
+    for (y, mut row) in result.rows_mut().into_iter().enumerate() {
+        let rows = [-1, 0, 1].map(|d| image.row(reflect(y as isize + d, height)));
+        for (x, value) in row.iter_mut().enumerate() {
+            let columns = [-1, 0, 1].map(|d| reflect(x as isize + d, width));
+            *value = f(&rows.map(|row| columns.map(|column| row[column])));
+        }
+    }
+    result
+}
+
+/// The image moved up and left by so many rows and columns.
+fn moved(image: ArrayView2<f32>, [down, across]: [usize; 2]) -> Array2<f32> {
+    let (height, width) = image.dim();
+    Array2::from_shape_fn((height, width), |(y, x)| {
+        image[(reflect((y + down) as isize, height), reflect((x + across) as isize, width))]
+    })
+}
+
+fn first(a: &Around) -> [f32; 2] {
+    [a[1][2] - a[1][1], a[2][1] - a[1][1]]
+}
+
+fn second(a: &Around) -> [f32; 2] {
+    [2.0 * a[1][1] - a[1][0] - a[1][2], 2.0 * a[1][1] - a[0][1] - a[2][1]]
+}
+
+fn laplacian(a: &Around) -> f32 {
+    second(a).iter().sum()
+}
+
+fn sobel(a: &Around) -> [f32; 2] {
+    [
+        (a[0][2] + 2.0 * a[1][2] + a[2][2]) - (a[0][0] + 2.0 * a[1][0] + a[2][0]),
+        (a[2][0] + 2.0 * a[2][1] + a[2][2]) - (a[0][0] + 2.0 * a[0][1] + a[0][2]),
+    ]
+}
+
+/// Least squares of `c0 x + c1 y + c2 x^2 + c3 y^2` over the neighbourhood.
+fn quadratic(a: &Around) -> f32 {
+    let columns = [0, 1, 2].map(|x| a[0][x] + a[1][x] + a[2][x]);
+    let rows = [0, 1, 2].map(|y| a[y].iter().sum::<f32>());
+    let [x2, y2] = [columns[0] + columns[2], rows[0] + rows[2]];
+    let slopes = ((columns[2] - columns[0]).abs() + (rows[2] - rows[0]).abs()) / 6.0;
+    // Of both squares over all nine pixels; their sum of grey values enters with the constant that is left out.
+    let all: f32 = rows.iter().sum();
+    slopes + [x2, y2].map(|sum| (0.5 * sum - all / 3.0).abs()).iter().sum::<f32>()
+}
+
+/// Mean of the squares less the square of the mean, over a window.
+fn variance(map: Array2<f32>, window_px: usize) -> Array2<f32> {
+    // About the image's mean, so that little is lost in the difference.
+    let middle = map.mean().unwrap_or(0.0);
+    let centred = map.mapv_into(|v| v - middle);
+    let mean = box_mean(centred.view(), window_px);
+    let mut squares = box_mean(centred.mapv(|v| v * v).view(), window_px);
+    squares.zip_mut_with(&mean, |square, mean| *square = (*square - mean * mean).max(0.0));
+    squares
+}
+
+/// Derivatives of the image smoothed by a Gaussian, along x and y.
+fn derivatives(image: ArrayView2<f32>) -> [Array2<f32>; 2] {
+    let radius = Sharpness::REACH_PX as isize;
+    let gauss = |t: f64| (-0.5 * t * t / (SIGMA_PX * SIGMA_PX)).exp();
+    let total: f64 = (-radius..=radius).map(|t| gauss(t as f64)).sum();
+    let smooth: Vec<f32> = (-radius..=radius).map(|t| (gauss(t as f64) / total) as f32).collect();
+    let slope: Vec<f32> = (-radius..=radius)
+        .map(|t| (t as f64 / (SIGMA_PX * SIGMA_PX) * gauss(t as f64) / total) as f32)
+        .collect();
+    [(&slope, &smooth), (&smooth, &slope)].map(|(across, down)| separable(image, across, down))
+}
+
+fn separable(image: ArrayView2<f32>, across: &[f32], down: &[f32]) -> Array2<f32> {
+    let pass = |image: ArrayView2<f32>, taps: &[f32]| {
+        let (height, width) = image.dim();
+        let radius = (taps.len() / 2) as isize;
+        let columns: Vec<usize> = (-radius..width as isize + radius).map(|x| reflect(x, width)).collect();
+        let mut result = Array2::zeros((height, width));
+        for (mut row, from) in result.rows_mut().into_iter().zip(image.rows()) {
+            let padded: Vec<f32> = columns.iter().map(|x| from[*x]).collect();
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = padded[x..x + taps.len()].iter().zip(taps).map(|(v, tap)| v * tap).sum();
+            }
+        }
+        result
+    };
+    let rows = pass(image, across);
+    pass(rows.t(), down).reversed_axes()
+}
+
+/// Largest magnitude of the derivative over the directions.
+fn steered(image: ArrayView2<f32>) -> Array2<f32> {
+    let [x, y] = derivatives(image);
+    let directions: [(f32, f32); DIRECTIONS] =
+        std::array::from_fn(|i| (std::f32::consts::PI * i as f32 / DIRECTIONS as f32).sin_cos());
+    Zip::from(&x)
+        .and(&y)
+        .map_collect(|x, y| directions.iter().map(|(sin, cos)| (cos * x + sin * y).abs()).fold(0.0, f32::max))
+}
+
+fn mean_quotient(image: ArrayView2<f32>, window_px: usize) -> Array2<f32> {
+    let mean = box_mean(image, window_px);
+    let quotient = Zip::from(image).and(&mean).map_collect(|here, mean| {
+        let [here, mean] = [here.max(DARK), mean.max(DARK)];
+        // Less 1, which a place without any texture has: what rises and falls with the focus is the rest.
+        (here / mean).max(mean / here) - 1.0
+    });
+    box_mean(quotient.view(), window_px)
+}
+
+fn range(image: ArrayView2<f32>, window_px: usize) -> Array2<f32> {
+    let extreme = |pick: fn(f32, f32) -> f32| {
+        let pass = |map: ArrayView2<f32>| {
+            let (height, width) = map.dim();
+            let half = window_px / 2;
+            Array2::from_shape_fn((height, width), |(y, x)| {
+                let row = map.row(y);
+                (x.saturating_sub(half)..(x + half + 1).min(width))
+                    .fold(row[x], |best, at| pick(best, row[at]))
+            })
+        };
+        let rows = pass(image);
+        pass(rows.t()).reversed_axes()
+    };
+    extreme(f32::max) - extreme(f32::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texture(blur: usize) -> Array2<f32> {
+        let noise = Array2::from_shape_fn((48, 64), |(y, x)| {
+            ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32 / 97.0 + 0.2
+        });
+        box_mean(noise.view(), blur)
+    }
+
+    #[test]
+    fn every_measure_falls_as_the_image_blurs_and_is_nought_without_texture() {
+        for measure in Sharpness::ALL {
+            let middle = |image: Array2<f32>| measure.of(image.view(), 9)[(24, 32)];
+            let [sharp, soft, softer] = [3, 5, 9].map(|blur| middle(texture(blur)));
+            assert!(sharp > soft && soft > softer, "{measure}: {sharp} {soft} {softer}");
+            let flat = middle(Array2::from_elem((48, 64), 0.5));
+            assert!((0.0..1e-6).contains(&flat), "{measure}: {flat}");
+            assert_eq!(measure.name().parse(), Ok(*measure));
+        }
+        assert!(Sharpness::ALL.len() >= 20);
+        assert!("sharp".parse::<Sharpness>().unwrap_err().to_string().contains("tenengrad"));
+    }
+
+    #[test]
+    fn a_ramp_has_its_slope_and_no_curvature() {
+        let ramp = Array2::from_shape_fn((40, 40), |(y, x)| 0.03 * x as f32 + 0.01 * y as f32);
+        let at = |measure: Sharpness| measure.of(ramp.view(), 7)[(20, 20)];
+        let close = |measure: Sharpness, expected: f32| {
+            assert!((at(measure) - expected).abs() < 1e-3 * expected.max(1e-3), "{measure}: {}", at(measure));
+        };
+        close(Sharpness::SquaredGradient, 9e-4);
+        close(Sharpness::GradientEnergy, 1e-3);
+        close(Sharpness::Tenengrad, 64.0 * 1e-3);
+        close(Sharpness::Brenner, 3.6e-3);
+        close(Sharpness::GaussianDerivative, 1e-3);
+        close(Sharpness::Curvature, 0.04);
+        close(Sharpness::LaplacianEnergy, 0.0);
+        close(Sharpness::ModifiedLaplacian, 0.0);
+        // Over 7 pixels: 6 steps of each slope.
+        close(Sharpness::Range, 0.24);
+        // Variance of 7 equal steps: 4 squared slopes in each direction.
+        close(Sharpness::GreyVariance, 4e-3);
+    }
+}

@@ -1,0 +1,115 @@
+//! Depth from a stack of images at different focus.
+
+use std::fs;
+
+use farnear_files::{image_file, map};
+use ndarray::{Array2, s};
+
+use crate::common::{Folder, fails, farnear, figures, number};
+
+const IMAGES: usize = 9;
+/// Where the left and the right half are sharpest, counted from 0.
+const SHARPEST: [f32; 2] = [3.0, 5.5];
+
+/// A stack whose texture fades with the distance from where its half is sharpest, as blur makes it; named 1.png to 9.png.
+fn stack(folder: &Folder) -> String {
+    let path = folder.text("stack");
+    fs::create_dir(&path).expect("a folder");
+    for number in 0..IMAGES {
+        let pixels = Array2::from_shape_fn((60, 80), |(y, x)| {
+            let away = number as f32 - SHARPEST[usize::from(x >= 40)];
+            let texture = ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32 / 97.0 - 0.5;
+            (128.0 + 200.0 * texture * (-0.06 * away * away).exp()) as u16
+        });
+        let png = image_file::encode_png(pixels.view(), 8).expect("a picture");
+        fs::write(format!("{path}/{}.png", number + 1), png).expect("a file");
+    }
+    path
+}
+
+fn halves(depth: &Array2<f32>) -> [f32; 2] {
+    [s![8..52, 8..32], s![8..52, 48..72]].map(|half| depth.slice(half).mean().expect("pixels"))
+}
+
+#[test]
+fn each_half_lies_where_it_is_sharpest() {
+    let folder = Folder::new();
+    let (stack, out) = (folder.text("stack"), folder.text("out"));
+    self::stack(&folder);
+    let found = figures(&mut farnear(&["focus-stack", &stack, "--out", &out, "--json"]));
+    assert_eq!((number(&found, "images"), found["unit"].as_str()), (9.0, Some("image")));
+    for file in ["depth.npy", "confidence.npy", "all-in-focus.png", "view.png", "stack.toml"] {
+        assert!(folder.listing().contains(&format!("out/{file}")), "{file}");
+    }
+    // Numbers of images count from 1.
+    for (half, expected) in halves(&read(&out)).iter().zip(SHARPEST) {
+        assert!((half - expected - 1.0).abs() < 0.1, "{half}");
+    }
+    let sharp = image_file::read_grey(format!("{out}/all-in-focus.png").as_ref()).expect("a picture").pixels;
+    let contrast = |half| sharp.slice(half).std(0.0);
+    // As in the sharpest images: 200 levels of 255 over a uniform texture; half-way between two images a little less.
+    assert!(contrast(s![8..52, 8..32]) > 0.2 && contrast(s![8..52, 48..72]) > 0.2);
+}
+
+fn read(out: &str) -> Array2<f32> {
+    map::read(format!("{out}/depth.npy").as_ref()).expect("a map")
+}
+
+#[test]
+fn distances_make_it_millimetres_in_either_order() {
+    let folder = Folder::new();
+    let stack = stack(&folder);
+    let rising = "300,310,320,330,340,350,360,370,380";
+    let falling = "380,370,360,350,340,330,320,310,300";
+    for (distances, [left, right]) in [(rising, [330.0, 354.9]), (falling, [350.0, 325.0])] {
+        let out = folder.text(&distances[..3]);
+        let arguments = ["focus-stack", &stack, "--out", &out, "--distances", distances, "--json"];
+        assert_eq!(figures(&mut farnear(&arguments))["unit"], "mm");
+        let found = halves(&read(&out));
+        assert!((found[0] - left).abs() < 1.0 && (found[1] - right).abs() < 1.0, "{found:?}");
+    }
+}
+
+#[test]
+fn a_moving_camera_is_followed() {
+    let folder = Folder::new();
+    let path = stack(&folder);
+    // Each image one pixel further to the right.
+    for number in 1..=IMAGES {
+        let file = format!("{path}/{number}.png");
+        let pixels = image_file::read_grey(file.as_ref()).expect("a picture").pixels;
+        let moved = Array2::from_shape_fn(pixels.dim(), |(y, x)| {
+            (255.0 * pixels[(y, (x + 80 - number) % 80)]).round() as u16
+        });
+        fs::write(&file, image_file::encode_png(moved.view(), 8).expect("a picture")).expect("a file");
+    }
+    let out = folder.text("out");
+    let found = figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--align", "shift", "--json"]));
+    assert!((number(&found, "moved_px") - 4.0).abs() < 0.3, "{found}");
+}
+
+#[test]
+fn what_is_no_stack_is_refused_and_nothing_is_written() {
+    let folder = Folder::new();
+    let (stack, out) = (stack(&folder), folder.text("out"));
+    let refuse = |arguments: &[&str], code, phrase: &str| {
+        fails(farnear(&["focus-stack"]).args(arguments).args(["--out", &out]), code, &[phrase]);
+        assert!(!folder.listing().iter().any(|name| name.starts_with("out")), "{phrase}");
+    };
+    refuse(&[&stack, "--distances", "300,310"], 2, "one for each of the 9 images is needed");
+    refuse(&[&stack, "--distances", "300,300,320,330,340,350,360,370,380"], 2, "300 mm twice");
+    refuse(&[&stack, "--distances", "300,far"], 2, "`far` is no distance in mm");
+    refuse(
+        &[&stack, "--measure", "sharp"],
+        2,
+        "`sharp` is no focus measure: expected one of modified-laplacian",
+    );
+    refuse(&[&stack, "--window", "8"], 1, "the window is 8: an odd number from 3");
+    refuse(&["/absent"], 1, "/absent: no such picture or folder");
+    fs::write(
+        format!("{stack}/5.png"),
+        image_file::encode_png(Array2::zeros((8, 8)).view(), 8).expect("a picture"),
+    )
+    .expect("a file");
+    refuse(&[&stack], 1, "image 5 has 8x8 px and the first one 80x60");
+}
