@@ -1,6 +1,7 @@
 //! One file per command: its flags, what it does, its figures.
 
 pub mod activity;
+pub mod batch;
 pub mod calibrate;
 pub mod camera;
 pub mod compare;

@@ -9,6 +9,7 @@ mod bad_images;
 mod bad_optics;
 mod bad_ports;
 mod bad_rigs;
+mod batch;
 mod calibration;
 mod camera;
 mod captures;
