@@ -359,10 +359,11 @@ impl Work<'_> {
         std::thread::scope(|scope| {
             let work = |pool: rayon::ThreadPool| pool.install(|| self.until_the_end());
             let threads: Vec<_> = pools.into_iter().map(|pool| scope.spawn(move || work(pool))).collect();
-            let ended = threads.into_iter().map(|thread| thread.join());
-            ended.fold(Ok(()), |all, ended| {
-                all.and(ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            })
+            let ended = threads
+                .into_iter()
+                .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            // All are waited for before one's error is given.
+            ended.collect::<Vec<Result<()>>>().into_iter().collect()
         })
     }
 

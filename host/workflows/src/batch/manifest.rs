@@ -149,6 +149,11 @@ fn of_row(
     base: &Path,
 ) -> Result<(String, Fields), BatchError> {
     let mut fields = Fields::new(base);
+    if row.len() != names.len() {
+        let cells = row.iter().collect::<Vec<_>>().join(",");
+        let reason = format!("{} cells, the header names {} fields", row.len(), names.len());
+        return Err(BatchError::field("row", cells, reason));
+    }
     for (name, cell) in names.iter().zip(row).filter(|(_, cell)| !cell.is_empty()) {
         fields.insert(name, vec![cell.into()]);
     }
@@ -156,7 +161,7 @@ fn of_row(
 }
 
 fn csv_source(file: File, path: &Path) -> Result<Source, BatchError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(file);
     let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
     if !names.iter().any(|name| name == KIND) {
         let header = names.iter().collect::<Vec<_>>().join(",");
@@ -229,7 +234,10 @@ fn wrong_csv(path: &Path, error: &csv::Error) -> BatchError {
 mod tests {
     use super::*;
 
-    fn all(name: &str, text: &str) -> Vec<(usize, Result<(String, Fields), String>)> {
+    /// A job's line, and its kind and fields or what is wrong with them.
+    type Found = (usize, Result<(String, Fields), String>);
+
+    fn all(name: &str, text: &str) -> Vec<Found> {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
         std::fs::write(&path, text).expect("a writable folder");
@@ -246,9 +254,9 @@ mod tests {
     #[test]
     fn toml_and_csv_give_the_same_jobs() {
         let toml = "# shared\n[depth]\nsmooth = 9\n\n[[job]]\ndo = 'depth'\nfar = 'a.png'\n\n[[ job ]] # the second\ndo = 'correct'\n";
-        let csv = "do, far, smooth\n\n# shared\ndepth, a.png, 9\ncorrect,,\n";
-        let jobs = |found: Vec<(usize, Result<(String, Fields), String>)>| -> Vec<_> {
-            let job = |(_, job): (usize, Result<(String, Fields), String>)| {
+        let csv = "do, far, smooth\ndepth, a.png, 9\ncorrect,,\n";
+        let jobs = |found: Vec<Found>| -> Vec<_> {
+            let job = |(_, job): Found| {
                 let (kind, fields) = job.expect("a job");
                 (kind, fields.without("out"))
             };
@@ -256,7 +264,7 @@ mod tests {
         };
         let (of_toml, of_csv) = (all("a.toml", toml), all("a.csv", csv));
         assert_eq!(of_toml.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [5, 9]);
-        assert_eq!(of_csv.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [4, 5]);
+        assert_eq!(of_csv.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
         let of_toml = jobs(of_toml);
         assert_eq!(of_toml, jobs(of_csv));
         assert_eq!(of_toml[0].1["smooth"], ["9"]);
