@@ -8,6 +8,7 @@ pub mod compare;
 pub mod completions;
 pub mod correct;
 pub mod depth;
+pub mod doctor;
 pub mod measure;
 pub mod operators;
 pub mod optics;

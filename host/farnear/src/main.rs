@@ -52,6 +52,7 @@ enum Command {
     Measure(commands::measure::Arguments),
     Report(commands::report::Arguments),
     Serve(commands::serve::Arguments),
+    Doctor(commands::doctor::Arguments),
     Completions(commands::completions::Arguments),
 }
 
@@ -74,6 +75,7 @@ fn main() -> ExitCode {
         Command::Measure(arguments) => commands::measure::run(arguments),
         Command::Report(arguments) => commands::report::run(arguments),
         Command::Serve(arguments) => commands::serve::run(arguments),
+        Command::Doctor(arguments) => commands::doctor::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
     };
     match result {

@@ -15,6 +15,7 @@
 //! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
 //!   [`sun`] stands; [`activity`]: what the person does.
 //! - [`batch`]: a list of such jobs on all cores, to be gone on with after whatever stopped it.
+//! - [`doctor`]: whether this computer has what is needed.
 //! - [`context`], [`error`]: the way to the face and back.
 //!
 //! A face that keeps what it is told, and a stage that is moved; a scripted board stands behind the port here.
@@ -68,6 +69,7 @@ pub mod correct;
 pub mod correction_file;
 mod counter;
 pub mod depth;
+pub mod doctor;
 pub mod error;
 pub mod figures;
 mod kept;

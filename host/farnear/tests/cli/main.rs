@@ -13,6 +13,7 @@ mod batch;
 mod calibration;
 mod camera;
 mod captures;
+mod doctor;
 mod emulated_rig;
 mod emulated_work;
 mod maps;
