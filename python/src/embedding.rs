@@ -31,7 +31,7 @@ pub fn isomap<'py>(
 type Parts<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>, f32, f64, f64);
 
 /// Gaussian radial basis functions on all samples.
-#[pyclass(frozen, module = "farnear")]
+#[pyclass(frozen, module = "farnear._farnear")]
 pub struct Rbf(rbf::Rbf);
 
 #[pymethods]

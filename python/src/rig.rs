@@ -39,7 +39,7 @@ const LOOK: Duration = Duration::from_millis(2);
 type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
 
 /// A connected board.
-#[pyclass(module = "farnear")]
+#[pyclass(module = "farnear._farnear")]
 pub struct RigClient(Client);
 
 #[pymethods]

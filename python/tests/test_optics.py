@@ -1,3 +1,5 @@
+import pickle
+
 import numpy as np
 import pytest
 
@@ -44,3 +46,9 @@ def test_operators_go_through_their_text(optics):
         farnear.Operators(optics, family="ro")
     with pytest.raises(farnear.FarnearError, match="gm1"):
         operators.kernel("gm2")
+
+
+def test_what_is_sent_to_other_processes_arrives(optics):
+    assert pickle.loads(pickle.dumps(optics)) == optics
+    operators = farnear.Operators(optics)
+    assert pickle.loads(pickle.dumps(operators)).dumps() == operators.dumps()
