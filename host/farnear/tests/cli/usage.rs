@@ -68,6 +68,8 @@ const COMMANDS: &[&[&str]] = &[
     &["activity", "train"],
     &["activity", "recognise"],
     &["activity", "evaluate"],
+    &["batch"],
+    &["doctor"],
     &["completions"],
 ];
 
