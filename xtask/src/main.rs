@@ -13,6 +13,7 @@ mod fuzz;
 mod host;
 mod install;
 mod instructions;
+mod python;
 mod run;
 mod sizes;
 mod test;

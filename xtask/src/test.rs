@@ -6,9 +6,11 @@ use anyhow::{Result, bail};
 
 use crate::{
     boards::BOARDS,
-    browser, firmware, instructions,
+    browser::{self, Counts},
+    firmware, instructions, python,
     run::{cargo, finish, step},
-    sizes, test_programs,
+    sizes,
+    test_programs::{self, Total},
     thumb::Way,
 };
 
@@ -36,7 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     instructions::run(false)?;
 
     step("lints");
-    finish(&mut cargo(["clippy", "--workspace", "--all-targets", "--locked", "--", "--deny", "warnings"]))?;
+    let workspace = ["--workspace", "--exclude", python::PACKAGE, "--locked"];
+    finish(cargo(["clippy", "--all-targets"]).args(workspace).args(["--", "--deny", "warnings"]))?;
     if way.has_clippy() {
         let arguments = ["--release", "--locked", "--", "--deny", "warnings"];
         for board in &BOARDS {
@@ -46,19 +49,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("skipped: clippy for the firmware (Debian's rust-web-clippy is not installed)");
     }
     step("documentation");
-    finish(
-        cargo(["doc", "--workspace", "--no-deps", "--locked", "--quiet"])
-            .env("RUSTDOCFLAGS", "--deny warnings"),
-    )?;
+    finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).env("RUSTDOCFLAGS", "--deny warnings"))?;
 
     step("tests on the host and on the emulated board");
     let mut total = test_programs::run(&elf, arguments.all)?;
     step("the page in a browser");
-    let page = browser::run()?;
-    total.passed += page.passed;
-    total.failed += page.failed;
-    total.ignored += page.skipped;
-    total.well &= page.ended_well;
+    add(&mut total, &browser::run()?);
+    step("the Python package");
+    add(&mut total, &python::run(&elf)?);
     eprintln!("\nall of it took {} s", start.elapsed().as_secs());
     if total.unchanged > 0 {
         eprintln!(
@@ -71,4 +69,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bail!("tests failed");
     }
     Ok(())
+}
+
+/// Adds what another runner has counted.
+fn add(total: &mut Total, counts: &Counts) {
+    total.passed += counts.passed;
+    total.failed += counts.failed;
+    total.ignored += counts.skipped;
+    total.well &= counts.ended_well;
 }

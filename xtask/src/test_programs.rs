@@ -13,7 +13,10 @@ use std::{
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-use crate::run::{ROOT, cargo, output, step, target_folder};
+use crate::{
+    python,
+    run::{ROOT, cargo, output, step, target_folder},
+};
 
 /// Packages whose tests run the programs or the firmware; those of the others depend on their own code and files alone.
 const RUN_PROGRAMS: [&str; 2] = ["farnear", "farnear-sim"];
@@ -72,7 +75,7 @@ pub fn run(elf: &Path, all: bool) -> Result<Total> {
         }
     }
     println!("\nexamples in the documentation");
-    let mut examples = cargo(["test", "--workspace", "--locked", "--doc"]);
+    let mut examples = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--doc"]);
     watch(environment(&mut examples, elf), &mut total)?;
     Ok(total)
 }
@@ -86,8 +89,8 @@ fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
 
 /// Compiles everything; gives the test programs, and the programs that some of them run.
 fn build(elf: &Path) -> Result<(Vec<Program>, Vec<PathBuf>)> {
-    let mut command =
-        cargo(["test", "--workspace", "--locked", "--no-run", "--message-format", "json-render-diagnostics"]);
+    let mut command = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked"]);
+    command.args(["--no-run", "--message-format", "json-render-diagnostics"]);
     let text = output(environment(&mut command, elf))?;
     step("running them");
     let (mut tests, mut programs) = (Vec::new(), Vec::new());

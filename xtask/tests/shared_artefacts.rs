@@ -24,23 +24,39 @@ fn features(arguments: &[&str]) -> BTreeMap<String, Vec<String>> {
     found
 }
 
+/// Those packages of the demo that another selection compiles with other features.
+fn twice(other: &BTreeMap<String, Vec<String>>) -> Vec<String> {
+    let demo = features(&[&DEMO[..], &["--edges", "normal,build"]].concat());
+    assert!(demo.len() > 100, "cargo tree found {} packages only", demo.len());
+    let differs = |(package, builds): &(&String, &Vec<String>)| {
+        !builds.iter().all(|build| other.get(*package).is_some_and(|all| all.contains(build)))
+    };
+    let said = |(package, builds): (&String, &Vec<String>)| {
+        format!("{package}: the demo with {builds:?}, the others with {:?}", other.get(package))
+    };
+    demo.iter().filter(differs).map(said).collect()
+}
+
+const DEMO: [&str; 4] = ["--package", "farnear", "--package", "farnear-sim"];
+
 #[test]
 fn the_demo_and_the_tests_compile_the_same_packages() {
-    let demo = features(&["--package", "farnear", "--package", "farnear-sim", "--edges", "normal,build"]);
-    let tests = features(&["--workspace", "--edges", "normal,build,dev"]);
-    assert!(demo.len() > 100, "cargo tree found {} packages only", demo.len());
-    let twice: Vec<String> = demo
-        .iter()
-        .filter(|(package, builds)| {
-            !builds.iter().all(|build| tests.get(*package).is_some_and(|all| all.contains(build)))
-        })
-        .map(|(package, builds)| {
-            format!("{package}: the demo with {builds:?}, the tests with {:?}", tests.get(package))
-        })
-        .collect();
+    let tests = features(&["--workspace", "--exclude", "farnear-python", "--edges", "normal,build,dev"]);
+    let twice = twice(&tests);
     assert!(
         twice.is_empty(),
         "compiled for the demo and again for the tests; turn the feature on in host/farnear/Cargo.toml too:\n{}",
+        twice.join("\n")
+    );
+}
+
+#[test]
+fn the_python_module_shares_what_the_programs_compile() {
+    let module = features(&[&DEMO[..], &["--package", "farnear-python", "--edges", "normal,build"]].concat());
+    let twice = twice(&module);
+    assert!(
+        twice.is_empty(),
+        "compiled for the demo and again for Python; turn the feature on in host/farnear/Cargo.toml too:\n{}",
         twice.join("\n")
     );
 }

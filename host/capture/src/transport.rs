@@ -106,6 +106,13 @@ fn refuse_what_is_no_port(_: &str) -> Result<(), PortError> {
     Ok(())
 }
 
+/// The ports behind which a board may be: those on USB.
+pub fn ports() -> Vec<String> {
+    let present = serialport::available_ports().unwrap_or_default();
+    let on_usb = present.into_iter().filter(|port| matches!(port.port_type, SerialPortType::UsbPort(_)));
+    on_usb.map(|port| port.port_name).collect()
+}
+
 fn absent(path: &str) -> PortError {
     let ports = serialport::available_ports().unwrap_or_default();
     PortError::Absent { port: path.into(), present: ports.into_iter().map(|port| port.port_name).collect() }

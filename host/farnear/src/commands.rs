@@ -1,12 +1,14 @@
 //! One file per command: its flags, what it does, its figures.
 
 pub mod activity;
+pub mod batch;
 pub mod calibrate;
 pub mod camera;
 pub mod compare;
 pub mod completions;
 pub mod correct;
 pub mod depth;
+pub mod doctor;
 pub mod focus_stack;
 pub mod measure;
 pub mod operators;

@@ -49,9 +49,11 @@ enum Command {
     Shadow(commands::shadow::Arguments),
     Silhouettes(commands::silhouettes::Arguments),
     Activity(commands::activity::Arguments),
+    Batch(commands::batch::Arguments),
     Measure(commands::measure::Arguments),
     Report(commands::report::Arguments),
     Serve(commands::serve::Arguments),
+    Doctor(commands::doctor::Arguments),
     Completions(commands::completions::Arguments),
 }
 
@@ -71,9 +73,11 @@ fn main() -> ExitCode {
         Command::Shadow(arguments) => commands::shadow::run(arguments),
         Command::Silhouettes(arguments) => commands::silhouettes::run(arguments),
         Command::Activity(arguments) => commands::activity::run(arguments),
+        Command::Batch(arguments) => commands::batch::run(arguments),
         Command::Measure(arguments) => commands::measure::run(arguments),
         Command::Report(arguments) => commands::report::run(arguments),
         Command::Serve(arguments) => commands::serve::run(arguments),
+        Command::Doctor(arguments) => commands::doctor::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
     };
     match result {

@@ -5,10 +5,10 @@ use std::{
     io::{BufRead, IsTerminal, Write},
     sync::{
         OnceLock,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::{RecvTimeoutError, channel},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use anyhow::{Context as _, Result};
@@ -19,9 +19,26 @@ const LOOK: Duration = Duration::from_millis(50);
 
 /// The terminal.
 pub struct Terminal {
-    /// Whether counts are shown while they rise.
-    counts: bool,
+    counts: Counts,
 }
+
+/// How counts are shown.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Counts {
+    /// Not at all.
+    Hidden,
+    /// On one line on which they rise.
+    Rising,
+    /// On a line of their own, now and then.
+    Lines,
+}
+
+/// From one line with a count to the next, seconds.
+const COUNT_S: u64 = 10;
+/// When the next line with a count is due, and how long the work will still take, seconds since the first look at the clock.
+static NEXT_COUNT_S: AtomicU64 = AtomicU64::new(0);
+/// What [`Progress::time_left`] said last; the largest number where it said nothing.
+static LEFT_S: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Whether the cursor stands behind a count that may still rise.
 static COUNTING_LINE: AtomicBool = AtomicBool::new(false);
@@ -33,7 +50,7 @@ pub fn end_count() {
     }
 }
 
-static PLAIN: Terminal = Terminal { counts: false };
+static PLAIN: Terminal = Terminal { counts: Counts::Hidden };
 
 /// The context of a workflow at the terminal. Ctrl-C cancels it.
 ///
@@ -57,10 +74,42 @@ pub fn context() -> Result<Context<'static>> {
 /// # Errors
 /// As [`context`].
 pub fn counting(json: bool) -> Result<Context<'static>> {
-    static COUNTING: Terminal = Terminal { counts: true };
+    static COUNTING: Terminal = Terminal { counts: Counts::Rising };
     let plain = context()?;
     let counts = std::io::stderr().is_terminal() && !json;
     Ok(if counts { Context { progress: &COUNTING, ..plain } } else { plain })
+}
+
+/// The same for work of hours: counts with the time that is left, on a line of their own every ten seconds where no terminal can
+/// show them rise, or figures come between.
+///
+/// # Errors
+/// As [`context`].
+pub fn long_work() -> Result<Context<'static>> {
+    static LINES: Terminal = Terminal { counts: Counts::Lines };
+    static RISING: Terminal = Terminal { counts: Counts::Rising };
+    let rising = std::io::stderr().is_terminal() && !std::io::stdout().is_terminal();
+    Ok(Context { progress: if rising { &RISING } else { &LINES }, ..context()? })
+}
+
+/// Whether a line with a count is due; then the next is due later.
+fn is_due() -> bool {
+    static START: OnceLock<Instant> = OnceLock::new();
+    let now_s = START.get_or_init(Instant::now).elapsed().as_secs();
+    let due = now_s >= NEXT_COUNT_S.load(Ordering::Relaxed);
+    if due {
+        NEXT_COUNT_S.store(now_s + COUNT_S, Ordering::Relaxed);
+    }
+    due
+}
+
+/// A time as a person says it: 40 s, 12 min, 3 h 20 min.
+fn in_words(seconds: u64) -> String {
+    match seconds {
+        0..100 => format!("{seconds} s"),
+        100..6000 => format!("{} min", seconds.div_ceil(60)),
+        _ => format!("{} h {} min", seconds / 3600, seconds % 3600 / 60),
+    }
 }
 
 impl Progress for Terminal {
@@ -69,13 +118,30 @@ impl Progress for Terminal {
         eprintln!("{what}");
     }
 
+    fn time_left(&self, left: Duration) {
+        LEFT_S.store(left.as_secs(), Ordering::Relaxed);
+    }
+
     fn advance(&self, unit: &'static str, done: usize, total: Option<usize>) {
-        if !self.counts {
-            return;
-        }
-        match total {
-            Some(total) => eprint!("\r{done} of {total} {unit}"),
-            None => eprint!("\r{done} {unit}"),
+        let count = match total {
+            Some(total) => format!("{done} of {total} {unit}"),
+            None => format!("{done} {unit}"),
+        };
+        let left = match LEFT_S.load(Ordering::Relaxed) {
+            0 | u64::MAX => String::new(),
+            seconds => format!(", {} left", in_words(seconds)),
+        };
+        match self.counts {
+            Counts::Hidden => return,
+            Counts::Lines => {
+                if is_due() {
+                    eprintln!("{count}{left}");
+                }
+                return;
+            }
+            // Blanks over what a longer time has left behind.
+            Counts::Rising if LEFT_S.load(Ordering::Relaxed) == u64::MAX => eprint!("\r{count}"),
+            Counts::Rising => eprint!("\r{count}{left:<20}"),
         }
         COUNTING_LINE.store(true, Ordering::Relaxed);
         if total == Some(done) {
@@ -106,6 +172,18 @@ impl Questions for Terminal {
                 Err(RecvTimeoutError::Timeout) => {}
                 Ok(_) | Err(RecvTimeoutError::Disconnected) => return Err(unanswered()),
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_said_in_words() {
+        for (seconds, words) in [(40, "40 s"), (100, "2 min"), (5999, "100 min"), (12_000, "3 h 20 min")] {
+            assert_eq!(in_words(seconds), words);
         }
     }
 }

@@ -3,9 +3,12 @@
 //! A workflow writes nothing to a terminal, reads no keyboard and listens for no signal; whoever starts it (the command
 //! line, a web page, a batch runner, Python) gives it a [`Context`].
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
 };
 
 use crate::error::{Result, WorkflowError};
@@ -19,6 +22,9 @@ pub trait Progress: Sync {
     fn warn(&self, what: &str) {
         self.say(&format!("warning: {what}"));
     }
+
+    /// How much longer it will take, as far as that can be told; said before the count that it belongs to.
+    fn time_left(&self, _left: Duration) {}
 
     /// How far the work has come: `done` of `total` (where that is known) of what `unit` names, e.g. "frames".
     fn advance(&self, _unit: &'static str, _done: usize, _total: Option<usize>) {}

@@ -5,8 +5,9 @@ pub mod noise;
 pub mod output;
 mod pair;
 mod record;
+mod shared;
 
-use std::{path::PathBuf, time::Instant};
+use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use farnear_depth::{
     corrections::Correction,
@@ -22,9 +23,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::{
-    camera_frames,
     context::Context,
-    correction_file,
     error::{About, Result, WorkflowError},
     figures::rounded,
     optics,
@@ -34,6 +33,8 @@ use method::{Method, Prepared};
 use noise::{CameraNoise, Source, Uncertainty};
 use output::{Outputs, Results};
 use pair::Pair;
+
+pub use shared::Shared;
 
 /// What depth is computed from, how, and where it goes.
 #[derive(Clone, Debug)]
@@ -99,8 +100,20 @@ pub struct DepthFigures {
 /// [`WorkflowError::Parameter`] for what contradicts itself, before anything is read; then optics, images, operators,
 /// correction, computation, files.
 pub fn compute(settings: &DepthSettings, context: &Context<'_>) -> Result<DepthFigures> {
+    compute_sharing(settings, &Shared::default(), context)
+}
+
+/// The same for one of many maps, which share what they are computed with.
+///
+/// # Errors
+/// As [`compute`].
+pub fn compute_sharing(
+    settings: &DepthSettings,
+    shared: &Shared,
+    context: &Context<'_>,
+) -> Result<DepthFigures> {
     settings.check()?;
-    let inputs = Inputs::read(settings)?;
+    let inputs = Inputs::read(settings, shared)?;
     let start = Instant::now();
     let computed = inputs.compute(settings, context)?;
     let seconds = start.elapsed().as_secs_f64();
@@ -166,8 +179,8 @@ struct Inputs {
     optics: Optics,
     pair: Pair,
     method: Prepared,
-    correction: Option<Correction>,
-    camera: Option<CameraFrames>,
+    correction: Option<Arc<Correction>>,
+    camera: Option<Arc<CameraFrames>>,
     /// What there is to say of the optics.
     doubts: Vec<String>,
 }
@@ -183,15 +196,15 @@ struct Computed {
 }
 
 impl Inputs {
-    fn read(settings: &DepthSettings) -> Result<Self> {
+    fn read(settings: &DepthSettings, shared: &Shared) -> Result<Self> {
         let (optics, doubts) = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
         let pair = Pair::read(&settings.far, &settings.near)?;
-        let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics)?;
-        let correction = settings.correction.as_deref().map(correction_file::read).transpose()?;
+        let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, shared)?;
+        let correction = settings.correction.as_deref().map(|file| shared.correction(file)).transpose()?;
         if let Some(correction) = &correction {
             correction.check_range(&optics.working_range())?;
         }
-        let camera = settings.camera.as_deref().map(camera_frames::read).transpose()?;
+        let camera = settings.camera.as_deref().map(|folder| shared.camera(folder)).transpose()?;
         Ok(Self { optics, pair, method, correction, camera, doubts })
     }
 
@@ -204,7 +217,7 @@ impl Inputs {
             self.pair.near.view(),
             &self.optics,
             self.method.as_real(),
-            self.camera.as_ref(),
+            self.camera.as_deref(),
             &real,
         )
         .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
@@ -222,7 +235,7 @@ impl Inputs {
                     settings: &real.run,
                     judged: &judgement.deviation_mm,
                 };
-                noise::deviation(noise, &source, &map, self.correction.as_ref())
+                noise::deviation(noise, &source, &map, self.correction.as_deref())
             })
             .transpose()?;
         cancel("computing its deviation")?;

@@ -99,7 +99,7 @@ pub enum WorkflowError {
         alarm: Option<u32>,
     },
     /// Lines that nobody takes any more.
-    #[error("the log cannot be handed on: {source}")]
+    #[error("what was found cannot be handed on: {source}")]
     Sink {
         /// What the system says.
         source: std::io::Error,
@@ -268,6 +268,9 @@ pub enum WorkflowError {
     /// An evaluation.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),
+    /// Many jobs.
+    #[error(transparent)]
+    Batch(#[from] crate::batch::BatchError),
     /// A record that cannot be put into TOML.
     #[error("cannot write a record: {0}")]
     Toml(#[from] toml::ser::Error),

@@ -14,6 +14,8 @@
 //! - [`calibrate`]: learning the point spread function and corrections.
 //! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
 //!   [`sun`] stands; [`activity`]: what the person does.
+//! - [`batch`]: a list of such jobs on all cores, to be gone on with after whatever stopped it.
+//! - [`doctor`]: whether this computer has what is needed.
 //! - [`context`], [`error`]: the way to the face and back.
 //!
 //! A face that keeps what it is told, and a stage that is moved; a scripted board stands behind the port here.
@@ -56,6 +58,7 @@
 //! ```
 
 pub mod activity;
+pub mod batch;
 pub mod calibrate;
 pub mod camera;
 pub mod camera_frames;
@@ -66,9 +69,11 @@ pub mod correct;
 pub mod correction_file;
 mod counter;
 pub mod depth;
+pub mod doctor;
 pub mod error;
 pub mod figures;
 pub mod focus_stack;
+mod kept;
 pub mod lens_table;
 pub mod measure;
 mod operator_cache;

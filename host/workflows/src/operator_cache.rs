@@ -88,7 +88,7 @@ fn build() -> Option<String> {
 }
 
 /// Where programs of this user keep what can be made again.
-fn folder() -> Option<PathBuf> {
+pub(crate) fn folder() -> Option<PathBuf> {
     let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     absolute("XDG_CACHE_HOME").or_else(|| {
         if cfg!(windows) {

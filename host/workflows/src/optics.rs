@@ -86,6 +86,14 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<String>)
     Err(WorkflowError::NoOptics { far: far.into() })
 }
 
+/// The file that [`of_pair`] reads; `None` where there is none.
+pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> {
+    let folder = far.parent().unwrap_or(Path::new(""));
+    let beside =
+        || [CAPTURE_FILE, "optics.toml"].map(|name| folder.join(name)).into_iter().find(|file| file.exists());
+    named.map(Path::to_path_buf).or_else(beside)
+}
+
 fn check(text: &str, path: &Path) -> Result<Optics> {
     let file: OpticsFile = toml::from_str(text).about(|| about(path))?;
     file.check().about(|| about(path))

@@ -220,7 +220,7 @@ fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<Str
 }
 
 /// Beside this program, else on the PATH.
-fn find() -> Result<PathBuf, SimulatorError> {
+pub(crate) fn find() -> Result<PathBuf, SimulatorError> {
     let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(&name)));
     let path = std::env::var_os("PATH").unwrap_or_default();

@@ -19,6 +19,7 @@ const COMMANDS: &[&[&str]] = &[
     &["camera", "grab"],
     &["camera", "live"],
     &["correct"],
+    &["focus-stack"],
     &["compare"],
     &["measure"],
     &["measure", "region"],
@@ -68,6 +69,8 @@ const COMMANDS: &[&[&str]] = &[
     &["activity", "train"],
     &["activity", "recognise"],
     &["activity", "evaluate"],
+    &["batch"],
+    &["doctor"],
     &["completions"],
 ];
 
@@ -124,7 +127,6 @@ fn bad_usage_ends_with_2() {
         (vec!["operators", "--optics", optics, "--design", "cubic"], vec!["cubic", "linear"]),
         (vec!["render", "--optics", optics, "--out", "x", "--scene", "cube"], vec!["cube", "staircase"]),
         (vec!["render", "--optics", optics, "--out", "x", "--noise", "9bit"], vec!["9bit", "12bit"]),
-        (vec!["rig", "info"], vec!["--port"]),
         (vec!["rig", "info", "--port", "sim", "--scene", "cube"], vec!["cube", "staircase"]),
         (vec!["rig", "info", "--port", "sim", "--noise", "9bit"], vec!["9bit", "12bit"]),
         (vec!["rig", "info", "--port", "/dev/x", "--seed", "2"], vec!["--seed goes with --port sim only"]),

@@ -1,13 +1,11 @@
 //! How depth is computed: rational operators or a method to compare with.
 
-use std::{fmt, path::Path, str::FromStr};
+use std::{fmt, path::Path, str::FromStr, sync::Arc};
 
 use farnear_depth::{baselines, operators::Operators, optics::Optics, real::RealMethod};
 
-use crate::{
-    error::{Result, WorkflowError},
-    operators,
-};
+use super::shared::Shared;
+use crate::error::{Result, WorkflowError};
 
 /// How depth is computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -56,7 +54,7 @@ impl fmt::Display for Method {
 /// A method with what it needs.
 pub enum Prepared {
     /// With its operators.
-    RationalOperators(Box<Operators>),
+    RationalOperators(Arc<Operators>),
     /// Designs its kernels for the optics.
     Whitened,
     /// Learns what it needs by itself.
@@ -68,10 +66,10 @@ impl Prepared {
     ///
     /// # Errors
     /// [`WorkflowError::Parameter`]; why there are no such operators.
-    pub fn new(method: Method, asked: Option<&Path>, optics: &Optics) -> Result<Self> {
+    pub fn new(method: Method, asked: Option<&Path>, optics: &Optics, shared: &Shared) -> Result<Self> {
         match (method, asked) {
             (Method::RationalOperators, asked) => {
-                Ok(Self::RationalOperators(Box::new(operators::find(asked, optics)?)))
+                Ok(Self::RationalOperators(shared.operators(asked, optics)?))
             }
             (Method::Whitened | Method::Baseline(_), Some(asked)) => Err(WorkflowError::parameter(
                 "operators",

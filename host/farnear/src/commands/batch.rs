@@ -1,0 +1,68 @@
+//! `farnear batch`: the jobs of a manifest on all cores.
+
+use std::{io, path::PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+use farnear_workflows::batch::{self, BatchSettings, JobReport, Shard};
+
+use crate::{report, terminal};
+
+/// Do many jobs on all cores: depth, correct, silhouettes-video, silhouettes-markers, shadow-remove, recognise.
+///
+/// A manifest in TOML names what jobs of a kind share, then every job; `do` is the kind, the other fields are the flags of the
+/// command of that name, and paths are relative to the manifest:
+///
+///     [depth]
+///     optics = "rig.toml"
+///     write = "npy,view"
+///
+///     [[job]]
+///     do = "depth"
+///     far = "001/far.png"
+///     near = "001/near.png"
+///     out = "001/depth"
+///
+/// A manifest in CSV has a header with the names of the fields and a row per job. Kinds and fields: depth (far, near, out, optics,
+/// ...), correct (depth, correction, out), silhouettes-video (video, out, ...), silhouettes-markers (file, template, out, ...),
+/// shadow-remove (masks, camera, lat, lon, time, out, ...), recognise (views, model, out, as, window).
+///
+/// Each job prints a JSON line when it ends: "done", "already" (its result was made before from the same inputs and settings by
+/// the same version, as batch.toml beside it says) or "failed", with its message. One that fails does not stop the others; failures
+/// stand in MANIFEST.failures.jsonl too, and the exit code is 1. After Ctrl-C, a kill or a loss of power the same command goes on
+/// where that ended.
+#[derive(Args)]
+#[command(
+    verbatim_doc_comment,
+    after_help = "Example: farnear batch pairs.toml\n\
+                  \x20        farnear batch clips.csv --shard 2/4 > clips-2.jsonl"
+)]
+pub struct Arguments {
+    /// The list of jobs: .toml or .csv.
+    manifest: PathBuf,
+    /// Jobs at a time, each on one core; 0 = as many as there are cores.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    jobs: usize,
+    /// Do the I-th of N shares of the jobs only, so that N machines do all of them.
+    #[arg(long, value_name = "I/N", default_value = "1/1")]
+    shard: Shard,
+    /// Look through results that are done already byte by byte, and make damaged ones again.
+    #[arg(long)]
+    verify: bool,
+    /// Where failures go [default: MANIFEST's name with .failures.jsonl].
+    #[arg(long, value_name = "FILE")]
+    failures: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// See [`batch::run`].
+pub fn run(arguments: Arguments) -> Result<()> {
+    let Arguments { manifest, jobs, shard, verify, failures } = arguments;
+    let settings = BatchSettings { manifest, jobs, shard, verify, failures };
+    let line =
+        |told: &JobReport| report::print(told, true).map_err(|error| io::Error::other(format!("{error:#}")));
+    batch::run(&settings, &terminal::long_work()?, &line)?;
+    Ok(())
+}

@@ -1,0 +1,59 @@
+//! `farnear doctor`: whether this computer has what farnear needs.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use farnear_workflows::doctor::{self, DoctorSettings, Finding, Health};
+
+use crate::{report, terminal};
+
+/// Look whether this computer has what farnear needs, and say what to do about what it has not.
+///
+/// Processor, folders, emulated rig, serial ports and the right to open them, cameras, ffmpeg and, with --port, the board's firmware.
+/// Nothing moves; no port is opened but the one that is named. Each line is ok, optional (only some need it) or missing; the exit code is 1
+/// where something is missing.
+#[derive(Args)]
+#[command(after_help = "Example: farnear doctor --port /dev/ttyACM0")]
+pub struct Arguments {
+    /// Ask the board behind this serial port for its firmware's version.
+    #[arg(long, value_name = "PORT")]
+    port: Option<String>,
+    /// Folders that results are to go to, beside the current one.
+    #[arg(value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Where something is missing.
+pub fn run(arguments: Arguments) -> Result<()> {
+    let settings = DoctorSettings { port: arguments.port, folders: arguments.folders };
+    let figures = doctor::examine(&settings, &terminal::context()?)?;
+    if arguments.json {
+        report::print(&figures, true)?;
+    } else {
+        let lines: String = figures.findings.iter().map(line).collect();
+        report::to_stdout(lines.as_bytes())?;
+    }
+    match figures.missing() {
+        0 => Ok(()),
+        1 => bail!("one thing is missing; its line says what to do"),
+        several => bail!("{several} things are missing; their lines say what to do"),
+    }
+}
+
+fn line(finding: &Finding) -> String {
+    let health = match finding.health {
+        Health::Ok => "ok",
+        Health::Optional => "optional",
+        Health::Missing => "missing",
+    };
+    let Finding { what, found, remedy, .. } = finding;
+    let remedy = if remedy.is_empty() { String::new() } else { format!("; {remedy}") };
+    format!("{health:<9} {what}: {found}{remedy}\n")
+}

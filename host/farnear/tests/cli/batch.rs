@@ -1,0 +1,288 @@
+//! `farnear batch`: each job gives what its command gives; killed, edited, damaged and failing ones.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use serde_json::Value;
+
+use crate::common::{Folder, fails, farnear, figures, rig_optics, succeeds};
+
+/// What a run says of its jobs, in the manifest's order.
+#[track_caller]
+fn lines(stdout: &[u8]) -> Vec<Value> {
+    let text = std::str::from_utf8(stdout).expect("UTF-8");
+    let mut lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect(line)).collect();
+    lines.sort_by_key(|line| line["job"].as_u64());
+    lines
+}
+
+/// The states of all jobs of a run that must succeed.
+#[track_caller]
+fn states(arguments: &[&str]) -> Vec<String> {
+    let (stdout, _) = succeeds(&mut farnear(arguments));
+    lines(stdout.as_bytes()).iter().map(|line| line["state"].as_str().expect("a state").into()).collect()
+}
+
+/// Every file below a folder with its bytes.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let entry = entry.expect("an entry");
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() {
+            found.extend(
+                files(&entry.path()).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)),
+            );
+        } else {
+            found.insert(name, fs::read(entry.path()).expect("a file"));
+        }
+    }
+    found
+}
+
+/// A rendered pair, its optics and a manifest of `jobs` maps of it, each with windows of its own.
+fn pairs(folder: &Folder, jobs: usize) -> String {
+    let size = ["--width", "160", "--height", "120", "--scene", "slant"];
+    succeeds(farnear(&["render", "--optics", rig_optics(), "--out", &folder.text("pair")]).args(size));
+    let mut text = String::from("[depth]\nfar = 'pair/far.png'\nnear = 'pair/near.png'\nwrite = 'npy'\n");
+    for job in 0..jobs {
+        text += &format!("[[job]]\ndo = 'depth'\nsmooth = {}\nout = 'maps/{job}'\n", 2 * (job % 8) + 3);
+    }
+    folder.file("pairs.toml", text)
+}
+
+#[test]
+fn what_was_killed_goes_on_and_ends_as_if_it_had_not_been() {
+    const JOBS: usize = 24;
+    let [whole, killed] = [Folder::new(), Folder::new()];
+    let manifests = [&whole, &killed].map(|folder| pairs(folder, JOBS));
+    assert_eq!(states(&["batch", &manifests[0]]), vec!["done"; JOBS]);
+    for _ in 0..3 {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_farnear"))
+            .env("XDG_CACHE_HOME", concat!(env!("CARGO_TARGET_TMPDIR"), "/cache"))
+            .args(["batch", &manifests[1], "--jobs", "2"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // The first of its jobs that was worked at has ended, others are under way.
+        let lines = BufReader::new(process.stdout.take().expect("a pipe")).lines();
+        let done = lines.map_while(Result::ok).find(|line| line.contains("\"done\""));
+        process.kill().expect("a process to kill");
+        process.wait().expect("a process that ends");
+        assert!(done.is_some(), "all was done before it could be killed");
+    }
+    let resumed = states(&["batch", &manifests[1]]);
+    let count = |state: &str| resumed.iter().filter(|found| *found == state).count();
+    assert!(count("already") >= 3 && count("done") > 0 && resumed.len() == JOBS, "{resumed:?}");
+    let (expected, found) = (files(&whole.path("maps")), files(&killed.path("maps")));
+    assert_eq!(
+        found.keys().collect::<Vec<_>>(),
+        expected.keys().collect::<Vec<_>>(),
+        "hidden ones are left too"
+    );
+    assert!(found == expected, "other bytes than of an unbroken run");
+}
+
+#[test]
+fn a_bad_job_does_not_stop_the_others() {
+    let folder = Folder::new();
+    let manifest = pairs(&folder, 2);
+    fs::create_dir(folder.path("mine")).expect("a writable folder");
+    folder.file("mine/notes.txt", "of the user");
+    let good = fs::read_to_string(&manifest).expect("the manifest");
+    let wrong: [(&str, &[&str]); 7] = [
+        ("do = 'depth'\nnear = 'gone.png'\nout = 'maps/a'", &["gone.png"]),
+        ("do = 'magic'\nout = 'maps/b'", &["magic", "depth, correct"]),
+        ("do = 'depth'\nsmoth = 3\nout = 'maps/c'", &["smoth", "smooth"]),
+        ("do = 'depth'\nout = ", &["line"]),
+        ("do = 'depth'\nout = 'mine'", &["mine", "no batch made it"]),
+        ("do = 'depth'\nsmooth = 4\nout = 'maps/d'", &["4 px", "odd"]),
+        // The first job's place.
+        ("do = 'depth'\nsmooth = 9\nout = 'maps/0'", &["another job", "maps/0"]),
+    ];
+    let bad: String = wrong.iter().map(|(job, _)| format!("[[job]]\n{job}\n")).collect();
+    fs::write(&manifest, good.clone() + &bad).expect("a writable folder");
+    // One after the other, so that it is known which of the two that share a place comes second.
+    let output = farnear(&["batch", &manifest, "--jobs", "1"]).output().expect("the program starts");
+    assert_eq!(output.status.code(), Some(1));
+    let said = lines(&output.stdout);
+    assert_eq!(said.len(), 9);
+    assert!(said[..2].iter().all(|line| line["state"] == "done"), "{said:?}");
+    for (line, (job, phrases)) in said[2..].iter().zip(wrong) {
+        let error = line["error"].as_str().expect("a message");
+        assert!(
+            line["state"] == "failed" && phrases.iter().all(|phrase| error.contains(phrase)),
+            "{job}: {line}"
+        );
+    }
+    let kept = fs::read(folder.path("pairs.failures.jsonl")).expect("failures");
+    assert_eq!(lines(&kept), said[2..], "kept apart with their messages");
+    assert_eq!(files(&folder.path("mine")).len(), 1);
+    assert!(!folder.listing().iter().any(|name| name.contains("partial")), "{:?}", folder.listing());
+
+    fs::write(&manifest, good).expect("a writable folder");
+    assert_eq!(states(&["batch", &manifest]), ["already"; 2]);
+    assert!(!folder.path("pairs.failures.jsonl").exists());
+}
+
+#[test]
+fn what_has_changed_is_done_again_and_nothing_else() {
+    let folder = Folder::new();
+    let manifest = pairs(&folder, 2);
+    let again = || states(&["batch", &manifest]);
+    assert_eq!(again(), ["done"; 2]);
+    let before = files(&folder.path("maps"));
+    let edit = |from: &str, to: &str| {
+        let text = fs::read_to_string(&manifest).expect("the manifest");
+        assert!(text.contains(from));
+        fs::write(&manifest, text.replace(from, to)).expect("a writable folder");
+    };
+    edit("smooth = 5", "smooth = 7");
+    assert_eq!(again(), ["already", "done"], "a setting");
+    // A pixel of the far image: both were made from it.
+    let far = folder.path("pair/far.png");
+    let mut picture = image::open(&far).expect("a picture").into_luma8();
+    picture.get_pixel_mut(80, 60).0[0] ^= 0x10;
+    picture.save(&far).expect("a writable folder");
+    assert_eq!(again(), ["done"; 2], "an image");
+    // The optics beside the pair, which no field names.
+    let optics = fs::read_to_string(folder.path("pair/optics.toml")).expect("optics");
+    folder.file("pair/optics.toml", format!("{optics}# looked through\n"));
+    assert_eq!(again(), ["done"; 2], "optics");
+    assert_eq!(again(), ["already"; 2]);
+    // Damage: a file that is cut is seen at once, one with another byte where it is looked for.
+    let cut = before["0/depth.npy"].len() as u64 - 4;
+    let map = fs::File::options().write(true).open(folder.path("maps/0/depth.npy")).expect("a map");
+    map.set_len(cut).expect("a writable file");
+    assert_eq!(again(), ["done", "already"], "a cut map");
+    let mut bytes = fs::read(folder.path("maps/1/depth.npy")).expect("a map");
+    *bytes.last_mut().expect("bytes") ^= 1;
+    fs::write(folder.path("maps/1/depth.npy"), bytes).expect("a writable file");
+    assert_eq!(again(), ["already"; 2]);
+    assert_eq!(states(&["batch", &manifest, "--verify"]), ["already", "done"], "another byte");
+    // What another setting wrote does not stay beside what this one writes.
+    edit("'npy'", "'png'");
+    assert_eq!(again(), ["done"; 2]);
+    assert!(!folder.path("maps/0/depth.npy").exists() && folder.path("maps/0/depth.png").exists());
+}
+
+#[test]
+fn shards_do_all_jobs_together() {
+    let [whole, shared] = [Folder::new(), Folder::new()];
+    let manifests = [&whole, &shared].map(|folder| pairs(folder, 5));
+    states(&["batch", &manifests[0]]);
+    assert_eq!(states(&["batch", &manifests[1], "--shard", "1/2"]).len(), 3);
+    assert_eq!(states(&["batch", &manifests[1], "--shard", "2/2"]).len(), 2);
+    assert!(files(&whole.path("maps")) == files(&shared.path("maps")), "other bytes than of one run");
+    fails(&mut farnear(&["batch", &manifests[0], "--shard", "3/2"]), 2, &["3/2", "1/N to N/N"]);
+}
+
+/// A job of every kind, and the command that does the same.
+#[test]
+fn each_kind_gives_what_its_command_gives() {
+    let folder = Folder::new();
+    pairs(&folder, 0);
+    let targets =
+        ["a", "b", "c", "d", "e", "f"].into_iter().zip([932.0_f32, 923.0, 914.0, 905.0, 896.0, 888.0]);
+    let list = targets.map(|(name, true_mm)| {
+        let found = ndarray::Array2::from_elem((30, 40), true_mm + 1.0);
+        folder.file(&format!("{name}.npy"), farnear_files::npy::write(found.view()));
+        format!("[[pattern]]\ndepth = \"{name}.npy\"\ntrue_mm = {true_mm:?}\n")
+    });
+    let list: String = list.collect();
+    folder.file("patterns.toml", list);
+    folder.file("suit.toml", "name = 'box'\n[[part]]\nname = 'body'\nmarkers = ['B1', 'B2', 'B3', 'B4']\n");
+    let corners = "0,0,0,400,0,0,0,0,1000,400,100,1000";
+    let names = [1, 2, 3, 4].map(|i| format!("B{i}_x,B{i}_y,B{i}_z")).join(",");
+    folder.file("walk.csv", format!("frame,{names}\n1,{corners}\n2,{corners}\n"));
+    folder.file("camera.toml", "[camera]\nheight_m = 0.8\nazimuth_deg = 140.0\npitch_deg = 0.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n");
+    for (folder_name, level) in [("masks", 255), ("video", 200)] {
+        fs::create_dir(folder.path(folder_name)).expect("a writable folder");
+        for frame in 0..16_u32 {
+            let inside =
+                |x: u32, y: u32| (100 + 4 * frame..130 + 4 * frame).contains(&x) && (60..200).contains(&y);
+            let level = |x, y| {
+                if inside(x, y) {
+                    level
+                } else if level == 255 {
+                    0
+                } else {
+                    90 + (x * 7 + y * 3 + frame) as u8 % 5
+                }
+            };
+            let picture = image::GrayImage::from_fn(640, 480, |x, y| image::Luma([level(x, y)]));
+            picture.save(folder.path(&format!("{folder_name}/{frame:02}.png"))).expect("a picture");
+        }
+    }
+    let run = |command: &str| {
+        let arguments: Vec<&str> = command.split(' ').collect();
+        // A job of a batch has one thread; some sums differ in their last bit with the number of threads.
+        succeeds(farnear(&arguments).current_dir(folder.path("")).env("RAYON_NUM_THREADS", "1"));
+    };
+    for command in [
+        "calibrate correction patterns.toml --method clsf --out learned.toml",
+        "silhouettes synthetic --subjects 2 --activities walk,dig --views 1 --rate-hz 6 --mm-per-px 25 --out people",
+        "activity train people/samples.toml --no-search --out model.fnm",
+        "depth pair/far.png pair/near.png --method whitened --fill --threads 1 --out c/depth",
+        "correct a.npy --correction learned.toml --out c/corrected.npy",
+        "silhouettes video video --learn-first --centred --out c/video",
+        "silhouettes markers walk.csv --template suit.toml --views 2 --out c/markers",
+        "shadow remove masks --camera camera.toml --lat 52.38 --lon -1.56 --time 2014-06-23T11:30:00Z --out c/clean",
+    ] {
+        if command.contains("correct a.npy") {
+            fs::create_dir_all(folder.path("c")).expect("a writable folder");
+        }
+        run(command);
+    }
+    let manifest = folder.file(
+        "all.csv",
+        "do,far,near,depth,file,video,masks,views,method,out,fill,correction,learn_first,centred,template,camera,lat,lon,time,model\n\
+         depth,pair/far.png,pair/near.png,,,,,,whitened,b/depth,true,,,,,,,,,\n\
+         correct,,,a.npy,,,,,,b/corrected.npy,,learned.toml,,,,,,,,\n\
+         silhouettes-video,,,,,video,,,,b/video,,,true,true,,,,,,\n\
+         silhouettes-markers,,,,walk.csv,,,2,,b/markers,,,,,suit.toml,,,,,\n\
+         shadow-remove,,,,,,masks,,,b/clean,,,,,,camera.toml,52.38,-1.56,2014-06-23T11:30:00Z,\n\
+         recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm\n",
+    );
+    assert_eq!(states(&["batch", &manifest]), ["done"; 6]);
+    assert_eq!(states(&["batch", &manifest]), ["already"; 6]);
+    let mut made = files(&folder.path("b"));
+    let answer = made.remove("answer/recognition.json").expect("an answer");
+    assert_eq!(made.remove("answer/answers.jsonl").expect("answers").split(|byte| *byte == b'\n').count(), {
+        let (stdout, _) = succeeds(
+            farnear(&["activity", "recognise", "people/p01-dig-1/view1", "--model", "model.fnm"])
+                .current_dir(folder.path("")),
+        );
+        stdout.lines().count()
+    });
+    made.retain(|name, _| !name.ends_with("batch.toml"));
+    let expected = files(&folder.path("c"));
+    assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
+    let other: Vec<&String> = made.keys().filter(|name| made[*name] != expected[*name]).collect();
+    assert!(other.is_empty(), "other bytes than the command's: {other:?}");
+    let whole = figures(
+        farnear(&["activity", "recognise", "people/p01-dig-1/view1", "--model", "model.fnm", "--json"])
+            .current_dir(folder.path("")),
+    );
+    let mut answer: Value = serde_json::from_slice(&answer).expect("JSON");
+    answer["seconds_per_frame"] = whole["seconds_per_frame"].clone();
+    assert_eq!(answer, whole);
+}
+
+#[test]
+fn a_manifest_that_is_none_is_refused_before_anything_is_done() {
+    let folder = Folder::new();
+    let manifest = folder.file("list.txt", "");
+    fails(&mut farnear(&["batch", &manifest]), 1, &["list.txt", ".toml or .csv"]);
+    fails(&mut farnear(&["batch", &folder.text("gone.toml")]), 1, &["gone.toml", "No such file"]);
+    let manifest = folder.file("list.csv", "far,near\na,b\n");
+    fails(&mut farnear(&["batch", &manifest]), 1, &["list.csv, line 1", "`do`"]);
+    // None at all is no failure.
+    assert!(states(&["batch", &folder.file("empty.toml", "")]).is_empty());
+}

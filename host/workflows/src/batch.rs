@@ -1,0 +1,495 @@
+//! Many jobs from a manifest, on all cores: each done once, whatever stops the work in between.
+//!
+//! A job is done when its result is whole and `batch.toml` beside it says that it was made from the same settings, the same bytes
+//! of input and by the same version of this program; a run leaves what is done alone. Results are made aside and renamed, so that
+//! one that is there is whole. A job that fails does not stop the others. The manifest is read job by job: memory depends on the
+//! number of jobs at a time and not on that of all.
+
+mod fields;
+mod jobs;
+mod manifest;
+mod place;
+mod provenance;
+mod tally;
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+    time::{Instant, SystemTime},
+};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use self::{
+    fields::Fields,
+    manifest::{Entry, Manifest},
+    place::{Found, Place},
+    provenance::{Provenance, Sums},
+    tally::Tally,
+};
+use crate::{
+    activity::recognition::Model,
+    context::{Cancel, Context, Nobody, Progress},
+    depth,
+    error::Result,
+    figures::rounded,
+    kept::{Kept, Stamp},
+};
+
+/// Models of activities that are kept from job to job.
+const MODELS: usize = 2;
+/// Warnings of one job that are reported.
+const WARNINGS_MAX: usize = 20;
+
+/// Which jobs are done, and how.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct BatchSettings {
+    /// The list of jobs: TOML or CSV.
+    pub manifest: PathBuf,
+    /// Jobs at a time, each on one core; 0 = as many as there are cores.
+    pub jobs: usize,
+    /// The part of the jobs that is done here.
+    pub shard: Shard,
+    /// Whether results that are done already are looked through byte by byte, not only by the lengths of their files.
+    pub verify: bool,
+    /// Where failures are written, a JSON line each; without it `NAME.failures.jsonl` beside the manifest.
+    pub failures: Option<PathBuf>,
+}
+
+/// Every so-many-th job.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Shard {
+    index: usize,
+    of: usize,
+}
+
+/// A text that names no part.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("`{0}` is no shard: expected I/N, from 1/N to N/N")]
+pub struct UnknownShard(String);
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { index: 1, of: 1 }
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = UnknownShard;
+
+    fn from_str(text: &str) -> Result<Self, UnknownShard> {
+        let parts =
+            text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err(UnknownShard(text.into())),
+        }
+    }
+}
+
+impl Shard {
+    /// Whether job `number`, from 1, belongs to it.
+    fn has(self, number: usize) -> bool {
+        (number - 1) % self.of == self.index - 1
+    }
+
+    /// How many of `jobs` belong to it.
+    fn share(self, jobs: usize) -> usize {
+        (jobs + self.of - self.index) / self.of
+    }
+}
+
+/// What became of a job.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// Its result was made now.
+    Done,
+    /// Its result was there.
+    Already,
+    /// It has none.
+    Failed,
+}
+
+/// One job's line.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct JobReport {
+    /// Its number in the manifest, from 1.
+    pub job: usize,
+    /// The line of the manifest that it begins on.
+    pub line: usize,
+    /// What it does.
+    #[serde(rename = "do")]
+    pub kind: String,
+    /// Where its result is, as the manifest says it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub out: Option<String>,
+    /// What became of it.
+    pub state: State,
+    /// How long it took.
+    pub seconds: f64,
+    /// What the command of the same name prints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub figures: Option<Value>,
+    /// What it warned of.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+    /// Why it failed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+}
+
+/// How many jobs were what.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+pub struct BatchFigures {
+    /// Jobs of the shard.
+    pub jobs: usize,
+    /// Made now.
+    pub done: usize,
+    /// Made before.
+    pub already: usize,
+    /// Without a result.
+    pub failed: usize,
+    /// For all.
+    pub seconds: f64,
+}
+
+/// Why jobs, or one of them, cannot be done.
+#[derive(Debug, thiserror::Error)]
+pub enum BatchError {
+    /// A file that cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A result that cannot be put in place.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The place.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Neither TOML nor CSV.
+    #[error("{}: a manifest's name ends in .toml or .csv", path.display())]
+    Ending {
+        /// The manifest.
+        path: PathBuf,
+    },
+    /// A manifest that cannot be understood.
+    #[error("{}, line {line}: {reason}", path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// Where.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A job of a kind that is not known.
+    #[error("there is no job `{name}`; expected {known}")]
+    UnknownKind {
+        /// Its name.
+        name: String,
+        /// Those that there are.
+        known: String,
+    },
+    /// A field that has to be there.
+    #[error("the field `{name}` is missing")]
+    MissingField {
+        /// The field.
+        name: &'static str,
+    },
+    /// A field that nobody knows.
+    #[error("there is no field `{name}`; expected some of {known}")]
+    UnknownField {
+        /// The field.
+        name: String,
+        /// Those that this kind of job has.
+        known: String,
+    },
+    /// A value that cannot be.
+    #[error("the field `{name}` is {value}: {reason}")]
+    Field {
+        /// The field.
+        name: String,
+        /// Its value.
+        value: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Something in the place of a result.
+    #[error(
+        "{} exists already and no batch made it (there is no batch.toml): name another place or remove it", path.display()
+    )]
+    Foreign {
+        /// The place.
+        path: PathBuf,
+    },
+    /// Two jobs for one result.
+    #[error("another job of this run has written {}: give each job an `out` of its own", path.display())]
+    SharedOut {
+        /// The place.
+        path: PathBuf,
+    },
+    /// Two programs at one result.
+    #[error("{} is being made by another program", path.display())]
+    InUse {
+        /// The place.
+        path: PathBuf,
+    },
+    /// Jobs without a result.
+    #[error("{failed} of {jobs} jobs failed; {} says why; run the batch again to do them again", failures.display())]
+    Failed {
+        /// How many.
+        failed: usize,
+        /// Of how many.
+        jobs: usize,
+        /// Where each stands with its message.
+        failures: PathBuf,
+    },
+    /// Threads that the system does not give.
+    #[error("cannot start a thread: {0}")]
+    Threads(String),
+}
+
+impl BatchError {
+    fn field(name: impl Into<String>, value: impl ToString, reason: impl ToString) -> Self {
+        Self::Field { name: name.into(), value: value.to_string(), reason: reason.to_string() }
+    }
+}
+
+/// What jobs have in common.
+#[derive(Default)]
+struct Shared {
+    depth: depth::Shared,
+    sums: Sums,
+    models: Models,
+}
+
+struct Models(Kept<Stamp, Model>);
+
+impl Default for Models {
+    fn default() -> Self {
+        Self(Kept::new(MODELS))
+    }
+}
+
+impl Shared {
+    /// As [`Model::read`].
+    fn model(&self, path: &Path) -> Result<Arc<Model>> {
+        self.models.0.get(Stamp::of("the model", path)?, || Model::read(path))
+    }
+}
+
+/// Does the jobs of a manifest; `on_job` is told of each as it ends, one at a time.
+///
+/// # Errors
+/// A manifest that cannot be read, before anything is done; [`BatchError::Failed`] after all jobs where some failed;
+/// [`crate::WorkflowError::Cancelled`] with what is done in its place; what `on_job` gives as [`crate::WorkflowError::Sink`], which stops the work.
+pub fn run(
+    settings: &BatchSettings,
+    context: &Context<'_>,
+    on_job: &(dyn Fn(&JobReport) -> io::Result<()> + Sync),
+) -> Result<BatchFigures> {
+    let start = Instant::now();
+    let total = settings.shard.share(Manifest::count(&settings.manifest)?);
+    let failures = settings.failures.clone().unwrap_or_else(|| failures_file(settings));
+    let tally = Tally::new(total, &failures, context, on_job)?;
+    let work = Work {
+        settings,
+        begun: SystemTime::now(),
+        base: settings.manifest.parent().unwrap_or(Path::new("")).to_path_buf(),
+        manifest: Mutex::new(Manifest::open(&settings.manifest)?),
+        shared: Shared::default(),
+        tally: &tally,
+        cancel: &context.cancel,
+        stop: Cancel::default(),
+    };
+    work.on_all_cores()?;
+    let figures = BatchFigures { seconds: rounded(start.elapsed().as_secs_f64(), 3), ..tally.end() };
+    let BatchFigures { jobs, done, already, failed, seconds } = figures;
+    let sum = format!("{done} done, {already} already done, {failed} failed, of {jobs} jobs");
+    context.cancel.check(&format!("doing jobs ({sum}); the same command goes on where this one ended"))?;
+    context.say(&format!("{sum}, in {seconds} s"));
+    if failed > 0 {
+        return Err(BatchError::Failed { failed, jobs, failures }.into());
+    }
+    Ok(figures)
+}
+
+/// Where failures go that were given no place.
+fn failures_file(settings: &BatchSettings) -> PathBuf {
+    let mut name = settings.manifest.file_stem().unwrap_or_default().to_os_string();
+    let Shard { index, of } = settings.shard;
+    if of > 1 {
+        name.push(format!(".{index}of{of}"));
+    }
+    name.push(".failures.jsonl");
+    settings.manifest.with_file_name(name)
+}
+
+/// What the threads share.
+struct Work<'a> {
+    settings: &'a BatchSettings,
+    /// When the run began.
+    begun: SystemTime,
+    base: PathBuf,
+    manifest: Mutex<Manifest>,
+    shared: Shared,
+    tally: &'a Tally<'a>,
+    cancel: &'a Cancel,
+    /// One thread's wish that the others stop.
+    stop: Cancel,
+}
+
+impl Work<'_> {
+    /// Does all jobs. Each runs on one thread, with whatever it computes in parallel: jobs fill the cores.
+    fn on_all_cores(&self) -> Result<()> {
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        let threads = if self.settings.jobs == 0 { cores } else { self.settings.jobs };
+        let pools = (0..threads).map(|_| rayon::ThreadPoolBuilder::new().num_threads(1).build());
+        let pools = pools.collect::<Result<Vec<_>, _>>();
+        let pools = pools.map_err(|error| BatchError::Threads(error.to_string()))?;
+        std::thread::scope(|scope| {
+            let work = |pool: rayon::ThreadPool| pool.install(|| self.until_the_end());
+            let threads: Vec<_> = pools.into_iter().map(|pool| scope.spawn(move || work(pool))).collect();
+            let ended = threads
+                .into_iter()
+                .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            // All are waited for before one's error is given.
+            ended.collect::<Vec<Result<()>>>().into_iter().collect()
+        })
+    }
+
+    fn until_the_end(&self) -> Result<()> {
+        while !self.cancel.is_cancelled() && !self.stop.is_cancelled() {
+            let next = self.next();
+            let told = next.and_then(|entry| match entry {
+                Some(entry) => self.do_one(entry).map(|()| true),
+                None => Ok(false),
+            });
+            match told {
+                Ok(true) => {}
+                Ok(false) => return Ok(()),
+                Err(error) => {
+                    self.stop.cancel();
+                    return Err(error);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn next(&self) -> Result<Option<Entry>> {
+        let mut manifest = self.manifest.lock().unwrap_or_else(PoisonError::into_inner);
+        while let Some(entry) = manifest.next()? {
+            if self.settings.shard.has(entry.number) {
+                return Ok(Some(entry));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Does a job and tells of it. An error is none of the job.
+    fn do_one(&self, entry: Entry) -> Result<()> {
+        let start = Instant::now();
+        let Entry { number, line, job } = entry;
+        let (kind, mut fields, unreadable) = match job {
+            Ok((kind, fields)) => (kind, fields, None),
+            Err(error) => (String::new(), Fields::default(), Some(error)),
+        };
+        let warnings = Warnings::default();
+        let context = Context { progress: &warnings, questions: &Nobody, cancel: self.cancel.clone() };
+        let out = fields.optional_text("out").ok().flatten();
+        let ended = match unreadable {
+            Some(error) => Err(error.into()),
+            None => self.job(&kind, &mut fields, &context),
+        };
+        let (state, figures, error) = match ended {
+            Ok((state, figures)) => (state, figures, None),
+            // Neither done nor failed: the next run does it.
+            Err(error) if error.is_cancelled() => return Ok(()),
+            Err(error) => (State::Failed, None, Some(error.to_string())),
+        };
+        let seconds = rounded(start.elapsed().as_secs_f64(), 6);
+        let mut warnings = warnings.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        // Said once.
+        if figures.as_ref().is_some_and(|figures| figures.get("warnings").is_some()) {
+            warnings.clear();
+        }
+        self.tally.tell(&JobReport { job: number, line, kind, out, state, seconds, figures, warnings, error })
+    }
+
+    fn job(&self, kind: &str, fields: &mut Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
+        let kind = jobs::kind(kind)?;
+        let work = (kind.work)(fields)?;
+        fields.all_taken()?;
+        let input = self.shared.sums.of(&work.inputs(), &self.base)?;
+        let wanted = Provenance::new(kind.name, fields, input);
+        let place = Place::new(fields.path("out")?, kind.makes_file);
+        match place.look(&wanted, self.begun, self.settings.verify)? {
+            Found::Done => Ok((State::Already, None)),
+            Found::ToDo => {
+                let figures = place.fill(wanted, |out| work.run(out, &self.shared, context))?;
+                Ok((State::Done, Some(figures)))
+            }
+        }
+    }
+}
+
+/// Keeps what a job warns of; its steps and counts are nobody's business among thousands.
+#[derive(Default)]
+struct Warnings(Mutex<Vec<String>>);
+
+impl Progress for Warnings {
+    fn say(&self, _: &str) {}
+
+    fn warn(&self, what: &str) {
+        let mut warnings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if warnings.len() < WARNINGS_MAX {
+            warnings.push(what.into());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_share_all_jobs() {
+        for jobs in [0, 1, 7, 12] {
+            let shards = (1..=3).map(|index| Shard { index, of: 3 });
+            assert_eq!(shards.clone().map(|shard| shard.share(jobs)).sum::<usize>(), jobs);
+            for number in 1..=jobs {
+                assert_eq!(shards.clone().filter(|shard| shard.has(number)).count(), 1);
+            }
+            for shard in shards {
+                assert_eq!((1..=jobs).filter(|number| shard.has(*number)).count(), shard.share(jobs));
+            }
+        }
+        assert_eq!("2/3".parse(), Ok(Shard { index: 2, of: 3 }));
+        for wrong in ["0/3", "4/3", "1", "a/b", "1/0", ""] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn failures_lie_beside_the_manifest() {
+        let settings = |shard: &str| BatchSettings {
+            manifest: "a/pairs.toml".into(),
+            jobs: 0,
+            shard: shard.parse().expect("a shard"),
+            verify: false,
+            failures: None,
+        };
+        assert_eq!(failures_file(&settings("1/1")), Path::new("a/pairs.failures.jsonl"));
+        assert_eq!(failures_file(&settings("2/3")), Path::new("a/pairs.2of3.failures.jsonl"));
+    }
+}

@@ -1,0 +1,177 @@
+//! Silhouettes, shadow and activities.
+
+use std::path::{Path, PathBuf};
+
+use farnear_activity::{
+    readers::recording::{Choices, Up},
+    shadow, shadow_detectors,
+    silhouette::parts::Fill,
+    sun::{self, Place},
+};
+use farnear_files::staging::Staging;
+use serde_json::Value;
+
+use super::{BatchError, Call, Fields, Shared, Work, value};
+use crate::{
+    activity::{
+        recognition::{Recognition, RecognitionSettings},
+        views::{View, ViewKind},
+    },
+    context::Context,
+    error::Result,
+    shadow::removal::{self, RemovalSettings},
+    silhouettes::{
+        markers::{self, MarkersSettings},
+        video::{self, ShadowTreatment, VideoSettings},
+    },
+    sun::Moment,
+};
+
+pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Work>> {
+    let detector = fields.optional::<shadow_detectors::Method>("shadow_detector")?;
+    let settings = VideoSettings {
+        video: fields.path("video")?,
+        out: fields.path("out")?,
+        learn_first: fields.flag("learn_first")?,
+        learning_frames: fields.or("learning_frames", 10)?,
+        history_frames: fields.or("history_frames", 500)?,
+        shadow: match (detector, fields.flag("keep_shadow")?) {
+            (Some(detector), true) => {
+                let reason = "keep_shadow says that nothing takes it off; name one of them";
+                return Err(BatchError::field("shadow_detector", detector.name(), reason).into());
+            }
+            (Some(detector), false) => ShadowTreatment::Detector(detector),
+            (None, true) => ShadowTreatment::Keep,
+            (None, false) => ShadowTreatment::ByModel,
+        },
+        centred: fields.flag("centred")?,
+        labels: None,
+        grey: fields.flag("grey")?,
+    };
+    Ok(Box::new(Call {
+        inputs: vec![settings.video.clone()],
+        settings,
+        run: |settings, out, _, context| {
+            value(video::extract(&VideoSettings { out: out.into(), ..settings.clone() }, context)?)
+        },
+    }))
+}
+
+pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Work>> {
+    let template = fields.name_or_file("template")?.ok_or(BatchError::MissingField { name: "template" })?;
+    let settings = MarkersSettings {
+        file: fields.path("file")?,
+        choices: Choices { unit: fields.optional("units")?, up: up(fields)? },
+        template: template.display().to_string(),
+        out: fields.path("out")?,
+        views: fields.or("views", 8)?,
+        first_view_deg: fields.or("first_view_deg", 0.0)?,
+        elevation_deg: fields.or("elevation_deg", 0.0)?,
+        mm_per_px: fields.or("mm_per_px", 6.0)?,
+        close_mm: fields.optional("close_mm")?,
+        fill: match fields.optional_text("fill")?.as_deref() {
+            None | Some("hull") => Fill::Hull,
+            Some("triplets") => Fill::Triplets,
+            Some(other) => return Err(BatchError::field("fill", other, "expected hull or triplets").into()),
+        },
+        every: fields.or("every", 1)?,
+        centred: fields.flag("centred")?,
+        keep: fields.optional("keep")?,
+    };
+    let mut inputs = vec![settings.file.clone()];
+    inputs.extend(template.is_file().then_some(template));
+    Ok(Box::new(Call {
+        inputs,
+        settings,
+        run: |settings, out, _, context| {
+            value(markers::draw(&MarkersSettings { out: out.into(), ..settings.clone() }, context)?)
+        },
+    }))
+}
+
+fn up(fields: &mut Fields) -> Result<Option<Up>, BatchError> {
+    match fields.optional_text("up")?.as_deref() {
+        None => Ok(None),
+        Some("x") => Ok(Some(Up::X)),
+        Some("y") => Ok(Some(Up::Y)),
+        Some("z") => Ok(Some(Up::Z)),
+        Some(other) => Err(BatchError::field("up", other, "expected x, y or z")),
+    }
+}
+
+pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Work>> {
+    let degrees = |fields: &mut Fields, name| -> Result<f64> {
+        Ok(fields.optional(name)?.ok_or(BatchError::MissingField { name })?)
+    };
+    let place = Place::new(degrees(fields, "lat")?, degrees(fields, "lon")?)?;
+    let settings = RemovalSettings {
+        masks: fields.path("masks")?,
+        camera: fields.path("camera")?,
+        moment: Moment { place, time: sun::parse_time(&fields.text("time")?)? },
+        rate_hz: fields.optional("rate_hz")?,
+        method: fields.or("method", shadow::Method::default())?,
+        out: fields.path("out")?,
+    };
+    Ok(Box::new(Call {
+        inputs: vec![settings.masks.clone(), settings.camera.clone()],
+        settings,
+        run: |settings, out, _, context| {
+            value(removal::remove_from_masks(
+                &RemovalSettings { out: out.into(), ..settings.clone() },
+                context,
+            )?)
+        },
+    }))
+}
+
+/// What is recognised by which model.
+struct Recognising {
+    model: PathBuf,
+    views: Vec<PathBuf>,
+    kind: Option<ViewKind>,
+    window: Option<usize>,
+}
+
+pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Work>> {
+    let settings = Recognising {
+        model: fields.path("model")?,
+        views: fields.paths("views")?,
+        kind: match fields.optional_text("as")?.as_deref() {
+            None => None,
+            Some("masks") => Some(ViewKind::Masks),
+            Some("video") => Some(ViewKind::Video),
+            Some(other) => return Err(BatchError::field("as", other, "expected masks or video").into()),
+        },
+        window: fields.optional("window")?,
+    };
+    fields.path("out")?;
+    let mut inputs = settings.views.clone();
+    inputs.push(settings.model.clone());
+    Ok(Box::new(Call { inputs, settings, run: recognised }))
+}
+
+/// Writes `answers.jsonl`, an answer a frame, and `recognition.json`, that for the whole.
+fn recognised(settings: &Recognising, out: &Path, shared: &Shared, context: &Context<'_>) -> Result<Value> {
+    let model = shared.model(&settings.model)?;
+    let view = |path: &PathBuf| -> Result<View> {
+        let kind = settings.kind.map_or_else(|| ViewKind::guess(path), Ok)?;
+        Ok(View { path: path.clone(), kind })
+    };
+    let views = settings.views.iter().map(view).collect::<Result<Vec<View>>>()?;
+    let settings = RecognitionSettings { views, window: settings.window };
+    let mut work = Recognition::begin(&model, &settings)?;
+    let mut answers = String::new();
+    while let Some(answer) = work.next(context)? {
+        answers.push_str(&value(answer)?.to_string());
+        answers.push('\n');
+    }
+    let figures = value(work.finish()?)?;
+    let mut kept = figures.clone();
+    // Another number each time; the same recording is to give the same file.
+    kept.as_object_mut().map(|kept| kept.remove("seconds_per_frame"));
+    let staged = Staging::new_folder(out)?;
+    staged.write("answers.jsonl", answers.as_bytes())?;
+    staged.write("recognition.json", format!("{kept}\n").as_bytes())?;
+    staged.finish()?;
+    Ok(figures)
+}

@@ -1,0 +1,305 @@
+//! The list of jobs, read job by job so that it may be of any length.
+//!
+//! TOML: a `[[job]]` table per job, after tables of a kind's name (`[depth]`) with what all its jobs share. CSV: a header with the
+//! fields' names, a row per job, an empty cell where a field is not given.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+use super::{BatchError, fields::Fields};
+
+/// A job of more text than this is none: memory must not depend on what is in the file.
+const JOB_BYTES_MAX: u64 = 1 << 20;
+/// The line that begins a job in TOML.
+const JOB: &str = "[[job]]";
+/// The field that says what a job does.
+pub(super) const KIND: &str = "do";
+
+/// A job as it stands in the manifest.
+pub(super) struct Entry {
+    /// From 1.
+    pub number: usize,
+    /// The line that it begins on.
+    pub line: usize,
+    /// What is to be done, and the fields without that; or why they cannot be read.
+    pub job: Result<(String, Fields), BatchError>,
+}
+
+/// The jobs of a manifest, one after the other.
+pub(super) struct Manifest {
+    path: PathBuf,
+    base: PathBuf,
+    source: Source,
+    number: usize,
+}
+
+enum Source {
+    Toml { reader: BufReader<File>, next_line: usize, defaults: BTreeMap<String, Fields>, ended: bool },
+    Csv { reader: Box<csv::Reader<File>>, names: csv::StringRecord },
+}
+
+impl Manifest {
+    /// Opens a manifest and reads what stands before its first job.
+    pub fn open(path: &Path) -> Result<Self, BatchError> {
+        let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let file = File::open(path).map_err(|source| BatchError::Read { path: path.into(), source })?;
+        let source = match ending.as_str() {
+            "csv" => csv_source(file, path)?,
+            "toml" => toml_source(file, path, &base)?,
+            _ => return Err(BatchError::Ending { path: path.into() }),
+        };
+        Ok(Self { path: path.into(), base, source, number: 0 })
+    }
+
+    /// How many jobs there are; reads the manifest once.
+    pub fn count(path: &Path) -> Result<usize, BatchError> {
+        let mut all = Self::open(path)?;
+        let mut jobs = 0;
+        if let Source::Csv { reader, .. } = &mut all.source {
+            let mut row = csv::ByteRecord::new();
+            while reader.read_byte_record(&mut row).map_err(|error| wrong_csv(path, &error))? {
+                jobs += 1;
+            }
+            return Ok(jobs);
+        }
+        while all.next_table()?.is_some() {
+            jobs += 1;
+        }
+        Ok(jobs)
+    }
+
+    /// The next job; `None` at the end.
+    ///
+    /// # Errors
+    /// A file that cannot be read on. A job that cannot be understood is an [`Entry`].
+    pub fn next(&mut self) -> Result<Option<Entry>, BatchError> {
+        let found = match &mut self.source {
+            Source::Csv { reader, names } => {
+                let line = reader.position().line() as usize;
+                let mut row = csv::StringRecord::new();
+                match reader.read_record(&mut row) {
+                    Ok(false) => None,
+                    Ok(true) => {
+                        let line = row.position().map_or(line, |position| position.line() as usize);
+                        Some((line, of_row(names, &row, &self.base)))
+                    }
+                    Err(error) if matches!(error.kind(), csv::ErrorKind::Io(_)) => {
+                        return Err(wrong_csv(&self.path, &error));
+                    }
+                    Err(error) => {
+                        let line = error.position().map_or(line, |position| position.line() as usize);
+                        Some((line, Err(wrong_csv(&self.path, &error))))
+                    }
+                }
+            }
+            Source::Toml { .. } => {
+                let table = self.next_table()?;
+                table.map(|(line, text)| (line, self.of_table(line, &text)))
+            }
+        };
+        Ok(found.map(|(line, job)| {
+            self.number += 1;
+            Entry { number: self.number, line, job }
+        }))
+    }
+
+    /// The text of the next `[[job]]` in TOML without that line, and the line it begins on.
+    fn next_table(&mut self) -> Result<Option<(usize, String)>, BatchError> {
+        let Source::Toml { reader, next_line, ended, .. } = &mut self.source else { return Ok(None) };
+        if *ended {
+            return Ok(None);
+        }
+        let begin = *next_line - 1;
+        let (text, more) = until_job(reader, &self.path, next_line)?;
+        *ended = !more;
+        Ok(Some((begin, text)))
+    }
+
+    fn of_table(&self, line: usize, text: &str) -> Result<(String, Fields), BatchError> {
+        let Source::Toml { defaults, .. } = &self.source else {
+            return Err(BatchError::MissingField { name: KIND });
+        };
+        // Lines are counted from the file's beginning.
+        let table =
+            text.parse::<toml::Table>().map_err(|error| wrong_toml(&self.path, line, text, &error))?;
+        let (kind, fields) = split(Fields::of_table(&table, &self.base)?)?;
+        let fields = match defaults.get(&kind) {
+            Some(defaults) => fields.with_defaults(defaults),
+            None => fields,
+        };
+        Ok((kind, fields))
+    }
+}
+
+/// Takes what is to be done out of the fields.
+fn split(mut fields: Fields) -> Result<(String, Fields), BatchError> {
+    let kind = fields.text(KIND)?;
+    fields.remove(KIND);
+    Ok((kind, fields))
+}
+
+fn of_row(
+    names: &csv::StringRecord,
+    row: &csv::StringRecord,
+    base: &Path,
+) -> Result<(String, Fields), BatchError> {
+    let mut fields = Fields::new(base);
+    if row.len() != names.len() {
+        let cells = row.iter().collect::<Vec<_>>().join(",");
+        let reason = format!("{} cells, the header names {} fields", row.len(), names.len());
+        return Err(BatchError::field("row", cells, reason));
+    }
+    for (name, cell) in names.iter().zip(row).filter(|(_, cell)| !cell.is_empty()) {
+        fields.insert(name, vec![cell.into()]);
+    }
+    split(fields)
+}
+
+fn csv_source(file: File, path: &Path) -> Result<Source, BatchError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(file);
+    let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
+    if !names.iter().any(|name| name == KIND) {
+        let header = names.iter().collect::<Vec<_>>().join(",");
+        let reason =
+            format!("its header is \"{header}\"; expected the names of fields with `{KIND}` among them");
+        return Err(BatchError::Manifest { path: path.into(), line: 1, reason });
+    }
+    Ok(Source::Csv { reader: Box::new(reader), names })
+}
+
+fn toml_source(file: File, path: &Path, base: &Path) -> Result<Source, BatchError> {
+    let mut reader = BufReader::new(file);
+    let mut next_line = 1;
+    let (head, more) = until_job(&mut reader, path, &mut next_line)?;
+    let table = head.parse::<toml::Table>().map_err(|error| wrong_toml(path, 0, &head, &error))?;
+    let mut defaults = BTreeMap::new();
+    for (kind, values) in table {
+        let Some(values) = values.as_table().filter(|_| super::jobs::is_kind(&kind)) else {
+            let kinds = super::jobs::names().join(", ");
+            let reason = format!(
+                "`{kind}` before the first {JOB}: expected tables with what jobs share, named {kinds}"
+            );
+            return Err(BatchError::Manifest { path: path.into(), line: 1, reason });
+        };
+        defaults.insert(kind, Fields::of_table(values, base)?);
+    }
+    Ok(Source::Toml { reader, next_line, defaults, ended: !more })
+}
+
+/// The text up to the next line `[[job]]`, and whether there is one.
+fn until_job(
+    reader: &mut BufReader<File>,
+    path: &Path,
+    next_line: &mut usize,
+) -> Result<(String, bool), BatchError> {
+    let mut text = String::new();
+    let mut left = reader.take(JOB_BYTES_MAX);
+    loop {
+        let begin = text.len();
+        let read = left.read_line(&mut text);
+        let count = read.map_err(|source| BatchError::Read { path: path.into(), source })?;
+        if count == 0 {
+            break;
+        }
+        *next_line += 1;
+        let line = text[begin..].split('#').next().unwrap_or_default();
+        if line.chars().filter(|letter| !letter.is_whitespace()).eq(JOB.chars()) {
+            text.truncate(begin);
+            return Ok((text, true));
+        }
+    }
+    if left.limit() == 0 {
+        let reason = format!("more than {JOB_BYTES_MAX} bytes without a line {JOB}");
+        return Err(BatchError::Manifest { path: path.into(), line: *next_line, reason });
+    }
+    Ok((text, false))
+}
+
+fn wrong_toml(path: &Path, before: usize, text: &str, error: &toml::de::Error) -> BatchError {
+    let at = error.span().map_or(0, |span| text.get(..span.start).unwrap_or(text).matches('\n').count() + 1);
+    BatchError::Manifest { path: path.into(), line: before + at, reason: error.message().into() }
+}
+
+fn wrong_csv(path: &Path, error: &csv::Error) -> BatchError {
+    let line = error.position().map_or(0, |position| position.line() as usize);
+    BatchError::Manifest { path: path.into(), line, reason: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A job's line, and its kind and fields or what is wrong with them.
+    type Found = (usize, Result<(String, Fields), String>);
+
+    fn all(name: &str, text: &str) -> Vec<Found> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("a writable folder");
+        let mut manifest = Manifest::open(&path).expect("a manifest");
+        let mut found = Vec::new();
+        while let Some(entry) = manifest.next().expect("readable") {
+            assert_eq!(entry.number, found.len() + 1);
+            found.push((entry.line, entry.job.map_err(|error| error.to_string())));
+        }
+        assert_eq!(Manifest::count(&path).expect("readable"), found.len());
+        found
+    }
+
+    #[test]
+    fn toml_and_csv_give_the_same_jobs() {
+        let toml = "# shared\n[depth]\nsmooth = 9\n\n[[job]]\ndo = 'depth'\nfar = 'a.png'\n\n[[ job ]] # the second\ndo = 'correct'\n";
+        let csv = "do, far, smooth\ndepth, a.png, 9\ncorrect,,\n";
+        let jobs = |found: Vec<Found>| -> Vec<_> {
+            let job = |(_, job): Found| {
+                let (kind, fields) = job.expect("a job");
+                (kind, fields.without("out"))
+            };
+            found.into_iter().map(job).collect()
+        };
+        let (of_toml, of_csv) = (all("a.toml", toml), all("a.csv", csv));
+        assert_eq!(of_toml.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [5, 9]);
+        assert_eq!(of_csv.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
+        let of_toml = jobs(of_toml);
+        assert_eq!(of_toml, jobs(of_csv));
+        assert_eq!(of_toml[0].1["smooth"], ["9"]);
+    }
+
+    #[test]
+    fn a_job_that_is_none_does_not_hide_the_others() {
+        let found =
+            all("a.toml", "[[job]]\ndo = 'depth'\nfar = \n[[job]]\nfar = 'x'\n[[job]]\ndo = 'correct'\n");
+        let error = found[0].1.as_ref().expect_err("no value");
+        assert!(error.contains("line 3"), "{error}");
+        assert!(found[1].1.as_ref().is_err_and(|error| error.contains("`do`")));
+        assert!(found[2].1.is_ok());
+        let found = all("a.csv", "do,far\ndepth,a,b\ncorrect,c\n");
+        assert!(found[0].1.is_err() && found[1].1.is_ok());
+    }
+
+    #[test]
+    fn a_manifest_that_is_none_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text, phrase) in [
+            ("a.txt", "", ".toml or .csv"),
+            ("a.csv", "far,near\n", "`do`"),
+            ("a.toml", "[dept]\nsmooth = 1\n", "dept"),
+            ("a.toml", "[depth\n", "line 1"),
+            ("b.csv", "", "header"),
+        ] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).expect("a writable folder");
+            let error = Manifest::open(&path).err().expect("no manifest").to_string();
+            assert!(error.contains(phrase), "{error}");
+        }
+        let long = format!("x = '{}'\n", "y".repeat(JOB_BYTES_MAX as usize));
+        std::fs::write(folder.path().join("long.toml"), long).expect("a writable folder");
+        let error = Manifest::open(&folder.path().join("long.toml")).err().expect("too long").to_string();
+        assert!(error.contains("bytes"), "{error}");
+    }
+}

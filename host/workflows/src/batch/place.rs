@@ -1,0 +1,148 @@
+//! Where a job's result goes: made aside, put in place when it is whole, never in the place of what no batch made.
+
+use std::{
+    ffi::OsString,
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+use super::{BatchError, provenance::Provenance};
+use crate::error::Result;
+
+/// The name of a folder's provenance, and what is added to a file's name for its own.
+const RECORD: &str = "batch.toml";
+
+/// A result's place.
+pub(super) struct Place {
+    target: PathBuf,
+    /// Whether the result is a file and not a folder.
+    is_file: bool,
+}
+
+/// What lies at a place.
+pub(super) enum Found {
+    /// The result, made from what it would be made from now.
+    Done,
+    /// Nothing, or a result that was made from something else or is not whole.
+    ToDo,
+}
+
+impl Place {
+    pub fn new(target: PathBuf, is_file: bool) -> Self {
+        let target = target.components().collect(); // without a slash at its end
+        Self { target, is_file }
+    }
+
+    /// Looks at what is there.
+    ///
+    /// # Errors
+    /// [`BatchError::Foreign`] where something lies there that no batch made; [`BatchError::SharedOut`] where another job of this run,
+    /// which began at `begun`, has made it.
+    pub fn look(&self, wanted: &Provenance, begun: SystemTime, verify: bool) -> Result<Found> {
+        let (record, root) = (self.record(), self.root());
+        if let Some(found) = Provenance::read(&record) {
+            if found.fulfils(wanted, root, verify) {
+                return Ok(Found::Done);
+            }
+            let written = fs::metadata(&record).and_then(|record| record.modified());
+            if written.is_ok_and(|written| written > begun) {
+                return Err(BatchError::SharedOut { path: self.target.clone() }.into());
+            }
+            return Ok(Found::ToDo);
+        }
+        let empty = fs::read_dir(&self.target).is_ok_and(|mut entries| entries.next().is_none());
+        // A file with a record that cannot be read is a batch's all the same.
+        if !self.target.exists() || empty || record.exists() {
+            return Ok(Found::ToDo);
+        }
+        Err(BatchError::Foreign { path: self.target.clone() }.into())
+    }
+
+    /// Makes the result by `make`, which is given a place aside, and puts it in its place. What was killed on the way is cleared
+    /// away first.
+    pub fn fill<T>(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+        let name = self.target.file_name().unwrap_or_default();
+        let aside = self.beside(".", ".batch-partial");
+        let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
+        if let Some(parent) = aside.parent() {
+            fs::create_dir_all(parent).map_err(unwritable)?;
+        }
+        let _lock = self.lock(&aside)?;
+        let clearing = Clearing(&aside);
+        clear(&aside).map_err(unwritable)?;
+        let made = aside.join(name);
+        let found = make(&made)?;
+        let record = toml::to_string(&wanted.with_output(&made)?)?;
+        self.put(&aside, &made, &record).map_err(unwritable)?;
+        drop(clearing);
+        Ok(found)
+    }
+
+    /// The folder aside, held by this process as long as it lives; two that make the same result must not mix.
+    fn lock(&self, aside: &Path) -> Result<File, BatchError> {
+        let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
+        match fs::create_dir(aside) {
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(unwritable(error)),
+            _ => {}
+        }
+        let lock = File::open(aside).map_err(unwritable)?;
+        match lock.try_lock() {
+            Err(fs::TryLockError::WouldBlock) => Err(BatchError::InUse { path: self.target.clone() }),
+            // Systems without such locks on folders go on without.
+            Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(lock),
+        }
+    }
+
+    fn put(&self, aside: &Path, made: &Path, record: &str) -> io::Result<()> {
+        if self.is_file {
+            // The old record goes first, so that it never stands beside a result that it is not of.
+            let (old, new) = (self.record(), aside.join("record"));
+            fs::write(&new, record)?;
+            if old.exists() {
+                fs::remove_file(&old)?;
+            }
+            fs::rename(made, &self.target)?;
+            return fs::rename(new, old);
+        }
+        fs::write(made.join(RECORD), record)?;
+        if self.target.exists() {
+            fs::rename(&self.target, aside.join("old"))?;
+        }
+        fs::rename(made, &self.target)
+    }
+
+    fn record(&self) -> PathBuf {
+        if self.is_file { self.beside("", &format!(".{RECORD}")) } else { self.target.join(RECORD) }
+    }
+
+    /// What a record's files are relative to.
+    fn root(&self) -> &Path {
+        if self.is_file { self.target.parent().unwrap_or(Path::new("")) } else { &self.target }
+    }
+
+    fn beside(&self, before: &str, after: &str) -> PathBuf {
+        let mut name = OsString::from(before);
+        name.push(self.target.file_name().unwrap_or_default());
+        name.push(after);
+        self.target.with_file_name(name)
+    }
+}
+
+/// Removes the folder aside at the end of the work, however that ends.
+struct Clearing<'a>(&'a Path);
+
+impl Drop for Clearing<'_> {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(self.0); // else the next run does
+    }
+}
+
+fn clear(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() { fs::remove_dir_all(path)? } else { fs::remove_file(path)? }
+    }
+    Ok(())
+}

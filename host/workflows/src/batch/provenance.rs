@@ -1,0 +1,219 @@
+//! `batch.toml`: what made a result, by which the next run sees that there is nothing to do.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::{self, Read},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::{BatchError, fields::Fields};
+use crate::{
+    MADE_BY,
+    error::Result,
+    kept::{Kept, Stamp},
+};
+
+/// Version of the record.
+const FORMAT: u32 = 1;
+/// Files that several jobs read (optics, corrections, models) are summed once; each job has a few of its own besides.
+const SUMS: usize = 64;
+/// Read at once while summing.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// What a job is made from, and what came of it.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub(super) struct Provenance {
+    format: u32,
+    made_by: String,
+    #[serde(rename = "do")]
+    kind: String,
+    /// The job's fields but `out`.
+    settings: BTreeMap<String, Vec<String>>,
+    #[serde(default)]
+    input: Vec<Summed>,
+    #[serde(default)]
+    output: Vec<Summed>,
+}
+
+/// A file with its length and sum.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub(super) struct Summed {
+    file: String,
+    bytes: u64,
+    sha256: String,
+}
+
+/// Sums of files, of which those that many jobs read are kept.
+pub(super) struct Sums(Kept<Stamp, Summed>);
+
+impl Default for Sums {
+    fn default() -> Self {
+        Self(Kept::new(SUMS))
+    }
+}
+
+impl Sums {
+    /// The files, and all files in folders among them, each with its sum.
+    pub fn of(&self, inputs: &[PathBuf], base: &Path) -> Result<Vec<Summed>> {
+        let mut files = Vec::new();
+        for input in inputs {
+            if input.is_dir() {
+                files.extend(files_below(input)?);
+            } else {
+                files.push(input.clone());
+            }
+        }
+        let sum = |file: &PathBuf| {
+            // By the manifest's own word for it, so that the whole may be moved.
+            let name = file.strip_prefix(base).unwrap_or(file).display().to_string();
+            let summed = self.0.get(Stamp::of("the input", file)?, || Ok(sum(file, &name)?))?;
+            Ok(Summed { file: name, ..Summed::clone(&summed) })
+        };
+        files.iter().map(sum).collect()
+    }
+}
+
+impl Provenance {
+    /// Of a job with nothing done yet.
+    pub fn new(kind: &str, fields: &Fields, input: Vec<Summed>) -> Self {
+        Self {
+            format: FORMAT,
+            made_by: MADE_BY.into(),
+            kind: kind.into(),
+            settings: fields.without("out"),
+            input,
+            output: Vec::new(),
+        }
+    }
+
+    /// The same with what came of it: the file or the folder at `result`.
+    pub fn with_output(mut self, result: &Path) -> Result<Self> {
+        let files = if result.is_dir() { files_below(result)? } else { vec![result.to_path_buf()] };
+        let root = if result.is_dir() { result } else { result.parent().unwrap_or(Path::new("")) };
+        let summed = |file: &PathBuf| {
+            let name = file.strip_prefix(root).unwrap_or(file);
+            // One separator everywhere, so that a record says the same on every system.
+            let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
+            sum(file, &parts.join("/"))
+        };
+        self.output = files.iter().map(summed).collect::<Result<_, BatchError>>()?;
+        Ok(self)
+    }
+
+    /// A record in a file; `None` where there is none, or another version's.
+    pub fn read(file: &Path) -> Option<Self> {
+        let text = fs::read_to_string(file).ok()?;
+        toml::from_str(&text).ok().filter(|record: &Self| record.format == FORMAT)
+    }
+
+    /// Whether this record's result was made from what `wanted` says, and its files are whole: by their lengths, or by their sums
+    /// where `verify` asks for them.
+    pub fn fulfils(&self, wanted: &Self, root: &Path, verify: bool) -> bool {
+        let made_alike = (&self.made_by, &self.kind, &self.settings, &self.input)
+            == (&wanted.made_by, &wanted.kind, &wanted.settings, &wanted.input);
+        let whole = |output: &Summed| {
+            let file = root.join(&output.file);
+            match verify {
+                true => sum(&file, &output.file).is_ok_and(|found| found == *output),
+                false => fs::metadata(&file).is_ok_and(|found| found.len() == output.bytes),
+            }
+        };
+        made_alike && !self.output.is_empty() && self.output.iter().all(whole)
+    }
+}
+
+/// All files below a folder, in the order of their names.
+fn files_below(folder: &Path) -> Result<Vec<PathBuf>, BatchError> {
+    let unreadable = |source| BatchError::Read { path: folder.into(), source };
+    let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    let mut entries: Vec<PathBuf> = entries.map_err(unreadable)?.iter().map(fs::DirEntry::path).collect();
+    entries.sort();
+    let mut files = Vec::new();
+    for entry in entries {
+        if entry.is_dir() {
+            files.extend(files_below(&entry)?);
+        } else {
+            files.push(entry);
+        }
+    }
+    Ok(files)
+}
+
+fn sum(file: &Path, name: &str) -> Result<Summed, BatchError> {
+    let unreadable = |source| BatchError::Read { path: file.into(), source };
+    let mut hasher = Sha256::new();
+    let mut opened = File::open(file).map_err(unreadable)?;
+    let mut buffer = vec![0; BUFFER_BYTES];
+    let mut bytes = 0;
+    loop {
+        match opened.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(count) => {
+                hasher.update(&buffer[..count]);
+                bytes += count as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(unreadable(error)),
+        }
+    }
+    let sha256 = hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(Summed { file: name.into(), bytes, sha256 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_result_is_done_while_nothing_has_changed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (input, result) = (folder.path().join("in"), folder.path().join("result"));
+        let write = |file: &Path, text: &str| fs::write(file, text).expect("a writable folder");
+        fs::create_dir(&result).expect("a writable folder");
+        write(&input, "abc");
+        write(&result.join("map"), "1234");
+        let sums = || Sums::default().of(std::slice::from_ref(&input), folder.path()).expect("readable");
+        let mut fields = Fields::new(folder.path());
+        fields.insert("out", vec!["result".into()]);
+        fields.insert("smooth", vec!["7".into()]);
+        let wanted = |fields: &Fields| Provenance::new("depth", fields, sums());
+        let made = wanted(&fields).with_output(&result).expect("readable");
+        // As sha256sum prints it.
+        let of_abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!((made.input[0].file.as_str(), made.input[0].sha256.as_str()), ("in", of_abc));
+        assert!(made.fulfils(&wanted(&fields), &result, true));
+
+        let mut other = fields.clone();
+        other.insert("smooth", vec!["9".into()]);
+        assert!(!made.fulfils(&wanted(&other), &result, false), "another setting");
+        assert!(!Provenance { made_by: "farnear 0".into(), ..made.clone() }.fulfils(
+            &wanted(&fields),
+            &result,
+            false
+        ));
+        write(&input, "abd");
+        assert!(!made.fulfils(&wanted(&fields), &result, false), "another input of the same length");
+        write(&input, "abc");
+        write(&result.join("map"), "1235");
+        assert!(made.fulfils(&wanted(&fields), &result, false));
+        assert!(!made.fulfils(&wanted(&fields), &result, true), "a changed result");
+        write(&result.join("map"), "123");
+        assert!(!made.fulfils(&wanted(&fields), &result, false), "a cut result");
+    }
+
+    #[test]
+    fn a_file_that_is_written_anew_is_summed_anew() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("optics.toml");
+        let sums = Sums::default();
+        let sum = |text: &str| {
+            fs::write(&file, text).expect("a writable folder");
+            sums.of(std::slice::from_ref(&file), folder.path()).expect("readable")
+        };
+        assert_ne!(sum("a"), sum("longer"));
+    }
+}

@@ -1,0 +1,97 @@
+//! What has become of the jobs so far: told one at a time, failures kept apart, the time that is left.
+
+use std::{
+    fs::{self, File},
+    io::{self, Write},
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
+
+use super::{BatchError, BatchFigures, JobReport, State};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// Counts jobs over threads.
+pub(super) struct Tally<'a> {
+    total: usize,
+    context: &'a Context<'a>,
+    on_job: &'a (dyn Fn(&JobReport) -> io::Result<()> + Sync),
+    failures: PathBuf,
+    inner: Mutex<Inner>,
+}
+
+#[derive(Default)]
+struct Inner {
+    figures: BatchFigures,
+    /// The file of failures, made with the first of them.
+    file: Option<File>,
+    /// When the first job began that had to be worked at; what is done already takes no time.
+    working_since: Option<Instant>,
+}
+
+impl<'a> Tally<'a> {
+    /// Nothing is done yet; the failures of the last run are put away.
+    pub fn new(
+        total: usize,
+        failures: &Path,
+        context: &'a Context<'a>,
+        on_job: &'a (dyn Fn(&JobReport) -> io::Result<()> + Sync),
+    ) -> Result<Self, BatchError> {
+        match fs::remove_file(failures) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(BatchError::Write { path: failures.into(), source });
+            }
+            _ => {}
+        }
+        context.progress.advance("jobs", 0, Some(total));
+        Ok(Self { total, context, on_job, failures: failures.into(), inner: Mutex::default() })
+    }
+
+    /// A job has ended.
+    ///
+    /// # Errors
+    /// Where nobody listens any more, or the failure cannot be written.
+    pub fn tell(&self, report: &JobReport) -> Result<()> {
+        // Held while it is told, so that lines do not mix and counts rise.
+        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        inner.figures.jobs += 1;
+        match report.state {
+            State::Done => inner.figures.done += 1,
+            State::Already => inner.figures.already += 1,
+            State::Failed => {
+                inner.figures.failed += 1;
+                self.keep(&mut inner.file, report)?;
+            }
+        }
+        (self.on_job)(report).map_err(|source| WorkflowError::Sink { source })?;
+        let told = inner.figures.jobs;
+        if report.state == State::Done {
+            let now = Instant::now();
+            let own = std::time::Duration::from_secs_f64(report.seconds.max(0.0));
+            let since = *inner.working_since.get_or_insert_with(|| now.checked_sub(own).unwrap_or(now));
+            let each = now.duration_since(since).div_f64(inner.figures.done as f64);
+            self.context.progress.time_left(each.mul_f64(self.total.saturating_sub(told) as f64));
+        }
+        self.context.progress.advance("jobs", told, Some(self.total));
+        Ok(())
+    }
+
+    fn keep(&self, file: &mut Option<File>, report: &JobReport) -> Result<()> {
+        let unwritable = |source| BatchError::Write { path: self.failures.clone(), source };
+        let file = match file {
+            Some(file) => file,
+            None => file.insert(File::create(&self.failures).map_err(unwritable)?),
+        };
+        let line = serde_json::to_string(report).map_err(|error| unwritable(error.into()))?;
+        writeln!(file, "{line}").map_err(unwritable)?;
+        Ok(())
+    }
+
+    /// The counts.
+    pub fn end(&self) -> BatchFigures {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner).figures.clone()
+    }
+}

@@ -1,0 +1,212 @@
+//! Whether this computer has what farnear needs: processor, folders, emulated rig, ports, cameras, the board's firmware; and what to
+//! do about what it has not.
+//!
+//! Looks only: no port is opened unless one is named, nothing moves.
+
+mod folders;
+mod ports;
+
+use std::path::PathBuf;
+
+use farnear_capture::Client;
+use farnear_depth::pipeline::Backend;
+use serde::Serialize;
+
+use crate::{camera, context::Context, error::Result, simulator};
+
+/// What is looked at beside the computer itself.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct DoctorSettings {
+    /// A board that is asked for its firmware's version.
+    pub port: Option<String>,
+    /// Folders that results are to go to, beside the current one.
+    pub folders: Vec<PathBuf>,
+}
+
+/// How it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Health {
+    /// There, and well.
+    Ok,
+    /// Not there, and only some need it.
+    Optional,
+    /// Something will fail.
+    Missing,
+}
+
+/// One thing that was looked at.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Finding {
+    /// What.
+    pub what: String,
+    /// How it is.
+    pub health: Health,
+    /// What was found.
+    pub found: String,
+    /// What to do; empty where nothing is to be done.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub remedy: String,
+}
+
+impl Finding {
+    fn ok(what: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { what: what.into(), health: Health::Ok, found: found.into(), remedy: String::new() }
+    }
+
+    fn bad(
+        health: Health,
+        what: impl Into<String>,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self { what: what.into(), health, found: found.into(), remedy: remedy.into() }
+    }
+}
+
+/// All that was looked at.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct DoctorFigures {
+    /// One after the other.
+    pub findings: Vec<Finding>,
+}
+
+impl DoctorFigures {
+    /// How many of them will make something fail.
+    pub fn missing(&self) -> usize {
+        self.findings.iter().filter(|finding| finding.health == Health::Missing).count()
+    }
+}
+
+/// Looks at everything; takes some milliseconds, and with a port as long as the board's answer.
+///
+/// # Errors
+/// [`crate::WorkflowError::Cancelled`]; what is not well is no error but a finding.
+pub fn examine(settings: &DoctorSettings, context: &Context<'_>) -> Result<DoctorFigures> {
+    let mut findings = vec![processor()];
+    findings.extend(folders::findings(&settings.folders));
+    findings.push(emulated_rig());
+    findings.extend(ports::findings());
+    findings.push(cameras());
+    findings.push(ffmpeg());
+    context.cancel.check("looking at the computer")?;
+    findings.push(firmware(settings.port.as_deref()));
+    Ok(DoctorFigures { findings })
+}
+
+fn processor() -> Finding {
+    const WHAT: &str = "processor";
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let cores = if cores == 1 { "1 core".into() } else { format!("{cores} cores") };
+    match Backend::best() {
+        Backend::Avx512 => Finding::ok(WHAT, format!("{cores}, AVX-512")),
+        Backend::Avx2 => Finding::ok(WHAT, format!("{cores}, AVX2")),
+        Backend::Portable => {
+            let remedy = "depth is right and some times slower than on a processor with AVX2 (docs/speed.md)";
+            Finding::bad(Health::Optional, WHAT, format!("{cores}, neither AVX2 nor AVX-512"), remedy)
+        }
+    }
+}
+
+fn emulated_rig() -> Finding {
+    const WHAT: &str = "emulated rig";
+    const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
+    let Ok(program) = simulator::find() else {
+        let remedy = "`cargo xtask install` in a clone installs it; without it there is no --port sim";
+        return Finding::bad(
+            Health::Optional,
+            WHAT,
+            "farnear-sim is neither beside this program nor on the PATH",
+            remedy,
+        );
+    };
+    let firmware = program.with_file_name(FIRMWARE);
+    if firmware.is_file() {
+        return Finding::ok(WHAT, program.display().to_string());
+    }
+    let found = format!("{} without {FIRMWARE} beside it", program.display());
+    Finding::bad(
+        Health::Missing,
+        WHAT,
+        found,
+        "`cargo xtask firmware` builds it, `cargo xtask install` lays it there",
+    )
+}
+
+fn cameras() -> Finding {
+    let listed = camera::list();
+    let found: Vec<String> =
+        listed.found.iter().map(|camera| format!("{} ({})", camera.address, camera.about)).collect();
+    if !found.is_empty() {
+        return Finding::ok("cameras", found.join(", "));
+    }
+    let absent: Vec<&str> = listed.kinds.iter().filter(|kind| !kind.built_in).map(|kind| kind.kind).collect();
+    let built = if absent.is_empty() {
+        String::new()
+    } else {
+        format!("; this program was built without {}", absent.join(" and "))
+    };
+    let remedy =
+        "a folder in which images appear or a program that takes them is a camera too (docs/cameras.md)";
+    Finding::bad(Health::Optional, "cameras", format!("none was found{built}"), remedy)
+}
+
+fn ffmpeg() -> Finding {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let name = format!("ffmpeg{}", std::env::consts::EXE_SUFFIX);
+    match std::env::split_paths(&path).map(|folder| folder.join(&name)).find(|place| place.is_file()) {
+        Some(program) => Finding::ok("video", program.display().to_string()),
+        None => {
+            let remedy = "Debian's package is ffmpeg; without it videos are Y4M files or folders of pictures";
+            Finding::bad(Health::Optional, "video", "ffmpeg is not on the PATH", remedy)
+        }
+    }
+}
+
+fn firmware(port: Option<&str>) -> Finding {
+    const WHAT: &str = "firmware";
+    let Some(port) = port else {
+        let remedy = "--port /dev/ttyACM0 asks the board there for its version";
+        return Finding::bad(Health::Optional, WHAT, "no board was asked", remedy);
+    };
+    match Client::open(port) {
+        Ok(client) => match client.firmware_note() {
+            None => {
+                Finding::ok(WHAT, format!("version {} on {port}, as this program", client.hello().firmware))
+            }
+            Some(note) => {
+                let remedy =
+                    "`cargo xtask firmware` builds the one that belongs to this program (docs/rig.md)";
+                Finding::bad(Health::Missing, WHAT, note, remedy)
+            }
+        },
+        Err(error) => {
+            let remedy = "docs/rig.md says how the board is connected and flashed";
+            Finding::bad(Health::Missing, WHAT, error.to_string(), remedy)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_that_is_not_well_says_what_to_do() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let gone = folder.path().join("gone");
+        let settings = DoctorSettings { port: Some("/dev/does-not-exist".into()), folders: vec![gone] };
+        let figures = examine(&settings, &Context::unattended()).expect("it looks only");
+        for finding in &figures.findings {
+            assert_eq!(finding.health == Health::Ok, finding.remedy.is_empty(), "{finding:?}");
+        }
+        let missing: Vec<&str> = figures
+            .findings
+            .iter()
+            .filter(|finding| finding.health == Health::Missing && finding.what != "emulated rig")
+            .map(|finding| finding.what.as_str())
+            .collect();
+        assert!(missing.contains(&"folder") && missing.contains(&"firmware"), "{missing:?}");
+        assert!(figures.findings.iter().any(|finding| finding.found.contains("/dev/does-not-exist")));
+    }
+}

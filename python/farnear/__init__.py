@@ -1,0 +1,34 @@
+"""Depth from defocus, corrections, people, and the farnear rig.
+
+Images and maps are numpy arrays (height, width); depth is in mm, NaN where there is none. See docs/python.md.
+"""
+
+from ._farnear import (
+    Correction,
+    DepthMap,
+    FarnearError,
+    Operators,
+    Optics,
+    Processor,
+    RigError,
+    centroid_distance,
+    depth,
+    remove_shadow,
+    render,
+    sun_position,
+)
+
+__all__ = [
+    "Correction",
+    "DepthMap",
+    "FarnearError",
+    "Operators",
+    "Optics",
+    "Processor",
+    "RigError",
+    "centroid_distance",
+    "depth",
+    "remove_shadow",
+    "render",
+    "sun_position",
+]

@@ -1,0 +1,86 @@
+//! Isomap and the map that embeds new samples.
+
+use farnear_activity::embedding::{isomap::isomap as lay_out, neighbours::Neighbourhood, rbf};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::errors::wrong;
+
+/// Coordinates, eigenvalues, geodesic distances.
+type Laid<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>);
+
+#[pyfunction]
+#[pyo3(signature = (samples, *, neighbours=5, dimensions=2))]
+pub fn isomap<'py>(
+    py: Python<'py>,
+    samples: PyReadonlyArray2<'py, f32>,
+    neighbours: usize,
+    dimensions: usize,
+) -> PyResult<Laid<'py>> {
+    let samples = samples.as_array();
+    let found =
+        py.detach(|| lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions)).map_err(wrong)?;
+    Ok((
+        found.coordinates.into_pyarray(py),
+        found.eigenvalues.into_pyarray(py),
+        found.geodesics.into_pyarray(py),
+    ))
+}
+
+/// What makes a map: centres, weights, gamma, ridge, condition.
+type Parts<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>, f32, f64, f64);
+
+/// Gaussian radial basis functions on all samples.
+#[pyclass(frozen, module = "farnear._farnear")]
+pub struct Rbf(rbf::Rbf);
+
+#[pymethods]
+impl Rbf {
+    #[new]
+    #[pyo3(signature = (samples, targets, *, gamma, ridge=1e-3))]
+    fn new(
+        py: Python<'_>,
+        samples: PyReadonlyArray2<'_, f32>,
+        targets: PyReadonlyArray2<'_, f32>,
+        gamma: f32,
+        ridge: f64,
+    ) -> PyResult<Self> {
+        let (samples, targets) = (samples.as_array(), targets.as_array());
+        py.detach(|| rbf::Rbf::train(samples, targets, gamma, ridge)).map(Self).map_err(wrong)
+    }
+
+    fn embed<'py>(
+        &self,
+        py: Python<'py>,
+        samples: PyReadonlyArray2<'py, f32>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let samples = samples.as_array();
+        Ok(py.detach(|| self.0.embed_all(samples)).map_err(wrong)?.into_pyarray(py))
+    }
+
+    /// A map from what [`Self::__reduce__`] gives.
+    #[staticmethod]
+    fn assemble(
+        centres: PyReadonlyArray2<'_, f32>,
+        weights: PyReadonlyArray2<'_, f32>,
+        gamma: f32,
+        ridge: f64,
+        condition: f64,
+    ) -> Self {
+        let (centres, weights) = (centres.as_array().to_owned(), weights.as_array().to_owned());
+        Self(rbf::Rbf::assemble(centres, weights, gamma, ridge, condition))
+    }
+
+    /// For pickle.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts<'py>)> {
+        let rbf::Rbf { centres, weights, gamma, ridge, condition, .. } = &self.0;
+        let arrays = (PyArray2::from_array(py, centres), PyArray2::from_array(py, weights));
+        let assemble = py.get_type::<Self>().getattr("assemble")?;
+        Ok((assemble, (arrays.0, arrays.1, *gamma, *ridge, *condition)))
+    }
+
+    #[getter]
+    fn condition(&self) -> f64 {
+        self.0.condition
+    }
+}

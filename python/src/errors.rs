@@ -1,0 +1,41 @@
+//! Errors as exceptions.
+
+use std::error::Error;
+
+use pyo3::{
+    create_exception,
+    exceptions::{PyRuntimeError, PyValueError},
+    prelude::*,
+};
+
+create_exception!(
+    farnear,
+    FarnearError,
+    PyValueError,
+    "What was given makes no sense; the message says what and why."
+);
+create_exception!(farnear, RigError, PyRuntimeError, "The rig, its camera or the way to them failed.");
+
+/// A library's error with its causes in one line, as a `FarnearError`.
+pub fn wrong(error: impl Error) -> PyErr {
+    FarnearError::new_err(message(&error))
+}
+
+/// The same as a `RigError`.
+pub fn rig(error: impl Error) -> PyErr {
+    RigError::new_err(message(&error))
+}
+
+/// A typed error often says its cause itself; that is not said twice.
+fn message(error: &dyn Error) -> String {
+    let mut message = error.to_string();
+    let mut next = error.source();
+    while let Some(cause) = next {
+        let text = cause.to_string();
+        if !message.contains(&text) {
+            message = format!("{message}: {text}");
+        }
+        next = cause.source();
+    }
+    message
+}

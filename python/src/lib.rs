@@ -1,0 +1,38 @@
+//! farnear for Python: thin functions and classes over the libraries. What they do is said in `farnear/_farnear.pyi` and
+//! `docs/python.md`; arrays go in without a copy where they are `float32` and come out without one.
+
+mod arrays;
+mod corrections;
+mod depth;
+mod embedding;
+mod errors;
+#[cfg(feature = "measure")]
+mod measure;
+mod optics;
+mod people;
+mod render;
+mod rig;
+
+/// The module behind the package `farnear`.
+#[pyo3::pymodule]
+mod _farnear {
+    #[pymodule_export]
+    use super::corrections::Correction;
+    #[pymodule_export]
+    use super::depth::{DepthMap, Processor, depth};
+    #[pymodule_export]
+    use super::embedding::{Rbf, isomap};
+    #[pymodule_export]
+    use super::errors::{FarnearError, RigError};
+    #[cfg(feature = "measure")]
+    #[pymodule_export]
+    use super::measure::{seconds_of_depth, seconds_of_processor};
+    #[pymodule_export]
+    use super::optics::{Operators, Optics};
+    #[pymodule_export]
+    use super::people::{centroid_distance, remove_shadow, sun_position};
+    #[pymodule_export]
+    use super::render::render;
+    #[pymodule_export]
+    use super::rig::RigClient;
+}

@@ -1,0 +1,75 @@
+//! Sun, shadow and what the embedding sees of a silhouette.
+
+use farnear_activity::{
+    embedding::descriptor::{self, Scaling},
+    shadow::{self, CameraFile, Method},
+    sun::{self, Model, Place, SunPosition},
+};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    arrays::Mask,
+    errors::{FarnearError, wrong},
+};
+
+#[pyfunction]
+#[pyo3(signature = (time, latitude_deg, longitude_deg, *, model="psa"))]
+pub fn sun_position(
+    time: &Bound<'_, PyAny>,
+    latitude_deg: f64,
+    longitude_deg: f64,
+    model: &str,
+) -> PyResult<(f64, f64)> {
+    let text = match time.call_method0("isoformat") {
+        Ok(text) => text.extract::<String>()?,
+        Err(_) => time.extract()?,
+    };
+    let time = sun::parse_time(&text).map_err(wrong)?;
+    let model: Model = model.parse().map_err(wrong)?;
+    let place = Place::new(latitude_deg, longitude_deg).map_err(wrong)?;
+    let sun = sun::position(time, place, model).map_err(wrong)?;
+    Ok((sun.elevation_deg, sun.azimuth_deg))
+}
+
+#[pyfunction]
+#[pyo3(signature = (mask, camera, *, elevation_deg, azimuth_deg, method="hybrid"))]
+pub fn remove_shadow<'py>(
+    py: Python<'py>,
+    mask: Mask,
+    camera: &str,
+    elevation_deg: f64,
+    azimuth_deg: f64,
+    method: &str,
+) -> PyResult<(Bound<'py, PyArray2<bool>>, Bound<'py, PyDict>)> {
+    let file = CameraFile::parse(camera).map_err(wrong)?;
+    let method: Method = method.parse().map_err(FarnearError::new_err::<String>)?;
+    let sun = SunPosition { elevation_deg, azimuth_deg };
+    let cut = || shadow::remove(&mask.0, &file, sun, 0.0, method);
+    let (clean, report) = py.detach(cut).map_err(wrong)?;
+    let said = PyDict::new(py);
+    said.set_item("beta_deg", report.beta_rad.to_degrees())?;
+    said.set_item("removed_fraction", report.removed_fraction)?;
+    said.set_item("distance_m", report.subject.distance_m)?;
+    said.set_item("trustworthy", report.trustworthy)?;
+    Ok((clean.into_pyarray(py), said))
+}
+
+#[pyfunction]
+#[pyo3(signature = (mask, *, scaling="keep-aspect"))]
+pub fn centroid_distance<'py>(
+    py: Python<'py>,
+    mask: Mask,
+    scaling: &str,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let scaling = match scaling {
+        "keep-aspect" => Scaling::KeepAspect,
+        "stretch" => Scaling::Stretch,
+        other => {
+            let message = format!("there is no scaling {other:?}; expected keep-aspect or stretch");
+            return Err(FarnearError::new_err(message));
+        }
+    };
+    let found = py.detach(|| descriptor::centroid_distance(mask.0.view(), scaling)).map_err(wrong)?;
+    Ok(found.to_vec().into_pyarray(py))
+}

@@ -1,0 +1,56 @@
+//! What a camera would see.
+
+use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Psf, Renderer, Scene, truth};
+use ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2};
+use pyo3::prelude::*;
+
+use crate::{errors::wrong, optics::Optics};
+
+/// Far image, near image, true depth.
+type Rendered<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyArray2<f32>>);
+
+#[pyfunction]
+#[pyo3(signature = (optics, scene="staircase", *, width=640, height=480, noise="8bit", seed=1, elliptical_distortion=false))]
+#[allow(clippy::too_many_arguments)] // keywords in Python
+pub fn render<'py>(
+    py: Python<'py>,
+    optics: &Optics,
+    scene: &str,
+    width: usize,
+    height: usize,
+    noise: &str,
+    seed: u64,
+    elliptical_distortion: bool,
+) -> PyResult<Rendered<'py>> {
+    let scene: Scene = scene.parse().map_err(wrong)?;
+    let noise: Noise = noise.parse().map_err(wrong)?;
+    let spread: Psf = optics.0.psf().to_string().parse().map_err(wrong)?;
+    let file = OpticsFile::parse(&toml::to_string(&optics.0).map_err(wrong)?).map_err(wrong)?;
+    let mut lens = Lens::from_optics(&file).map_err(wrong)?;
+    if elliptical_distortion {
+        lens = lens.with_distortion(EllipticalDistortion::default());
+    }
+    let camera = Camera::new(width, height, noise);
+    let expose = || -> PyResult<_> {
+        let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed).map_err(wrong)?;
+        let far = renderer.expose(lens.sensor_far_mm, 0).map_err(wrong)?;
+        let near = renderer.expose(lens.sensor_near_mm, 1).map_err(wrong)?;
+        Ok((far, near, truth(&scene, &lens, &camera)))
+    };
+    let (far, near, truth) = py.detach(expose)?;
+    let bits = noise.bits();
+    Ok((of_codes(py, far, bits), of_codes(py, near, bits), truth.into_pyarray(py)))
+}
+
+/// Codes of a camera with so many bits, over the whole of the type that holds them.
+fn of_codes(py: Python<'_>, codes: Array2<u16>, bits: u8) -> Bound<'_, PyAny> {
+    if bits <= 8 {
+        return codes.mapv(|code| code as u8).into_pyarray(py).into_any();
+    }
+    let full = f64::from((1u32 << bits) - 1);
+    codes
+        .mapv(|code| (f64::from(code) * f64::from(u16::MAX) / full).round() as u16)
+        .into_pyarray(py)
+        .into_any()
+}

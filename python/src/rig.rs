@@ -1,0 +1,287 @@
+//! The board, as `farnear.rig.Rig` uses it: every call can be interrupted by Ctrl-C, which stops what moves.
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+
+use farnear_capture::{
+    Client,
+    describe::{alarm_text, state_name, um},
+    expose::{CaptureError, expose, sensor_mm},
+    pair::{Exposures, capture_pair},
+    plan::SensorPair,
+    ready::{ensure_homed, steppers},
+    sequence::{ShotDefaults, nanometres},
+};
+use farnear_protocol::{
+    Micros, Nanometres,
+    message::{Axis, AxisStatus, Limits, ShotRecord},
+};
+use farnear_workflows::rig::camera::CameraAddress;
+use ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    errors::{FarnearError, RigError, rig, wrong},
+    optics::Optics,
+};
+
+/// From one look at the keyboard to the next.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// An image (height, width), its bits, and its record.
+type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
+
+/// A connected board.
+#[pyclass(module = "farnear._farnear")]
+pub struct RigClient(Client);
+
+#[pymethods]
+impl RigClient {
+    #[new]
+    fn new(py: Python<'_>, port: &str) -> PyResult<Self> {
+        py.detach(|| Client::open(port)).map(Self).map_err(rig)
+    }
+
+    /// Homes axes at the same time, all that have a home switch where none are named; gives their encoders' shifts in um.
+    #[pyo3(signature = (axes=None))]
+    fn home(&self, py: Python<'_>, axes: Option<Vec<String>>) -> PyResult<BTreeMap<&'static str, f64>> {
+        let axes = match axes {
+            Some(names) => names.iter().map(|name| axis(name)).collect::<PyResult<Vec<_>>>()?,
+            None => steppers(&self.0.hello().capabilities),
+        };
+        self.interruptibly(py, |client| {
+            let started: Vec<_> = axes
+                .into_iter()
+                .map(|axis| Ok((axis, client.start_home(axis)?)))
+                .collect::<Result<_, Failed>>()?;
+            started.into_iter().map(|(axis, work)| Ok((axis.name(), um(work.homed()?)))).collect()
+        })
+    }
+
+    /// Homes what is not homed.
+    fn ensure_homed(&self, py: Python<'_>) -> PyResult<()> {
+        self.interruptibly(py, |client| Ok(ensure_homed(client, &mut |_| {})?))
+    }
+
+    /// Moves axes at the same time, um; gives where they have come to, um.
+    fn move_to(
+        &self,
+        py: Python<'_>,
+        targets_um: BTreeMap<String, f64>,
+    ) -> PyResult<BTreeMap<&'static str, f64>> {
+        let targets = targets_um.iter().map(|(name, to_um)| Ok((axis(name)?, position(*to_um)?)));
+        let targets = targets.collect::<PyResult<Vec<_>>>()?;
+        self.interruptibly(py, |client| {
+            let started: Vec<_> = targets
+                .into_iter()
+                .map(|(axis, target)| Ok((axis, client.start_move(axis, target)?)))
+                .collect::<Result<_, Failed>>()?;
+            started.into_iter().map(|(axis, work)| Ok((axis.name(), um(work.moved()?.measured)))).collect()
+        })
+    }
+
+    /// What the board says of itself now.
+    fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let status = self.interruptibly(py, |client| Ok(client.status()?))?;
+        let said = PyDict::new(py);
+        for (name, axis) in [("coarse", &status.coarse), ("fine", &status.fine), ("lens", &status.lens)] {
+            said.set_item(name, of_axis(py, axis)?)?;
+        }
+        said.set_item("emergency_stop", status.emergency_stop)?;
+        said.set_item("alarm", status.alarm.map(|record| record.number))?;
+        said.set_item("alarm_text", status.alarm.map(|record| alarm_text(record.alarm)))?;
+        Ok(said)
+    }
+
+    /// Who the board is and how far it goes.
+    fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let hello = self.0.hello();
+        let limits = hello.limits;
+        let said = PyDict::new(py);
+        said.set_item("board", hello.board.as_str())?;
+        said.set_item("firmware", hello.firmware.as_str())?;
+        said.set_item("emulated", hello.emulated)?;
+        said.set_item("shots_max", limits.shots_max)?;
+        for (name, min, max) in [
+            ("coarse_um", limits.coarse_min, limits.coarse_max),
+            ("fine_um", limits.fine_min, limits.fine_max),
+            ("lens_um", limits.lens_min, limits.lens_max),
+        ] {
+            said.set_item(name, (um(min), um(max)))?;
+        }
+        Ok(said)
+    }
+
+    /// Stops all motion along the ramps.
+    fn stop(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.0.stop()).map_err(rig)
+    }
+
+    /// Emergency stop.
+    fn halt(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.0.halt()).map_err(rig)
+    }
+
+    /// Clears an alarm by its number.
+    fn clear_alarm(&self, py: Python<'_>, number: u32) -> PyResult<()> {
+        py.detach(|| self.0.clear_alarm(number)).map_err(rig)
+    }
+
+    /// Runs a program of positions (axis, um) on the board; gives an image with its record for each.
+    #[pyo3(signature = (camera, shots, *, exposure_us=5000, wait_s=30.0))]
+    fn expose<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &str,
+        shots: Vec<(String, f64)>,
+        exposure_us: u32,
+        wait_s: f64,
+    ) -> PyResult<Vec<Taken<'py>>> {
+        let (address, wait) = (address(camera)?, waiting(wait_s)?);
+        let usual = ShotDefaults { exposure: Micros(exposure_us), ..ShotDefaults::default() };
+        let shots = shots.iter().map(|(name, to_um)| Ok(usual.shot(axis(name)?, position(*to_um)?)));
+        let shots = shots.collect::<PyResult<Vec<_>>>()?;
+        let limits = self.0.hello().limits;
+        let taken = self.interruptibly(py, |client| {
+            let mut camera = open(&address)?;
+            let mut taken = Vec::with_capacity(shots.len());
+            expose(client, camera.as_mut(), &shots, wait, |record, image| -> Result<(), CaptureError> {
+                taken.push((image.pixels, image.bits, record));
+                Ok(())
+            })?;
+            Ok(taken)
+        })?;
+        taken.into_iter().map(|taken| of_image(py, taken, &limits)).collect()
+    }
+
+    /// A far- and a near-focused image for some optics: homes where needed, brings the stage near, exposes both by piezo.
+    #[pyo3(signature = (camera, optics, *, exposure_us=5000, wait_s=30.0))]
+    fn capture_pair<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &str,
+        optics: &Optics,
+        exposure_us: u32,
+        wait_s: f64,
+    ) -> PyResult<(Taken<'py>, Taken<'py>)> {
+        let (address, image_wait) = (address(camera)?, waiting(wait_s)?);
+        let range = optics.0.working_range();
+        let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
+        let exposures = Exposures { exposure: Micros(exposure_us), image_wait, ..Exposures::default() };
+        let limits = self.0.hello().limits;
+        let pair = self.interruptibly(py, |client| {
+            let mut camera = open(&address)?;
+            Ok(capture_pair(client, camera.as_mut(), &sensor, &exposures, &mut |_| {})?)
+        })?;
+        let [far, near] = [pair.far, pair.near]
+            .map(|taken| of_image(py, (taken.image.pixels, taken.image.bits, taken.record), &limits));
+        Ok((far?, near?))
+    }
+}
+
+/// What went wrong aside of Python.
+struct Failed(String);
+
+impl<E: std::error::Error> From<E> for Failed {
+    fn from(error: E) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl RigClient {
+    /// Does `work` in a thread while this one looks whether the user interrupts; then the rig is stopped before the interruption
+    /// goes on.
+    fn interruptibly<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&Client) -> Result<T, Failed> + Send,
+    ) -> PyResult<T> {
+        let mut client = self.0.clone();
+        let wish = Arc::new(AtomicBool::new(false));
+        client.interrupt_by(Arc::clone(&wish));
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(move || work(&client));
+            let mut interrupted = None;
+            while !worker.is_finished() {
+                py.detach(|| std::thread::sleep(LOOK));
+                if interrupted.is_none()
+                    && let Err(error) = py.check_signals()
+                {
+                    wish.store(true, Ordering::Relaxed);
+                    interrupted = Some(error);
+                }
+            }
+            let done = worker
+                .join()
+                .map_err(|_| RigError::new_err("the work ended with a panic, a mistake of farnear's"))?;
+            match interrupted {
+                Some(error) => Err(error),
+                None => done.map_err(|Failed(message)| RigError::new_err(message)),
+            }
+        })
+    }
+}
+
+fn axis(name: &str) -> PyResult<Axis> {
+    let known = [Axis::SensorCoarse, Axis::SensorFine, Axis::Lens];
+    known.into_iter().find(|axis| axis.name() == name).ok_or_else(|| {
+        FarnearError::new_err(format!("there is no axis {name:?}; expected coarse, fine or lens"))
+    })
+}
+
+fn position(to_um: f64) -> PyResult<Nanometres> {
+    nanometres(to_um).ok_or_else(|| {
+        FarnearError::new_err(format!("{to_um} um is no position; expected -2147483 to 2147483 um"))
+    })
+}
+
+fn waiting(wait_s: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(wait_s)
+        .map_err(|error| FarnearError::new_err(format!("wait_s = {wait_s}: {error}")))
+}
+
+fn address(camera: &str) -> PyResult<CameraAddress> {
+    match camera.parse().map_err(wrong)? {
+        CameraAddress::Emulated => Err(FarnearError::new_err(
+            "the camera \"sim\" has no address; farnear.rig.EmulatedRig knows that of its camera",
+        )),
+        address => Ok(address),
+    }
+}
+
+fn open(address: &CameraAddress) -> Result<Box<dyn farnear_capture::camera::Camera>, Failed> {
+    address.open()?.ok_or_else(|| Failed("there is no camera".into()))
+}
+
+fn of_axis<'py>(py: Python<'py>, status: &AxisStatus) -> PyResult<Bound<'py, PyDict>> {
+    let said = PyDict::new(py);
+    said.set_item("state", state_name(status.state))?;
+    said.set_item("asked_um", um(status.asked))?;
+    said.set_item("measured_um", um(status.measured))?;
+    said.set_item("moving", status.moving)?;
+    Ok(said)
+}
+
+fn of_image<'py>(
+    py: Python<'py>,
+    (pixels, bits, record): (Array2<u16>, u8, ShotRecord),
+    limits: &Limits,
+) -> PyResult<Taken<'py>> {
+    let said = PyDict::new(py);
+    said.set_item("axis", record.axis.name())?;
+    said.set_item("asked_um", um(record.asked))?;
+    said.set_item("measured_um", um(record.measured(record.axis)))?;
+    said.set_item("sensor_mm", sensor_mm(&record, limits))?;
+    said.set_item("settle_ms", f64::from(record.settle.0) / 1e3)?;
+    said.set_item("strobe_start_us", record.strobe_start.0)?;
+    said.set_item("strobe_end_us", record.strobe_end.0)?;
+    said.set_item("exposure_us", record.exposure.0)?;
+    Ok((pixels.into_pyarray(py), bits, said))
+}

@@ -1,0 +1,57 @@
+"""The emulated rig as a fixture: what a test of one's own measuring program looks like. Also the rig's client itself."""
+
+import numpy as np
+import pytest
+
+import farnear
+
+
+def test_a_stage_goes_where_it_is_sent(emulated_rig):
+    with pytest.raises(farnear.RigError, match="not homed|home"):
+        emulated_rig.move(coarse=5800)
+    reached = emulated_rig.move(home=True, coarse=5800, fine=50)
+    # Half a step of the screw; the window of the piezo.
+    assert reached["coarse"] == pytest.approx(5800, abs=0.6)
+    assert reached["fine"] == pytest.approx(50, abs=0.1)
+    assert emulated_rig.status()["coarse"]["state"] == "homed"
+    with pytest.raises(farnear.RigError, match="limit|range|outside"):
+        emulated_rig.move(fine=1000)
+    with pytest.raises(farnear.FarnearError, match="coarse, fine or lens"):
+        emulated_rig.move(focus=1)
+
+
+@pytest.mark.emulated_rig(scene="plane:910", seed=2)
+def test_a_pair_gives_the_scenes_depth(emulated_rig, optics):
+    far, near = emulated_rig.capture_pair(optics)
+    assert far.record["sensor_mm"] == pytest.approx(optics.sensor_far_mm, abs=2e-3)
+    found = farnear.depth(far.image, near.image, optics)
+    # docs/accuracy.md: 0.7 mm for planes at 8 bit, over many pixels.
+    assert np.nanmedian(found.depth_mm) == pytest.approx(910, abs=1)
+
+
+def test_a_sequence_of_micro_manager_goes_through_the_focus(emulated_rig):
+    useq = pytest.importorskip("useq")
+    emulated_rig.home()
+    sequence = useq.MDASequence(z_plan={"bottom": 20, "top": 60, "step": 20}, time_plan={"interval": 0, "loops": 2})
+    taken = list(emulated_rig.run_sequence(sequence))
+    assert [exposure.record["asked_um"] for exposure in taken] == [20, 40, 60] * 2
+    assert all(abs(exposure.record["measured_um"] - exposure.record["asked_um"]) < 0.1 for exposure in taken)
+    assert [exposure.index["z"] for exposure in taken] == [0, 1, 2] * 2
+    begins = [exposure.record["strobe_start_us"] for exposure in taken]
+    assert begins == sorted(begins) and len(set(begins)) == 6
+    with pytest.raises(farnear.FarnearError, match="channel"):
+        list(emulated_rig.run_sequence(useq.MDASequence(channels=["DAPI"], z_plan={"range": 2, "step": 1})))
+
+
+def test_a_rig_that_was_left_is_closed(emulated_rig):
+    with emulated_rig as rig:
+        assert rig.info()["emulated"]
+    with pytest.raises(farnear.RigError, match="closed"):
+        rig.status()
+
+
+def test_a_port_that_is_none_is_said():
+    from farnear.rig import Rig
+
+    with pytest.raises(farnear.RigError, match="/dev/does-not-exist"):
+        Rig("/dev/does-not-exist")

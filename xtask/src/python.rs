@@ -1,0 +1,163 @@
+//! The tests of the Python package, where there is a Python with what they need: the module is built as everything else is, laid
+//! beside the package's own files, and looked at by pytest in an environment of its own.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context, Result};
+
+use crate::{
+    browser::Counts,
+    run::{ROOT, cargo, finish, target_folder},
+};
+
+/// The package that only those compile who have Python.
+pub const PACKAGE: &str = "farnear-python";
+/// What the tests need beside the package.
+const NEEDS: [&str; 4] = ["numpy>=1.23", "pytest>=7", "scikit-learn>=1.6", "useq-schema>=0.5"];
+/// Says whether a Python is new enough and can make environments.
+const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
+
+/// Runs them, or says what is missing and counts them as skipped.
+///
+/// # Errors
+/// A module that cannot be built, a Python that cannot be started though it is there.
+pub fn run(elf: &Path) -> Result<Counts> {
+    let tests = ROOT.join("python/tests");
+    let folder = target_folder().join("python-tests");
+    let python = match environment(&folder) {
+        Ok(python) => python,
+        Err(missing) => {
+            eprintln!("skipped: the Python package ({missing})");
+            return Ok(Counts { skipped: written(&tests)?, ended_well: true, ..Counts::default() });
+        }
+    };
+    let built = build()?;
+    lay_out(&folder.join("package/farnear"), &built)?;
+    let output = Command::new(python)
+        .args(["-m", "pytest", "-q", "-p", "farnear.pytest_plugin", "-p", "no:cacheprovider"])
+        .arg("--rootdir")
+        .arg(&tests)
+        .arg(&tests)
+        // Not the repository's: its folder of the package has no module in it.
+        .current_dir(&folder)
+        .env("PYTHONPATH", folder.join("package"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .env("FARNEAR_SIM", built.join("farnear-sim"))
+        .env("FARNEAR_FIRMWARE", elf)
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot start Python")?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    print!("{text}");
+    Ok(Counts {
+        passed: count(&text, "passed"),
+        failed: count(&text, "failed") + count(&text, "error") + count(&text, "errors"),
+        skipped: count(&text, "skipped"),
+        ended_well: output.status.success(),
+    })
+}
+
+/// The Python of an environment with what the tests need, made where it is not there; else what is missing.
+fn environment(folder: &Path) -> Result<PathBuf, String> {
+    let venv = folder.join("venv");
+    let (python, whole) = (venv.join("bin/python"), folder.join("needs"));
+    if fs::read_to_string(&whole).is_ok_and(|needs| needs == NEEDS.join("\n"))
+        && quiet(Command::new(&python).arg("-V"))
+    {
+        return Ok(python);
+    }
+    if !quiet(Command::new("python3").args(["-c", ABLE])) {
+        return Err(
+            "no python3 of at least 3.9 with venv; Debian's packages are python3 and python3-venv".into()
+        );
+    }
+    if !quiet(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
+        return Err("python3 -m venv makes no environment; Debian's package is python3-venv".into());
+    }
+    eprintln!("fetching {}", NEEDS.join(", "));
+    let fetch = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:"];
+    if !quiet(Command::new(&python).args(fetch).args(NEEDS)) {
+        return Err(format!("pip cannot fetch {}", NEEDS.join(", ")));
+    }
+    fs::write(&whole, NEEDS.join("\n")).map_err(|error| format!("{}: {error}", whole.display()))?;
+    Ok(python)
+}
+
+/// Whether a program can be started and ends well.
+fn quiet(command: &mut Command) -> bool {
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|s| s.success())
+}
+
+/// The module and the programs that its tests run, in one call, so that all share what is compiled already; gives their folder.
+fn build() -> Result<PathBuf> {
+    let mut command = cargo([
+        "build",
+        "--locked",
+        "--package",
+        PACKAGE,
+        "--package",
+        "farnear",
+        "--package",
+        "farnear-sim",
+    ]);
+    // A module is not linked with Python, and one for every version asks none of them.
+    finish(command.env("PYO3_BUILD_EXTENSION_MODULE", "1").env("PYO3_NO_PYTHON", "1"))?;
+    Ok(target_folder().join("debug"))
+}
+
+/// The package as it is when it is installed.
+fn lay_out(package: &Path, built: &Path) -> Result<()> {
+    fs::create_dir_all(package).with_context(|| format!("cannot make {}", package.display()))?;
+    for entry in fs::read_dir(ROOT.join("python/farnear")).context("the package is not there")? {
+        let entry = entry?;
+        if entry.path().is_file() {
+            fs::copy(entry.path(), package.join(entry.file_name()))?;
+        }
+    }
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let module = built.join(format!("{prefix}_farnear{suffix}"));
+    fs::copy(&module, package.join("_farnear.abi3.so"))
+        .with_context(|| format!("no {}", module.display()))?;
+    Ok(())
+}
+
+/// How many tests stand in the files; one that runs for several values counts once.
+fn written(tests: &Path) -> Result<u32> {
+    let mut count = 0;
+    for entry in fs::read_dir(tests).context("the package's tests are not there")? {
+        let text = fs::read_to_string(entry?.path()).unwrap_or_default(); // folders of caches
+        count += text.lines().filter(|line| line.starts_with("def test_")).count() as u32;
+    }
+    Ok(count)
+}
+
+/// The number before a word in pytest's last line: "1 failed, 98 passed, 3 skipped in 8.34s".
+fn count(text: &str, word: &str) -> u32 {
+    let last = text.lines().rev().find(|line| line.contains(" in ")).unwrap_or_default();
+    let parts = last.trim_matches(['=', ' ']).split(['(', ',']).flat_map(|part| part.split(" in "));
+    let number = |part: &str| part.trim().strip_suffix(word)?.trim().parse().ok();
+    parts.filter_map(number).next().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ROOT, count, written};
+
+    #[test]
+    fn counts_are_read() {
+        let text = "FAILED a in b\n1 failed, 98 passed, 3 skipped in 8.34s\n";
+        let words = ["failed", "passed", "skipped", "error"];
+        assert_eq!(words.map(|word| count(text, word)), [1, 98, 3, 0]);
+        assert_eq!(words.map(|word| count("== 5 passed in 75.00s (0:01:15) ==\n", word)), [0, 5, 0, 0]);
+        assert!(written(&ROOT.join("python/tests")).is_ok_and(|tests| tests > 20));
+    }
+}
