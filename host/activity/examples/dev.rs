@@ -1,0 +1,207 @@
+#![allow(missing_docs, clippy::all, unused_imports, dead_code)]
+use anyhow::Result;
+use farnear_activity::{
+    embedding::descriptor::Scaling,
+    recognition::{
+        choice::names,
+        classifier::{Classifier, ClassifierKind},
+        clip::{Clip, Track},
+        frames::{Mode, Weights},
+        space::{PatternKind, Space, SpaceSettings},
+    },
+    synthetic::everyday,
+};
+use ndarray::Array2;
+use rayon::prelude::*;
+use std::time::Instant;
+
+#[path = "../../evaluation/src/people/skeletons.rs"]
+mod skeletons;
+#[path = "../../evaluation/src/people/strips.rs"]
+mod strips;
+
+fn numbered(folder: &str) -> Vec<(u64, std::path::PathBuf)> {
+    let mut files: Vec<(u64, std::path::PathBuf)> = std::fs::read_dir(folder).unwrap().filter_map(|e| {
+        let p = e.ok()?.path();
+        let d: String = p.file_stem()?.to_str()?.chars().filter(char::is_ascii_digit).collect();
+        Some((d.parse().ok()?, p))
+    }).collect();
+    files.sort();
+    files
+}
+
+fn kth() -> Vec<Clip> {
+    let mut clips = Vec::new();
+    for person in ["person01", "person02"] {
+        let mut runs: Vec<Vec<farnear_activity::mask::Mask>> = Vec::new();
+        let mut previous = None;
+        for (n, p) in numbered(&format!("/work/shared/data/kth_walk/{person}")) {
+            let i = image::open(&p).unwrap().to_luma8();
+            let m = farnear_activity::mask::Mask::from_shape_fn((i.height() as usize, i.width() as usize), |(y, x)| i.get_pixel(x as u32, y as u32).0[0] > 127);
+            if previous.is_none_or(|q| n != q + 1) { runs.push(Vec::new()); }
+            previous = Some(n);
+            if farnear_activity::mask::area(m.view()) >= 200 { runs.last_mut().unwrap().push(m); }
+        }
+        for run in runs.into_iter().filter(|r| r.len() >= 20) {
+            clips.push(Clip { subject: person.into(), activity: "walk".into(), views: vec![Track::from_masks(&run, Scaling::default(), true)] });
+        }
+    }
+    clips
+}
+
+fn weizmann() -> Vec<Clip> {
+    let mut files = Vec::new();
+    for (f, a) in [("0", "wave one"), ("1", "wave two"), ("3", "jack"), ("4", "bend")] {
+        for (n, p) in numbered(&format!("/work/shared/data/weizmann4/{f}")) { files.push((n, a, p)); }
+    }
+    files.into_par_iter().map(|(n, a, p)| Clip { subject: format!("w{}", n / 8), activity: a.into(),
+        views: vec![Track::from_masks(&strips::masks(&strips::read(&p).unwrap()), Scaling::default(), true)] }).collect()
+}
+
+fn var(name: &str, default: f64) -> f64 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
+/// The model's name of a set's activity.
+fn renamed(name: &str) -> &str {
+    match name {
+        "wave hands" => "wave two hands",
+        "clap hands" => "clap",
+        "wave one" | "wave" => "wave one hand",
+        "wave two" => "wave two hands",
+        "jack" => "jumping jack",
+        "tight lace" => "tie laces",
+        other => other,
+    }
+}
+
+fn main() -> Result<()> {
+    let t = Instant::now();
+    let read = |n: &str| std::fs::read(format!("/work/shared/data/skeletons/{n}")).unwrap();
+    let all: Vec<(&str, Vec<Clip>)> = vec![
+        ("UTKinect", skeletons::utkinect(&read("UTKinect_Skeletons.mat"), 4, Scaling::default())?),
+        ("Florence", skeletons::florence(&read("Florence_3D_Action_Skeletons.mat"), 4, Scaling::default())?),
+        ("Weizmann", weizmann()),
+        ("KTH", kth()),
+    ];
+    eprintln!("read in {:.1} s", t.elapsed().as_secs_f64());
+    let people = var("PEOPLE", 20.0) as usize;
+    let t = Instant::now();
+    let training = everyday::clips(0, people, Scaling::default());
+    eprintln!("made {} clips in {:.1} s", training.len(), t.elapsed().as_secs_f64());
+    for (mode_name, mode) in [("order-free", Mode::OrderFree), ("ordered", Mode::Ordered)] {
+        let classes = names(training.iter().map(|c| &c.activity));
+        let refs: Vec<&Clip> = training.iter().collect();
+        let settings = SpaceSettings {
+            mode,
+            dimensions: var("DIM", 20.0) as usize,
+            pattern: PatternKind::Codebook(var("BOOK", 200.0) as usize),
+            residuals: var("RES", 32.0) as usize,
+            gallery: 4000,
+            weights: Weights {
+                relative_weight: var("REL", 1.0) as f32,
+                box_weight: var("BOX", 6.0) as f32,
+                motion_weight: var("MOT", 0.7) as f32,
+            },
+            ..SpaceSettings::default()
+        };
+        let t = Instant::now();
+        let space = Space::train(&refs, &settings)?;
+        let sharp = var("SHARP", 2.0) as f32;
+        let pattern = |track: &Track| -> Vec<f32> {
+            space.pattern_of(space.vectors(track).expect("vectors").view(), sharp).to_vec()
+        };
+        let rows: Vec<Vec<f32>> = training.par_iter().map(|c| pattern(&c.views[0])).collect();
+        let patterns = Array2::from_shape_vec((rows.len(), rows[0].len()), rows.concat())?;
+        let labels: Vec<usize> =
+            training.iter().map(|c| classes.iter().position(|k| *k == c.activity).unwrap_or(0)).collect();
+        let classifier = Classifier::train(
+            ClassifierKind::Svc(var("COST", 1.0) as f32),
+            patterns.view(),
+            &labels,
+            classes.len(),
+        );
+        eprintln!("{mode_name}: trained in {:.1} s, width {}", t.elapsed().as_secs_f64(), patterns.ncols());
+        let fresh = everyday::clips(100_000, 4, Scaling::default());
+        let mut judged = vec![("fresh synthetic", fresh.iter().collect::<Vec<_>>())];
+        judged.extend(all.iter().map(|(n, c)| (*n, c.iter().collect())));
+        for (name, clips) in judged {
+            report(name, &clips, &classes, &|track| {
+                classifier.probabilities(ndarray::ArrayView1::from(&pattern(track)[..]))
+            });
+        }
+    }
+    Ok(())
+}
+
+fn report(name: &str, clips: &[&Clip], classes: &[String], answer: &(dyn Fn(&Track) -> Vec<f32> + Sync)) {
+    let known: Vec<&&Clip> =
+        clips.iter().filter(|c| classes.iter().any(|k| k == renamed(&c.activity))).collect();
+    let mut among: Vec<usize> =
+        known.iter().filter_map(|c| classes.iter().position(|k| k == renamed(&c.activity))).collect();
+    among.sort_unstable();
+    among.dedup();
+    let best =
+        |p: &[f32], of: &[usize]| of.iter().copied().max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap_or(0);
+    let everything: Vec<usize> = (0..classes.len()).collect();
+    let results: Vec<(usize, Vec<Vec<f32>>)> = known
+        .par_iter()
+        .map(|c| {
+            let truth = classes.iter().position(|k| k == renamed(&c.activity)).unwrap_or(0);
+            (truth, c.views.iter().map(&answer).collect())
+        })
+        .collect();
+    let (mut n, mut right, mut right_among, mut fused) = (0, 0, 0, 0);
+    let mut by_view = vec![0; 8];
+    let mut confusion = vec![vec![0; classes.len()]; classes.len()];
+    let mut free = vec![vec![0; classes.len()]; classes.len()];
+    for (truth, views) in &results {
+        let mut sum = vec![0.0; classes.len()];
+        for (v, p) in views.iter().enumerate() {
+            n += 1;
+            let b = best(p, &everything);
+            right += usize::from(b == *truth);
+            free[*truth][b] += 1;
+            let a = best(p, &among);
+            confusion[*truth][a] += 1;
+            right_among += usize::from(a == *truth);
+            by_view[v] += usize::from(a == *truth);
+            for (s, p) in sum.iter_mut().zip(p) {
+                *s += p.max(1e-6).ln();
+            }
+        }
+        fused += usize::from(best(&sum, &among) == *truth);
+    }
+    let pc = |k: usize, n: usize| 100.0 * k as f64 / n.max(1) as f64;
+    eprintln!(
+        "  {name}: {} clips, all classes {:.1}, among {} {:.1}, fused among {:.1}; views {:?}",
+        results.len(),
+        pc(right, n),
+        among.len(),
+        pc(right_among, n),
+        pc(fused, results.len()),
+        by_view
+            .iter()
+            .take(results.first().map_or(0, |r| r.1.len()))
+            .map(|k| pc(*k, results.len()).round())
+            .collect::<Vec<_>>()
+    );
+    if std::env::var("CONF").is_ok()
+        && (name != "fresh synthetic" || std::env::var("CONF").is_ok_and(|v| v == "2"))
+    {
+        for &t in &among {
+            let total: usize = confusion[t].iter().sum();
+            let list = |row: &Vec<usize>| {
+                let mut l: Vec<(usize, usize)> =
+                    row.iter().copied().enumerate().filter(|x| x.1 > 0).collect();
+                l.sort_by_key(|x| std::cmp::Reverse(x.1));
+                l.iter()
+                    .take(5)
+                    .map(|(k, c)| format!("{} {:.0}", classes[*k], pc(*c, total)))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            };
+            eprintln!("      {:>15}: {}   | {}", classes[t], list(&confusion[t]), list(&free[t]));
+        }
+    }
+}
