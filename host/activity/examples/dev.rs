@@ -21,11 +21,14 @@ mod skeletons;
 mod strips;
 
 fn numbered(folder: &str) -> Vec<(u64, std::path::PathBuf)> {
-    let mut files: Vec<(u64, std::path::PathBuf)> = std::fs::read_dir(folder).unwrap().filter_map(|e| {
-        let p = e.ok()?.path();
-        let d: String = p.file_stem()?.to_str()?.chars().filter(char::is_ascii_digit).collect();
-        Some((d.parse().ok()?, p))
-    }).collect();
+    let mut files: Vec<(u64, std::path::PathBuf)> = std::fs::read_dir(folder)
+        .unwrap()
+        .filter_map(|e| {
+            let p = e.ok()?.path();
+            let d: String = p.file_stem()?.to_str()?.chars().filter(char::is_ascii_digit).collect();
+            Some((d.parse().ok()?, p))
+        })
+        .collect();
     files.sort();
     files
 }
@@ -37,13 +40,24 @@ fn kth() -> Vec<Clip> {
         let mut previous = None;
         for (n, p) in numbered(&format!("/work/shared/data/kth_walk/{person}")) {
             let i = image::open(&p).unwrap().to_luma8();
-            let m = farnear_activity::mask::Mask::from_shape_fn((i.height() as usize, i.width() as usize), |(y, x)| i.get_pixel(x as u32, y as u32).0[0] > 127);
-            if previous.is_none_or(|q| n != q + 1) { runs.push(Vec::new()); }
+            let m = farnear_activity::mask::Mask::from_shape_fn(
+                (i.height() as usize, i.width() as usize),
+                |(y, x)| i.get_pixel(x as u32, y as u32).0[0] > 127,
+            );
+            if previous.is_none_or(|q| n != q + 1) {
+                runs.push(Vec::new());
+            }
             previous = Some(n);
-            if farnear_activity::mask::area(m.view()) >= 200 { runs.last_mut().unwrap().push(m); }
+            if farnear_activity::mask::area(m.view()) >= 200 {
+                runs.last_mut().unwrap().push(m);
+            }
         }
         for run in runs.into_iter().filter(|r| r.len() >= 20) {
-            clips.push(Clip { subject: person.into(), activity: "walk".into(), views: vec![Track::from_masks(&run, Scaling::default(), true)] });
+            clips.push(Clip {
+                subject: person.into(),
+                activity: "walk".into(),
+                views: vec![Track::from_masks(&run, Scaling::default(), true)],
+            });
         }
     }
     clips
@@ -52,10 +66,22 @@ fn kth() -> Vec<Clip> {
 fn weizmann() -> Vec<Clip> {
     let mut files = Vec::new();
     for (f, a) in [("0", "wave one"), ("1", "wave two"), ("3", "jack"), ("4", "bend")] {
-        for (n, p) in numbered(&format!("/work/shared/data/weizmann4/{f}")) { files.push((n, a, p)); }
+        for (n, p) in numbered(&format!("/work/shared/data/weizmann4/{f}")) {
+            files.push((n, a, p));
+        }
     }
-    files.into_par_iter().map(|(n, a, p)| Clip { subject: format!("w{}", n / 8), activity: a.into(),
-        views: vec![Track::from_masks(&strips::masks(&strips::read(&p).unwrap()), Scaling::default(), true)] }).collect()
+    files
+        .into_par_iter()
+        .map(|(n, a, p)| Clip {
+            subject: format!("w{}", n / 8),
+            activity: a.into(),
+            views: vec![Track::from_masks(
+                &strips::masks(&strips::read(&p).unwrap()),
+                Scaling::default(),
+                true,
+            )],
+        })
+        .collect()
 }
 
 fn var(name: &str, default: f64) -> f64 {
@@ -90,6 +116,7 @@ fn main() -> Result<()> {
     let training = everyday::clips(0, people, Scaling::default());
     eprintln!("made {} clips in {:.1} s", training.len(), t.elapsed().as_secs_f64());
     for (mode_name, mode) in [("order-free", Mode::OrderFree), ("ordered", Mode::Ordered)] {
+        if var("ONLY", 0.0) == 1.0 && mode == Mode::OrderFree { continue; }
         let classes = names(training.iter().map(|c| &c.activity));
         let refs: Vec<&Clip> = training.iter().collect();
         let settings = SpaceSettings {
@@ -107,28 +134,43 @@ fn main() -> Result<()> {
         };
         let t = Instant::now();
         let space = Space::train(&refs, &settings)?;
-        let sharp = var("SHARP", 2.0) as f32;
-        let pattern = |track: &Track| -> Vec<f32> {
-            space.pattern_of(space.vectors(track).expect("vectors").view(), sharp).to_vec()
-        };
-        let rows: Vec<Vec<f32>> = training.par_iter().map(|c| pattern(&c.views[0])).collect();
-        let patterns = Array2::from_shape_vec((rows.len(), rows[0].len()), rows.concat())?;
+        use farnear_activity::recognition::network::training::{NetworkSettings, train};
+        let vectors = |track: &Track| space.vectors(track).expect("vectors");
+        let mut rows: Vec<Array2<f32>> = training.par_iter().map(|c| vectors(&c.views[0])).collect();
+        let mirror = var("MIRROR", 1.0) > 0.0;
+        if mirror { rows.extend(training.par_iter().map(|c| vectors(&c.views[0].mirrored())).collect::<Vec<_>>()); }
         let labels: Vec<usize> =
             training.iter().map(|c| classes.iter().position(|k| *k == c.activity).unwrap_or(0)).collect();
-        let classifier = Classifier::train(
-            ClassifierKind::Svc(var("COST", 1.0) as f32),
-            patterns.view(),
+        let labels = if mirror { [labels.clone(), labels].concat() } else { labels };
+        let w = var("WIDTH", 1.0);
+        let net = train(
+            &rows,
             &labels,
             classes.len(),
-        );
-        eprintln!("{mode_name}: trained in {:.1} s, width {}", t.elapsed().as_secs_f64(), patterns.ncols());
+            &NetworkSettings {
+                passes: var("PASSES", 30.0) as usize,
+                rate: var("RATE", 2e-3) as f32,
+                decay: var("DECAY", 1e-2) as f32,
+                dropout: var("DROP", 0.3) as f32,
+                widths: [(64.0 * w) as usize, (128.0 * w) as usize, (96.0 * w) as usize],
+                ..NetworkSettings::default()
+            },
+            &farnear_activity::recognition::watch::Unwatched,
+        )
+        .unwrap();
+        eprintln!("{mode_name}: trained in {:.1} s", t.elapsed().as_secs_f64());
+        let probabilities = |track: &Track| {
+            let d = net.decide(net.pattern(vectors(track).view()).view());
+            let m = d.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
+            let e: Vec<f32> = d.iter().map(|v| (v - m).exp()).collect();
+            let s: f32 = e.iter().sum();
+            e.into_iter().map(|v| v / s).collect::<Vec<f32>>()
+        };
         let fresh = everyday::clips(100_000, 4, Scaling::default());
         let mut judged = vec![("fresh synthetic", fresh.iter().collect::<Vec<_>>())];
         judged.extend(all.iter().map(|(n, c)| (*n, c.iter().collect())));
         for (name, clips) in judged {
-            report(name, &clips, &classes, &|track| {
-                classifier.probabilities(ndarray::ArrayView1::from(&pattern(track)[..]))
-            });
+            report(name, &clips, &classes, &probabilities);
         }
     }
     Ok(())

@@ -14,6 +14,7 @@ pub mod frames;
 pub mod live;
 pub mod model;
 pub mod model_file;
+pub mod network;
 pub mod occupancy;
 pub(crate) mod patterns;
 pub mod residuals;

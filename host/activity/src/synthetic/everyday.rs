@@ -33,12 +33,10 @@ type Activity = (&'static str, fn(&mut Maker) -> Motion);
 
 /// All activities.
 pub const ACTIVITIES: &[Activity] = &[
-    ("walk", |maker| Motion::Gait(Gait::walk(maker.rng))),
+    ("walk", |maker| Motion::Gait(Gait::walking_about(maker.rng, maker.main))),
     ("jog", |maker| Motion::Gait(Gait::jog(maker.rng))),
     ("sneak", |maker| Motion::Gait(Gait::sneak(maker.rng))),
     ("carry", |maker| Motion::Gait(Gait::carry(maker.rng))),
-    ("walk with a bag", |maker| Motion::Gait(Gait::bag(maker.rng, maker.main))),
-    ("walk phoning", |maker| Motion::Gait(Gait::phone(maker.rng, maker.main))),
     ("stand", gestures::stand),
     ("wave one hand", gestures::wave_one_hand),
     ("wave two hands", gestures::wave_two_hands),
@@ -91,19 +89,24 @@ pub fn performance(activity: usize, seed: u64) -> Performance {
 /// Joints of every moment. Who goes is where the way has led; who stands keeps the middle of the feet in place.
 fn placed(person: &Person, moments: &[Moment], going: bool) -> Vec<Joints> {
     let h = person.build.height_mm;
-    let mut joints: Vec<Joints> = moments
-        .iter()
-        .map(|moment| {
-            let mut found = person.joints(moment);
+    let (mut at, mut gone) = ([0.0_f64; 2], moments.first().map_or(0.0, |moment| moment.ahead));
+    let mut joints: Vec<Joints> = Vec::with_capacity(moments.len());
+    for moment in moments {
+        let mut found = person.joints(moment);
+        if !going && moment.tilt_deg <= 1.0 {
             let feet = middle(found.ankles[0], found.ankles[1]);
-            let off = if going || moment.tilt_deg > 1.0 { [0.0; 2] } else { [-feet[0], -feet[1]] };
-            found.place(0.0, [off[0], off[1] + moment.ahead * h]);
-            found
-        })
-        .collect();
+            found.place(0.0, [-feet[0], -feet[1]]);
+        }
+        let (s, c) = moment.heading_deg.to_radians().sin_cos();
+        let step = (moment.ahead - gone) * h;
+        gone = moment.ahead;
+        at = [at[0] - s * step, at[1] + c * step];
+        found.place(moment.heading_deg, at);
+        joints.push(found);
+    }
     let n = joints.len().max(1) as f64;
-    let way = joints.iter().map(|found| found.pelvis[1]).sum::<f64>() / n;
-    joints.iter_mut().for_each(|found| found.place(0.0, [0.0, -way]));
+    let way: [f64; 2] = std::array::from_fn(|k| joints.iter().map(|found| found.pelvis[k]).sum::<f64>() / n);
+    joints.iter_mut().for_each(|found| found.place(0.0, [-way[0], -way[1]]));
     joints
 }
 

@@ -63,7 +63,7 @@ impl Camera {
             },
             distance_mm,
             target_mm,
-            person_px: rng.random_range(40.0_f64.ln()..180.0_f64.ln()).exp(),
+            person_px: rng.random_range(36.0_f64.ln()..120.0_f64.ln()).exp(),
             segmentation,
             cut: [below, beside],
         }

@@ -39,7 +39,7 @@ pub struct Gait {
 
 impl Gait {
     /// Walking somewhere. Strides of 0.75 to 1.1 Hz (Winter 1991, slow to fast cadence, a little widened).
-    pub fn walk(rng: &mut ChaCha8Rng) -> Self {
+    fn walk(rng: &mut ChaCha8Rng) -> Self {
         Self {
             run: 0.0,
             stride: rng.random_range(0.7..1.25),
@@ -102,15 +102,24 @@ impl Gait {
         gait
     }
 
+    /// Walking, one in six with a bag in a hand, one in twelve with a phone at the ear.
+    pub fn walking_about(rng: &mut ChaCha8Rng, main: usize) -> Self {
+        match rng.random_range(0..12) {
+            0 | 1 => Self::bag(rng, main),
+            2 => Self::phone(rng, main),
+            _ => Self::walk(rng),
+        }
+    }
+
     /// Walking with a bag in one hand.
-    pub fn bag(rng: &mut ChaCha8Rng, main: usize) -> Self {
+    fn bag(rng: &mut ChaCha8Rng, main: usize) -> Self {
         let mut gait = Self::walk(rng);
         gait.held[main] = Some(Hand::at(rng.random_range(0.1..0.25), rng.random_range(-0.05..0.1), -0.97));
         gait
     }
 
     /// Walking with a phone at the ear.
-    pub fn phone(rng: &mut ChaCha8Rng, main: usize) -> Self {
+    fn phone(rng: &mut ChaCha8Rng, main: usize) -> Self {
         let mut gait = Self::walk(rng);
         gait.held[main] = Some(super::gestures::ear(rng));
         gait

@@ -75,13 +75,13 @@ fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> 
     if back {
         parts.push((maker.seconds(0.9), maker.rest));
     }
-    maker.once(parts)
+    maker.gesture(parts)
 }
 
 /// Taking a call: the hand goes to the ear and stays.
 pub fn answer_phone(maker: &mut Maker) -> Motion {
     let hand = ear(maker.rng);
-    let (hold, back, nod) = (maker.draw(0.8, 2.6), maker.chance(0.5), maker.draw(-5.0, 20.0));
+    let (hold, back, nod) = (maker.draw(0.3, 2.6), maker.chance(0.3), maker.draw(-5.0, 20.0));
     bring(maker, hand, nod, hold, back)
 }
 
@@ -89,7 +89,7 @@ pub fn answer_phone(maker: &mut Maker) -> Motion {
 pub fn drink(maker: &mut Maker) -> Motion {
     let mouth = Hand::at(-0.26, 0.34, 0.26).elbow(0.6);
     let hand = maker.near(mouth, 0.09);
-    let (hold, back, nod) = (maker.draw(0.5, 2.0), maker.chance(0.75), maker.draw(-25.0, 5.0));
+    let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(-25.0, 5.0));
     bring(maker, hand, nod, hold, back)
 }
 
@@ -99,7 +99,7 @@ pub fn read_watch(maker: &mut Maker) -> Motion {
     maker.main = 1 - maker.main;
     let chest = Hand::at(-0.34, 0.42, -0.12).elbow(0.75);
     let hand = maker.near(chest, 0.14);
-    let (hold, back, nod) = (maker.draw(0.6, 2.0), maker.chance(0.75), maker.draw(10.0, 40.0));
+    let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(10.0, 40.0));
     bring(maker, hand, nod, hold, back)
 }
 
@@ -129,10 +129,10 @@ pub fn throw(maker: &mut Maker) -> Motion {
     let through = stride(rest.hand(main, end).bent(lean, 5.0).twisted(turn), 1.0);
     let mut parts =
         vec![(maker.seconds(0.7), wound), (maker.seconds(0.25), thrown), (maker.seconds(0.2), through)];
-    if maker.chance(0.8) {
+    if maker.chance(0.5) {
         parts.push((maker.seconds(0.7), rest.gone(0.5 * step)));
     }
-    maker.once(parts)
+    maker.gesture(parts)
 }
 
 /// Hands that push or pull: one or both.
@@ -144,8 +144,8 @@ fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
 fn near_and_far(maker: &mut Maker) -> (Hand, Hand) {
     let up = maker.draw(-0.35, 0.12);
     let (reach, out) = (maker.draw(0.75, 0.98), maker.draw(-0.22, 0.1));
-    let near = Hand::at(maker.draw(-0.1, 0.12), maker.draw(0.12, 0.4), up + maker.draw(-0.3, 0.05));
-    (near.elbow(maker.draw(0.0, 0.8)), Hand::at(out, reach, up).elbow(maker.draw(0.0, 0.6)))
+    let near = Hand::at(maker.draw(-0.1, 0.12), maker.draw(0.1, 0.4), up + maker.draw(-0.25, 0.3));
+    (near.elbow(maker.draw(0.0, 0.5)), Hand::at(out, reach, up).elbow(maker.draw(0.0, 0.5)))
 }
 
 fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
@@ -158,7 +158,7 @@ fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
 
 /// Pushing something away.
 pub fn push(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.75);
+    let hands = both_or_one(maker, 0.5);
     let (near, far) = near_and_far(maker);
     let (lean, step) = (maker.draw(0.0, 16.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
@@ -166,18 +166,18 @@ pub fn push(maker: &mut Maker) -> Motion {
     let pushed = with(rest, &hands, far).bent(rest.pose.lean_deg + lean, 5.0).gone(step);
     let mut parts =
         vec![(maker.seconds(0.5), ready), (maker.seconds(0.45), pushed), (maker.seconds(0.25), pushed)];
-    if maker.chance(0.8) {
+    if maker.chance(0.5) {
         if maker.chance(0.4) {
             parts.push((maker.seconds(0.5), ready));
         }
         parts.push((maker.seconds(0.6), rest));
     }
-    maker.once(parts)
+    maker.gesture(parts)
 }
 
 /// Pulling something near.
 pub fn pull(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.75);
+    let hands = both_or_one(maker, 0.5);
     let (near, far) = near_and_far(maker);
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
@@ -186,10 +186,10 @@ pub fn pull(maker: &mut Maker) -> Motion {
         with(rest, &hands, near.moved(0.0, -0.15, -0.1)).bent(rest.pose.lean_deg - lean, 5.0).gone(-step);
     let mut parts =
         vec![(maker.seconds(0.7), reached), (maker.seconds(0.25), reached), (maker.seconds(0.45), pulled)];
-    if maker.chance(0.8) {
+    if maker.chance(0.5) {
         parts.push((maker.seconds(0.6), rest));
     }
-    maker.once(parts)
+    maker.gesture(parts)
 }
 
 /// Punching from a guard.
@@ -240,7 +240,7 @@ pub fn shoot(maker: &mut Maker) -> Motion {
         parts.extend([(maker.seconds(0.5), there), (0.08, kicked), (0.15, there)]);
     }
     parts.push((maker.seconds(0.7), maker.rest));
-    maker.once(parts)
+    maker.gesture(parts)
 }
 
 /// Standing about, perhaps looking round or shifting a hand.

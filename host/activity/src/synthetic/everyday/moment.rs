@@ -66,8 +66,10 @@ pub struct Moment {
     pub tilt_deg: f64,
     /// Off the ground, of stature.
     pub lift: f64,
-    /// Gone ahead since the beginning, of stature.
+    /// Gone ahead since the beginning, of stature, along the way.
     pub ahead: f64,
+    /// Where the way leads, degrees to the left of where it began.
+    pub heading_deg: f64,
 }
 
 /// `a` and what lies `s` of the way to `b`.
@@ -86,6 +88,7 @@ impl Moment {
             tilt_deg: 0.0,
             lift: 0.0,
             ahead: 0.0,
+            heading_deg: 0.0,
         }
     }
 
@@ -121,6 +124,7 @@ impl Moment {
             tilt_deg: mixed(a.tilt_deg, b.tilt_deg, s),
             lift: mixed(a.lift, b.lift, s),
             ahead: mixed(a.ahead, b.ahead, s),
+            heading_deg: mixed(a.heading_deg, b.heading_deg, s),
         }
     }
 

@@ -18,6 +18,8 @@ pub enum Motion {
         from: f64,
         /// Where it ends.
         to: f64,
+        /// Where everything is ready for it, from which some clips begin.
+        ready: f64,
     },
     /// Something that is repeated between `from` and `to`.
     Repeated {
@@ -51,7 +53,7 @@ impl<'r> Maker<'r> {
         let tempo = rng.random_range(0.7..1.45);
         let mut rest = Moment::standing()
             .bent(rng.random_range(-2.0..9.0), rng.random_range(-6.0..18.0))
-            .legs(rng.random_range(0.0..4.0), rng.random_range(0.0..8.0), rng.random_range(0.0..9.0))
+            .legs(rng.random_range(0.0..4.0), rng.random_range(0.0..8.0), rng.random_range(-1.0..6.0))
             .twisted(rng.random_range(-6.0..6.0));
         let step = rng.random_range(-7.0..7.0);
         rest.pose.legs[0].hip_deg += step;
@@ -100,18 +102,27 @@ impl<'r> Maker<'r> {
 
     /// Rest, then the parts, then rest again, all but the rests being the activity.
     pub fn once(&mut self, parts: Keys) -> Motion {
-        let (before, after) = (self.draw(0.3, 1.2), self.draw(0.4, 1.2));
         let length = duration(&parts);
+        let (before, after) = (self.draw(0.2, 0.8 + length), self.draw(0.4, 1.2));
         let last = parts.last().map_or(self.rest, |(_, moment)| *moment);
         let mut keys = vec![(0.0, self.rest), (before, self.rest)];
         keys.extend(parts);
         keys.push((after, last));
-        Motion::Once { keys, from: before, to: before + length }
+        Motion::Once { keys, from: before, to: before + length, ready: before }
+    }
+
+    /// As [`Self::once`], for what a clip may show without how the hands got there.
+    pub fn gesture(&mut self, parts: Keys) -> Motion {
+        let way_in = parts.first().map_or(0.0, |(seconds, _)| *seconds);
+        match self.once(parts) {
+            Motion::Once { keys, from, to, .. } => Motion::Once { keys, from, to, ready: from + way_in },
+            other => other,
+        }
     }
 
     /// A way in, then `cycle` so many times (a little different each time), then back to rest.
     pub fn repeated(&mut self, way_in: Keys, cycle: &[(f64, Moment)], times: usize) -> Motion {
-        let before = self.draw(0.1, 0.6);
+        let before = self.draw(0.1, 1.5);
         let mut keys = vec![(0.0, self.rest), (before, self.rest)];
         keys.extend(way_in);
         let from = duration(&keys);
@@ -134,37 +145,16 @@ impl<'r> Maker<'r> {
 impl Motion {
     /// The moments of a clip at `rate_hz`, cut as clips are: tight or with something before and after, begun anywhere where it repeats.
     pub fn clip(&self, rng: &mut ChaCha8Rng, rate_hz: f64) -> Vec<Moment> {
-        let (begin, length) = match self {
-            Self::Gait(gait) => (rng.random_range(0.0..5.0), rng.random_range(1.0..4.2) / gait.strides_hz),
-            Self::Once { keys, from, to } => {
-                // Six in ten are cut tight, up to a tenth short; the others begin and end in rest.
-                let core = to - from;
-                let edge = |room: f64, rng: &mut ChaCha8Rng| {
-                    if rng.random_bool(0.6) {
-                        rng.random_range(-0.12..0.04) * core
-                    } else {
-                        rng.random_range(0.0..1.0) * room
-                    }
-                };
-                let begin = from - edge(*from, rng);
-                let end = (to + edge(duration(keys) - to, rng)).min(duration(keys));
-                (begin.max(0.0), end - begin.max(0.0))
-            }
-            Self::Repeated { keys, from, to, period } => {
-                if rng.random_bool(0.45) {
-                    (0.0, duration(keys))
-                } else {
-                    let most = to - from;
-                    let length = (period * rng.random_range(1.0..4.0)).min(most);
-                    (from + rng.random_range(0.0..1.0) * (most - length), length)
-                }
-            }
-        };
+        let (begin, end) = self.cut(rng);
+        let length = (end - begin).max(0.1);
         let frames = ((length * rate_hz).round() as usize).clamp(LEAST_FRAMES, MOST_FRAMES);
         // Sways of a standing body, and steps that it makes on the way.
         let sway = rng.random_range(0.0..2.5);
         let sway_hz = rng.random_range(0.2..0.7);
         let phase = rng.random_range(0.0..std::f64::consts::TAU);
+        // One in three who go turn on the way.
+        let turning = matches!(self, Self::Gait(_)) && rng.random_bool(0.33);
+        let turn_deg_s = if turning { rng.random_range(-60.0..60.0) } else { 0.0 };
         (0..frames)
             .map(|frame| {
                 let t = begin + length * frame as f64 / (frames - 1) as f64;
@@ -176,11 +166,54 @@ impl Motion {
                     Self::Once { keys, .. } | Self::Repeated { keys, .. } => at(keys, t),
                 };
                 let s = (std::f64::consts::TAU * sway_hz * t + phase).sin();
+                moment.heading_deg = turn_deg_s * (t - begin);
                 moment.pose.lean_deg += 0.7 * sway * s;
                 moment.side_deg += sway * s;
                 moment
             })
             .collect()
+    }
+}
+
+impl Motion {
+    /// Where a clip begins and ends, seconds.
+    fn cut(&self, rng: &mut ChaCha8Rng) -> (f64, f64) {
+        match self {
+            Self::Gait(gait) => {
+                let begin = rng.random_range(0.0..5.0);
+                (begin, begin + rng.random_range(0.9..4.2) / gait.strides_hz)
+            }
+            Self::Once { keys, from, to, ready } => {
+                // Half are cut tight at either side, up to a tenth short; some begin when everything is ready.
+                let (core, all) = (to - from, duration(keys));
+                let begin = match rng.random_range(0..20) {
+                    0..10 => from + rng.random_range(-0.04..0.1) * core,
+                    10..14 => *ready,
+                    _ => rng.random_range(0.0..1.0) * from,
+                };
+                let end = match rng.random_range(0..10) {
+                    0..6 => to + rng.random_range(-0.1..0.04) * core,
+                    _ => to + rng.random_range(0.0..1.0) * (all - to),
+                };
+                (begin.max(0.0), end.min(all))
+            }
+            Self::Repeated { keys, from, to, period } => {
+                // From rest or from the middle, to rest or to the middle.
+                let begin = if rng.random_bool(0.5) {
+                    rng.random_range(0.0..1.0) * from
+                } else {
+                    rng.random_range(*from..*to)
+                };
+                let least = begin.max(*from) + rng.random_range(0.6..1.5) * period;
+                let end = match rng.random_range(0..4) {
+                    0 => duration(keys),
+                    1 => *to,
+                    _ => least + rng.random_range(0.0..3.0) * period,
+                };
+                let end = end.max(least).min(duration(keys));
+                (begin.min(end - 0.9 * period).max(0.0), end)
+            }
+        }
     }
 }
 

@@ -31,17 +31,17 @@ impl Person {
     /// Somebody. Stature after the spread of grown-ups (mean 1.70 m, SD 0.10 m; NCD-RisC, eLife 5, 2016), breadths and lengths of limbs
     /// with the coefficients of variation of Gordon et al. (ANSUR, 1989), 4 to 6 %; clothes are guessed wide.
     pub fn drawn(rng: &mut ChaCha8Rng) -> Self {
-        let girth = rng.random_range(0.85..1.2);
+        let girth = rng.random_range(0.85..1.12);
         Self {
             build: Build {
                 height_mm: rng.random_range(1500.0..1930.0),
                 girth: 1.0,
-                breadth: rng.random_range(0.85..1.2),
+                breadth: rng.random_range(0.7..1.05),
                 leg: rng.random_range(0.92..1.07),
             },
-            trunk: girth * rng.random_range(0.8..1.25),
-            arms: girth * rng.random_range(0.8..1.4),
-            legs: girth * rng.random_range(0.8..1.25),
+            trunk: girth * rng.random_range(0.75..1.2),
+            arms: girth * rng.random_range(0.75..1.3),
+            legs: girth * rng.random_range(0.75..1.15),
             head: rng.random_range(0.95..1.4),
             feet: rng.random_bool(0.8),
             skirt: if rng.random_bool(0.15) { rng.random_range(0.2..0.8) } else { 0.0 },

@@ -90,7 +90,7 @@ pub fn bow(maker: &mut Maker) -> Motion {
         low = low.both(Hand::swung(-0.8 * lean, 5.0, 0.1));
     }
     let mut parts = vec![(maker.seconds(0.9), low), (maker.seconds(0.5), low)];
-    if maker.chance(0.85) {
+    if maker.chance(0.5) {
         parts.push((maker.seconds(0.9), rest));
     }
     maker.once(parts)
