@@ -116,7 +116,9 @@ fn main() -> Result<()> {
     let training = everyday::clips(0, people, Scaling::default());
     eprintln!("made {} clips in {:.1} s", training.len(), t.elapsed().as_secs_f64());
     for (mode_name, mode) in [("order-free", Mode::OrderFree), ("ordered", Mode::Ordered)] {
-        if var("ONLY", 0.0) == 1.0 && mode == Mode::OrderFree { continue; }
+        if var("ONLY", 0.0) == 1.0 && mode == Mode::OrderFree {
+            continue;
+        }
         let classes = names(training.iter().map(|c| &c.activity));
         let refs: Vec<&Clip> = training.iter().collect();
         let settings = SpaceSettings {
@@ -138,12 +140,14 @@ fn main() -> Result<()> {
         let vectors = |track: &Track| space.vectors(track).expect("vectors");
         let mut rows: Vec<Array2<f32>> = training.par_iter().map(|c| vectors(&c.views[0])).collect();
         let mirror = var("MIRROR", 1.0) > 0.0;
-        if mirror { rows.extend(training.par_iter().map(|c| vectors(&c.views[0].mirrored())).collect::<Vec<_>>()); }
+        if mirror {
+            rows.extend(training.par_iter().map(|c| vectors(&c.views[0].mirrored())).collect::<Vec<_>>());
+        }
         let labels: Vec<usize> =
             training.iter().map(|c| classes.iter().position(|k| *k == c.activity).unwrap_or(0)).collect();
         let labels = if mirror { [labels.clone(), labels].concat() } else { labels };
         let w = var("WIDTH", 1.0);
-        let net = train(
+        let (net, last) = train(
             &rows,
             &labels,
             classes.len(),
@@ -160,7 +164,7 @@ fn main() -> Result<()> {
         .unwrap();
         eprintln!("{mode_name}: trained in {:.1} s", t.elapsed().as_secs_f64());
         let probabilities = |track: &Track| {
-            let d = net.decide(net.pattern(vectors(track).view()).view());
+            let d = net.pattern(vectors(track).view()).dot(&last.weights) + &last.offsets;
             let m = d.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
             let e: Vec<f32> = d.iter().map(|v| (v - m).exp()).collect();
             let s: f32 = e.iter().sum();

@@ -1,13 +1,14 @@
 //! A small network over the frames of a clip: every frame goes through the same two layers, mean and largest of what comes out over the
-//! clip go through two more (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017).
+//! clip go through a third (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017).
 //!
 //! Mean and largest do not know the order of frames, so that what shuffling leaves unchanged stays unchanged; order comes in by the
 //! frames' own motion ([`super::frames`]). A clip's pattern is what the third layer gives. Unlike a codebook it is learned with the
 //! activities' names, and needs many more clips: thousands, which synthetic people can give. O(frames x (F x 64 + 64 x 128)) a clip.
 
+pub mod recogniser;
 pub mod training;
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 use serde::{Deserialize, Serialize};
 
 /// A layer: inputs x outputs, and what is added.
@@ -38,8 +39,8 @@ pub struct Network {
     pub mean: Array1<f32>,
     /// Spread of the training frames, divided by.
     pub spread: Array1<f32>,
-    /// Layers of a frame, two, then of a clip, two; the last gives a value per activity.
-    pub layers: [Dense; 4],
+    /// Two layers of a frame, then one of a clip.
+    pub layers: [Dense; 3],
 }
 
 /// What is below zero becomes zero.
@@ -67,28 +68,23 @@ impl Network {
         self.layers[2].offsets.len()
     }
 
-    /// The clip's pattern from its frame vectors (frames x F): values of the third layer, of unit length; zeros for an empty clip.
+    /// The clip's pattern from its frame vectors (frames x F): values of the third layer; zeros for an empty clip.
     pub fn pattern(&self, frames: ArrayView2<f32>) -> Array1<f32> {
         if frames.nrows() == 0 {
             return Array1::zeros(self.width());
         }
         let inputs = (&frames - &self.mean) / &self.spread;
-        let [first, second, third, _] = &self.layers;
+        let [first, second, third] = &self.layers;
         let seen = rectified(second.apply(rectified(first.apply(inputs.view())).view()));
         let clip = pooled(seen.view()).insert_axis(Axis(0));
         rectified(third.apply(clip.view())).remove_axis(Axis(0))
     }
 
-    /// A value per activity for a pattern: the logarithm of its probability but for a constant.
-    pub fn decide(&self, pattern: ArrayView1<f32>) -> Array1<f32> {
-        pattern.dot(&self.layers[3].weights) + &self.layers[3].offsets
-    }
-
-    /// Whether all sizes fit frame vectors of `inputs` numbers and so many activities.
-    pub fn fits(&self, inputs: usize, activities: usize) -> bool {
-        let [first, second, third, last] = &self.layers;
+    /// Whether all sizes fit one another and frame vectors of `inputs` numbers.
+    pub fn fits(&self, inputs: usize) -> bool {
+        let [first, second, third] = &self.layers;
         let (a, b, c) = (first.offsets.len(), second.offsets.len(), third.offsets.len());
-        let layers = first.is(inputs, a) && second.is(a, b) && third.is(2 * b, c) && last.is(c, activities);
+        let layers = first.is(inputs, a) && second.is(a, b) && third.is(2 * b, c);
         layers && [self.mean.len(), self.spread.len()] == [inputs; 2] && self.spread.iter().all(|v| *v > 0.0)
     }
 }

@@ -106,6 +106,19 @@ pub enum SamplesError {
         /// Samples to learn from.
         train: PathBuf,
     },
+    /// None of the samples' activities is known to the model.
+    #[error(
+        "{}: the model knows none of its activities ({}); it knows {}. Give names that mean the same",
+        samples.display(), found.join(", "), known.join(", ")
+    )]
+    NothingInCommon {
+        /// The samples.
+        samples: PathBuf,
+        /// Their activities.
+        found: Vec<String>,
+        /// The model's.
+        known: Vec<String>,
+    },
     /// The same person in what is learned and what is tested.
     #[error(
         "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()

@@ -51,6 +51,23 @@ pub struct View {
     pub kind: ViewKind,
 }
 
+impl View {
+    /// Whether it holds silhouettes that are cut out at 100x100.
+    ///
+    /// # Errors
+    /// Masks that cannot be read.
+    pub(super) fn is_cut_out(&self) -> Result<bool> {
+        if self.kind == ViewKind::Video {
+            return Ok(false);
+        }
+        let first = masks::listed(&self.path)?.into_iter().next();
+        Ok(first
+            .map(|file| masks::read(&file))
+            .transpose()?
+            .is_some_and(|mask| mask.dim() == (SIDE_PX, SIDE_PX)))
+    }
+}
+
 /// A frame's mask and what is doubtful about it.
 pub(super) struct Seen {
     pub name: String,

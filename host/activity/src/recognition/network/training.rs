@@ -114,15 +114,15 @@ impl Step {
     }
 }
 
-/// Trains on clips given by their frame vectors (frames x F each, at least one frame) and labels below `classes`; `watch` may stop
-/// it, and hears of every pass.
+/// Trains on clips given by their frame vectors (frames x F each, at least one frame) and labels below `classes`; gives the network and
+/// the linear values per class that its patterns were learned for. `watch` may stop it (`None`), and hears of every pass.
 pub fn train(
     clips: &[Array2<f32>],
     labels: &[usize],
     classes: usize,
     settings: &NetworkSettings,
     watch: &dyn Watch,
-) -> Option<Network> {
+) -> Option<(Network, Dense)> {
     let inputs = clips.first()?.ncols();
     let (mean, spread) = scaling(clips, inputs);
     let scaled: Vec<Array2<f32>> = clips.iter().map(|clip| (clip - &mean) / &spread).collect();
@@ -147,7 +147,8 @@ pub fn train(
         }
         watch.fold_done(settings.passes);
     }
-    Some(Network { mean, spread, layers: learners.map(|learner| learner.layer) })
+    let [first, second, third, last] = learners.map(|learner| learner.layer);
+    Some((Network { mean, spread, layers: [first, second, third] }, last))
 }
 
 /// Mean and spread of all frames; what never changes is left as it is.
@@ -267,11 +268,12 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (train_clips, labels) = clips(&mut rng);
         let settings = NetworkSettings { widths: [8, 12, 8], batch: 16, ..NetworkSettings::default() };
-        let network = train(&train_clips, &labels, 3, &settings, &Unwatched).expect("not stopped");
-        assert!(network.fits(4, 3) && !network.fits(5, 3) && !network.fits(4, 2));
+        let (network, last) = train(&train_clips, &labels, 3, &settings, &Unwatched).expect("not stopped");
+        assert!(network.fits(4) && !network.fits(5) && last.is(8, 3));
         let (fresh, truth) = clips(&mut rng);
         let right = fresh.iter().zip(&truth).filter(|(clip, truth)| {
-            let decision = network.decide(network.pattern(clip.view()).view());
+            let pattern = network.pattern(clip.view()).insert_axis(Axis(0));
+            let decision = last.apply(pattern.view()).remove_axis(Axis(0));
             (0..3).max_by(|&a, &b| decision[a].total_cmp(&decision[b])) == Some(**truth)
         });
         let right = right.count();

@@ -111,7 +111,13 @@ pub fn throw(maker: &mut Maker) -> Motion {
     let (back, front, end) = if under {
         (Hand::swung(-50.0, 10.0, 0.15), Hand::swung(85.0, 8.0, 0.0), Hand::swung(120.0, 20.0, 0.0))
     } else {
-        (Hand::at(0.25, -0.3, 0.45).elbow(0.95), Hand::at(0.0, 0.8, 0.45), Hand::at(-0.25, 0.7, -0.45))
+        // The hand winds up behind the shoulder or no further than the ear.
+        let behind = maker.draw(-0.35, 0.2);
+        (
+            Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.7),
+            Hand::at(0.0, maker.draw(0.55, 0.95), maker.draw(0.0, 0.5)),
+            Hand::at(maker.draw(-0.3, 0.15), maker.draw(0.15, 0.8), maker.draw(-0.9, -0.2)),
+        )
     };
     let (back, front, end) = (maker.near(back, 0.16), maker.near(front, 0.16), maker.near(end, 0.2));
     let turn = sign * maker.draw(5.0, 38.0);
@@ -158,7 +164,7 @@ fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
 
 /// Pushing something away.
 pub fn push(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.5);
+    let hands = both_or_one(maker, 0.4);
     let (near, far) = near_and_far(maker);
     let (lean, step) = (maker.draw(0.0, 16.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
@@ -177,7 +183,7 @@ pub fn push(maker: &mut Maker) -> Motion {
 
 /// Pulling something near.
 pub fn pull(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.5);
+    let hands = both_or_one(maker, 0.4);
     let (near, far) = near_and_far(maker);
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;

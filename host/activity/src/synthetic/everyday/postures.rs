@@ -101,10 +101,22 @@ pub fn tie_laces(maker: &mut Maker) -> Motion {
     let foot = Hand::at(-0.12, 0.4, -0.85);
     let mut low = down(maker, &[0, 1], 0.95);
     let side = maker.main;
-    if maker.chance(0.4) {
+    match maker.rng.random_range(0..4) {
         // One foot set ahead or up.
-        low.pose.legs[side].hip_deg += maker.draw(10.0, 35.0);
-        low.pose.legs[1 - side].hip_deg -= maker.draw(5.0, 25.0);
+        0 => {
+            low.pose.legs[side].hip_deg += maker.draw(10.0, 35.0);
+            low.pose.legs[1 - side].hip_deg -= maker.draw(5.0, 25.0);
+        }
+        // Down on a knee.
+        1 | 2 => {
+            let knee = maker.draw(70.0, 115.0);
+            low.pose.legs[side].hip_deg = knee + maker.draw(-5.0, 25.0);
+            low.pose.legs[side].knee_deg = knee;
+            low.pose.legs[1 - side].hip_deg = maker.draw(-30.0, 25.0);
+            low.pose.legs[1 - side].knee_deg = maker.draw(50.0, 120.0);
+            low.pose.lean_deg = maker.draw(30.0, 80.0);
+        }
+        _ => {}
     }
     let place = maker.near(foot, 0.1);
     low = low.both(place);
