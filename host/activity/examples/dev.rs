@@ -155,6 +155,7 @@ fn main() -> Result<()> {
                 passes: var("PASSES", 30.0) as usize,
                 rate: var("RATE", 2e-3) as f32,
                 decay: var("DECAY", 1e-2) as f32,
+                noise: var("NOISE", 0.2) as f32,
                 dropout: var("DROP", 0.3) as f32,
                 widths: [(64.0 * w) as usize, (128.0 * w) as usize, (96.0 * w) as usize],
                 ..NetworkSettings::default()

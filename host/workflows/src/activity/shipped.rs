@@ -4,20 +4,15 @@ use std::{path::PathBuf, time::Instant};
 
 use farnear_activity::{
     recognition::{
-        frames::Mode, model::Recogniser, network::training::NetworkSettings, space::SpaceSettings,
+        clip::Clip, frames::Mode, model::Recogniser, network::training::NetworkSettings, space::SpaceSettings,
     },
     synthetic::everyday,
 };
-use farnear_files::staging;
+use farnear_files::staging::Staging;
 use serde::Serialize;
 
 use super::{samples::SCALING, watched};
-use crate::{
-    context::Context,
-    error::Result,
-    figures::rounded,
-    parameters::within,
-};
+use crate::{context::Context, error::Result, figures::rounded, parameters::within};
 
 /// A recogniser that comes with the program.
 pub struct Shipped {
@@ -100,18 +95,19 @@ pub fn list() -> Result<Vec<ModelFigures>> {
         .collect()
 }
 
-/// How a model is made of synthetic people.
+/// People and passes that the shipped models were made with.
+pub const PEOPLE: usize = 300;
+/// See [`PEOPLE`].
+pub const PASSES: usize = 12;
+
+/// How models are made of synthetic people.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SyntheticTraining {
     /// People to learn from, each at all activities once, 20 to 5000.
     pub people: usize,
     /// Passes over all of them, 1 to 200.
     pub passes: usize,
-    /// Whether the order of frames counts.
-    pub mode: Mode,
-    /// For silhouettes that are cut out at 100x100: shapes alone.
-    pub cut_out: bool,
-    /// The model.
+    /// A new folder for the models.
     pub out: PathBuf,
 }
 
@@ -120,32 +116,50 @@ pub struct SyntheticTraining {
 pub struct SyntheticTrainingFigures {
     /// Clips learned from; their mirrors come on top.
     pub clips: usize,
-    /// Clips of other people by which it was calibrated.
+    /// Clips of other people by which models were calibrated.
     pub calibration_clips: usize,
-    /// Share of right answers for those.
-    pub accuracy: f64,
     /// Activities.
     pub activities: usize,
-    /// The model's size.
-    pub bytes: usize,
     /// Time for all.
     pub seconds: f64,
+    /// The models.
+    pub model: Vec<MadeModel>,
+}
+
+/// A model that was made.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MadeModel {
+    /// Its file in the folder.
+    pub file: String,
+    /// Share of right answers for the clips that calibrated it.
+    pub accuracy: f64,
+    /// Its size.
+    pub bytes: usize,
 }
 
 /// The first of the people who calibrate: nobody who is learned from, however many those are.
 const CALIBRATING_FROM: usize = 100_000;
 /// People who are drawn between two looks at whether to go on.
 const PEOPLE_AT_ONCE: usize = 10;
+/// The models' files, whether the order of frames counts, and whether silhouettes are cut out.
+const FILES: [(&str, Mode, bool); 4] = [
+    ("everyday.fnm", Mode::Ordered, false),
+    ("everyday-order-free.fnm", Mode::OrderFree, false),
+    ("everyday-cut-out.fnm", Mode::Ordered, true),
+    ("everyday-order-free-cut-out.fnm", Mode::OrderFree, true),
+];
+/// Silhouettes that principal components are found from.
+const GALLERY: usize = 4000;
 
-/// Makes a recogniser of everyday activities from seeds alone: the same file every time on one kind of processor.
+/// Makes recognisers of everyday activities from seeds alone: the same files every time on one kind of processor.
 ///
 /// # Errors
-/// Parameters out of range, a model that cannot be written, [`crate::WorkflowError::Cancelled`].
+/// Parameters out of range, models that cannot be written, [`crate::WorkflowError::Cancelled`].
 pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<SyntheticTrainingFigures> {
     within("people", settings.people, &(20..=5000), "")?;
     within("passes", settings.passes, &(1..=200), "")?;
     let start = Instant::now();
-    let calibrating = (settings.people / 8).clamp(20, 60);
+    let out = Staging::new_folder(&settings.out)?;
     let mut people = Vec::new();
     for first in (0..settings.people).step_by(PEOPLE_AT_ONCE) {
         context.cancel.check("drawing people")?;
@@ -153,40 +167,48 @@ pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<Synt
         people.extend(everyday::clips(first, count, SCALING));
         context.progress.advance("people drawn", first + count, Some(settings.people));
     }
+    let calibrating = (settings.people / 8).clamp(20, 60);
     let mut others = everyday::clips(CALIBRATING_FROM, calibrating, SCALING);
-    if settings.cut_out {
-        for clip in people.iter_mut().chain(&mut others) {
-            clip.views.iter_mut().for_each(|view| view.boxes = None);
+    let mut made = Vec::new();
+    for (file, mode, cut_out) in FILES {
+        if cut_out {
+            let views = people.iter_mut().chain(&mut others).flat_map(|clip| &mut clip.views);
+            views.for_each(|view| view.boxes = None);
         }
+        context.say(&format!("training {file}"));
+        made.push(one(file, mode, &people, &others, settings.passes, &out, context)?);
     }
-    let space = SpaceSettings {
-        mode: settings.mode,
-        dimensions: DIMENSIONS,
-        gallery: GALLERY,
-        ..SpaceSettings::default()
-    };
-    let network = NetworkSettings { passes: settings.passes, ..NetworkSettings::default() };
-    let watch = watched::Passes::new(context);
-    let trained = Recogniser::train_network(&people, &others, &space, &network, SCALING, &watch);
-    let model = watched::outcome(trained, context, "training")?;
-    let right = others.iter().filter(|clip| {
-        model.recognise(&clip.views).is_ok_and(|answer| answer.best() == Some(&clip.activity))
-    });
-    let accuracy = right.count() as f64 / others.len().max(1) as f64;
-    let bytes = model.to_bytes()?;
-    staging::write_file(&settings.out, &bytes)?;
+    out.finish()?;
     context.say(&format!("wrote {}", settings.out.display()));
     Ok(SyntheticTrainingFigures {
         clips: people.len(),
         calibration_clips: others.len(),
-        accuracy: rounded(accuracy, 4),
-        activities: model.activities.len(),
-        bytes: bytes.len(),
+        activities: everyday::ACTIVITIES.len(),
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
+        model: made,
     })
 }
 
-/// Principal components that a frame is described by.
-const DIMENSIONS: usize = 32;
-/// Silhouettes that they are found from.
-const GALLERY: usize = 6000;
+/// Trains a model and writes it.
+fn one(
+    file: &str,
+    mode: Mode,
+    people: &[Clip],
+    others: &[Clip],
+    passes: usize,
+    out: &Staging,
+    context: &Context<'_>,
+) -> Result<MadeModel> {
+    let space = SpaceSettings { mode, gallery: GALLERY, ..SpaceSettings::default() };
+    let network = NetworkSettings { passes, ..NetworkSettings::default() };
+    let watch = watched::Passes::new(context);
+    let trained = Recogniser::train_network(people, others, &space, &network, SCALING, &watch);
+    let model = watched::outcome(trained, context, "training")?;
+    let right = others.iter().filter(|clip| {
+        model.recognise(&clip.views).is_ok_and(|answer| answer.best() == Some(&clip.activity))
+    });
+    let accuracy = rounded(right.count() as f64 / others.len().max(1) as f64, 4);
+    let bytes = model.to_bytes()?;
+    out.write(file, &bytes)?;
+    Ok(MadeModel { file: file.into(), accuracy, bytes: bytes.len() })
+}

@@ -22,6 +22,8 @@ pub struct NetworkSettings {
     pub decay: f32,
     /// Share of the pooled values that is left out at random in a step.
     pub dropout: f32,
+    /// Spread of what is added at random to every number of a frame in a step, in spreads of that number.
+    pub noise: f32,
     /// Share of the probability that goes to all activities alike (label smoothing; Szegedy et al., CVPR 2016).
     pub smoothing: f32,
     /// Seed of everything random.
@@ -37,6 +39,7 @@ impl Default for NetworkSettings {
             rate: 2e-3,
             decay: 1e-2,
             dropout: 0.3,
+            noise: 0.2,
             smoothing: 0.1,
             seed: 1,
         }
@@ -173,7 +176,10 @@ fn one_step(
     rng: &mut ChaCha8Rng,
 ) {
     let parts: Vec<ArrayView2<f32>> = chosen.iter().map(|&clip| clips[clip].view()).collect();
-    let Ok(frames) = ndarray::concatenate(Axis(0), &parts) else { return };
+    let Ok(mut frames) = ndarray::concatenate(Axis(0), &parts) else { return };
+    if let Ok(normal) = Normal::new(0.0, settings.noise) {
+        frames.mapv_inplace(|v| v + normal.sample(rng));
+    }
     let [first, second, third, last] = learners;
     let hidden = rectified(first.layer.apply(frames.view()));
     let seen = rectified(second.layer.apply(hidden.view()));

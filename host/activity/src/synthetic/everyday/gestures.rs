@@ -121,7 +121,7 @@ pub fn throw(maker: &mut Maker) -> Motion {
     };
     let (back, front, end) = (maker.near(back, 0.16), maker.near(front, 0.16), maker.near(end, 0.2));
     let turn = sign * maker.draw(5.0, 38.0);
-    let (lean, step) = (maker.draw(2.0, 24.0), if maker.chance(0.4) { maker.draw(0.05, 0.3) } else { 0.0 });
+    let (lean, step) = (maker.draw(0.0, 16.0), if maker.chance(0.4) { maker.draw(0.05, 0.3) } else { 0.0 });
     let other = Hand::at(maker.draw(0.05, 0.3), maker.draw(0.0, 0.5), maker.draw(-0.9, -0.3));
     let stride = |mut moment: Moment, s: f64| {
         moment.pose.legs[1 - main].hip_deg += 60.0 * step * s;
@@ -148,9 +148,9 @@ fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
 
 /// The two places between which hands push and pull: at the chest or waist, and stretched ahead.
 fn near_and_far(maker: &mut Maker) -> (Hand, Hand) {
-    let up = maker.draw(-0.35, 0.12);
+    let up = maker.draw(-0.35, 0.2);
     let (reach, out) = (maker.draw(0.75, 0.98), maker.draw(-0.22, 0.1));
-    let near = Hand::at(maker.draw(-0.1, 0.12), maker.draw(0.1, 0.4), up + maker.draw(-0.25, 0.3));
+    let near = Hand::at(maker.draw(-0.1, 0.12), maker.draw(0.1, 0.4), up + maker.draw(-0.25, 0.4));
     (near.elbow(maker.draw(0.0, 0.5)), Hand::at(out, reach, up).elbow(maker.draw(0.0, 0.5)))
 }
 
@@ -188,8 +188,9 @@ pub fn pull(maker: &mut Maker) -> Motion {
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
     let reached = with(rest, &hands, far).bent(rest.pose.lean_deg + 0.6 * lean, 5.0);
-    let pulled =
-        with(rest, &hands, near.moved(0.0, -0.15, -0.1)).bent(rest.pose.lean_deg - lean, 5.0).gone(-step);
+    let pulled = with(rest, &hands, near.moved(0.0, -0.1, maker.draw(-0.2, 0.15)))
+        .bent(rest.pose.lean_deg - lean, 5.0)
+        .gone(-step);
     let mut parts =
         vec![(maker.seconds(0.7), reached), (maker.seconds(0.25), reached), (maker.seconds(0.45), pulled)];
     if maker.chance(0.5) {

@@ -187,8 +187,8 @@ impl Motion {
                 // Half are cut tight at either side, up to a tenth short; some begin when everything is ready.
                 let (core, all) = (to - from, duration(keys));
                 let begin = match rng.random_range(0..20) {
-                    0..10 => from + rng.random_range(-0.04..0.1) * core,
-                    10..14 => *ready,
+                    0..8 => from + rng.random_range(-0.04..0.1) * core,
+                    8..14 => ready - rng.random_range(0.0..0.3) * (ready - from),
                     _ => rng.random_range(0.0..1.0) * from,
                 };
                 let end = match rng.random_range(0..10) {

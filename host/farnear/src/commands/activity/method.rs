@@ -32,11 +32,6 @@ enum Epl {
 }
 
 impl MethodArguments {
-    /// Whether the order of frames counts.
-    pub fn mode(&self) -> Mode {
-        self.mode
-    }
-
     /// As a workflow takes it. Says on a terminal what will take long.
     pub fn method(&self) -> Method {
         let search = !self.no_search;

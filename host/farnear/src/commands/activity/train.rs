@@ -19,29 +19,26 @@ use crate::{report, terminal};
 /// views are fused; give them a common `clip = "name"` where a subject does an activity more than once and the order does not tell.
 /// With two or more subjects the settings are chosen by cross-validation over them.
 ///
-/// --synthetic makes a model of everyday activities from seeded people alone, as those that come with the program were made: a network
-/// that recognises from any one view.
+/// --synthetic makes models of everyday activities from seeded people alone, as those that come with the program were made: networks
+/// that recognise from any one view, ordered and order-free, for full frames and for 100x100; --out is a new folder then.
 #[derive(Args)]
 #[command(after_help = "Example: farnear activity train samples.toml --out model.fnm --mode ordered\n\
-                  \x20        farnear activity train --synthetic everyday --mode ordered --out everyday.fnm")]
+                  \x20        farnear activity train --synthetic everyday --out models/")]
 pub struct Arguments {
     /// The samples, TOML.
     #[arg(required_unless_present = "synthetic")]
     samples: Option<PathBuf>,
     /// Learn from synthetic people in place of samples.
-    #[arg(long, value_name = "WHICH", conflicts_with_all = ["samples", "window", "any_view", "epl", "classifier"])]
+    #[arg(long, value_name = "WHICH", conflicts_with_all = ["samples", "window", "any_view", "mode", "epl", "classifier", "no_search"])]
     synthetic: Option<Synthetic>,
     /// Synthetic people to learn from.
-    #[arg(long, value_name = "COUNT", default_value_t = 800, requires = "synthetic")]
+    #[arg(long, value_name = "COUNT", default_value_t = shipped::PEOPLE, requires = "synthetic")]
     people: usize,
     /// Passes of the learning over all synthetic people.
-    #[arg(long, value_name = "COUNT", default_value_t = 12, requires = "synthetic")]
+    #[arg(long, value_name = "COUNT", default_value_t = shipped::PASSES, requires = "synthetic")]
     passes: usize,
-    /// For silhouettes that are cut out at 100x100 in place of full frames.
-    #[arg(long, requires = "synthetic")]
-    cut_out: bool,
-    /// The model to write.
-    #[arg(long, value_name = "FILE")]
+    /// The model to write, or with --synthetic the new folder for several.
+    #[arg(long, value_name = "FILE|DIR")]
     out: PathBuf,
     #[command(flatten)]
     method: MethodArguments,
@@ -69,13 +66,8 @@ enum Synthetic {
 pub fn run(arguments: Arguments) -> Result<()> {
     let json = arguments.json;
     if let Some(Synthetic::Everyday) = arguments.synthetic {
-        let settings = SyntheticTraining {
-            people: arguments.people,
-            passes: arguments.passes,
-            mode: arguments.method.mode(),
-            cut_out: arguments.cut_out,
-            out: arguments.out,
-        };
+        let settings =
+            SyntheticTraining { people: arguments.people, passes: arguments.passes, out: arguments.out };
         return report::print(&shipped::train(&settings, &terminal::counting(json)?)?, json);
     }
     let Some(samples) = arguments.samples else {
