@@ -111,6 +111,61 @@ fn main() -> Result<()> {
         ("KTH", kth()),
     ];
     eprintln!("read in {:.1} s", t.elapsed().as_secs_f64());
+    if let Ok(folder) = std::env::var("MODELS") {
+        use farnear_activity::evaluation::calibration::*;
+        use farnear_activity::recognition::model::Recogniser;
+        for f in ["everyday", "everyday-order-free", "everyday-cut-out", "everyday-order-free-cut-out"] {
+            let Ok(b) = std::fs::read(format!("{folder}/{f}.fnm")) else { continue };
+            let m = Recogniser::from_bytes(&b).unwrap();
+            eprintln!("{f} {} bytes", b.len());
+            for (name, clips) in &all {
+                let refs: Vec<&Clip> = clips.iter().collect();
+                for tta in [false, true] {
+                    let answer = |track: &Track| -> Vec<f32> {
+                        let mut views = vec![track.clone()];
+                        if tta {
+                            views.push(track.mirrored());
+                        }
+                        m.recognise(&views).unwrap().probabilities.iter().map(|p| p.1).collect()
+                    };
+                    eprint!("{}", if tta { " mirrored too" } else { "" });
+                    report(name, &refs, &m.activities, &answer);
+                    // calibration and unknown among
+                    let mut among: Vec<String> = clips
+                        .iter()
+                        .map(|c| renamed(&c.activity).to_owned())
+                        .filter(|c| m.activities.contains(c))
+                        .collect();
+                    among.sort();
+                    among.dedup();
+                    let (mut r, mut ra, mut unknown, mut n) =
+                        (Reliability::default(), Reliability::default(), 0, 0);
+                    for c in clips {
+                        for v in &c.views {
+                            let mut views = vec![v.clone()];
+                            if tta {
+                                views.push(v.mirrored());
+                            }
+                            let a = m.recognise(&views).unwrap();
+                            let b = a.among(&among);
+                            let t = renamed(&c.activity).to_owned();
+                            r.count(a.confidence, a.best() == Some(&t));
+                            ra.count(b.confidence, b.best() == Some(&t));
+                            unknown += u32::from(a.outlier_score > 1.0);
+                            n += 1;
+                        }
+                    }
+                    eprintln!(
+                        "     ECE all {:.3} among {:.3}, unknown {:.1} %",
+                        r.expected_error(),
+                        ra.expected_error(),
+                        100.0 * unknown as f64 / n as f64
+                    );
+                }
+            }
+        }
+        return Ok(());
+    }
     let people = var("PEOPLE", 20.0) as usize;
     let t = Instant::now();
     let training = everyday::clips(0, people, Scaling::default());

@@ -129,6 +129,7 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
     check_subjects(settings, &subjects, learned)?;
+    check_activities(settings, &test, learned)?;
     let experiment = settings.method.experiment();
     let outcome = train_on_others(learned, &test, &experiment, &[views], &watched::Folds::new(context));
     let outcome = watched::outcome(outcome, context, "evaluating")?;
@@ -201,6 +202,16 @@ fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &
             Err(SamplesError::SamePerson { subject: both.clone(), test, train }.into())
         }
     }
+}
+
+/// Refuses to recognise what nobody has taught: an accuracy of 0 that only says that names differ.
+fn check_activities(settings: &EvaluationSettings, test: &[Clip], learned: &[Clip]) -> Result<()> {
+    let (found, known) =
+        (names(test.iter().map(|clip| &clip.activity)), names(learned.iter().map(|clip| &clip.activity)));
+    if found.iter().any(|activity| known.contains(activity)) {
+        return Ok(());
+    }
+    Err(SamplesError::NothingInCommon { samples: settings.samples.clone(), found, known }.into())
 }
 
 fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<()> {

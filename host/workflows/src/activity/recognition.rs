@@ -124,6 +124,9 @@ pub struct RecognitionFigures {
     pub confidence: f64,
     /// Outlier score, as in [`FrameAnswer`].
     pub strangeness: Option<f64>,
+    /// Why the activity is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
     /// Probability of every activity.
     pub shares: Vec<Share>,
     /// Frames of a view.
@@ -265,6 +268,7 @@ impl<'m> Recognition<'m> {
         Ok(RecognitionFigures {
             confidence: rounded_share(answer.confidence),
             strangeness: outlier_score(&answer),
+            reason: unknown_because(&answer, self.frames),
             activity: answer.activity,
             shares: answer
                 .probabilities
@@ -291,6 +295,21 @@ impl<'m> Recognition<'m> {
 /// The answer if only some activities can be; all can where none is named.
 fn restricted(answer: Answer, among: &[String]) -> Answer {
     if among.is_empty() { answer } else { answer.among(among) }
+}
+
+/// Why an answer is unknown, in words; `None` where it is not.
+fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
+    if answer.activity.is_some() {
+        return None;
+    }
+    let score = answer.outlier_score;
+    Some(match answer.best() {
+        _ if frames == 0 => "there is no frame".into(),
+        Some(best) if score.is_finite() => {
+            format!("most like `{best}`, but {score:.2} times as far from it as what the model knows")
+        }
+        _ => format!("nobody is seen in any of the {frames} frames"),
+    })
 }
 
 /// A share with four decimals, without the digits that f32 does not have.

@@ -108,7 +108,7 @@ pub enum SamplesError {
     },
     /// None of the samples' activities is known to the model.
     #[error(
-        "{}: the model knows none of its activities ({}); it knows {}. Give names that mean the same",
+        "{}: none of its activities ({}) is among those that were learned ({}); names must be the same",
         samples.display(), found.join(", "), known.join(", ")
     )]
     NothingInCommon {

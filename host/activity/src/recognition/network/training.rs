@@ -39,7 +39,7 @@ impl Default for NetworkSettings {
             rate: 2e-3,
             decay: 1e-2,
             dropout: 0.3,
-            noise: 0.2,
+            noise: 0.05,
             smoothing: 0.1,
             seed: 1,
         }

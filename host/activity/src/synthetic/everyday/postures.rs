@@ -146,18 +146,18 @@ pub fn crouch(maker: &mut Maker) -> Motion {
 
 /// Sitting on a chair, and the way there: trunk ahead while the seat is not reached.
 fn seated(maker: &mut Maker) -> (Moment, Moment) {
-    let knee = maker.draw(72.0, 102.0);
-    let hip = knee + maker.draw(-16.0, 8.0);
+    let knee = maker.draw(68.0, 112.0);
+    let hip = knee + maker.draw(-20.0, 10.0);
     let lap = if maker.chance(0.6) { Hand::at(0.0, 0.45, -0.7) } else { Hand::at(0.12, 0.1, -0.9) };
     let seated = maker
         .rest
         .bent(maker.draw(-14.0, 12.0), maker.draw(-5.0, 20.0))
         .legs(hip, knee, maker.draw(1.0, 10.0))
         .both(maker.near(lap, 0.12));
-    let share = maker.draw(0.5, 0.8);
+    let share = maker.draw(0.4, 0.85);
     let mut between = Moment::between(&maker.rest, &seated, share);
-    between.pose.lean_deg = maker.draw(22.0, 55.0);
-    between = between.both(maker.near(Hand::at(0.08, 0.3, -0.75), 0.2));
+    between.pose.lean_deg = maker.draw(20.0, 78.0);
+    between = between.both(maker.near(Hand::at(0.12, 0.2, -0.7), 0.35));
     (seated, between)
 }
 
