@@ -4,3 +4,4 @@
 pub mod calibration;
 pub mod confusion;
 pub mod leave_one_out;
+pub mod open_set;

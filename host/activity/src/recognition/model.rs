@@ -196,7 +196,15 @@ impl Recogniser {
             });
         }
         let seen = |view: &&Track| view.frames() > 0;
-        let mut answers = if any_view {
+        let mirrored: Vec<Track>;
+        let views = if self.views == 1 && matches!(self.space.pattern, Pattern::Network(_)) {
+            // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
+            mirrored = views.iter().flat_map(|view| [view.clone(), view.mirrored()]).collect();
+            mirrored.as_slice()
+        } else {
+            views
+        };
+        let mut answers = if self.views == 1 && views.len() > 1 {
             let each = views.iter().filter(seen).map(|view| self.answer(std::slice::from_ref(view)));
             each.collect::<Result<Vec<Answer>, ModelError>>()?
         } else if views.iter().any(|view| seen(&view)) {

@@ -8,6 +8,7 @@ use farnear_activity::{evaluation::confusion::Confusion, recognition::choice::Vi
 use farnear_workflows::activity::{
     evaluation::{self, EvaluationSettings, LearnFrom},
     judging::{self, JudgingSettings},
+    method::Method,
     recognition::Model,
 };
 
@@ -22,6 +23,8 @@ use crate::{report, terminal};
 /// chosen is chosen by cross-validation over the remaining subjects. --train gives other samples to learn from (clean
 /// masks for damaged ones of the same people, say; a subject's own are left out as before). Without
 /// --leave-one-subject-out but with --train all of that is learned from, and the subjects must be others.
+///
+/// --open-set leaves out activities in place of subjects: half of the subjects teach the others, the other half does all.
 ///
 /// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
 /// from shares of right answers, how many known and strange activities it calls unknown.
@@ -45,6 +48,9 @@ pub struct Arguments {
     /// An activity's name in the samples and in the model, where they differ; may be repeated.
     #[arg(long, value_name = "SAMPLES=MODEL", requires = "model", value_parser = same)]
     same: Vec<(String, String)>,
+    /// Leave every activity out of the training in turn, and say how well it is told to be unknown.
+    #[arg(long, conflicts_with_all = ["leave_one_subject_out", "train", "model", "views", "out"])]
+    open_set: bool,
     #[command(flatten)]
     method: MethodArguments,
     /// each: every view by itself, answers counted together; fused: all views of a clip at once [default: fused, or each where clips
@@ -79,12 +85,18 @@ pub fn run(arguments: Arguments) -> Result<()> {
         let figures = judging::judge(&Model::read(model)?, &settings, &terminal::counting(arguments.json)?)?;
         return printed(&figures, &figures.confusion, arguments.json);
     }
+    if arguments.open_set {
+        // One setting for all rounds: with a search in each there would be dozens.
+        let method = Method { search: false, ..arguments.method.method() };
+        let context = terminal::counting(arguments.json)?;
+        return report::print(&evaluation::open_set(&arguments.samples, &method, &context)?, arguments.json);
+    }
     let learn_from = match (arguments.leave_one_subject_out, arguments.train) {
         (true, None) => LearnFrom::OtherSubjects,
         (true, Some(train)) => LearnFrom::SamplesOfOthers(train),
         (false, Some(train)) => LearnFrom::Samples(train),
         (false, None) => bail!(report::Usage(
-            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both; or --model to \
+            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both; or --open-set; or --model to \
              judge a finished one"
                 .into()
         )),
