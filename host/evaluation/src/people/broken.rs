@@ -92,7 +92,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
 }
 
 /// The passages as clips of `walk`, one view each; none where the set is not at hand.
-pub fn clips(data: &Data) -> Result<Vec<Clip>> {
+pub fn walking(data: &Data) -> Result<Vec<Clip>> {
     let Some(folder) = data.path("kth_walk") else { return Ok(Vec::new()) };
     let mut clips = Vec::new();
     for person in ["person01", "person02"] {

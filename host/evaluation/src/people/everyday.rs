@@ -55,7 +55,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
             all.push((set.name, set.clips));
         }
     }
-    let walking = broken::clips(data)?;
+    let walking = broken::walking(data)?;
     if !walking.is_empty() {
         all.push(("KTH walking", walking));
     }

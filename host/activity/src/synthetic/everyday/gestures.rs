@@ -23,7 +23,7 @@ fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
         let at = |off: f64| Hand::at(out + off, ahead, up - 0.3 * off.abs()).elbow(elbow);
         (at(-wide), at(wide))
     } else {
-        let (low, high) = (maker.draw(-60.0, 55.0), maker.draw(65.0, 115.0));
+        let (low, high) = (maker.draw(-30.0, 55.0), maker.draw(65.0, 115.0));
         let reach = maker.draw(0.72, 0.98);
         (Hand::sideways(low, reach, ahead), Hand::sideways(high, reach, ahead))
     }

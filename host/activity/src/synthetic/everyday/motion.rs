@@ -204,16 +204,14 @@ impl Motion {
                 } else {
                     rng.random_range(*from..*to)
                 };
-                // Who comes from rest may be cut before the first repetition is over; the middle shows one at least.
-                let whole = if begin < *from { 0.6 } else { 1.1 };
-                let least = begin.max(*from) + rng.random_range(whole..whole + 0.9) * period;
+                let least = begin.max(*from) + rng.random_range(0.6..1.5) * period;
                 let end = match rng.random_range(0..4) {
                     0 => duration(keys),
                     1 => *to,
                     _ => least + rng.random_range(0.0..3.0) * period,
                 };
                 let end = end.max(least).min(duration(keys));
-                (begin.min(end - 1.1 * period).max(0.0), end)
+                (begin.min(end - 0.9 * period).max(0.0), end)
             }
         }
     }
