@@ -127,7 +127,7 @@ fn a_person_who_lies_because_another_axis_points_up_is_warned_of() {
         figures(farnear(&arguments).args(["--up", up, "--out", &folder.text(out), "--json"]))["warnings"]
             .clone()
     };
-    assert_eq!(drawn("z", "upright"), serde_json::json!([]));
+    assert!(drawn("z", "upright").is_null());
     let lying = drawn("y", "lying").to_string();
     assert!(lying.contains("longer than high in 3 of 3 frames") && lying.contains("--up"), "{lying}");
 }

@@ -68,6 +68,7 @@ const COMMANDS: &[&[&str]] = &[
     &["activity", "train"],
     &["activity", "recognise"],
     &["activity", "evaluate"],
+    &["activity", "models"],
     &["completions"],
 ];
 
