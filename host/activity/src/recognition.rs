@@ -1,8 +1,8 @@
 //! Activities from embedded silhouettes: patterns of a clip, classifiers, models, live recognition (Li 2014, section 9.3.2, which calls
 //! it embedded pattern learning, EPL).
 //!
-//! The way of a clip: [`clip`] describes its masks, [`space`] embeds them and makes a pattern ([`codebook`], or the thesis'
-//! [`occupancy`] grid), a [`classifier`] answers. [`choice`] finds the settings of an [`experiment`] by cross-validation, [`training`]
+//! The way of a clip: [`clip`] describes its masks, [`space`] embeds them and makes a pattern ([`codebook`], the thesis'
+//! [`occupancy`] grid, or a [`network`]), a [`classifier`] answers, [`unknown`] says what it does not know. [`choice`] finds the settings of an [`experiment`] by cross-validation, [`training`]
 //! makes the [`model`], [`live`] uses it while frames come in.
 
 pub mod choice;
@@ -14,9 +14,11 @@ pub mod frames;
 pub mod live;
 pub mod model;
 pub mod model_file;
+pub mod network;
 pub mod occupancy;
 pub(crate) mod patterns;
 pub mod residuals;
 pub mod space;
 pub mod training;
+pub mod unknown;
 pub mod watch;

@@ -1,8 +1,8 @@
 //! The parts of `docs/activity.md`: people's shadows, silhouettes and activities, like Li 2014, chapters 8 and 9.
 
 mod broken;
-mod damage;
 pub mod data;
+mod everyday;
 mod layout;
 mod matrix;
 mod recognition;
@@ -22,13 +22,14 @@ use data::Data;
 type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
 
 /// In the order of the page.
-pub const PARTS: [Part; 9] = [
+pub const PARTS: [Part; 10] = [
     ("synthetic-people", |page, _| recognition::measure(page)),
     ("utkinect", |page, data| recognition::measure_real(page, data, sets::utkinect, "UTKinect")),
     ("florence", |page, data| recognition::measure_real(page, data, sets::florence, "Florence")),
     ("weizmann", |page, data| recognition::measure_real(page, data, sets::weizmann, "the Weizmann strips")),
     ("robustness", robustness::measure),
     ("broken-silhouettes", broken::measure),
+    ("everyday", everyday::measure),
     ("layout", |page, _| layout::measure(page)),
     ("shadows", shadows::measure),
     ("sun", sun::measure),

@@ -1,11 +1,13 @@
 //! Recognising what people do from their silhouettes: [`training`] a model on [`samples`], using it ([`recognition`]), evaluating
-//! a [`method`] ([`evaluation`]).
+//! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
 mod confusion_picture;
 pub mod evaluation;
+pub mod judging;
 pub mod method;
 pub mod recognition;
 pub mod samples;
+pub mod shipped;
 pub mod training;
 pub mod views;
 mod watched;

@@ -60,6 +60,15 @@ pub enum EvaluationError {
     /// Leaving one out needs two.
     #[error("leave-one-subject-out needs at least 3 subjects, the samples have {0}")]
     Subjects(usize),
+    /// Two halves of subjects, each enough to say what is usual.
+    #[error("an open set needs at least 4 subjects, the samples have {0}")]
+    OpenSetSubjects(usize),
+    /// Two activities are taught when one is left out.
+    #[error("an open set needs at least 3 activities, the samples have {0}")]
+    Activities(usize),
+    /// A model could not be made or used.
+    #[error(transparent)]
+    Model(Box<crate::recognition::model::ModelError>),
     /// A clip was seen from another number of views than the first.
     #[error(
         "clip {clip} has {found} views, the first has {expected}: fused views need the same in all clips"

@@ -56,6 +56,16 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         });
     }
     let frames = rows(&lines, names.len())?;
+    // Files without the number are read as far as they go; one that promises more was cut short.
+    if let Ok(promised) = number("NumFrames")
+        && promised > frames.len() as f64
+    {
+        let reason = format!(
+            "NumFrames promises {promised} frames, the file ends after {}: it was cut short",
+            frames.len()
+        );
+        return Err(RecordingError::Line { line: 3, reason });
+    }
     Ok(Found {
         names,
         rate_hz,

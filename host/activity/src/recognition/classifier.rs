@@ -5,12 +5,14 @@
 
 pub mod method;
 pub mod neighbours;
+pub mod softmax;
 pub mod svc;
 
 use method::{Fold, Method};
 use ndarray::{ArrayView1, ArrayView2};
 use neighbours::Neighbours;
 use serde::{Deserialize, Serialize};
+use softmax::Softmax;
 use svc::LinearSvc;
 
 macro_rules! classifiers {
@@ -110,6 +112,8 @@ classifiers! {
     Knn(usize) => Neighbours;
     /// Linear support vectors with this cost.
     Svc(f32) => LinearSvc;
+    /// Multinomial logistic regression with this cost.
+    Softmax(f32) => Softmax;
 }
 
 impl std::str::FromStr for Family {
@@ -162,6 +166,6 @@ mod tests {
             assert_eq!(kind.right(&fold), held.len(), "{kind:?}");
             assert!(trained.fits(2, 3) && !trained.fits(3, 3) && !trained.fits(2, 4), "{kind:?}");
         }
-        assert!("forest".parse::<Family>().expect_err("none").contains("knn or svc"));
+        assert!("forest".parse::<Family>().expect_err("none").contains("knn or svc or softmax"));
     }
 }

@@ -1,10 +1,12 @@
 //! A trained recogniser as one value, and what it answers; [`super::training`] makes it, [`super::model_file`] saves and reads it.
 
+use super::classifier::softmax::softmax;
 use super::classifier::{Classifier, ClassifierKind};
 use super::clip::Track;
 use super::frames::Mode;
 use super::patterns::joined;
 use super::space::{Map, Pattern, Space, SpaceSettings};
+use super::unknown::Limits;
 use crate::embedding::EmbeddingError;
 use crate::embedding::descriptor::Scaling;
 use ndarray::{Array1, Array2, ArrayView1};
@@ -50,9 +52,9 @@ pub struct Recogniser {
     pub space: Space,
     /// The classifier, trained on the patterns.
     pub classifier: Classifier,
-    /// Squared distance to the nearest training pattern beyond which a clip is unknown.
-    pub far: f32,
-    /// Training patterns, from whose nearest the outlier score is measured.
+    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown.
+    pub limits: Limits,
+    /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
     pub patterns: Array2<f32>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
@@ -70,6 +72,54 @@ pub struct Answer {
     /// Squared distance to the nearest training pattern over the largest at which an activity still counts as known: above 1 is
     /// unknown.
     pub outlier_score: f32,
+}
+
+impl Answer {
+    /// The answer where nobody was seen.
+    fn nobody(activities: &[String]) -> Self {
+        let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
+        Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
+    }
+
+    /// One answer from those of several views: probabilities by their geometric mean, the outlier score by its mean.
+    fn joint(answers: &[Self]) -> Self {
+        let n = answers.len().max(1) as f32;
+        let mut values: Vec<f32> = (0..answers[0].probabilities.len())
+            .map(|k| answers.iter().map(|answer| answer.probabilities[k].1.max(1e-9).ln()).sum::<f32>() / n)
+            .collect();
+        softmax(&mut values);
+        let names = answers[0].probabilities.iter().map(|(name, _)| name.clone());
+        let outlier_score = answers.iter().map(|answer| answer.outlier_score).sum::<f32>() / n;
+        Self::of(names.zip(values).collect(), outlier_score)
+    }
+
+    /// The answer if only some activities can be: their probabilities, which add up to 1 again.
+    #[must_use]
+    pub fn among(&self, activities: &[String]) -> Self {
+        let mut kept: Vec<(String, f32)> =
+            self.probabilities.iter().filter(|(name, _)| activities.contains(name)).cloned().collect();
+        let total: f32 = kept.iter().map(|(_, share)| share).sum();
+        kept.iter_mut().for_each(|(_, share)| *share /= total.max(f32::MIN_POSITIVE));
+        Self::of(kept, self.outlier_score)
+    }
+
+    /// The most probable activity (the first of equals), also where it is called unknown.
+    pub fn best(&self) -> Option<&String> {
+        most_probable(&self.probabilities).map(|(name, _)| name)
+    }
+
+    fn of(probabilities: Vec<(String, f32)>, outlier_score: f32) -> Self {
+        let best = most_probable(&probabilities);
+        let (activity, confidence) = best.map_or((None, 0.0), |(name, share)| (Some(name.clone()), *share));
+        Self { activity: activity.filter(|_| outlier_score <= 1.0), confidence, probabilities, outlier_score }
+    }
+}
+
+fn most_probable(probabilities: &[(String, f32)]) -> Option<&(String, f32)> {
+    probabilities.iter().fold(None, |best, next| match best {
+        Some((_, share)) if *share >= next.1 => best,
+        _ => Some(next),
+    })
 }
 
 /// Why a model could not be made, read or used.
@@ -129,12 +179,15 @@ fn with(boxes: bool) -> &'static str {
 impl Recogniser {
     /// Recognises one clip.
     ///
+    /// A model of one view takes any number of views: the answers of all that see somebody count together.
+    ///
     /// # Errors
     /// A clip with other views than the model's, or with cut-out silhouettes where the model knows full frames.
     pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
         let boxes = self.uses_boxes();
         let found_boxes = views.iter().all(|view| view.boxes.is_some());
-        if views.len() != self.views || (boxes && !found_boxes) {
+        let any_view = self.views == 1 && views.len() > 1;
+        if !(views.len() == self.views || any_view) || (boxes && !found_boxes) {
             return Err(ModelError::Clip {
                 found: views.len(),
                 found_boxes,
@@ -142,27 +195,36 @@ impl Recogniser {
                 expected_boxes: boxes,
             });
         }
-        if views.iter().all(|view| view.frames() == 0) {
-            let probabilities = self.activities.iter().map(|a| (a.clone(), 0.0)).collect();
-            return Ok(Answer {
-                activity: None,
-                confidence: 0.0,
-                probabilities,
-                outlier_score: f32::INFINITY,
-            });
-        }
-        // A model of cut-out silhouettes looks at shapes only, also in full frames.
-        let shapes: Vec<Track>;
-        let views = if boxes || !found_boxes {
-            views
+        let seen = |view: &&Track| view.frames() > 0;
+        let mirrored: Vec<Track>;
+        let views = if self.views == 1 && matches!(self.space.pattern, Pattern::Network(_)) {
+            // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
+            mirrored = views.iter().flat_map(|view| [view.clone(), view.mirrored()]).collect();
+            mirrored.as_slice()
         } else {
-            shapes = views.iter().map(|view| Track { boxes: None, ..view.clone() }).collect();
-            &shapes
+            views
         };
-        let pattern = pattern(&self.space, views, self.settings.sharpness)?;
+        let mut answers = if self.views == 1 && views.len() > 1 {
+            let each = views.iter().filter(seen).map(|view| self.answer(std::slice::from_ref(view)));
+            each.collect::<Result<Vec<Answer>, ModelError>>()?
+        } else if views.iter().any(|view| seen(&view)) {
+            vec![self.answer(views)?]
+        } else {
+            Vec::new()
+        };
+        Ok(match answers.len() {
+            0 => Answer::nobody(&self.activities),
+            1 => answers.swap_remove(0),
+            _ => Answer::joint(&answers),
+        })
+    }
+
+    /// The answer for views that fit the model.
+    fn answer(&self, views: &[Track]) -> Result<Answer, ModelError> {
+        let pattern = self.pattern(views)?;
         let probabilities = self.classifier.probabilities(pattern.view());
         let (best, confidence) = self.classifier.best(pattern.view());
-        let outlier_score = nearest(self.patterns.rows().into_iter(), &pattern) / self.far.max(1e-9);
+        let outlier_score = self.limits.score(best, self.distance(&pattern));
         Ok(Answer {
             activity: (outlier_score <= 1.0).then(|| self.activities[best].clone()),
             confidence,
@@ -171,18 +233,31 @@ impl Recogniser {
         })
     }
 
+    /// The pattern of views that fit the model. A model of cut-out silhouettes looks at shapes only, also in full frames.
+    pub(super) fn pattern(&self, views: &[Track]) -> Result<Array1<f32>, ModelError> {
+        if self.uses_boxes() || views.iter().all(|view| view.boxes.is_none()) {
+            return pattern(&self.space, views, self.settings.sharpness);
+        }
+        let shapes: Vec<Track> = views.iter().map(|view| Track { boxes: None, ..view.clone() }).collect();
+        pattern(&self.space, &shapes, self.settings.sharpness)
+    }
+
+    /// Squared distance of a pattern to the nearest of what was learned.
+    pub(super) fn distance(&self, pattern: &Array1<f32>) -> f32 {
+        nearest(self.patterns.rows().into_iter(), pattern)
+    }
+
     /// Whether the box's motion is part of what was learned.
     pub fn uses_boxes(&self) -> bool {
-        match (&self.space.pattern, &self.space.map) {
-            (Pattern::Thesis(_), _) => false,
-            (Pattern::Codebook(book), map) => {
-                let dimensions = match map {
-                    Map::Rbf(rbf) => rbf.dimensions(),
-                    Map::Pca(pca) => pca.directions.nrows(),
-                };
-                let repeats = if self.settings.space.mode == Mode::Ordered { 3 } else { 2 };
-                book.centres.ncols() > repeats * dimensions
-            }
+        let dimensions = match &self.space.map {
+            Map::Rbf(rbf) => rbf.dimensions(),
+            Map::Pca(pca) => pca.directions.nrows(),
+        };
+        let repeats = if self.settings.space.mode == Mode::Ordered { 3 } else { 2 };
+        match &self.space.pattern {
+            Pattern::Thesis(_) => false,
+            Pattern::Codebook(book) => book.centres.ncols() > repeats * dimensions,
+            Pattern::Network(network) => network.mean.len() > repeats * dimensions,
         }
     }
 }

@@ -9,8 +9,10 @@ use super::clip::BOX_NUMBERS;
 use super::codebook::Codebook;
 use super::frames::Mode;
 use super::model::{ModelError, Recogniser, RecogniserSettings};
+use super::network::Network;
 use super::occupancy::OccupancyGrid;
 use super::space::{Map, Pattern, Space};
+use super::unknown::Limits;
 use crate::embedding::descriptor::{ANGLES, DESCRIPTOR_VERSION};
 use crate::embedding::pca::Pca;
 use crate::embedding::rbf::Rbf;
@@ -18,7 +20,7 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
 /// Version of the file's format.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
@@ -33,7 +35,7 @@ struct Body {
     neighbours: usize,
     pattern: SavedPattern,
     classifier: Classifier,
-    far: f32,
+    limits: Limits,
     patterns: Array2<f32>,
     typical_frames: u64,
 }
@@ -48,6 +50,7 @@ enum SavedMap {
 enum SavedPattern {
     Thesis(OccupancyGrid),
     Codebook(Codebook),
+    Network(Network),
 }
 
 impl Recogniser {
@@ -79,9 +82,10 @@ impl Recogniser {
             pattern: match &self.space.pattern {
                 Pattern::Thesis(grid) => SavedPattern::Thesis(grid.clone()),
                 Pattern::Codebook(book) => SavedPattern::Codebook(book.clone()),
+                Pattern::Network(network) => SavedPattern::Network(network.clone()),
             },
             classifier: self.classifier.clone(),
-            far: self.far,
+            limits: self.limits.clone(),
             patterns: self.patterns.clone(),
             typical_frames: self.typical_frames as u64,
         };
@@ -128,6 +132,7 @@ impl Recogniser {
         let pattern = match body.pattern {
             SavedPattern::Thesis(grid) => Pattern::Thesis(grid),
             SavedPattern::Codebook(book) => Pattern::Codebook(book),
+            SavedPattern::Network(network) => Pattern::Network(network),
         };
         let space = Space {
             settings: body.settings.space.clone(),
@@ -142,7 +147,7 @@ impl Recogniser {
             views: body.views,
             space,
             classifier: body.classifier,
-            far: body.far,
+            limits: body.limits,
             patterns: body.patterns,
             typical_frames: body.typical_frames as usize,
         };
@@ -174,6 +179,9 @@ impl Recogniser {
             }
         };
         fits(self.space.spread > 0.0, "the gallery's spread")?;
+        let ordered = self.settings.space.mode == Mode::Ordered;
+        let width = |boxes: usize| 2 * dimensions + boxes + if ordered { dimensions + boxes } else { 0 };
+        let of_frame = |found: usize| found == width(0) || found == width(BOX_NUMBERS);
         let of_view = match &self.space.pattern {
             Pattern::Thesis(grid) => {
                 let sizes = [grid.low.len(), grid.range.len()] == [grid.bins.len(); 2];
@@ -183,12 +191,14 @@ impl Recogniser {
                 )?;
                 grid.bins.iter().try_fold(1_usize, |product, &bins| product.checked_mul(bins))
             }
+            Pattern::Network(network) => {
+                let found = network.mean.len();
+                fits(of_frame(found) && network.fits(found), "the network's layers")?;
+                Some(network.width())
+            }
             Pattern::Codebook(book) => {
-                let ordered = self.settings.space.mode == Mode::Ordered;
-                let width =
-                    |boxes: usize| 2 * dimensions + boxes + if ordered { dimensions + boxes } else { 0 };
                 let found = book.centres.ncols();
-                fits(found == width(0) || found == width(BOX_NUMBERS), "the codebook's width")?;
+                fits(of_frame(found), "the codebook's width")?;
                 if let Some(residual) = &book.residual {
                     let same = residual.centres.ncols() == found && residual.residual.is_none();
                     fits(same, "the width of the residuals' centres")?;
@@ -198,6 +208,7 @@ impl Recogniser {
         };
         let width = of_view.and_then(|width| width.checked_mul(self.views)).unwrap_or(usize::MAX);
         fits(self.patterns.ncols() == width, "the training patterns' width")?;
+        fits(self.limits.squared_distances.len() == self.activities.len(), "the limits of what is known")?;
         fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
         Ok(self)
     }

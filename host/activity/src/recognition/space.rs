@@ -3,6 +3,7 @@
 use super::clip::{Clip, Track};
 use super::codebook::{Codebook, stacked};
 use super::frames::{self, Mode, Weights};
+use super::network::Network;
 use super::occupancy::OccupancyGrid;
 use crate::embedding::EmbeddingError;
 use crate::embedding::isomap::isomap;
@@ -32,6 +33,8 @@ pub enum PatternKind {
     Thesis(Vec<usize>),
     /// Square-rooted mean soft assignments to a codebook of this size.
     Codebook(usize),
+    /// What a network gives that has learned the activities' names; made by [`Recogniser::train_network`](super::model::Recogniser).
+    Network,
 }
 
 /// Everything that is chosen before patterns exist.
@@ -108,6 +111,8 @@ pub enum Pattern {
     Thesis(OccupancyGrid),
     /// A codebook of frame vectors.
     Codebook(Codebook),
+    /// A network over frame vectors.
+    Network(Network),
 }
 
 /// The learned space of frames and patterns.
@@ -154,7 +159,7 @@ impl Space {
         let points = self.points(track)?;
         Ok(match self.settings.pattern {
             PatternKind::Thesis(_) => points,
-            PatternKind::Codebook(_) => {
+            PatternKind::Codebook(_) | PatternKind::Network => {
                 frames::vectors(points.view(), track, self.settings.mode, self.settings.weights)
             }
         })
@@ -165,6 +170,7 @@ impl Space {
         match &self.pattern {
             Pattern::Thesis(grid) => grid.pattern(vectors),
             Pattern::Codebook(book) => book.pattern(vectors, self.settings.mode, sharpness),
+            Pattern::Network(network) => network.pattern(vectors),
         }
     }
 }
@@ -227,6 +233,8 @@ impl Galleries {
             neighbours: gallery.neighbours,
         };
         space.pattern = match &settings.pattern {
+            // Learned afterwards, with the activities' names.
+            PatternKind::Network => return Ok(space),
             PatternKind::Thesis(bins) => {
                 Pattern::Thesis(OccupancyGrid::new((&gallery.coordinates / spread).view(), bins))
             }

@@ -2,11 +2,11 @@
 
 use super::choice::{Chosen, Views, choose, names};
 use super::classifier::Classifier;
-use super::clip::{Clip, Track};
+use super::clip::Clip;
 use super::experiment::Experiment;
-use super::model::{ModelError, Recogniser, RecogniserSettings, nearest, pattern};
+use super::model::{ModelError, Recogniser, RecogniserSettings, nearest};
 use super::patterns::gathered;
-use super::space::Space;
+use super::unknown::Limits;
 use super::watch::{Unwatched, Watch};
 use crate::embedding::descriptor::Scaling;
 use ndarray::Array2;
@@ -70,7 +70,7 @@ impl Recogniser {
         lengths.sort_unstable();
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
-            far: unknown_beyond(&space, &all, clips.len(), &patterns, sharpness)?,
+            limits: limits(&all, &labels, activities.len(), clips.len(), &patterns),
             settings: RecogniserSettings {
                 scaling,
                 space: space.settings.clone(),
@@ -101,37 +101,25 @@ fn fits(clip: &Clip, expected: usize, expected_boxes: bool) -> Result<(), ModelE
     Err(ModelError::Clip { found, found_boxes, expected, expected_boxes })
 }
 
-/// Share of what was trained on that must count as known when somebody new does it.
-const KNOWN: f64 = 0.99;
-
-/// Beyond this squared distance to every training pattern nothing is known. Whole clips and their halves (a running answer has seen a
-/// part only) are compared with all other subjects' patterns, as somebody new would be; with a single subject, with their
-/// other clips. `clips` are followed by their mirrors, if those train too, and `patterns` are in the same order.
-fn unknown_beyond(
-    space: &Space,
+/// What counts as unknown: every clip is compared with all other subjects' patterns, as somebody new would be; with a single subject,
+/// with their other clips. `clips` are followed by their mirrors, if those train too, and `patterns` are in the same order.
+fn limits(
     clips: &[&Clip],
+    labels: &[usize],
+    classes: usize,
     originals: usize,
     patterns: &Array2<f32>,
-    sharpness: f32,
-) -> Result<f32, ModelError> {
+) -> Limits {
     let alone = clips.iter().all(|clip| clip.subject == clips[0].subject);
-    let apart: Result<Vec<Vec<f32>>, ModelError> = (0..originals)
+    let scored: Vec<(usize, f32)> = (0..originals)
         .into_par_iter()
         .map(|i| {
-            let clip = clips[i];
-            let other = |j: usize| if alone { j % originals != i } else { clips[j].subject != clip.subject };
+            let other =
+                |j: usize| if alone { j % originals != i } else { clips[j].subject != clips[i].subject };
             let others =
-                || patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
-            let half = clip.views.iter().map(Track::frames).min().unwrap_or(0).div_ceil(2);
-            let mut found = vec![nearest(others(), &patterns.row(i).to_owned())];
-            for part in clip.windows(half) {
-                found.push(nearest(others(), &pattern(space, &part.views, sharpness)?));
-            }
-            Ok(found)
+                patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
+            (labels[i], nearest(others, &patterns.row(i).to_owned()))
         })
         .collect();
-    let mut apart: Vec<f32> = apart?.into_iter().flatten().filter(|d| d.is_finite()).collect();
-    apart.sort_by(f32::total_cmp);
-    let place = (KNOWN * apart.len().saturating_sub(1) as f64).round() as usize;
-    Ok(apart.get(place).copied().unwrap_or(f32::INFINITY))
+    Limits::conformal(&scored, classes, Limits::FALSE_ALARMS)
 }

@@ -2,6 +2,7 @@
 
 mod background;
 mod bvh;
+mod everyday;
 mod highway;
 mod readers;
 mod recognition;

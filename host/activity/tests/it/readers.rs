@@ -183,6 +183,20 @@ fn a_small_c3d_file_is_read_as_written() {
 }
 
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumMarkers\tUnits\n100\t2\tm\nFrame#\tTime\tA\t\t\tB\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0\t0.1\t0.2\t0.3\t\t\t\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
+/// A header that promises more frames than there are tells of a copy that was cut short.
+#[test]
+fn a_trc_file_cut_short_is_refused_with_both_numbers() {
+    let promising = |frames: &str| {
+        let keys = TRC.replace("DataRate\tNumMarkers", "DataRate\tNumFrames\tNumMarkers");
+        keys.replace("100\t2\tm", &format!("100\t{frames}\t2\tm"))
+    };
+    assert_eq!(trc::read(promising("2").as_bytes()).expect("whole").frames.len(), 2);
+    // Fewer than there are, or no number at all, does no harm.
+    assert!(trc::read(promising("1").as_bytes()).is_ok() && trc::read(promising("?").as_bytes()).is_ok());
+    let error = trc::read(promising("139").as_bytes()).expect_err("cut short").to_string();
+    assert!(error.contains("139") && error.contains("ends after 2") && error.contains("line 3"), "{error}");
+}
+
 const CSV: &str = "frame,A_x,A_y,A_z,B_x,B_y,B_z\n1,1,2,3,,,\n2,4,5,6,7,8,9\n";
 
 proptest! {

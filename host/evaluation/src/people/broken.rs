@@ -91,6 +91,22 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
+/// The passages as clips of `walk`, one view each; none where the set is not at hand.
+pub fn walking(data: &Data) -> Result<Vec<Clip>> {
+    let Some(folder) = data.path("kth_walk") else { return Ok(Vec::new()) };
+    let mut clips = Vec::new();
+    for person in ["person01", "person02"] {
+        for passage in read(&folder.join(person), person)? {
+            clips.push(Clip {
+                subject: passage.person,
+                activity: "walk".into(),
+                views: vec![Track::from_masks(&passage.masks, Scaling::default(), true)],
+            });
+        }
+    }
+    Ok(clips)
+}
+
 /// Passages: runs of frames with consecutive numbers.
 fn read(folder: &std::path::Path, person: &str) -> Result<Vec<Passage>> {
     let files = numbered_files(folder)?;

@@ -215,6 +215,7 @@ fn chosen(choices: &[Choice], views: usize) -> String {
     tell("pattern", &|choice| match &choice.space.pattern {
         PatternKind::Thesis(bins) => bins.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x "),
         PatternKind::Codebook(size) => format!("codebook of {size}"),
+        PatternKind::Network => "network".into(),
     });
     tell("residuals", &|choice| unless_thesis(choice, choice.space.residuals.to_string()));
     tell("box weight", &|choice| unless_thesis(choice, choice.space.weights.box_weight.to_string()));

@@ -16,14 +16,16 @@ use farnear_activity::{
         space::SpaceSettings,
     },
     silhouette::view::{Canvas, View, draw, extent, views_round},
-    synthetic::activities::{ACTIVITIES, performance},
+    synthetic::{
+        activities::{ACTIVITIES, performance},
+        damage::{Damage, damaged},
+    },
 };
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{
-    damage::{Damage, damaged},
     data::Data,
     sets::{self, PEOPLE, RATE_HZ, VIEWS},
 };

@@ -118,6 +118,20 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
     assert_eq!(folder.listing(), before, "nothing is left behind");
 }
 
+#[test]
+fn a_person_who_lies_because_another_axis_points_up_is_warned_of() {
+    let folder = Folder::new();
+    let (file, template) = (folder.file("walk.csv", recording()), folder.file("suit.toml", TEMPLATE));
+    let drawn = |up: &str, out: &str| {
+        let arguments = ["silhouettes", "markers", &file, "--template", &template, "--mm-per-px", "20"];
+        figures(farnear(&arguments).args(["--up", up, "--out", &folder.text(out), "--json"]))["warnings"]
+            .clone()
+    };
+    assert!(drawn("z", "upright").is_null());
+    let lying = drawn("y", "lying").to_string();
+    assert!(lying.contains("longer than high in 3 of 3 frames") && lying.contains("--up"), "{lying}");
+}
+
 /// A body as the CMU library's BVH files have it: joints by their names there, y up, in its units of 56.444 mm, 30.5 of them from
 /// toe to crown. In three frames it walks 10 units along z, and turns about the vertical in the last.
 fn skeleton() -> String {

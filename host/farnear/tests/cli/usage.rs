@@ -69,6 +69,7 @@ const COMMANDS: &[&[&str]] = &[
     &["activity", "train"],
     &["activity", "recognise"],
     &["activity", "evaluate"],
+    &["activity", "models"],
     &["batch"],
     &["doctor"],
     &["completions"],

@@ -9,12 +9,14 @@ use farnear_activity::{
     evaluation::{
         confusion::Confusion,
         leave_one_out::{Choice, EvaluationError, Outcome, train_on_others},
+        open_set::{self, OpenSet},
     },
     mask::Mask,
     recognition::{
         choice::{Views, names},
         clip::{Clip, Track},
         model::Recogniser,
+        unknown::Limits,
         watch::Unwatched,
     },
 };
@@ -129,6 +131,7 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
     check_subjects(settings, &subjects, learned)?;
+    check_activities(settings, &test, learned)?;
     let experiment = settings.method.experiment();
     let outcome = train_on_others(learned, &test, &experiment, &[views], &watched::Folds::new(context));
     let outcome = watched::outcome(outcome, context, "evaluating")?;
@@ -158,6 +161,45 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     figures.seconds_per_frame = seconds_per_frame(learned, &settings.method, &folders, context)?;
     figures.seconds = rounded(start.elapsed().as_secs_f64(), 3);
     Ok(figures)
+}
+
+/// What of an open set is shown.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct OpenSetFigures {
+    /// Share of what is known that models were made to call unknown at most.
+    pub false_alarms: f64,
+    /// Mean over the activities of the area under the outlier score's ROC curve.
+    pub auroc: f64,
+    /// Mean share of the left-out activities' clips that was called unknown.
+    pub unknown_of_strangers: f64,
+    /// Mean share of the others' clips that was called unknown.
+    pub unknown_of_known: f64,
+    /// Every activity left out in turn.
+    pub activity: Vec<OpenSet>,
+}
+
+/// Leaves every activity out of the training in turn, on one half of the subjects, and lets the other half do all.
+///
+/// # Errors
+/// Samples that cannot be read or used, too few subjects or activities.
+pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Result<OpenSetFigures> {
+    let clips = Samples::read(samples, context)?.fused()?;
+    let found = open_set::open_set(&clips, &method.experiment(), SCALING, &watched::Folds::new(context));
+    let mut rows = watched::outcome(found, context, "evaluating")?;
+    for row in &mut rows {
+        for value in [&mut row.unknown_of_known, &mut row.unknown_of_strangers, &mut row.auroc] {
+            *value = rounded(*value, 4);
+        }
+    }
+    let mean = rows.pop();
+    let of_mean = |value: fn(&OpenSet) -> f64| mean.as_ref().map_or(f64::NAN, value);
+    Ok(OpenSetFigures {
+        false_alarms: rounded(f64::from(Limits::FALSE_ALARMS), 4),
+        auroc: of_mean(|row| row.auroc),
+        unknown_of_strangers: of_mean(|row| row.unknown_of_strangers),
+        unknown_of_known: of_mean(|row| row.unknown_of_known),
+        activity: rows,
+    })
 }
 
 /// The clips of an evaluation, and which of their views are recognised together.
@@ -201,6 +243,16 @@ fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &
             Err(SamplesError::SamePerson { subject: both.clone(), test, train }.into())
         }
     }
+}
+
+/// Refuses to recognise what nobody has taught: an accuracy of 0 that only says that names differ.
+fn check_activities(settings: &EvaluationSettings, test: &[Clip], learned: &[Clip]) -> Result<()> {
+    let (found, known) =
+        (names(test.iter().map(|clip| &clip.activity)), names(learned.iter().map(|clip| &clip.activity)));
+    if found.iter().any(|activity| known.contains(activity)) {
+        return Ok(());
+    }
+    Err(SamplesError::NothingInCommon { samples: settings.samples.clone(), found, known }.into())
 }
 
 fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<()> {

@@ -16,7 +16,10 @@ use farnear_activity::{
 };
 use serde::Serialize;
 
-use super::views::{Frames, Seen, View};
+use super::{
+    shipped::Shipped,
+    views::{Frames, Seen, View},
+};
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
@@ -24,29 +27,60 @@ use crate::{
     parameters::at_least,
 };
 
-/// A model and the file it comes from.
+/// A model and where it comes from.
 pub struct Model {
     path: PathBuf,
     recogniser: Recogniser,
+    /// For silhouettes that are cut out, where the other one is not for them.
+    cut_out: Option<Recogniser>,
 }
 
 impl Model {
-    /// Reads a model.
+    /// Reads a model from a file; where there is none of that path, it may be the name of one that comes with the program.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged, or of another version.
+    /// A file that cannot be read, is damaged, or of another version; a path that is neither.
     pub fn read(path: &Path) -> Result<Self> {
+        let named = path.to_str().and_then(Shipped::named).filter(|_| !path.exists());
+        if let Some(shipped) = named {
+            let [recogniser, cut_out] = shipped.recognisers()?;
+            return Ok(Self { path: path.into(), recogniser, cut_out: Some(cut_out) });
+        }
         let bytes = fs::read(path).map_err(WorkflowError::read("the model", path))?;
         let recogniser = Recogniser::from_bytes(&bytes).about(|| path.display().to_string())?;
-        Ok(Self { path: path.into(), recogniser })
+        Ok(Self { path: path.into(), recogniser, cut_out: None })
+    }
+
+    /// What recognises masks of that kind.
+    pub fn recogniser(&self, full_frames: bool) -> &Recogniser {
+        self.cut_out.as_ref().filter(|_| !full_frames).unwrap_or(&self.recogniser)
+    }
+
+    /// What it can answer.
+    pub fn activities(&self) -> &[String] {
+        &self.recogniser.activities
+    }
+
+    /// Activities in the order of the model.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`] for one that it does not know.
+    fn check_known(&self, activities: &[String]) -> Result<()> {
+        let Some(unknown) = activities.iter().find(|name| !self.activities().contains(name)) else {
+            return Ok(());
+        };
+        let expected = format!("the model knows {}", self.activities().join(", "));
+        Err(WorkflowError::parameter("activity", unknown, expected))
     }
 }
 
 /// What is recognised.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RecognitionSettings {
-    /// As many views as the model fuses, in its order.
+    /// As many views as the model fuses, in its order; any number for a model of one view.
     pub views: Vec<View>,
+    /// The only activities that can be; empty for all that the model knows.
+    pub among: Vec<String>,
     /// Frames of the running answer and of windows over a long recording; without it as many as a training clip had.
     pub window: Option<usize>,
 }
@@ -90,6 +124,9 @@ pub struct RecognitionFigures {
     pub confidence: f64,
     /// Outlier score, as in [`FrameAnswer`].
     pub strangeness: Option<f64>,
+    /// Why the activity is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
     /// Probability of every activity.
     pub shares: Vec<Share>,
     /// Frames of a view.
@@ -136,6 +173,7 @@ pub struct Recognition<'m> {
     views: Vec<Frames>,
     window: usize,
     live: Live<'m>,
+    among: Vec<String>,
     /// Everything seen so far: `[view][frame]`.
     tracks: Vec<Vec<Track>>,
     frames: usize,
@@ -149,9 +187,12 @@ impl<'m> Recognition<'m> {
     /// # Errors
     /// [`ViewsError`], views that cannot be opened.
     pub fn begin(model: &'m Model, settings: &RecognitionSettings) -> Result<Self> {
-        let Model { path, recogniser: model } = model;
+        let path = &model.path;
+        model.check_known(&settings.among)?;
+        let first = settings.views.first().map(View::is_cut_out).transpose()?;
+        let model = model.recogniser(first != Some(true));
         let (expected, found) = (model.views, settings.views.len());
-        if found != expected {
+        if found != expected && (expected > 1 || found == 0) {
             return Err(ViewsError { model: path.clone(), expected, found }.into());
         }
         if let Some(window) = settings.window {
@@ -161,6 +202,7 @@ impl<'m> Recognition<'m> {
         let window = settings.window.unwrap_or(model.typical_frames).max(1);
         Ok(Self {
             live: Live::new(model, window, true),
+            among: settings.among.clone(),
             tracks: vec![Vec::new(); views.len()],
             model,
             views,
@@ -193,6 +235,7 @@ impl<'m> Recognition<'m> {
             all.push(track.clone());
         }
         let answer = self.live.push_described(described).about(|| name.clone())?;
+        let answer = restricted(answer, &self.among);
         self.seconds += start.elapsed().as_secs_f64();
         let flags: Vec<String> =
             moment.iter().flat_map(|seen| seen.flags.iter().map(Flag::to_string)).collect();
@@ -213,8 +256,9 @@ impl<'m> Recognition<'m> {
     /// Views that do not fit the model.
     pub fn finish(self) -> Result<RecognitionFigures> {
         let whole: Vec<Track> = self.tracks.iter().map(|parts| joined(parts.iter())).collect();
-        let answer = self.model.recognise(&whole)?;
-        let stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
+        let answer = restricted(self.model.recognise(&whole)?, &self.among);
+        let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
+        stretches.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), &self.among));
         let part = |from: usize, to, activity: &Option<String>, confidence| Part {
             from: from + 1,
             to,
@@ -224,6 +268,7 @@ impl<'m> Recognition<'m> {
         Ok(RecognitionFigures {
             confidence: rounded_share(answer.confidence),
             strangeness: outlier_score(&answer),
+            reason: unknown_because(&answer, self.frames),
             activity: answer.activity,
             shares: answer
                 .probabilities
@@ -245,6 +290,26 @@ impl<'m> Recognition<'m> {
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
         })
     }
+}
+
+/// The answer if only some activities can be; all can where none is named.
+fn restricted(answer: Answer, among: &[String]) -> Answer {
+    if among.is_empty() { answer } else { answer.among(among) }
+}
+
+/// Why an answer is unknown, in words; `None` where it is not.
+fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
+    if answer.activity.is_some() {
+        return None;
+    }
+    let score = answer.outlier_score;
+    Some(match answer.best() {
+        _ if frames == 0 => "there is no frame".into(),
+        Some(best) if score.is_finite() => {
+            format!("most like `{best}`, but {score:.2} times as far from it as what the model knows")
+        }
+        _ => format!("nobody is seen in any of the {frames} frames"),
+    })
 }
 
 /// A share with four decimals, without the digits that f32 does not have.

@@ -106,6 +106,19 @@ pub enum SamplesError {
         /// Samples to learn from.
         train: PathBuf,
     },
+    /// None of the samples' activities is known to the model.
+    #[error(
+        "{}: none of its activities ({}) is among those that were learned ({}); names must be the same",
+        samples.display(), found.join(", "), known.join(", ")
+    )]
+    NothingInCommon {
+        /// The samples.
+        samples: PathBuf,
+        /// Their activities.
+        found: Vec<String>,
+        /// The model's.
+        known: Vec<String>,
+    },
     /// The same person in what is learned and what is tested.
     #[error(
         "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()

@@ -132,5 +132,6 @@ fn pattern(model: &Recogniser) -> String {
             format!("grid:{}", bins.iter().map(ToString::to_string).collect::<Vec<_>>().join("x"))
         }
         PatternKind::Codebook(size) => format!("codebook:{size}"),
+        PatternKind::Network => "network".into(),
     }
 }

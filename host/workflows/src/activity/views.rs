@@ -25,7 +25,7 @@ pub enum ViewKind {
 }
 
 impl ViewKind {
-    /// What a path most likely holds: masks are folders of pictures (or one picture) with nothing but black and white.
+    /// What a path most likely holds: masks are folders of pictures (or one picture) with hardly anything but black and white.
     ///
     /// # Errors
     /// Folders without pictures, pictures that cannot be read.
@@ -35,11 +35,22 @@ impl ViewKind {
         if !pictures::EXTENSIONS.contains(&ending.as_str()) {
             return Ok(Self::Video);
         }
-        Ok(match pictures::read(&first)? {
-            Pixels::Grey(levels) if levels.iter().all(|level| matches!(level, 0 | 255)) => Self::Masks,
-            _ => Self::Video,
-        })
+        let two_levels = match pictures::read(&first)? {
+            Pixels::Grey(levels) => nearly_two_levels(levels.iter().copied()),
+            Pixels::Rgb(rgb) => {
+                let grey = rgb.lanes(ndarray::Axis(2)).into_iter().all(|p| p[0] == p[1] && p[1] == p[2]);
+                grey && nearly_two_levels(rgb.iter().copied())
+            }
+        };
+        Ok(if two_levels { Self::Masks } else { Self::Video })
     }
+}
+
+/// Whether a picture is black and white but for the ringing that JPEG leaves about edges: less than 2 % of it lies between.
+fn nearly_two_levels(levels: impl ExactSizeIterator<Item = u8>) -> bool {
+    let all = levels.len();
+    let between = levels.filter(|level| (40..=215).contains(level)).count();
+    50 * between <= all
 }
 
 /// A view: where it lies, and what it is.
@@ -49,6 +60,23 @@ pub struct View {
     pub path: PathBuf,
     /// What it is.
     pub kind: ViewKind,
+}
+
+impl View {
+    /// Whether it holds silhouettes that are cut out at 100x100.
+    ///
+    /// # Errors
+    /// Masks that cannot be read.
+    pub(super) fn is_cut_out(&self) -> Result<bool> {
+        if self.kind == ViewKind::Video {
+            return Ok(false);
+        }
+        let first = masks::listed(&self.path)?.into_iter().next();
+        Ok(first
+            .map(|file| masks::read(&file))
+            .transpose()?
+            .is_some_and(|mask| mask.dim() == (SIDE_PX, SIDE_PX)))
+    }
 }
 
 /// A frame's mask and what is doubtful about it.

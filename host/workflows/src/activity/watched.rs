@@ -46,6 +46,25 @@ impl Watch for Folds<'_> {
     }
 }
 
+/// Counts the passes of a network's training.
+pub(super) struct Passes<'a>(Counter<'a>);
+
+impl<'a> Passes<'a> {
+    pub fn new(context: &'a Context<'_>) -> Self {
+        Self(Counter::new(context, "passes"))
+    }
+}
+
+impl Watch for Passes<'_> {
+    fn fold_done(&self, passes: usize) {
+        self.0.one(Some(passes));
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
 /// What came out of watched work, or that it was cancelled.
 pub(super) fn outcome<T, E: Into<WorkflowError>>(
     result: std::result::Result<T, E>,

@@ -148,8 +148,12 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
     let recording = recording(&settings.file, settings.choices)?;
     let shown = settings.file.display();
     check_fit(&template, &recording, &settings.file)?;
-    let warnings: Vec<String> =
-        recording.remarks().into_iter().map(|remark| format!("{shown}: {remark}")).collect();
+    let warnings: Vec<String> = recording
+        .remarks()
+        .into_iter()
+        .chain(lying(&recording))
+        .map(|remark| format!("{shown}: {remark}"))
+        .collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
     let out = Staging::new_folder(&settings.out)?;
     let numbers = || (0..recording.frames.len()).step_by(settings.every);
@@ -191,6 +195,28 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         hidden_markers_percent: rounded(hidden_percent(&recording), 2),
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
         warnings: warnings.clone(),
+    })
+}
+
+/// A person who is longer than high in most frames lies down, or another axis points up.
+fn lying(recording: &Recording) -> Option<String> {
+    /// Arms spread reach as far as a person is high; this is clearly more.
+    const LONGER: f64 = 1.4;
+    let extents = recording.frames.iter().filter_map(|frame| {
+        let points: Vec<&Point3> = frame.iter().flatten().collect();
+        let side = |k: usize| {
+            let values = || points.iter().map(|point| point[k]);
+            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+        };
+        (points.len() > 3).then(|| (side(0).max(side(1)), side(2)))
+    });
+    let (mut frames, mut longer) = (0_usize, 0);
+    for (along, up) in extents {
+        frames += 1;
+        longer += usize::from(along > LONGER * up);
+    }
+    (frames > 0 && 2 * longer > frames).then(|| {
+        format!("longer than high in {longer} of {frames} frames: if nobody lies there, another axis points up (--up x, y or z)")
     })
 }
 

@@ -1,11 +1,18 @@
-//! `farnear activity evaluate`: how well the method recognises subjects that it was not trained on.
+//! `farnear activity evaluate`: how well the method recognises subjects that it was not trained on, or a model samples.
 
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use farnear_activity::recognition::choice::Views;
-use farnear_workflows::activity::evaluation::{self, EvaluationSettings, LearnFrom};
+use farnear_activity::{evaluation::confusion::Confusion, recognition::choice::Views};
+use farnear_workflows::activity::{
+    evaluation::{self, EvaluationSettings, LearnFrom},
+    judging::{self, JudgingSettings},
+    method::Method,
+    recognition::Model,
+};
+
+use serde::Serialize;
 
 use super::method::MethodArguments;
 use crate::{report, terminal};
@@ -16,9 +23,15 @@ use crate::{report, terminal};
 /// chosen is chosen by cross-validation over the remaining subjects. --train gives other samples to learn from (clean
 /// masks for damaged ones of the same people, say; a subject's own are left out as before). Without
 /// --leave-one-subject-out but with --train all of that is learned from, and the subjects must be others.
+///
+/// --open-set leaves out activities in place of subjects: half of the subjects teach the others, the other half does all.
+///
+/// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
+/// from shares of right answers, how many known and strange activities it calls unknown.
 #[derive(Args)]
 #[command(
-    after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json"
+    after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json\n\
+         \x20        farnear activity evaluate samples.toml --model everyday --same 'clap hands=clap' --out judged/"
 )]
 pub struct Arguments {
     /// The samples, TOML (see farnear activity train --help).
@@ -29,13 +42,22 @@ pub struct Arguments {
     /// Learn from these samples instead.
     #[arg(long, value_name = "SAMPLES")]
     train: Option<PathBuf>,
+    /// Judge this model: a file, or the name of one that comes with the program.
+    #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["leave_one_subject_out", "train", "mode", "epl", "classifier", "no_search"])]
+    model: Option<PathBuf>,
+    /// An activity's name in the samples and in the model, where they differ; may be repeated.
+    #[arg(long, value_name = "SAMPLES=MODEL", requires = "model", value_parser = same)]
+    same: Vec<(String, String)>,
+    /// Leave every activity out of the training in turn, and say how well it is told to be unknown.
+    #[arg(long, conflicts_with_all = ["leave_one_subject_out", "train", "model", "views", "out"])]
+    open_set: bool,
     #[command(flatten)]
     method: MethodArguments,
     /// each: every view by itself, answers counted together; fused: all views of a clip at once [default: fused, or each where clips
     /// differ in their views].
     #[arg(long)]
     views: Option<Views>,
-    /// Folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold).
+    /// Folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold), or wrong.csv (a model's mistakes).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print figures as JSON.
@@ -43,17 +65,39 @@ pub struct Arguments {
     json: bool,
 }
 
+fn same(text: &str) -> Result<(String, String), String> {
+    let (own, known) = text.split_once('=').ok_or("expected NAME IN THE SAMPLES=NAME IN THE MODEL")?;
+    Ok((own.trim().into(), known.trim().into()))
+}
+
 /// Runs the command.
 ///
 /// # Errors
-/// See [`evaluation::evaluate`]; nothing to learn from.
+/// See [`evaluation::evaluate`] and [`judging::judge`]; nothing to learn from.
 pub fn run(arguments: Arguments) -> Result<()> {
+    if let Some(model) = &arguments.model {
+        let settings = JudgingSettings {
+            samples: arguments.samples,
+            same: arguments.same,
+            fused: arguments.views == Some(Views::Fused),
+            out: arguments.out,
+        };
+        let figures = judging::judge(&Model::read(model)?, &settings, &terminal::counting(arguments.json)?)?;
+        return printed(&figures, &figures.confusion, arguments.json);
+    }
+    if arguments.open_set {
+        // One setting for all rounds: with a search in each there would be dozens.
+        let method = Method { search: false, ..arguments.method.method() };
+        let context = terminal::counting(arguments.json)?;
+        return report::print(&evaluation::open_set(&arguments.samples, &method, &context)?, arguments.json);
+    }
     let learn_from = match (arguments.leave_one_subject_out, arguments.train) {
         (true, None) => LearnFrom::OtherSubjects,
         (true, Some(train)) => LearnFrom::SamplesOfOthers(train),
         (false, Some(train)) => LearnFrom::Samples(train),
         (false, None) => bail!(report::Usage(
-            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both"
+            "say what to learn from: --leave-one-subject-out (the other subjects), --train SAMPLES, or both; or --open-set; or --model to \
+             judge a finished one"
                 .into()
         )),
     };
@@ -65,9 +109,14 @@ pub fn run(arguments: Arguments) -> Result<()> {
         out: arguments.out,
     };
     let figures = evaluation::evaluate(&settings, &terminal::counting(arguments.json)?)?;
-    report::print(&figures, arguments.json)?;
-    if arguments.json {
+    printed(&figures, &figures.confusion, arguments.json)
+}
+
+/// Prints figures, and the confusion as a table where they are for people.
+fn printed<T: Serialize>(figures: &T, confusion: &Confusion, json: bool) -> Result<()> {
+    report::print(figures, json)?;
+    if json {
         return Ok(());
     }
-    report::to_stdout(format!("\n{}", figures.confusion.to_markdown()).as_bytes())
+    report::to_stdout(format!("\n{}", confusion.to_markdown()).as_bytes())
 }

@@ -18,7 +18,7 @@ pub struct MethodArguments {
     /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
     #[arg(long, value_name = "PATTERN", conflicts_with_all = ["mode", "classifier"])]
     epl: Option<Epl>,
-    /// svc (linear support vectors) or knn (nearest neighbours).
+    /// svc (linear support vectors), softmax (logistic regression) or knn (nearest neighbours).
     #[arg(long, default_value = "svc", value_parser = classifiers())]
     classifier: Family,
     /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).

@@ -17,15 +17,20 @@ use crate::{report, terminal};
 /// strangeness, the distance from all training data over what is known (above 1 the activity is null: unknown). The last line
 /// answers for the whole and, window by window, for a recording that nobody cut. With `--json` only that object is printed.
 #[derive(Args)]
-#[command(after_help = "Example: farnear activity recognise masks/ --model model.fnm\n\
+#[command(after_help = "Example: farnear activity recognise masks/ --model everyday\n\
+                  \x20        farnear activity recognise masks/ --model everyday --among walk,jog,'sit down','stand up'\n\
                   \x20        farnear activity recognise walk.y4m --model model.fnm --window 50")]
 pub struct Arguments {
-    /// Folders of masks or videos (what `farnear silhouettes video` reads), one per view of the model, in its order.
+    /// Folders of masks or videos (what `farnear silhouettes video` reads), one per view of the model, in its order; a model of one
+    /// view takes any number.
     #[arg(required = true, value_name = "MASKS|VIDEO")]
     views: Vec<PathBuf>,
-    /// The model.
-    #[arg(long, value_name = "FILE")]
+    /// The model: a file, or the name of one that comes with the program (farnear activity models).
+    #[arg(long, value_name = "FILE|NAME")]
     model: PathBuf,
+    /// The only activities that can be, separated by commas: whoever knows some of what is not done gets better answers.
+    #[arg(long, value_name = "ACTIVITIES", value_delimiter = ',')]
+    among: Vec<String>,
     /// Frames of the running answer and of windows over a long recording [default: as many as a training clip had].
     #[arg(long, value_name = "FRAMES")]
     window: Option<usize>,
@@ -51,7 +56,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let model = Model::read(&arguments.model)?;
     let view = |path: PathBuf| -> Result<View> { Ok(View { kind: kind(&path, arguments.kind)?, path }) };
     let views = arguments.views.into_iter().map(view).collect::<Result<Vec<View>>>()?;
-    let settings = RecognitionSettings { views, window: arguments.window };
+    let settings = RecognitionSettings { views, among: arguments.among, window: arguments.window };
     let context = terminal::context()?;
     let mut work = Recognition::begin(&model, &settings)?;
     while let Some(answer) = work.next(&context)? {

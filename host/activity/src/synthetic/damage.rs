@@ -1,6 +1,6 @@
 //! Silhouettes as bad as segmentation makes them: heads and limbs cut off, holes, ragged outlines; seeded.
 
-use farnear_activity::mask::{BoundingBox, Mask, bits::BitMask};
+use crate::mask::{BoundingBox, Mask, bits::BitMask};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,0 +1,293 @@
+//! Training of the network: gradients by the chain rule, steps by Adam (Kingma and Ba, ICLR 2015) whose size falls as a cosine.
+
+use super::{Dense, Network, pooled, rectified, rows};
+use crate::recognition::watch::Watch;
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use rand::{Rng, SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+/// How the network is trained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NetworkSettings {
+    /// Outputs of the first three layers.
+    pub widths: [usize; 3],
+    /// Passes over all clips.
+    pub passes: usize,
+    /// Clips of a step.
+    pub batch: usize,
+    /// Size of the first steps.
+    pub rate: f32,
+    /// How much weights shrink in a step, times its size.
+    pub decay: f32,
+    /// Share of the pooled values that is left out at random in a step.
+    pub dropout: f32,
+    /// Spread of what is added at random to every number of a frame in a step, in spreads of that number.
+    pub noise: f32,
+    /// Share of the probability that goes to all activities alike (label smoothing; Szegedy et al., CVPR 2016).
+    pub smoothing: f32,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for NetworkSettings {
+    fn default() -> Self {
+        Self {
+            widths: [64, 128, 96],
+            passes: 30,
+            batch: 64,
+            rate: 2e-3,
+            decay: 1e-2,
+            dropout: 0.3,
+            noise: 0.05,
+            smoothing: 0.1,
+            seed: 1,
+        }
+    }
+}
+
+/// First and second moments of a parameter's gradient.
+struct Moments {
+    first: Vec<f32>,
+    second: Vec<f32>,
+}
+
+/// A layer with its gradients' moments.
+struct Learner {
+    layer: Dense,
+    weights: Moments,
+    offsets: Moments,
+}
+
+impl Learner {
+    /// Weights drawn after He et al. (ICCV 2015).
+    fn new(inputs: usize, outputs: usize, rng: &mut ChaCha8Rng) -> Self {
+        let spread = (2.0 / inputs.max(1) as f32).sqrt();
+        let mut draw = || Normal::new(0.0, spread).map_or(0.0, |normal| normal.sample(rng));
+        let weights = Array2::from_shape_simple_fn((inputs, outputs), &mut draw);
+        let moments = |n: usize| Moments { first: vec![0.0; n], second: vec![0.0; n] };
+        Self {
+            layer: Dense { weights, offsets: Array1::zeros(outputs) },
+            weights: moments(inputs * outputs),
+            offsets: moments(outputs),
+        }
+    }
+
+    /// One step down the gradient; gives the gradient of the inputs.
+    fn step(
+        &mut self,
+        inputs: ArrayView2<f32>,
+        gradient: &Array2<f32>,
+        step: Step,
+        back: bool,
+    ) -> Option<Array2<f32>> {
+        let before = back.then(|| gradient.dot(&self.layer.weights.t()));
+        let of_weights = inputs.t().dot(gradient);
+        let of_offsets = gradient.sum_axis(Axis(0));
+        step.take(self.layer.weights.iter_mut().zip(of_weights.iter()), &mut self.weights, true);
+        step.take(self.layer.offsets.iter_mut().zip(of_offsets.iter()), &mut self.offsets, false);
+        before
+    }
+}
+
+/// A step of Adam.
+#[derive(Clone, Copy)]
+struct Step {
+    number: i32,
+    rate: f32,
+    decay: f32,
+}
+
+impl Step {
+    fn take<'a>(
+        self,
+        values: impl Iterator<Item = (&'a mut f32, &'a f32)>,
+        moments: &mut Moments,
+        shrink: bool,
+    ) {
+        const FIRST: f32 = 0.9;
+        const SECOND: f32 = 0.999;
+        let (first, second) = (1.0 - FIRST.powi(self.number), 1.0 - SECOND.powi(self.number));
+        let decay = if shrink { self.rate * self.decay } else { 0.0 };
+        for (((value, gradient), m), v) in values.zip(&mut moments.first).zip(&mut moments.second) {
+            *m = FIRST * *m + (1.0 - FIRST) * gradient;
+            *v = SECOND * *v + (1.0 - SECOND) * gradient * gradient;
+            *value -= self.rate * (*m / first) / ((*v / second).sqrt() + 1e-8) + decay * *value;
+        }
+    }
+}
+
+/// Trains on clips given by their frame vectors (frames x F each, at least one frame) and labels below `classes`; gives the network and
+/// the linear values per class that its patterns were learned for. `watch` may stop it (`None`), and hears of every pass.
+pub fn train(
+    clips: &[Array2<f32>],
+    labels: &[usize],
+    classes: usize,
+    settings: &NetworkSettings,
+    watch: &dyn Watch,
+) -> Option<(Network, Dense)> {
+    let inputs = clips.first()?.ncols();
+    let (mean, spread) = scaling(clips, inputs);
+    let scaled: Vec<Array2<f32>> = clips.iter().map(|clip| (clip - &mean) / &spread).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    let [a, b, c] = settings.widths;
+    let mut learners = [(inputs, a), (a, b), (2 * b, c), (c, classes)]
+        .map(|(inputs, outputs)| Learner::new(inputs, outputs, &mut rng));
+    let mut order: Vec<usize> = (0..clips.len()).collect();
+    let steps = settings.passes * clips.len().div_ceil(settings.batch.max(1));
+    let mut number = 0;
+    for _ in 0..settings.passes {
+        if watch.is_stopped() {
+            return None;
+        }
+        order.shuffle(&mut rng);
+        for chosen in order.chunks(settings.batch.max(1)) {
+            number += 1;
+            let share = number as f32 / steps.max(1) as f32;
+            let rate = settings.rate * (0.5 + 0.5 * (std::f32::consts::PI * share).cos());
+            let step = Step { number: number as i32, rate, decay: settings.decay };
+            one_step(&mut learners, &scaled, labels, chosen, settings, step, &mut rng);
+        }
+        watch.fold_done(settings.passes);
+    }
+    let [first, second, third, last] = learners.map(|learner| learner.layer);
+    Some((Network { mean, spread, layers: [first, second, third] }, last))
+}
+
+/// Mean and spread of all frames; what never changes is left as it is.
+fn scaling(clips: &[Array2<f32>], width: usize) -> (Array1<f32>, Array1<f32>) {
+    let frames: usize = clips.iter().map(Array2::nrows).sum();
+    let n = frames.max(1) as f32;
+    let mut mean = Array1::<f32>::zeros(width);
+    clips.iter().for_each(|clip| mean += &(clip.sum_axis(Axis(0)) / n));
+    let mut spread = Array1::<f32>::zeros(width);
+    clips.iter().for_each(|clip| spread += &((clip - &mean).mapv(|v| v * v).sum_axis(Axis(0)) / n));
+    (mean, spread.mapv(|v| if v > 1e-10 { v.sqrt() } else { 1.0 }))
+}
+
+/// One step on a few clips.
+fn one_step(
+    learners: &mut [Learner; 4],
+    clips: &[Array2<f32>],
+    labels: &[usize],
+    chosen: &[usize],
+    settings: &NetworkSettings,
+    step: Step,
+    rng: &mut ChaCha8Rng,
+) {
+    let parts: Vec<ArrayView2<f32>> = chosen.iter().map(|&clip| clips[clip].view()).collect();
+    let Ok(mut frames) = ndarray::concatenate(Axis(0), &parts) else { return };
+    if let Ok(normal) = Normal::new(0.0, settings.noise) {
+        frames.mapv_inplace(|v| v + normal.sample(rng));
+    }
+    let [first, second, third, last] = learners;
+    let hidden = rectified(first.layer.apply(frames.view()));
+    let seen = rectified(second.layer.apply(hidden.view()));
+    let width = seen.ncols();
+    let mut clip = Array2::zeros((chosen.len(), 2 * width));
+    let mut spans = Vec::with_capacity(chosen.len());
+    let mut from = 0;
+    for (row, part) in parts.iter().enumerate() {
+        let to = from + part.nrows();
+        clip.row_mut(row).assign(&pooled(rows(&seen, from, to)));
+        spans.push((from, to));
+        from = to;
+    }
+    let keep = 1.0 - settings.dropout;
+    let kept =
+        Array2::from_shape_simple_fn(
+            clip.dim(),
+            || if rng.random::<f32>() < keep { 1.0 / keep } else { 0.0 },
+        );
+    let dropped = &clip * &kept;
+    let pattern = rectified(third.layer.apply(dropped.view()));
+    let decision = last.layer.apply(pattern.view());
+    let gradient = cross_entropy(&decision, chosen.iter().map(|&clip| labels[clip]), settings.smoothing);
+    let Some(mut gradient) = last.step(pattern.view(), &gradient, step, true) else { return };
+    only_above_zero(&mut gradient, &pattern);
+    let Some(gradient) = third.step(dropped.view(), &gradient, step, true) else { return };
+    let gradient = gradient * &kept;
+    let mut of_seen = Array2::zeros(seen.dim());
+    for (row, &(from, to)) in spans.iter().enumerate() {
+        let n = (to - from) as f32;
+        for k in 0..width {
+            let column = seen.slice(s![from..to, k]);
+            let largest = clip[[row, width + k]];
+            let at = column.iter().position(|&v| v >= largest).unwrap_or(0);
+            let mut out = of_seen.slice_mut(s![from..to, k]);
+            out.fill(gradient[[row, k]] / n);
+            out[at] += gradient[[row, width + k]];
+        }
+    }
+    only_above_zero(&mut of_seen, &seen);
+    let Some(mut of_hidden) = second.step(hidden.view(), &of_seen, step, true) else { return };
+    only_above_zero(&mut of_hidden, &hidden);
+    first.step(frames.view(), &of_hidden, step, false);
+}
+
+/// Gradient of the mean cross entropy between the softmax of decisions and smoothed labels.
+fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, smoothing: f32) -> Array2<f32> {
+    let (n, classes) = decision.dim();
+    let mut gradient = decision.clone();
+    for (mut row, label) in gradient.rows_mut().into_iter().zip(labels) {
+        let best = row.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
+        row.mapv_inplace(|v| (v - best).exp());
+        let total = row.sum();
+        row.mapv_inplace(|v| v / total - smoothing / classes as f32);
+        row[label] -= 1.0 - smoothing;
+    }
+    gradient / n as f32
+}
+
+/// The gradient of what was rectified.
+fn only_above_zero(gradient: &mut Array2<f32>, values: &Array2<f32>) {
+    gradient.zip_mut_with(values, |gradient, &value| {
+        if value <= 0.0 {
+            *gradient = 0.0;
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recognition::watch::Unwatched;
+
+    /// Clips of two kinds of frames: classes differ in which kinds come up, not in how often.
+    fn clips(rng: &mut ChaCha8Rng) -> (Vec<Array2<f32>>, Vec<usize>) {
+        (0..240)
+            .map(|i| {
+                let label = i % 3;
+                let frames = rng.random_range(3..9);
+                let clip = Array2::from_shape_fn((frames, 4), |(frame, k)| {
+                    let kind = [0, 1, frame % 2][label];
+                    let middle = if k == kind { 2.0 } else { 0.0 };
+                    middle + rng.random_range(-0.7..0.7_f32)
+                });
+                (clip, label)
+            })
+            .unzip()
+    }
+
+    #[test]
+    fn it_learns_what_means_alone_tell_and_ignores_the_order_of_frames() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (train_clips, labels) = clips(&mut rng);
+        let settings = NetworkSettings { widths: [8, 12, 8], batch: 16, ..NetworkSettings::default() };
+        let (network, last) = train(&train_clips, &labels, 3, &settings, &Unwatched).expect("not stopped");
+        assert!(network.fits(4) && !network.fits(5) && last.is(8, 3));
+        let (fresh, truth) = clips(&mut rng);
+        let right = fresh.iter().zip(&truth).filter(|(clip, truth)| {
+            let pattern = network.pattern(clip.view()).insert_axis(Axis(0));
+            let decision = last.apply(pattern.view()).remove_axis(Axis(0));
+            (0..3).max_by(|&a, &b| decision[a].total_cmp(&decision[b])) == Some(**truth)
+        });
+        let right = right.count();
+        assert!(right > 225, "{right} of 240");
+        let clip = &fresh[2];
+        let backwards = clip.slice(s![..;-1, ..]);
+        let (a, b) = (network.pattern(clip.view()), network.pattern(backwards));
+        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-5));
+        assert_eq!(network.pattern(clip.slice(s![..0, ..])).len(), 8);
+    }
+}

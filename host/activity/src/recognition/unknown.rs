@@ -1,0 +1,87 @@
+//! What counts as unknown: the conformal rule (Vovk et al., Algorithmic Learning in a Random World, 2005).
+//!
+//! Clips of people who taught nothing are measured by how far they are from all that was learned. A clip is unknown when it lies
+//! further off than the k-th of these n, k = ceil((n + 1) (1 - share)): whoever comes next from the same population is wrongly
+//! called unknown with at most that share as probability, whatever the distances' distribution. The rule is applied to each activity
+//! that is answered (Mondrian), where enough clips were; the others share one limit.
+
+use serde::{Deserialize, Serialize};
+
+/// Distances beyond which an answer is unknown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Per class.
+    pub squared_distances: Vec<f32>,
+    /// Share of what is known that is called unknown, as asked for.
+    pub false_alarms: f32,
+}
+
+impl Limits {
+    /// The share of false alarms that models are made for.
+    pub const FALSE_ALARMS: f32 = 0.05;
+
+    /// Nothing is unknown.
+    pub fn none(classes: usize) -> Self {
+        Self { squared_distances: vec![f32::INFINITY; classes], false_alarms: 0.0 }
+    }
+
+    /// From the class and squared distance of clips that are known and taught nothing.
+    pub fn conformal(scored: &[(usize, f32)], classes: usize, false_alarms: f32) -> Self {
+        let all = limit(scored.iter().map(|(_, distance)| *distance).collect(), false_alarms)
+            .unwrap_or(f32::INFINITY);
+        let of_class = |class: usize| {
+            let own = scored.iter().filter(|(answer, _)| *answer == class).map(|(_, distance)| *distance);
+            limit(own.collect(), false_alarms).unwrap_or(all)
+        };
+        Self { squared_distances: (0..classes).map(of_class).collect(), false_alarms }
+    }
+
+    /// The outlier score of an answer: above 1 is unknown.
+    pub fn score(&self, class: usize, squared_distance: f32) -> f32 {
+        squared_distance / self.squared_distances.get(class).copied().unwrap_or(f32::INFINITY).max(1e-9)
+    }
+}
+
+/// The conformal limit, `None` where there are too few distances for it.
+fn limit(mut distances: Vec<f32>, false_alarms: f32) -> Option<f32> {
+    distances.retain(|distance| distance.is_finite());
+    distances.sort_by(f32::total_cmp);
+    let place = ((distances.len() + 1) as f64 * (1.0 - f64::from(false_alarms))).ceil() as usize;
+    distances.get(place.checked_sub(1)?).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    #[test]
+    fn at_most_the_stated_share_of_what_is_known_is_called_unknown() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let (mut alarms, mut asked) = (0, 0);
+        for _ in 0..400 {
+            // Distances of any distribution: here with a heavy tail, and another one for each of two classes.
+            let mut draw =
+                |class: usize| (class, (1.0 / rng.random_range(0.01..1.0_f32)) * (1 + 9 * class) as f32);
+            let scored: Vec<(usize, f32)> = (0..120).map(|i| draw(i % 2)).collect();
+            let limits = Limits::conformal(&scored, 2, 0.05);
+            for i in 0..20 {
+                let (class, distance) = draw(i % 2);
+                alarms += u32::from(limits.score(class, distance) > 1.0);
+                asked += 1;
+            }
+        }
+        let share = f64::from(alarms) / f64::from(asked);
+        // 5 % of 8000 with a spread of 0.25 points, and a little less by the rounding up to whole clips.
+        assert!((0.03..=0.058).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn classes_with_few_clips_share_a_limit_and_none_means_all_are_known() {
+        let scored: Vec<(usize, f32)> = (0..99).map(|i| (0, i as f32)).chain([(1, 5.0)]).collect();
+        let limits = Limits::conformal(&scored, 3, 0.05);
+        assert_eq!(limits.squared_distances[1], limits.squared_distances[2]);
+        assert_eq!(Limits::conformal(&[], 2, 0.05), Limits { false_alarms: 0.05, ..Limits::none(2) });
+        assert_eq!(Limits::none(2).score(1, 1e9), 0.0);
+    }
+}

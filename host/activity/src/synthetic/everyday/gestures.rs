@@ -1,0 +1,262 @@
+//! What is done with arms and hands while the body stands.
+//!
+//! Places of hands are in lengths of the stretched arm from the shoulder: the mouth is 0.3 inwards and 0.3 up, the ear 0.1 inwards and
+//! 0.35 up (Winter's proportions). Times are those of unhurried grown-ups; all vary.
+
+use super::moment::{Hand, Moment};
+use super::motion::{Maker, Motion};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// A hand at the ear.
+pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
+    Hand::at(rng.random_range(-0.15..0.06), rng.random_range(0.06..0.26), rng.random_range(0.2..0.45))
+        .elbow(rng.random_range(0.2..0.95))
+}
+
+/// The two ends of a wave: with the forearm, or with the whole arm up and down at the side.
+fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
+    let ahead = maker.draw(-0.05, 0.35);
+    if maker.chance(0.5) {
+        let (out, up, wide) = (maker.draw(0.0, 0.55), maker.draw(0.25, 0.85), maker.draw(0.12, 0.35));
+        let elbow = maker.draw(0.2, 1.0);
+        let at = |off: f64| Hand::at(out + off, ahead, up - 0.3 * off.abs()).elbow(elbow);
+        (at(-wide), at(wide))
+    } else {
+        let (low, high) = (maker.draw(-30.0, 55.0), maker.draw(65.0, 115.0));
+        let reach = maker.draw(0.72, 0.98);
+        (Hand::sideways(low, reach, ahead), Hand::sideways(high, reach, ahead))
+    }
+}
+
+/// Waving with one hand or both.
+fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
+    let (low, high) = wave_ends(maker);
+    let with = |mut moment: Moment, hand: Hand| {
+        for &side in hands {
+            moment.hands[side] = hand;
+        }
+        moment
+    };
+    let (a, b) = (with(maker.rest, low), with(maker.rest, high));
+    let (rise, swing) = (maker.seconds(0.7), maker.seconds(0.4));
+    let times = maker.rng.random_range(2..6);
+    maker.repeated(vec![(rise, a)], &[(swing, b), (swing, a)], times)
+}
+
+/// Waving with one hand.
+pub fn wave_one_hand(maker: &mut Maker) -> Motion {
+    let main = maker.main;
+    wave(maker, &[main])
+}
+
+/// Waving with both hands.
+pub fn wave_two_hands(maker: &mut Maker) -> Motion {
+    wave(maker, &[0, 1])
+}
+
+/// Clapping before the chest.
+pub fn clap(maker: &mut Maker) -> Motion {
+    let place = Hand::at(-0.28, 0.55, -0.1);
+    let middle = Hand { out: -0.29, ..maker.near(place, 0.22) };
+    let wide = maker.draw(0.12, 0.5);
+    let (together, apart) = (maker.rest.both(middle), maker.rest.both(middle.moved(wide, -0.3 * wide, 0.0)));
+    let (rise, beat) = (maker.seconds(0.6), maker.seconds(0.22));
+    let times = maker.rng.random_range(2..9);
+    maker.repeated(vec![(rise, apart)], &[(beat, together), (beat, apart)], times)
+}
+
+/// A hand goes somewhere near the head or chest, stays and comes back, the head following.
+fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> Motion {
+    let main = maker.main;
+    let there = maker.rest.hand(main, hand).bent(maker.rest.pose.lean_deg, nod_deg);
+    let still = there.hand(main, maker.near(hand, 0.03));
+    let mut parts = vec![(maker.seconds(0.9), there), (maker.seconds(hold), still)];
+    if back {
+        parts.push((maker.seconds(0.9), maker.rest));
+    }
+    maker.gesture(parts)
+}
+
+/// Taking a call: the hand goes to the ear and stays.
+pub fn answer_phone(maker: &mut Maker) -> Motion {
+    let hand = ear(maker.rng);
+    let (hold, back, nod) = (maker.draw(0.3, 2.6), maker.chance(0.3), maker.draw(-5.0, 20.0));
+    bring(maker, hand, nod, hold, back)
+}
+
+/// Drinking: the hand goes to the mouth, the head goes back.
+pub fn drink(maker: &mut Maker) -> Motion {
+    let mouth = Hand::at(-0.26, 0.34, 0.26).elbow(0.6);
+    let hand = maker.near(mouth, 0.09);
+    let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(-25.0, 5.0));
+    bring(maker, hand, nod, hold, back)
+}
+
+/// Reading the watch: the forearm comes up before the chest, the head bends to it.
+pub fn read_watch(maker: &mut Maker) -> Motion {
+    // The watch is on the other arm.
+    maker.main = 1 - maker.main;
+    let chest = Hand::at(-0.34, 0.42, -0.12).elbow(0.75);
+    let hand = maker.near(chest, 0.14);
+    let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(10.0, 40.0));
+    bring(maker, hand, nod, hold, back)
+}
+
+/// Throwing: over the shoulder, or from below.
+pub fn throw(maker: &mut Maker) -> Motion {
+    let main = maker.main;
+    let sign = if main == 1 { 1.0 } else { -1.0 };
+    let under = maker.chance(0.2);
+    let (back, front, end) = if under {
+        (Hand::swung(-50.0, 10.0, 0.15), Hand::swung(85.0, 8.0, 0.0), Hand::swung(120.0, 20.0, 0.0))
+    } else {
+        // The hand winds up behind the shoulder or no further than the ear.
+        let behind = maker.draw(-0.35, 0.2);
+        (
+            Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.7),
+            Hand::at(0.0, maker.draw(0.55, 0.95), maker.draw(0.0, 0.5)),
+            Hand::at(maker.draw(-0.3, 0.15), maker.draw(0.15, 0.8), maker.draw(-0.9, -0.2)),
+        )
+    };
+    let (back, front, end) = (maker.near(back, 0.16), maker.near(front, 0.16), maker.near(end, 0.2));
+    let turn = sign * maker.draw(5.0, 38.0);
+    let (lean, step) = (maker.draw(0.0, 16.0), if maker.chance(0.4) { maker.draw(0.05, 0.3) } else { 0.0 });
+    let other = Hand::at(maker.draw(0.05, 0.3), maker.draw(0.0, 0.5), maker.draw(-0.9, -0.3));
+    let stride = |mut moment: Moment, s: f64| {
+        moment.pose.legs[1 - main].hip_deg += 60.0 * step * s;
+        moment.pose.legs[main].hip_deg -= 60.0 * step * s;
+        moment.gone(0.5 * step * s)
+    };
+    let rest = maker.rest;
+    let wound =
+        stride(rest.hand(main, back).hand(1 - main, other).bent(-0.4 * lean, 0.0).twisted(-turn), 0.3);
+    let thrown = stride(rest.hand(main, front).bent(0.7 * lean, 0.0).twisted(0.6 * turn), 1.0);
+    let through = stride(rest.hand(main, end).bent(lean, 5.0).twisted(turn), 1.0);
+    let mut parts =
+        vec![(maker.seconds(0.7), wound), (maker.seconds(0.25), thrown), (maker.seconds(0.2), through)];
+    if maker.chance(0.5) {
+        parts.push((maker.seconds(0.7), rest.gone(0.5 * step)));
+    }
+    maker.gesture(parts)
+}
+
+/// Hands that push or pull: one or both.
+fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
+    if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
+}
+
+/// The two places between which hands push and pull: at the chest or waist, and stretched ahead.
+fn near_and_far(maker: &mut Maker) -> (Hand, Hand) {
+    let up = maker.draw(-0.35, 0.2);
+    let (reach, out) = (maker.draw(0.75, 0.98), maker.draw(-0.22, 0.1));
+    let near = Hand::at(maker.draw(-0.1, 0.12), maker.draw(0.1, 0.4), up + maker.draw(-0.25, 0.4));
+    (near.elbow(maker.draw(0.0, 0.5)), Hand::at(out, reach, up).elbow(maker.draw(0.0, 0.5)))
+}
+
+fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
+    let mut moment = rest;
+    for &side in hands {
+        moment.hands[side] = hand;
+    }
+    moment
+}
+
+/// Pushing something away.
+pub fn push(maker: &mut Maker) -> Motion {
+    let hands = both_or_one(maker, 0.4);
+    let (near, far) = near_and_far(maker);
+    let (lean, step) = (maker.draw(0.0, 16.0), maker.draw(0.0, 0.08));
+    let rest = maker.rest;
+    let ready = with(rest, &hands, near).bent(-0.2 * lean, 5.0);
+    let pushed = with(rest, &hands, far).bent(rest.pose.lean_deg + lean, 5.0).gone(step);
+    let mut parts =
+        vec![(maker.seconds(0.5), ready), (maker.seconds(0.45), pushed), (maker.seconds(0.25), pushed)];
+    if maker.chance(0.5) {
+        if maker.chance(0.4) {
+            parts.push((maker.seconds(0.5), ready));
+        }
+        parts.push((maker.seconds(0.6), rest));
+    }
+    maker.gesture(parts)
+}
+
+/// Pulling something near.
+pub fn pull(maker: &mut Maker) -> Motion {
+    let hands = both_or_one(maker, 0.4);
+    let (near, far) = near_and_far(maker);
+    let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
+    let rest = maker.rest;
+    let reached = with(rest, &hands, far).bent(rest.pose.lean_deg + 0.6 * lean, 5.0);
+    let pulled = with(rest, &hands, near.moved(0.0, -0.1, maker.draw(-0.2, 0.15)))
+        .bent(rest.pose.lean_deg - lean, 5.0)
+        .gone(-step);
+    let mut parts =
+        vec![(maker.seconds(0.7), reached), (maker.seconds(0.25), reached), (maker.seconds(0.45), pulled)];
+    if maker.chance(0.5) {
+        parts.push((maker.seconds(0.6), rest));
+    }
+    maker.gesture(parts)
+}
+
+/// Punching from a guard.
+pub fn punch(maker: &mut Maker) -> Motion {
+    let guard_place = maker.near(Hand::at(-0.15, 0.35, 0.08), 0.12);
+    let main = maker.main;
+    let (turn, lean) = (maker.draw(5.0, 35.0), maker.draw(0.0, 14.0));
+    let sign = if main == 1 { 1.0 } else { -1.0 };
+    let mut guard =
+        if maker.chance(0.7) { maker.rest.both(guard_place) } else { maker.rest.hand(main, guard_place) };
+    let (step, bend) = (maker.draw(0.0, 16.0), maker.draw(0.0, 20.0));
+    guard.pose.legs[1 - main].hip_deg += step + 0.5 * bend;
+    guard.pose.legs[main].hip_deg += 0.5 * bend - step;
+    guard.pose.legs[0].knee_deg += bend;
+    guard.pose.legs[1].knee_deg += bend;
+    let fist = maker.near(Hand::at(-0.12, 0.95, 0.08), 0.12);
+    let hit = guard.hand(main, fist).twisted(sign * turn).bent(guard.pose.lean_deg + lean, 0.0);
+    let (raise, out, back) = (maker.seconds(0.5), maker.seconds(0.2), maker.seconds(0.3));
+    let other = guard.hand(1 - main, fist).twisted(-sign * turn).bent(guard.pose.lean_deg + lean, 0.0);
+    let alternate = maker.chance(0.4);
+    let cycle = if alternate {
+        vec![(out, hit), (back, guard), (out, other), (back, guard)]
+    } else {
+        vec![(out, hit), (back, guard)]
+    };
+    let times = maker.rng.random_range(1..4);
+    maker.repeated(vec![(raise, guard)], &cycle, times)
+}
+
+/// Aiming a short gun in one or both hands, and firing.
+pub fn shoot(maker: &mut Maker) -> Motion {
+    let both = maker.chance(0.65);
+    let main = maker.main;
+    let place = Hand::at(if both { -0.28 } else { 0.0 }, 0.9, 0.08);
+    let aim = maker.near(place, 0.07);
+    let mut there = if both { maker.rest.both(aim) } else { maker.rest.hand(main, aim) };
+    let step = maker.draw(0.0, 14.0);
+    there.pose.legs[main].hip_deg -= step;
+    there.pose.legs[1 - main].hip_deg += step;
+    let kick = maker.draw(0.0, 0.12);
+    let kicked = if both {
+        there.both(aim.moved(0.0, -0.05, kick))
+    } else {
+        there.hand(main, aim.moved(0.0, -0.05, kick))
+    };
+    let mut parts = vec![(maker.seconds(0.6), there)];
+    for _ in 0..maker.rng.random_range(1..4) {
+        parts.extend([(maker.seconds(0.5), there), (0.08, kicked), (0.15, there)]);
+    }
+    parts.push((maker.seconds(0.7), maker.rest));
+    maker.gesture(parts)
+}
+
+/// Standing about, perhaps looking round or shifting a hand.
+pub fn stand(maker: &mut Maker) -> Motion {
+    let shift = maker.draw(0.0, 0.12);
+    let side = maker.main;
+    let hand = maker.near(maker.rest.hands[side], shift.max(0.01));
+    let turned = maker.rest.hand(side, hand).twisted(maker.rest.twist_deg + maker.draw(-8.0, 8.0));
+    let parts =
+        vec![(maker.seconds(1.0), turned), (maker.seconds(1.0), maker.rest), (maker.seconds(0.8), turned)];
+    maker.once(parts)
+}

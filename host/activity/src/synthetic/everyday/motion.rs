@@ -1,0 +1,222 @@
+//! A motion in seconds, and the stretch of it that is the activity.
+
+use super::gait::Gait;
+use super::moment::{Hand, Keys, Moment, at, duration};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// What somebody does.
+#[derive(Clone, Debug)]
+pub enum Motion {
+    /// Going, without an end.
+    Gait(Gait),
+    /// Something with a beginning and an end: what comes before and after it (seconds) may be cut off.
+    Once {
+        /// All of it.
+        keys: Keys,
+        /// Where the activity begins.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+        /// Where everything is ready for it, from which some clips begin.
+        ready: f64,
+    },
+    /// Something that is repeated between `from` and `to`.
+    Repeated {
+        /// All of it.
+        keys: Keys,
+        /// Where repetition begins.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+        /// Seconds of one repetition.
+        period: f64,
+    },
+}
+
+/// Makes motions of one person: how they stand, which hand they use, how fast they are.
+pub struct Maker<'r> {
+    /// Where all spreads come from.
+    pub rng: &'r mut ChaCha8Rng,
+    /// The hand that does it: 0 left, 1 right.
+    pub main: usize,
+    /// How they stand while nothing happens.
+    pub rest: Moment,
+    /// Scales all times.
+    tempo: f64,
+}
+
+impl<'r> Maker<'r> {
+    /// Somebody: nine in ten use the right hand.
+    pub fn new(rng: &'r mut ChaCha8Rng) -> Self {
+        let main = usize::from(rng.random_bool(0.85));
+        let tempo = rng.random_range(0.7..1.45);
+        let mut rest = Moment::standing()
+            .bent(rng.random_range(-2.0..9.0), rng.random_range(-6.0..18.0))
+            .legs(rng.random_range(0.0..4.0), rng.random_range(0.0..8.0), rng.random_range(-1.0..6.0))
+            .twisted(rng.random_range(-6.0..6.0));
+        let step = rng.random_range(-7.0..7.0);
+        rest.pose.legs[0].hip_deg += step;
+        rest.pose.legs[1].hip_deg -= step;
+        for side in 0..2 {
+            rest.hands[side] = Hand::swung(
+                rng.random_range(-8.0..14.0),
+                rng.random_range(4.0..30.0),
+                rng.random_range(0.04..0.26),
+            );
+        }
+        // One in ten rests a hand on the hip or before the body.
+        if rng.random_bool(0.1) {
+            let side = rng.random_range(0..2);
+            rest.hands[side] = Hand::at(
+                rng.random_range(-0.25..0.15),
+                rng.random_range(0.1..0.35),
+                rng.random_range(-0.75..-0.5),
+            )
+            .elbow(rng.random_range(0.3..1.0));
+        }
+        Self { rng, main, rest, tempo }
+    }
+
+    /// Between two values.
+    pub fn draw(&mut self, low: f64, high: f64) -> f64 {
+        self.rng.random_range(low..high)
+    }
+
+    /// True so often.
+    pub fn chance(&mut self, share: f64) -> bool {
+        self.rng.random_bool(share)
+    }
+
+    /// Seconds about a usual time: the person's tempo, and a fifth either way.
+    pub fn seconds(&mut self, usual: f64) -> f64 {
+        usual * self.tempo * self.rng.random_range(0.8..1.25)
+    }
+
+    /// A place about another, by so much in each direction.
+    pub fn near(&mut self, hand: Hand, by: f64) -> Hand {
+        let mut off = || self.rng.random_range(-by..by);
+        let moved = hand.moved(off(), off(), off());
+        Hand { elbow: hand.elbow + 0.6 * self.rng.random_range(-0.5..0.5), ..moved }
+    }
+
+    /// Rest, then the parts, then rest again, all but the rests being the activity.
+    pub fn once(&mut self, parts: Keys) -> Motion {
+        let length = duration(&parts);
+        let (before, after) = (self.draw(0.2, 0.8 + length), self.draw(0.4, 1.2));
+        let last = parts.last().map_or(self.rest, |(_, moment)| *moment);
+        let mut keys = vec![(0.0, self.rest), (before, self.rest)];
+        keys.extend(parts);
+        keys.push((after, last));
+        Motion::Once { keys, from: before, to: before + length, ready: before }
+    }
+
+    /// As [`Self::once`], for what a clip may show without how the hands got there.
+    pub fn gesture(&mut self, parts: Keys) -> Motion {
+        let way_in = parts.first().map_or(0.0, |(seconds, _)| *seconds);
+        match self.once(parts) {
+            Motion::Once { keys, from, to, .. } => Motion::Once { keys, from, to, ready: from + way_in },
+            other => other,
+        }
+    }
+
+    /// A way in, then `cycle` so many times (a little different each time), then back to rest.
+    pub fn repeated(&mut self, way_in: Keys, cycle: &[(f64, Moment)], times: usize) -> Motion {
+        let before = self.draw(0.1, 1.5);
+        let mut keys = vec![(0.0, self.rest), (before, self.rest)];
+        keys.extend(way_in);
+        let from = duration(&keys);
+        let period: f64 = cycle.iter().map(|(seconds, _)| seconds).sum();
+        for _ in 0..times.max(1) {
+            let (slow, wide) = (self.draw(0.9, 1.12), self.draw(0.85, 1.1));
+            keys.extend(
+                cycle
+                    .iter()
+                    .map(|(seconds, moment)| (slow * seconds, Moment::between(&cycle[0].1, moment, wide))),
+            );
+        }
+        let to = duration(&keys);
+        let back = self.seconds(0.7);
+        keys.push((back, self.rest));
+        Motion::Repeated { keys, from, to, period }
+    }
+}
+
+impl Motion {
+    /// The moments of a clip at `rate_hz`, cut as clips are: tight or with something before and after, begun anywhere where it repeats.
+    pub fn clip(&self, rng: &mut ChaCha8Rng, rate_hz: f64) -> Vec<Moment> {
+        let (begin, end) = self.cut(rng);
+        let length = (end - begin).max(0.1);
+        let frames = ((length * rate_hz).round() as usize).clamp(LEAST_FRAMES, MOST_FRAMES);
+        // Sways of a standing body, and steps that it makes on the way.
+        let sway = rng.random_range(0.0..2.5);
+        let sway_hz = rng.random_range(0.2..0.7);
+        let phase = rng.random_range(0.0..std::f64::consts::TAU);
+        // One in three who go turn on the way.
+        let turning = matches!(self, Self::Gait(_)) && rng.random_bool(0.33);
+        let turn_deg_s = if turning { rng.random_range(-60.0..60.0) } else { 0.0 };
+        (0..frames)
+            .map(|frame| {
+                let t = begin + length * frame as f64 / (frames - 1) as f64;
+                let mut moment = match self {
+                    Self::Gait(gait) => {
+                        let turns = t * gait.strides_hz;
+                        gait.at(turns).gone(turns * gait.stride_statures())
+                    }
+                    Self::Once { keys, .. } | Self::Repeated { keys, .. } => at(keys, t),
+                };
+                let s = (std::f64::consts::TAU * sway_hz * t + phase).sin();
+                moment.heading_deg = turn_deg_s * (t - begin);
+                moment.pose.lean_deg += 0.7 * sway * s;
+                moment.side_deg += sway * s;
+                moment
+            })
+            .collect()
+    }
+}
+
+impl Motion {
+    /// Where a clip begins and ends, seconds.
+    fn cut(&self, rng: &mut ChaCha8Rng) -> (f64, f64) {
+        match self {
+            Self::Gait(gait) => {
+                let begin = rng.random_range(0.0..5.0);
+                (begin, begin + rng.random_range(0.9..4.2) / gait.strides_hz)
+            }
+            Self::Once { keys, from, to, ready } => {
+                // Half are cut tight at either side, up to a tenth short; some begin when everything is ready.
+                let (core, all) = (to - from, duration(keys));
+                let begin = match rng.random_range(0..20) {
+                    0..8 => from + rng.random_range(-0.04..0.1) * core,
+                    8..14 => ready - rng.random_range(0.0..0.3) * (ready - from),
+                    _ => rng.random_range(0.0..1.0) * from,
+                };
+                let end = match rng.random_range(0..10) {
+                    0..6 => to + rng.random_range(-0.1..0.04) * core,
+                    _ => to + rng.random_range(0.0..1.0) * (all - to),
+                };
+                (begin.max(0.0), end.min(all))
+            }
+            Self::Repeated { keys, from, to, period } => {
+                // From rest or from the middle, to rest or to the middle.
+                let begin = if rng.random_bool(0.5) {
+                    rng.random_range(0.0..1.0) * from
+                } else {
+                    rng.random_range(*from..*to)
+                };
+                let least = begin.max(*from) + rng.random_range(0.6..1.5) * period;
+                let end = match rng.random_range(0..4) {
+                    0 => duration(keys),
+                    1 => *to,
+                    _ => least + rng.random_range(0.0..3.0) * period,
+                };
+                let end = end.max(least).min(duration(keys));
+                (begin.min(end - 0.9 * period).max(0.0), end)
+            }
+        }
+    }
+}
+
+/// Fewest and most frames of a clip.
+const LEAST_FRAMES: usize = 6;
+const MOST_FRAMES: usize = 64;

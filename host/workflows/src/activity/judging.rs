@@ -1,0 +1,208 @@
+//! How well a finished model recognises clips that others have named.
+
+use std::path::PathBuf;
+
+use farnear_activity::{
+    evaluation::{
+        calibration::{Reliability, area_under_roc},
+        confusion::{Confusion, wilson},
+    },
+    recognition::{
+        clip::{Clip, Track},
+        model::{Answer, Recogniser},
+    },
+};
+use farnear_files::staging::Staging;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{
+    confusion_picture,
+    recognition::Model,
+    samples::{Samples, SamplesError},
+};
+use crate::{context::Context, counter::Counter, error::Result, figures::rounded};
+
+/// What is judged by what.
+#[derive(Clone, PartialEq, Debug)]
+pub struct JudgingSettings {
+    /// The samples, TOML.
+    pub samples: PathBuf,
+    /// Names of activities in the samples and in the model where they differ.
+    pub same: Vec<(String, String)>,
+    /// All views of a clip together, in place of each by itself.
+    pub fused: bool,
+    /// A new folder for confusion.png, confusion.md and wrong.csv.
+    pub out: Option<PathBuf>,
+}
+
+/// How well a model did.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct JudgingFigures {
+    /// Answers for clips of activities that the model knows.
+    pub answers: u32,
+    /// Share of them that are right, whatever the model could answer.
+    pub accuracy: f64,
+    /// Its 95 % interval (Wilson).
+    pub confidence_interval: [f64; 2],
+    /// Share that is right if only activities of the samples can be.
+    pub accuracy_among: f64,
+    /// Its 95 % interval.
+    pub confidence_interval_among: [f64; 2],
+    /// How far confidences are from shares of right answers (expected calibration error), 0 to 1.
+    pub calibration_error: f64,
+    /// The same among the samples' activities.
+    pub calibration_error_among: f64,
+    /// Share of these clips that is called unknown.
+    pub unknown_of_known: f64,
+    /// Clips of activities that the model does not know.
+    pub strangers: u32,
+    /// Share of those that is called unknown; `None` without any.
+    pub unknown_of_strangers: Option<f64>,
+    /// How well the outlier score tells them from the others (area under the ROC curve); `None` without any.
+    pub outlier_auroc: Option<f64>,
+    /// Activities that the model does not know.
+    pub not_known: Vec<String>,
+    /// `counts[truth][answer]` among the samples' activities.
+    pub confusion: Confusion,
+}
+
+/// One answer.
+struct Judged<'a> {
+    clip: &'a Clip,
+    view: usize,
+    /// In the model's words.
+    truth: String,
+    answer: Answer,
+}
+
+/// Lets a model answer for all clips.
+///
+/// # Errors
+/// Samples that cannot be read, of which the model knows no activity, or which do not fit it.
+pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -> Result<JudgingFigures> {
+    let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
+    let samples = Samples::read(&settings.samples, context)?;
+    let activities = model.activities();
+    let name = |activity: &str| {
+        settings.same.iter().find(|(own, _)| own == activity).map_or(activity, |(_, known)| known).to_owned()
+    };
+    let recogniser = model.recogniser(samples.full_frames);
+    let judged = answers(recogniser, &samples.clips, settings.fused, &name, context)?;
+    let (known, strange): (Vec<Judged>, Vec<Judged>) =
+        judged.into_iter().partition(|judged| activities.contains(&judged.truth));
+    let mut among: Vec<String> = known.iter().map(|judged| judged.truth.clone()).collect();
+    among.sort();
+    among.dedup();
+    let mut not_known: Vec<String> = strange.iter().map(|judged| judged.clip.activity.clone()).collect();
+    not_known.sort();
+    not_known.dedup();
+    if known.is_empty() {
+        return Err(SamplesError::NothingInCommon {
+            samples: settings.samples.clone(),
+            found: not_known,
+            known: activities.to_vec(),
+        }
+        .into());
+    }
+    if !not_known.is_empty() {
+        context.say(&format!("the model does not know: {}", not_known.join(", ")));
+    }
+    let figures = figures(&known, &strange, &among, not_known);
+    if let (Some(staged), Some(out)) = (out, &settings.out) {
+        staged.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
+        staged.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
+        staged.write("wrong.csv", wrong(&known, &among).as_bytes())?;
+        staged.finish()?;
+        context.say(&format!("wrote {}", out.display()));
+    }
+    Ok(figures)
+}
+
+fn answers<'a>(
+    recogniser: &Recogniser,
+    clips: &'a [Clip],
+    fused: bool,
+    name: &(dyn Fn(&str) -> String + Sync),
+    context: &Context<'_>,
+) -> Result<Vec<Judged<'a>>> {
+    let counter = Counter::new(context, "clips recognised");
+    let of_clip = |clip: &'a Clip| -> Result<Vec<Judged<'a>>> {
+        counter.check("recognising clips")?;
+        let together = fused || recogniser.views > 1;
+        let views: Vec<&[Track]> = if together {
+            vec![clip.views.as_slice()]
+        } else {
+            clip.views.iter().map(std::slice::from_ref).collect()
+        };
+        let judged = views.into_iter().enumerate().map(|(view, tracks)| {
+            let answer = recogniser.recognise(tracks)?;
+            Ok(Judged { clip, view: view + 1, truth: name(&clip.activity), answer })
+        });
+        let judged = judged.collect();
+        counter.one(Some(clips.len()));
+        judged
+    };
+    Ok(clips.par_iter().map(of_clip).collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+}
+
+fn figures(known: &[Judged], strange: &[Judged], among: &[String], not_known: Vec<String>) -> JudgingFigures {
+    let mut confusion = Confusion::new(among.to_vec());
+    let (mut free, mut restricted) = (Reliability::default(), Reliability::default());
+    let place = |name: &str| among.iter().position(|class| class == name);
+    let mut right = 0;
+    for judged in known {
+        let answer = judged.answer.among(among);
+        let is_right = judged.answer.best() == Some(&judged.truth);
+        right += u32::from(is_right);
+        free.count(judged.answer.confidence, is_right);
+        restricted.count(answer.confidence, answer.best() == Some(&judged.truth));
+        if let (Some(truth), Some(found)) = (place(&judged.truth), answer.best().and_then(|name| place(name)))
+        {
+            confusion.count(truth, found);
+        }
+    }
+    let scores = |of: &[Judged]| of.iter().map(|judged| judged.answer.outlier_score).collect::<Vec<f32>>();
+    let unknown = |of: &[Judged]| {
+        let count = of.iter().filter(|judged| judged.answer.outlier_score > 1.0).count();
+        rounded(count as f64 / of.len().max(1) as f64, 4)
+    };
+    let answers = known.len() as u32;
+    let (low, high) = wilson(right, answers, 1.96);
+    let (low_among, high_among) = confusion.interval();
+    let any = !strange.is_empty();
+    JudgingFigures {
+        answers,
+        accuracy: rounded(f64::from(right) / f64::from(answers), 4),
+        confidence_interval: [rounded(low, 4), rounded(high, 4)],
+        accuracy_among: rounded(confusion.accuracy(), 4),
+        confidence_interval_among: [rounded(low_among, 4), rounded(high_among, 4)],
+        calibration_error: rounded(free.expected_error(), 4),
+        calibration_error_among: rounded(restricted.expected_error(), 4),
+        unknown_of_known: unknown(known),
+        strangers: strange.len() as u32,
+        unknown_of_strangers: any.then(|| unknown(strange)),
+        outlier_auroc: any.then(|| rounded(area_under_roc(&scores(known), &scores(strange)), 4)),
+        not_known,
+        confusion,
+    }
+}
+
+/// The clips that were taken for something else, the surest mistakes first.
+fn wrong(known: &[Judged], among: &[String]) -> String {
+    let mut found: Vec<(f32, String)> = known
+        .iter()
+        .filter_map(|judged| {
+            let answer = judged.answer.among(among);
+            let best = answer.best().filter(|best| *best != &judged.truth)?;
+            let Clip { subject, activity, .. } = judged.clip;
+            let frames = judged.clip.views.get(judged.view - 1).map_or(0, Track::frames);
+            let line =
+                format!("{subject},{activity},{},{frames},{best},{:.4}\n", judged.view, answer.confidence);
+            Some((answer.confidence, line))
+        })
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let head = "subject,activity,view,frames,answer,confidence\n".to_owned();
+    found.into_iter().fold(head, |text, (_, line)| text + &line)
+}

@@ -1,0 +1,214 @@
+//! Recognisers that come with the program, and how they are made.
+
+use std::{path::PathBuf, time::Instant};
+
+use farnear_activity::{
+    recognition::{
+        clip::Clip, frames::Mode, model::Recogniser, network::training::NetworkSettings, space::SpaceSettings,
+    },
+    synthetic::everyday,
+};
+use farnear_files::staging::Staging;
+use serde::Serialize;
+
+use super::{samples::SCALING, watched};
+use crate::{context::Context, error::Result, figures::rounded, parameters::within};
+
+/// A recogniser that comes with the program.
+pub struct Shipped {
+    /// What it is called in place of a file.
+    pub name: &'static str,
+    /// What it is, in a line.
+    pub about: &'static str,
+    /// Its file.
+    bytes: &'static [u8],
+    /// Its file for silhouettes that are cut out at 100x100, whose motion through the picture is gone.
+    cut_out: &'static [u8],
+}
+
+/// All of them.
+pub const MODELS: &[Shipped] = &[
+    Shipped {
+        name: "everyday",
+        about: "everyday activities from one view or several, from any side; the order of frames counts",
+        bytes: include_bytes!("../../../activity/models/everyday.fnm"),
+        cut_out: include_bytes!("../../../activity/models/everyday-cut-out.fnm"),
+    },
+    Shipped {
+        name: "everyday-order-free",
+        about: "the same where the order of frames does not count",
+        bytes: include_bytes!("../../../activity/models/everyday-order-free.fnm"),
+        cut_out: include_bytes!("../../../activity/models/everyday-order-free-cut-out.fnm"),
+    },
+];
+
+/// What they were trained on and tested on, and where they fail.
+pub const SHEET: &str = include_str!("../../../activity/models/README.md");
+
+impl Shipped {
+    /// The one of a name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        MODELS.iter().find(|model| model.name == name)
+    }
+
+    /// The recogniser of full frames, and that of cut-out silhouettes.
+    ///
+    /// # Errors
+    /// None but in a program that was built from a damaged file.
+    pub fn recognisers(&self) -> Result<[Recogniser; 2]> {
+        Ok([Recogniser::from_bytes(self.bytes)?, Recogniser::from_bytes(self.cut_out)?])
+    }
+}
+
+/// What there is of a shipped model to list.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct ModelFigures {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Its size in the program.
+    pub bytes: usize,
+    /// Share of what it knows that it calls unknown, as it was made for.
+    pub false_alarms: f64,
+    /// What it can answer.
+    pub activities: Vec<String>,
+}
+
+/// All shipped models.
+///
+/// # Errors
+/// As [`Shipped::recognisers`].
+pub fn list() -> Result<Vec<ModelFigures>> {
+    MODELS
+        .iter()
+        .map(|model| {
+            let [recogniser, _] = model.recognisers()?;
+            Ok(ModelFigures {
+                name: model.name,
+                about: model.about,
+                bytes: model.bytes.len() + model.cut_out.len(),
+                false_alarms: rounded(f64::from(recogniser.limits.false_alarms), 4),
+                activities: recogniser.activities,
+            })
+        })
+        .collect()
+}
+
+/// People and passes that the shipped models were made with.
+pub const PEOPLE: usize = 300;
+/// See [`PEOPLE`].
+pub const PASSES: usize = 12;
+
+/// How models are made of synthetic people.
+#[derive(Clone, PartialEq, Debug)]
+pub struct SyntheticTraining {
+    /// People to learn from, each at all activities once, 20 to 5000.
+    pub people: usize,
+    /// Passes over all of them, 1 to 200.
+    pub passes: usize,
+    /// A new folder for the models.
+    pub out: PathBuf,
+}
+
+/// What was made.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SyntheticTrainingFigures {
+    /// Clips learned from; their mirrors come on top.
+    pub clips: usize,
+    /// Clips of other people by which models were calibrated.
+    pub calibration_clips: usize,
+    /// Activities.
+    pub activities: usize,
+    /// Time for all.
+    pub seconds: f64,
+    /// The models.
+    pub model: Vec<MadeModel>,
+}
+
+/// A model that was made.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct MadeModel {
+    /// Its file in the folder.
+    pub file: String,
+    /// Share of right answers for the clips that calibrated it.
+    pub accuracy: f64,
+    /// Its size.
+    pub bytes: usize,
+}
+
+/// The first of the people who calibrate: nobody who is learned from, however many those are.
+const CALIBRATING_FROM: usize = 100_000;
+/// People who are drawn between two looks at whether to go on.
+const PEOPLE_AT_ONCE: usize = 10;
+/// The models' files, whether the order of frames counts, and whether silhouettes are cut out.
+const FILES: [(&str, Mode, bool); 4] = [
+    ("everyday.fnm", Mode::Ordered, false),
+    ("everyday-order-free.fnm", Mode::OrderFree, false),
+    ("everyday-cut-out.fnm", Mode::Ordered, true),
+    ("everyday-order-free-cut-out.fnm", Mode::OrderFree, true),
+];
+/// Silhouettes that principal components are found from.
+const GALLERY: usize = 4000;
+
+/// Makes recognisers of everyday activities from seeds alone: the same files every time on one kind of processor.
+///
+/// # Errors
+/// Parameters out of range, models that cannot be written, [`crate::WorkflowError::Cancelled`].
+pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<SyntheticTrainingFigures> {
+    within("people", settings.people, &(20..=5000), "")?;
+    within("passes", settings.passes, &(1..=200), "")?;
+    let start = Instant::now();
+    let out = Staging::new_folder(&settings.out)?;
+    let mut people = Vec::new();
+    for first in (0..settings.people).step_by(PEOPLE_AT_ONCE) {
+        context.cancel.check("drawing people")?;
+        let count = PEOPLE_AT_ONCE.min(settings.people - first);
+        people.extend(everyday::clips(first, count, SCALING));
+        context.progress.advance("people drawn", first + count, Some(settings.people));
+    }
+    let calibrating = (settings.people / 8).clamp(20, 60);
+    let mut others = everyday::clips(CALIBRATING_FROM, calibrating, SCALING);
+    let mut made = Vec::new();
+    for (file, mode, cut_out) in FILES {
+        if cut_out {
+            let views = people.iter_mut().chain(&mut others).flat_map(|clip| &mut clip.views);
+            views.for_each(|view| view.boxes = None);
+        }
+        context.say(&format!("training {file}"));
+        made.push(one(file, mode, &people, &others, settings.passes, &out, context)?);
+    }
+    out.finish()?;
+    context.say(&format!("wrote {}", settings.out.display()));
+    Ok(SyntheticTrainingFigures {
+        clips: people.len(),
+        calibration_clips: others.len(),
+        activities: everyday::ACTIVITIES.len(),
+        seconds: rounded(start.elapsed().as_secs_f64(), 3),
+        model: made,
+    })
+}
+
+/// Trains a model and writes it.
+fn one(
+    file: &str,
+    mode: Mode,
+    people: &[Clip],
+    others: &[Clip],
+    passes: usize,
+    out: &Staging,
+    context: &Context<'_>,
+) -> Result<MadeModel> {
+    let space = SpaceSettings { mode, gallery: GALLERY, ..SpaceSettings::default() };
+    let network = NetworkSettings { passes, ..NetworkSettings::default() };
+    let watch = watched::Passes::new(context);
+    let trained = Recogniser::train_network(people, others, &space, &network, SCALING, &watch);
+    let model = watched::outcome(trained, context, "training")?;
+    let right = others.iter().filter(|clip| {
+        model.recognise(&clip.views).is_ok_and(|answer| answer.best() == Some(&clip.activity))
+    });
+    let accuracy = rounded(right.count() as f64 / others.len().max(1) as f64, 4);
+    let bytes = model.to_bytes()?;
+    out.write(file, &bytes)?;
+    Ok(MadeModel { file: file.into(), accuracy, bytes: bytes.len() })
+}
