@@ -5,7 +5,7 @@ use embassy_stm32::{
     Peri, Peripherals,
     gpio::{Input, Pull},
     peripherals::{IWDG, PB0, TIM1, TIM3, TIM4, TIM8},
-    usart::{BufferedUartTx, ConfigError},
+    usart::ConfigError,
     wdg::IndependentWatchdog,
 };
 use farnear_protocol::{BoardMicros, Log, frame::Encoded};
@@ -47,8 +47,6 @@ pub struct Nucleo {
 pub struct Parts {
     /// The board.
     pub board: Nucleo,
-    /// The sending end of the link.
-    pub sender: BufferedUartTx<'static>,
     /// The LED that shows that the loop runs.
     pub led: Peri<'static, PB0>,
     /// Whether the strap says that this is an emulated board.
@@ -60,7 +58,7 @@ impl Nucleo {
     /// be set up. As long as the board has pins: a table, which shorter functions would only tear apart.
     pub fn set_up(p: Peripherals) -> Result<Parts, ConfigError> {
         let emulated = Input::new(p.PD15, Pull::Down).is_high();
-        let (link, sender) = link::open(p.USART3, p.PD8, p.PD9)?;
+        let link = link::open(p.USART3, p.PD8, p.PD9)?;
         let coarse =
             DriverPins { step: p.PE9, direction: p.PF13, enable: p.PF14, diagnosis: p.PF15, stop: p.PE15 };
         let lens = DriverPins { step: p.PC6, direction: p.PF0, enable: p.PF1, diagnosis: p.PF2, stop: p.PA6 };
@@ -82,7 +80,7 @@ impl Nucleo {
             link,
             watchdog: IndependentWatchdog::new(p.IWDG, WATCHDOG_US),
         };
-        Ok(Parts { board, sender, led: p.PB0, emulated })
+        Ok(Parts { board, led: p.PB0, emulated })
     }
 
     /// Wakes the watchdog: from now on it wants to be fed.
@@ -137,8 +135,8 @@ impl Board for Nucleo {
         self.coarse.apply(&outputs.coarse);
         self.lens.apply(&outputs.lens);
         self.camera.listen(outputs.listen);
-        if let Some(length) = outputs.trigger {
-            self.camera.expose(length);
+        if let Some(trigger) = outputs.trigger {
+            self.camera.expose(trigger);
         }
         if let (Some(memory), Some(order)) = (&mut self.memory, &outputs.memory) {
             memory.write(order);
@@ -150,7 +148,7 @@ impl Board for Nucleo {
     }
 
     fn send(&mut self, frame: Encoded) {
-        self.link.send(frame);
+        self.link.send(&frame);
     }
 
     fn all_sent(&self) -> bool {

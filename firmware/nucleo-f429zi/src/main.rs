@@ -22,7 +22,7 @@
 //! | PD15 | GPIO, pull-down | strap: high only on the emulated board |
 //! | PB0 | GPIO | LED: blinks while the control loop runs |
 //!
-//! Interrupts: the step timers' update and break above TIM2 (camera) above USART3 above TIM5 (time); the loop runs in
+//! Interrupts: the step timers' update and break above TIM2 (camera) above TIM5 (time); the link has none, for its bytes travel by DMA; the loop runs in
 //! thread mode below them all.
 #![no_std]
 #![no_main]
@@ -78,7 +78,6 @@ fn count_cycles() {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
     }
-    Interrupt::USART3.set_priority(Priority::P2);
     Interrupt::TIM5.set_priority(Priority::P3);
 }
 
@@ -95,7 +94,7 @@ fn tell_of(last: Option<Last>) {
 }
 
 #[embassy_executor::main]
-async fn main(spawner: Spawner) {
+async fn main(_spawner: Spawner) {
     let brown_out_reset = option_bytes::demand_brown_out_reset();
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
@@ -105,7 +104,7 @@ async fn main(spawner: Spawner) {
     if !brown_out_reset {
         error!("the option bytes cannot be written: there is no brown-out reset");
     }
-    let Parts { mut board, sender, led, emulated } = match Nucleo::set_up(peripherals) {
+    let Parts { mut board, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,
         Err(fault) => {
             // Nobody can be told; the log is all there is.
@@ -113,10 +112,6 @@ async fn main(spawner: Spawner) {
             return;
         }
     };
-    match link::send(sender) {
-        Ok(task) => spawner.spawn(task),
-        Err(fault) => error!("no place for the sending task: {}", defmt::Debug2Format(&fault)),
-    }
     let identity = Identity {
         board: "nucleo-f429zi",
         firmware: env!("CARGO_PKG_VERSION"),

@@ -4,12 +4,13 @@
 //! [`crate::io::TICK_HZ`] times a second. The order is here, once for all boards:
 //!
 //! 1. The strain gauge is sampled, so that its samples come evenly whatever else a tick has to do.
-//! 2. Bytes from the link go to the rig, stamped with the tick's first look at the clock. Then the rest of the hardware is read. The
+//! 2. Bytes from the link go to the rig, where whole requests wait. Then the rest of the hardware is read. The
 //!    emergency stop comes after the step timers: its circuit stops them by itself, and one that opens between the two
 //!    readings must not look like a timer that ran dry.
 //! 3. The rig decides, and its outputs are carried out.
-//! 4. The link is given a frame of what there is to say: answers and events first, then the log, which a host that asks without
-//!    a pause does not keep waiting for ever.
+//! 4. One thing is done for the host, for a tick has time for one beside two motors and the piezo: a frame is sent where the link
+//!    takes one and there is something to say, answers and events first, then the log, which a host that asks without
+//!    a pause does not keep waiting for ever; or else an answer is put into its frame; or else a request is carried out.
 //! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
 //!
 //! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
@@ -118,13 +119,14 @@ impl<'r> Control<'r> {
             return leave(board, since);
         }
         let gauge_code = board.gauge();
-        let now = board.now();
-        let link_overflow = board.receive(|byte| self.rig.receive(byte, now));
+        let link_overflow = board.receive(|byte| self.rig.receive(byte));
         let inputs = read(board, gauge_code, link_overflow);
         self.tell_of_dry_queues(board, &inputs);
         let outputs = self.rig.tick(&inputs);
         board.apply(&outputs);
-        self.speak(board);
+        if !self.speak(board) {
+            self.rig.serve(inputs.now);
+        }
         if outputs.reset {
             board.note(Note::Reset);
             let now = board.now();
@@ -142,21 +144,19 @@ impl<'r> Control<'r> {
         self.dry = dry;
     }
 
-    fn speak(&mut self, board: &mut impl Board) {
-        // One frame a tick: to make one takes a tenth of a tick, and the line takes longer for any.
+    /// Sends a frame; says whether there was one, and room for it.
+    fn speak(&mut self, board: &mut impl Board) -> bool {
         if !board.has_room() {
-            return;
+            return false;
         }
         let log_is_due = self.frames_before_log >= FRAMES_BEFORE_LOG;
         if log_is_due && self.speak_log(board) {
-            return;
+            return true;
         }
-        if let Some(frame) = self.rig.transmit() {
-            self.frames_before_log = self.frames_before_log.saturating_add(1);
-            self.send(board, frame);
-        } else {
-            self.speak_log(board);
-        }
+        let Some(frame) = self.rig.transmit() else { return self.speak_log(board) };
+        self.frames_before_log = self.frames_before_log.saturating_add(1);
+        self.send(board, frame);
+        true
     }
 
     /// Sends a piece of the log; says whether there was one. What was logged at the start waits for the first session: a host

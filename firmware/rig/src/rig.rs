@@ -185,19 +185,32 @@ impl Rig {
         self.boot
     }
 
-    /// Takes one byte from the link. At the end of a request the request is carried out or begun, and its answer
-    /// waits in [`Self::transmit`].
-    pub fn receive(&mut self, byte: u8, now: BoardMicros) {
+    /// Takes one byte from the link. A whole request waits for [`Self::serve`].
+    pub fn receive(&mut self, byte: u8) {
+        self.session.receive(byte);
+    }
+
+    /// Takes a step for the host, of which a tick has time for one: puts an answer into a frame, which waits in
+    /// [`Self::transmit`] then, or carries the next request out, or begins it. `false` where there was nothing to do.
+    pub fn serve(&mut self, now: BoardMicros) -> bool {
+        if self.session.has_answer() {
+            self.session.put_answer();
+            return true;
+        }
+        if !self.session.has_request() {
+            return false;
+        }
         self.begin(now);
         let heard = self.session.heard();
-        let incoming = self.session.receive(byte);
+        let incoming = self.session.next_request();
         if self.session.heard() != heard {
             self.silence.hear(now);
         }
         if let Some(incoming) = incoming {
             let answer = self.carry_out(&incoming, now);
-            self.session.answer(incoming, &answer);
+            self.session.answer(incoming, answer);
         }
+        true
     }
 
     /// The next frame for the link, answers before events; call it until it gives `None`.

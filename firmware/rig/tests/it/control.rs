@@ -16,9 +16,8 @@ use self::fake::{Call, Fake};
 use crate::bench::{self, BOOT};
 
 /// All that happens in a tick in which there is an event and a line of the log to send.
-const TICK: [Call; 13] = [
+const TICK: [Call; 12] = [
     Call::Gauge,
-    Call::Now,
     Call::Receive,
     Call::Now,
     Call::Coarse,
