@@ -98,6 +98,10 @@ impl Board for Nucleo {
         self.link.drain(take)
     }
 
+    fn sample_gauge(&mut self) {
+        self.piezo.sample();
+    }
+
     fn gauge(&mut self) -> Option<u32> {
         self.piezo.gauge()
     }

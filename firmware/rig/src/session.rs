@@ -205,6 +205,11 @@ impl Session {
         self.done = Some((incoming, answer));
     }
 
+    /// Whether a step is to be taken for the host.
+    pub(crate) fn has_work(&self) -> bool {
+        self.has_answer() || self.has_request()
+    }
+
     /// Whether an answer waits to be put into a frame.
     pub(crate) const fn has_answer(&self) -> bool {
         self.done.is_some()

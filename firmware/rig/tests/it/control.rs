@@ -16,9 +16,10 @@ use self::fake::{Call, Fake};
 use crate::bench::{self, BOOT};
 
 /// All that happens in a tick in which there is an event and a line of the log to send.
-const TICK: [Call; 12] = [
-    Call::Gauge,
+const TICK: [Call; 13] = [
+    Call::SampleGauge,
     Call::Receive,
+    Call::Gauge,
     Call::Now,
     Call::Coarse,
     Call::Lens,
@@ -146,7 +147,7 @@ fn the_log_takes_the_room_that_is_left() {
     run(&mut control, &mut fake, 3);
     assert_eq!((fake.sent.len(), fake.logs.len()), (1, 1), "the log waits for a session");
     fake.ask(&Request::Status);
-    run(&mut control, &mut fake, 4);
+    run(&mut control, &mut fake, 10);
     let kinds: Vec<Kind> = packets(&fake).iter().map(|packet| packet.header.kind).collect();
     assert_eq!(kinds, [Kind::Event, Kind::Response, Kind::Response, Kind::Log]);
     let packet = packets(&fake).pop().expect("the log");
