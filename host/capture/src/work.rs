@@ -175,6 +175,11 @@ impl Work {
             return Err(self.stop_with(ClientError::Nonsense { during: during(), answer }));
         }
         match kind {
+            // Whoever wished it may have told the board, too, and that word may come first.
+            EventKind::Failed { reason: Failure::Stopped, .. } if self.client.interrupted() => {
+                self.over = true;
+                Err(ClientError::Interrupted { during: during() })
+            }
             EventKind::Failed { axis, reason, .. } => {
                 self.over = true;
                 Err(ClientError::Failed { during: during(), axis, reason, alarm: self.alarm_of(reason) })

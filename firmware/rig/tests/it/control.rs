@@ -159,7 +159,8 @@ fn a_host_that_asks_without_a_pause_gets_the_log_too() {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     fake.logs.push_back(log());
-    for _ in 0..20 {
+    // An answer is sent every third tick, and eight of them go before the log.
+    for _ in 0..40 {
         fake.room = 1;
         fake.ask(&Request::Status);
         run(&mut control, &mut fake, 1);
