@@ -40,7 +40,7 @@ pub use self::{
     },
     memory::{Counters, RecordName, Setting, SettingKey, StepperKeys},
     request::Request,
-    shot::{ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode},
+    shot::{DropReason, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode},
 };
 
 /// A key of the whole message table: two programs with the same key agree on every byte of every message.

@@ -98,6 +98,10 @@ impl Board for Nucleo {
         self.link.drain(take)
     }
 
+    fn sample_gauge(&mut self) {
+        self.piezo.sample();
+    }
+
     fn gauge(&mut self) -> Option<u32> {
         self.piezo.gauge()
     }
@@ -135,8 +139,8 @@ impl Board for Nucleo {
         self.coarse.apply(&outputs.coarse);
         self.lens.apply(&outputs.lens);
         self.camera.listen(outputs.listen);
-        if let Some(length) = outputs.trigger {
-            self.camera.expose(length);
+        if let Some(trigger) = outputs.trigger {
+            self.camera.expose(trigger);
         }
         if let (Some(memory), Some(order)) = (&mut self.memory, &outputs.memory) {
             memory.write(order);

@@ -17,9 +17,9 @@ use embassy_stm32::{
     rcc,
     timer::{Ch3, Ch4, input_capture::CapturePin, simple_pwm::PwmPin},
 };
-use farnear_protocol::{BoardMicros, Micros};
+use farnear_protocol::BoardMicros;
 use farnear_rig::{
-    io::{ExposureEdges, StrobeEdges},
+    io::{ExposureEdges, StrobeEdges, Trigger},
     stamp,
 };
 
@@ -181,14 +181,17 @@ impl CameraPort {
         Self { _trigger: trigger, _strobe: strobe }
     }
 
-    /// Gives a trigger pulse of this length in a few microseconds and captures what the camera answers.
-    pub fn expose(&mut self, length: Micros) {
+    /// Gives a trigger pulse when it is due, a few microseconds ahead at least, and captures what the camera answers.
+    pub fn expose(&mut self, order: Trigger) {
         let timer = pac::TIM2;
         critical_section::with(|cs| {
             capture_rising(true);
-            let rising = timer.cnt().read().wrapping_add(LEAD_US);
+            let soonest = timer.cnt().read().wrapping_add(LEAD_US);
+            // TIM2 holds the lower half of the board's time; what lies behind the soonest moment is over.
+            let due = order.at.0 as u32;
+            let rising = if due.wrapping_sub(soonest) as i32 > 0 { due } else { soonest };
             *EXPOSURE.borrow_ref_mut(cs) = Strobe::Triggered(Exposure {
-                length_us: length.0,
+                length_us: order.length.0,
                 rising,
                 pulse_ended: false,
                 strobe_start: None,

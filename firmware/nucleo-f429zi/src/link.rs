@@ -183,8 +183,11 @@ fn received() -> (usize, bool) {
             if lapped {
                 clear(RECEIVE_STREAM);
             }
-            // An error flag is cleared by reading it, and then, as the DMA does, the data.
-            let _ = pac::USART3.sr().read();
+            // An error's flag is cleared by reading it, then the data: the DMA does that with the next byte, which may not come
+            // after an overrun. A byte that is taken from the DMA here is one of a frame that is lost already.
+            if pac::USART3.sr().read().ore() {
+                let _ = pac::USART3.dr().read();
+            }
             fence(Ordering::Acquire);
             return ((RECEIVE_RING - before) % RECEIVE_RING, lapped);
         }

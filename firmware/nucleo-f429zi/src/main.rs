@@ -22,8 +22,8 @@
 //! | PD15 | GPIO, pull-down | strap: high only on the emulated board |
 //! | PB0 | GPIO | LED: blinks while the control loop runs |
 //!
-//! Interrupts: the step timers' update and break above TIM2 (camera) above TIM5 (time); the loop runs in
-//! thread mode below them all.
+//! Interrupts: the step timers' update and break above TIM2 (camera) above TIM5 (time); the link has none, for its bytes
+//! travel by DMA; the loop runs in thread mode below them all.
 #![no_std]
 #![no_main]
 

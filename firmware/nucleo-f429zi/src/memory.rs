@@ -8,6 +8,7 @@ use embassy_stm32::{
     Peri,
     gpio::{Level, Output, Speed},
     mode::Blocking,
+    pac,
     peripherals::{PE2, PE4, PE5, PE6, SPI4},
     spi::{self, MODE_0, Spi, mode::Master},
     time::Hertz,
@@ -103,7 +104,23 @@ impl Memory {
     /// Writes; a failure shows at the next start, where each record is checked.
     pub fn write(&mut self, order: &MemoryWrite) {
         let [high, low] = order.address.to_be_bytes();
-        let _ = self.command(&[WRITE_ENABLE], |_| true)
-            && self.command(&[WRITE, high, low], |spi| spi.blocking_write(&order.bytes).is_ok());
+        self.send(&[WRITE_ENABLE], &[]);
+        self.send(&[WRITE, high, low], &order.bytes);
+    }
+
+    /// Sends bytes one right behind the other. The HAL waits for what comes back after each, which takes twice as long as the bus.
+    fn send(&mut self, head: &[u8], bytes: &[u8]) {
+        let spi = pac::SPI4;
+        self.select.set_low();
+        for byte in head.iter().chain(bytes) {
+            while !spi.sr().read().txe() {}
+            spi.dr().write(|w| w.set_dr(u16::from(*byte)));
+        }
+        while !spi.sr().read().txe() {}
+        while spi.sr().read().bsy() {}
+        self.select.set_high();
+        // What came meanwhile says nothing, and was too much: reading data and status clears both.
+        let _ = spi.dr().read();
+        let _ = spi.sr().read();
     }
 }

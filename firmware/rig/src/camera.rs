@@ -9,7 +9,7 @@
 
 use farnear_protocol::{BoardMicros, Micros};
 
-use crate::io::{ExposureEdges, Inputs};
+use crate::io::{ExposureEdges, Inputs, Trigger};
 use crate::settings::CameraSettings;
 
 /// How an awaited exposure comes about.
@@ -36,7 +36,7 @@ pub(crate) struct Camera {
     ready_at: BoardMicros,
     triggers: u32,
     pending: Option<Pending>,
-    order: Option<Micros>,
+    order: Option<Trigger>,
     edges: Option<(u32, ExposureEdges)>,
 }
 
@@ -55,16 +55,21 @@ impl Camera {
         self.triggers
     }
 
-    /// Whether it may be exposed.
-    pub(crate) fn is_ready(&self, now: BoardMicros) -> bool {
-        self.pending.is_none() && now >= self.ready_at
+    /// Whether it may be exposed at a moment.
+    pub(crate) fn is_ready(&self, at: BoardMicros) -> bool {
+        self.pending.is_none() && at >= self.ready_at
     }
 
-    /// Orders an exposure; gives its number, from 0. The camera is ready.
-    pub(crate) fn trigger(&mut self, exposure: Micros, now: BoardMicros) -> u32 {
-        let end = now.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
+    /// From the start of an exposure until it may be exposed again, at least.
+    pub(crate) const fn period(&self, exposure: Micros) -> Micros {
+        Micros(exposure.0.saturating_add(self.settings.readout.0))
+    }
+
+    /// Orders an exposure at a moment; gives its number, from 0. The camera is ready then.
+    pub(crate) fn trigger(&mut self, exposure: Micros, at: BoardMicros) -> u32 {
+        let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
-        self.order = Some(exposure);
+        self.order = Some(Trigger { at, length: exposure });
         self.expect(BoardMicros(end), Awaited::Triggered)
     }
 
@@ -87,7 +92,7 @@ impl Camera {
     }
 
     /// The exposure ordered in this tick, for the board.
-    pub(crate) const fn take_order(&mut self) -> Option<Micros> {
+    pub(crate) const fn take_order(&mut self) -> Option<Trigger> {
         self.order.take()
     }
 

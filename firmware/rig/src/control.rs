@@ -3,13 +3,16 @@
 //! A board implements [`Board`], a few small things that only it can do, and calls [`Control::tick`]
 //! [`crate::io::TICK_HZ`] times a second. The order is here, once for all boards:
 //!
-//! 1. The strain gauge is sampled, so that its samples come evenly whatever else a tick has to do.
-//! 2. Bytes from the link go to the rig, stamped with the tick's first look at the clock. Then the rest of the hardware is read. The
+//! 1. The strain gauge is sampled, so that its samples come evenly whatever else a tick has to do. Its converter takes some microseconds;
+//!    what it says is read at the end of the second step.
+//! 2. Bytes from the link go to the rig, where whole requests wait. Then the rest of the hardware is read. The
 //!    emergency stop comes after the step timers: its circuit stops them by itself, and one that opens between the two
 //!    readings must not look like a timer that ran dry.
 //! 3. The rig decides, and its outputs are carried out.
-//! 4. The link is given a frame of what there is to say: answers and events first, then the log, which a host that asks without
-//!    a pause does not keep waiting for ever.
+//! 4. One thing is done for the host, for a tick has time for one beside two motors and the piezo: a frame is sent where the link
+//!    takes one and there is something to say, answers and events first, then the log, which a host that asks without
+//!    a pause does not keep waiting for ever; or else an answer is put into its frame; or else a request is carried out. In a tick in
+//!    which the memory was written, or a frame came to its end, this waits for the next.
 //! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
 //!
 //! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
@@ -46,7 +49,10 @@ pub trait Board {
     /// Hands over the bytes that came in over the link; `true` where some may have been lost.
     fn receive(&mut self, take: impl FnMut(u8)) -> bool;
 
-    /// Samples the strain gauge: [`Inputs::gauge_code`].
+    /// Samples the strain gauge; its converter is at work from now on.
+    fn sample_gauge(&mut self);
+
+    /// What the converter made of the sample, once it is done: [`Inputs::gauge_code`].
     fn gauge(&mut self) -> Option<u32>;
 
     /// Reads stage A's stepper.
@@ -104,12 +110,14 @@ pub struct Control<'r> {
     spoken: bool,
     /// Frames since the log had its turn.
     frames_before_log: u8,
+    /// What is to be done for the host was put off in the tick before.
+    put_off: bool,
 }
 
 impl<'r> Control<'r> {
     /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
-        Self { rig, dry: false, leaving: None, spoken: false, frames_before_log: 0 }
+        Self { rig, dry: false, leaving: None, spoken: false, frames_before_log: 0, put_off: false }
     }
 
     /// One tick.
@@ -117,14 +125,21 @@ impl<'r> Control<'r> {
         if let Some(since) = self.leaving {
             return leave(board, since);
         }
+        board.sample_gauge();
+        let frames = self.rig.frames_received();
+        let link_overflow = board.receive(|byte| self.rig.receive(byte));
+        let frame_came = self.rig.frames_received() != frames;
         let gauge_code = board.gauge();
-        let now = board.now();
-        let link_overflow = board.receive(|byte| self.rig.receive(byte, now));
         let inputs = read(board, gauge_code, link_overflow);
         self.tell_of_dry_queues(board, &inputs);
         let outputs = self.rig.tick(&inputs);
         board.apply(&outputs);
-        self.speak(board);
+        // Frames without a pause put it off by a tick at most; the memory's writes leave a tick out by themselves.
+        let has_time = outputs.memory.is_none() && (!frame_came || self.put_off);
+        self.put_off = !has_time;
+        if has_time && !self.speak(board) {
+            self.rig.serve(inputs.now);
+        }
         if outputs.reset {
             board.note(Note::Reset);
             let now = board.now();
@@ -142,21 +157,22 @@ impl<'r> Control<'r> {
         self.dry = dry;
     }
 
-    fn speak(&mut self, board: &mut impl Board) {
-        // One frame a tick: to make one takes a tenth of a tick, and the line takes longer for any.
+    /// Sends a frame; says whether there was one, and room for it.
+    fn speak(&mut self, board: &mut impl Board) -> bool {
         if !board.has_room() {
-            return;
+            return false;
         }
         let log_is_due = self.frames_before_log >= FRAMES_BEFORE_LOG;
         if log_is_due && self.speak_log(board) {
-            return;
+            return true;
         }
-        if let Some(frame) = self.rig.transmit() {
-            self.frames_before_log = self.frames_before_log.saturating_add(1);
-            self.send(board, frame);
-        } else {
-            self.speak_log(board);
-        }
+        let Some(frame) = self.rig.transmit() else {
+            // An answer that is being made comes before the log.
+            return !self.rig.has_work() && self.speak_log(board);
+        };
+        self.frames_before_log = self.frames_before_log.saturating_add(1);
+        self.send(board, frame);
+        true
     }
 
     /// Sends a piece of the log; says whether there was one. What was logged at the start waits for the first session: a host

@@ -204,6 +204,15 @@ pub struct MemoryWrite {
     pub bytes: Vec<u8, MEMORY_CHUNK>,
 }
 
+/// A trigger pulse for the camera.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Trigger {
+    /// Its rising edge, to the microsecond, at most a few ticks ahead; as soon as possible where that is over.
+    pub at: BoardMicros,
+    /// Its length.
+    pub length: Micros,
+}
+
 /// What the board is to do now.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs {
@@ -216,8 +225,8 @@ pub struct Outputs {
     /// Measure exposures that come without a trigger: report each that begins from now on as [`Inputs::strobe`]. Not
     /// set together with `trigger`, nor while a triggered exposure is awaited.
     pub listen: bool,
-    /// Give a trigger pulse of this length now, and capture its edges.
-    pub trigger: Option<Micros>,
+    /// Give a trigger pulse, and capture its edges.
+    pub trigger: Option<Trigger>,
     /// Write this to the memory now.
     pub memory: Option<MemoryWrite>,
     /// Reset the microcontroller now; the answers have left.

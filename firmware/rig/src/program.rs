@@ -6,12 +6,17 @@
 //! camera took.
 //!
 //! A pause waits for the exposure that is under way; a resumed program settles anew.
+//!
+//! A continuous run goes from the last shot to the first, at a pace ([`pace`]) or as fast as it can, until it is stopped.
+
+pub(crate) mod pace;
 
 use farnear_protocol::message::{
-    Axis, Failure, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode,
+    Axis, DropReason, Failure, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode,
 };
 use farnear_protocol::{BoardMicros, Micros, Nanometres, Settle};
 
+use self::pace::Pace;
 use crate::camera::{Camera, NoAnswer};
 use crate::io::ExposureEdges;
 use crate::motion::positioning::Positioning;
@@ -90,8 +95,8 @@ struct Places {
 enum Phase {
     /// On the way, settling, or waiting for the camera.
     Positioning,
-    /// Waiting for the strobe of this exposure; the positions are those of the trigger.
-    Exposing { number: u32, places: Places },
+    /// Waiting for the strobe of this exposure; the positions are those of the trigger, and the deviation is the largest since.
+    Exposing { number: u32, frame: u32, places: Places, deviation: Nanometres },
     /// Standing between two exposures.
     Paused,
 }
@@ -104,6 +109,8 @@ pub(crate) struct Run {
     shot: Shot,
     repeat: u16,
     exposures: u16,
+    /// Of a continuous run.
+    pace: Option<Pace>,
     positioning: Positioning,
     /// From the start of the move until it was first settled.
     settle: Option<Micros>,
@@ -124,15 +131,19 @@ pub(crate) enum Progress {
     Paused,
     /// An exposure was taken; with the number of exposures, if it was the last.
     Taken { shot: ShotRecord, end: Option<u16> },
+    /// An exposure of a continuous run was taken; with all exposures and dropped frames, if it was the last.
+    Frame { frame: u32, deviation: Nanometres, shot: ShotRecord, end: Option<(u32, u32)> },
+    /// A moment of a continuous run's pace passed without an exposure.
+    Dropped { frame: u32, reason: DropReason },
     /// It cannot go on; whether that is the axis' fault.
     Failed { axis: Option<Axis>, reason: Failure },
 }
 
 impl Run {
-    /// Sets off to the first of `count` shots; all of them are loaded, and `first` is the first.
+    /// Sets off to the first of `count` shots; all of them are loaded, and `first` is the first. With a pace it goes on for ever.
     pub(crate) fn start(
-        count: u8,
-        first: Shot,
+        (count, first): (u8, Shot),
+        pace: Option<Pace>,
         stage: &mut Stage,
         settings: &Settings,
         now: BoardMicros,
@@ -143,6 +154,7 @@ impl Run {
             shot: first,
             repeat: 0,
             exposures: 0,
+            pace,
             positioning: approach(&first, stage, settings, now),
             settle: None,
             phase: Phase::Positioning,
@@ -188,6 +200,9 @@ impl Run {
         self.phase = Phase::Positioning;
         self.settle = None;
         self.positioning = approach(&self.shot, stage, settings, now);
+        if let Some(pace) = &mut self.pace {
+            pace.begin_anew();
+        }
     }
 
     /// Goes on.
@@ -214,30 +229,92 @@ impl Run {
                 self.phase = Phase::Paused;
                 Progress::Paused
             }
-            Phase::Positioning => match self.positioning.tick(stage, now) {
-                None => Progress::On,
-                Some(Err(reason)) => Progress::Failed { axis: Some(self.shot.axis), reason },
-                Some(Ok(time)) => {
-                    self.settle.get_or_insert(time);
-                    if camera.is_ready(now) { self.expose(stage, camera, now) } else { Progress::On }
+            Phase::Positioning => {
+                let settled = match self.positioning.tick(stage, now) {
+                    Some(Err(reason)) => return Progress::Failed { axis: Some(self.shot.axis), reason },
+                    Some(Ok(time)) => {
+                        self.settle.get_or_insert(time);
+                        true
+                    }
+                    None => false,
+                };
+                self.expose_when_due(settled, stage, camera, now)
+            }
+            Phase::Exposing { number, frame, places, ref mut deviation } => {
+                *deviation = self.positioning.deviation(stage).max(*deviation);
+                let deviation = *deviation;
+                match camera.result(number) {
+                    None => self.pass_while_exposing(now),
+                    Some(Err(NoAnswer)) => self.go_without(frame),
+                    Some(Ok(edges)) => {
+                        let shot = self.record(number, places, &edges);
+                        self.exposures = self.exposures.saturating_add(1);
+                        self.phase = Phase::Positioning;
+                        let Some(pace) = &mut self.pace else {
+                            return Progress::Taken { shot, end: self.next(shots, stage, settings, now) };
+                        };
+                        let end = pace.answered();
+                        if end.is_none() {
+                            self.next(shots, stage, settings, now);
+                        }
+                        Progress::Frame { frame, deviation, shot, end }
+                    }
                 }
-            },
-            Phase::Exposing { number, places } => match camera.result(number) {
-                None => Progress::On,
-                Some(Err(NoAnswer)) => Progress::Failed { axis: None, reason: Failure::NoStrobe },
-                Some(Ok(edges)) => {
-                    let shot = self.record(number, places, &edges);
-                    self.exposures = self.exposures.saturating_add(1);
-                    self.phase = Phase::Positioning;
-                    Progress::Taken { shot, end: self.next(shots, stage, settings, now) }
-                }
-            },
+            }
         }
     }
 
-    fn expose(&mut self, stage: &Stage, camera: &mut Camera, now: BoardMicros) -> Progress {
+    /// Exposes where position and camera are ready; of a continuous run at its moment.
+    fn expose_when_due(
+        &mut self,
+        settled: bool,
+        stage: &Stage,
+        camera: &mut Camera,
+        now: BoardMicros,
+    ) -> Progress {
+        let Some(pace) = &mut self.pace else {
+            let ready = settled && camera.is_ready(now);
+            return if ready { self.expose(stage, camera, (0, now), now) } else { Progress::On };
+        };
+        let Some(due) = pace.due(now) else { return Progress::On };
+        let reason = match (settled, camera.is_ready(due)) {
+            (true, true) => {
+                let frame = pace.take(due);
+                return self.expose(stage, camera, (frame, due), now);
+            }
+            _ if !pace.presses() => return Progress::On,
+            (true, false) => DropReason::CameraBusy,
+            (false, _) => DropReason::NotSettled { error: self.positioning.error(stage) },
+        };
+        Progress::Dropped { frame: pace.drop_frame(), reason }
+    }
+
+    /// A moment of the pace may pass while the exposure before it is still under way.
+    fn pass_while_exposing(&mut self, now: BoardMicros) -> Progress {
+        match self.pace.as_mut().filter(|pace| pace.presses() && pace.due(now).is_some()) {
+            Some(pace) => Progress::Dropped { frame: pace.drop_frame(), reason: DropReason::CameraBusy },
+            None => Progress::On,
+        }
+    }
+
+    /// The camera did not answer: a continuous run goes on without that frame, unless there are several in a row.
+    fn go_without(&mut self, frame: u32) -> Progress {
+        if self.pace.as_mut().is_some_and(Pace::unanswered) {
+            self.phase = Phase::Positioning;
+            return Progress::Dropped { frame, reason: DropReason::NoStrobe };
+        }
+        Progress::Failed { axis: None, reason: Failure::NoStrobe }
+    }
+
+    fn expose(
+        &mut self,
+        stage: &Stage,
+        camera: &mut Camera,
+        (frame, due): (u32, BoardMicros),
+        now: BoardMicros,
+    ) -> Progress {
         let number = match self.shot.mode {
-            TriggerMode::Hardware => camera.trigger(self.shot.exposure, now),
+            TriggerMode::Hardware => camera.trigger(self.shot.exposure, due),
             TriggerMode::Software | TriggerMode::FreeRunning => camera.listen(now),
         };
         let places = Places {
@@ -245,7 +322,8 @@ impl Run {
             fine: self.positioning.mean_fine(),
             lens: stage.lens.measured(),
         };
-        self.phase = Phase::Exposing { number, places };
+        let deviation = self.positioning.deviation(stage);
+        self.phase = Phase::Exposing { number, frame, places, deviation };
         if self.shot.mode == TriggerMode::Software { Progress::Ready { number } } else { Progress::On }
     }
 
@@ -261,12 +339,20 @@ impl Run {
         if self.repeat < self.shot.repeat {
             return None;
         }
-        (self.repeat, self.index, self.settle) = (0, self.index + 1, None);
+        (self.repeat, self.index) = (0, self.index + 1);
+        if self.pace.is_some() && self.index >= self.shots {
+            self.index = 0;
+        }
         let Some(shot) = shots.get(self.index).filter(|_| self.index < self.shots) else {
             return Some(self.exposures);
         };
+        let place = |shot: &Shot| (shot.axis, shot.target, shot.settle_window, shot.settle_dwell);
+        let stays = self.pace.is_some() && place(shot) == place(&self.shot);
         self.shot = *shot;
-        if !self.pausing {
+        if !stays {
+            self.settle = None;
+        }
+        if !self.pausing && !stays {
             self.positioning = approach(shot, stage, settings, now);
         }
         None

@@ -4,7 +4,7 @@ use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, RecordName};
 
 use crate::calibrate::Step;
-use crate::program::Progress;
+use crate::program::{Progress, Run};
 use crate::rig::Rig;
 use crate::work::{AxisWork, WholeWork};
 
@@ -62,32 +62,14 @@ impl Rig {
         let Some(mut active) = self.works.whole.take() else { return };
         let request = active.request;
         let end = match &mut active.work {
-            WholeWork::Program(run) => {
-                let progress = run.tick(&self.shots, &mut self.stage, &mut self.camera, &self.settings, now);
-                let (index, repeat, shot) = run.shot();
-                match progress {
-                    Progress::On => None,
-                    Progress::Ready { number } => {
-                        let (trigger_number, exposure) = (number, shot.exposure);
-                        let kind = EventKind::ShotReady { request, index, repeat, trigger_number, exposure };
-                        self.events.push(now, kind);
-                        None
-                    }
-                    Progress::Paused => {
-                        self.events.push(now, EventKind::Paused { request, index });
-                        None
-                    }
-                    Progress::Taken { shot, end } => {
-                        self.events.push(now, EventKind::ShotDone { request, shot });
-                        end.map(|exposures| EventKind::ProgramDone { request, exposures })
-                    }
-                    Progress::Failed { axis, reason } => {
-                        self.stage.stop();
-                        active.work = WholeWork::Ending { axis, reason };
-                        None
-                    }
+            WholeWork::Program(run) => match self.advance_program(run, request, now) {
+                Ok(end) => end,
+                Err((axis, reason)) => {
+                    self.stage.stop();
+                    active.work = WholeWork::Ending { axis, reason };
+                    None
                 }
-            }
+            },
             WholeWork::Calibration(routine) => {
                 let step = routine.tick(&mut self.stage, &self.settings);
                 match self.take_step(step) {
@@ -111,6 +93,40 @@ impl Rig {
                 self.store.mark(RecordName::Counters); // triggers
             }
         }
+    }
+
+    /// Takes a program one tick further: its end, or why it cannot go on.
+    fn advance_program(
+        &mut self,
+        run: &mut Run,
+        request: u32,
+        now: BoardMicros,
+    ) -> Result<Option<EventKind>, (Option<Axis>, Failure)> {
+        let progress = run.tick(&self.shots, &mut self.stage, &mut self.camera, &self.settings, now);
+        let (index, repeat, shot) = run.shot();
+        let (told, end) = match progress {
+            Progress::On => return Ok(None),
+            Progress::Ready { number } => {
+                let (trigger_number, exposure) = (number, shot.exposure);
+                (EventKind::ShotReady { request, index, repeat, trigger_number, exposure }, None)
+            }
+            Progress::Paused => (EventKind::Paused { request, index }, None),
+            Progress::Taken { shot, end } => {
+                let end = end.map(|exposures| EventKind::ProgramDone { request, exposures });
+                (EventKind::ShotDone { request, shot }, end)
+            }
+            Progress::Frame { frame, deviation, shot, end } => {
+                let end =
+                    end.map(|(exposures, dropped)| EventKind::ContinuousDone { request, exposures, dropped });
+                (EventKind::FrameTaken { request, frame, deviation, shot }, end)
+            }
+            Progress::Dropped { frame, reason } => {
+                (EventKind::FrameDropped { request, frame, index, reason }, None)
+            }
+            Progress::Failed { axis, reason } => return Err((axis, reason)),
+        };
+        self.events.push(now, told);
+        Ok(end)
     }
 
     /// Takes over what a tick of a calibration brought: its result at the end, or why it cannot be done.

@@ -39,6 +39,9 @@ impl Rig {
             Request::LoadShot { index, shot } => self.load_shot(*index, shot),
             Request::ArmProgram { shots } => self.arm_program(*shots),
             Request::RunProgram { silence } => self.run_program((id, *silence), now),
+            Request::RunContinuously { period, exposures, silence } => {
+                self.run_continuously(*period, *exposures, (id, *silence), now)
+            }
             Request::PauseProgram => self.pause_program(),
             Request::ResumeProgram => self.resume_program(now),
             Request::Calibrate { routine, silence } => self.calibrate(*routine, (id, *silence)),

@@ -57,6 +57,8 @@ pub struct Rig {
     in_motion_stored: u8,
     pub(crate) emergency_stop: bool,
     pub(crate) supply_low: bool,
+    /// The memory was written in the tick before.
+    wrote: bool,
     untold: Option<Untold>,
 }
 
@@ -117,6 +119,7 @@ impl Rig {
             in_motion_stored: 0,
             emergency_stop: false,
             supply_low: false,
+            wrote: false,
             untold: Some(Untold { found: memory.map(record::find_all), in_motion }),
         }
     }
@@ -185,19 +188,43 @@ impl Rig {
         self.boot
     }
 
-    /// Takes one byte from the link. At the end of a request the request is carried out or begun, and its answer
-    /// waits in [`Self::transmit`].
-    pub fn receive(&mut self, byte: u8, now: BoardMicros) {
+    /// Takes one byte from the link. A whole request waits for [`Self::serve`].
+    pub fn receive(&mut self, byte: u8) {
+        self.session.receive(byte);
+    }
+
+    /// Whether a request or its answer waits for [`Self::serve`].
+    pub(crate) fn has_work(&self) -> bool {
+        self.session.has_work()
+    }
+
+    /// Frames that came to their end, good and bad ones; wraps.
+    pub(crate) const fn frames_received(&self) -> u32 {
+        let link = self.session.counters();
+        link.frames.wrapping_add(link.bad_frames)
+    }
+
+    /// Takes a step for the host, of which a tick has time for one: puts an answer into a frame, which waits in
+    /// [`Self::transmit`] then, or carries the next request out, or begins it. `false` where there was nothing to do.
+    pub fn serve(&mut self, now: BoardMicros) -> bool {
+        if self.session.has_answer() {
+            self.session.put_answer();
+            return true;
+        }
+        if !self.session.has_request() {
+            return false;
+        }
         self.begin(now);
         let heard = self.session.heard();
-        let incoming = self.session.receive(byte);
+        let incoming = self.session.next_request();
         if self.session.heard() != heard {
             self.silence.hear(now);
         }
         if let Some(incoming) = incoming {
             let answer = self.carry_out(&incoming, now);
-            self.session.answer(incoming, &answer);
+            self.session.answer(incoming, answer);
         }
+        true
     }
 
     /// The next frame for the link, answers before events; call it until it gives `None`.
@@ -310,7 +337,11 @@ impl Rig {
 
     /// What is to be written to the memory now.
     fn write(&mut self) -> Option<MemoryWrite> {
-        if self.store.is_idle() {
+        // A tick has no time for a write and for the host. They take turns; once the supply sinks nothing but the write counts.
+        let said = self.session.all_sent() && self.events.all_sent();
+        let gives_way = self.wrote && !self.supply_low && !said;
+        self.wrote = false;
+        if gives_way || self.store.is_idle() {
             return None;
         }
         let contents = Contents {
@@ -326,6 +357,7 @@ impl Rig {
             // A change begins the record again, so what was written is what is wanted now.
             self.in_motion_stored = self.in_motion;
         }
+        self.wrote = true;
         Some(write)
     }
 

@@ -5,11 +5,14 @@
 //! everything older. A request also names its host's session: one that belongs to another session than the one that is
 //! open is refused, so that of two hosts only the one that came last is heard. Hello belongs to none and changes nothing.
 //!
-//! Answers wait in a queue of their own, so no burst of events can push one out. Where it is full a request is not
-//! looked at but refused with `QueueFull`; of the refusals only the ids wait, so that there is room for many. A burst that
+//! What takes long is done in steps, of which a control tick takes one: a frame's bytes come, and it waits; it is looked at and
+//! carried out; its answer is put into a frame; that is sent.
+//!
+//! Answers wait in a queue of their own, so no burst of events can push one out. Where frames and answers together are as many as are promised,
+//! a request is not looked at but refused with `QueueFull`; of the refusals only the ids wait, so that there is room for many. A burst that
 //! is too long even for that is counted.
 //!
-//! RAM: about 5.5 KiB, most of it remembered answers.
+//! RAM: about 8 KiB, most of it remembered answers.
 
 mod ids;
 
@@ -54,6 +57,10 @@ pub(crate) struct Session {
     /// The open session's number, or [`NO_SESSION`].
     number: u32,
     ids: Ids,
+    /// Requests whose frames are whole, and that nobody has looked at.
+    frames: Deque<Packet, OUTSTANDING>,
+    /// A request that was carried out, and its answer, not in a frame yet.
+    done: Option<(Incoming, Result<Response, RequestError>)>,
     answered: Deque<Answered, REMEMBERED>,
     waiting: Deque<Encoded, OUTSTANDING>,
     refused: Deque<u32, REFUSED>,
@@ -75,6 +82,8 @@ impl Session {
             decoder: Decoder::new(),
             number: NO_SESSION,
             ids: Ids::new(),
+            frames: Deque::new(),
+            done: None,
             answered: Deque::new(),
             waiting: Deque::new(),
             refused: Deque::new(),
@@ -98,29 +107,35 @@ impl Session {
         self.heard
     }
 
-    /// Takes a byte; gives a request that is new and was made for this boot and this session.
-    pub(crate) fn receive(&mut self, byte: u8) -> Option<Incoming> {
-        match self.decoder.push(byte)? {
-            Ok(packet) if packet.header.kind == Kind::Request => {
+    /// Takes a byte; at the end of a request it waits for [`Self::next_request`].
+    pub(crate) fn receive(&mut self, byte: u8) {
+        match self.decoder.push(byte) {
+            None => {}
+            Some(Ok(packet)) if packet.header.kind == Kind::Request => {
                 count(&mut self.counters.frames);
-                self.take(&packet)
+                let owed = self.frames.len() + usize::from(self.done.is_some()) + self.waiting.len();
+                let id = packet.header.id;
+                if owed >= OUTSTANDING || self.frames.push_back(packet).is_err() {
+                    count(&mut self.counters.overflowed);
+                    let _ = self.refused.push_back(id); // without room for that either, being counted is all
+                }
             }
             // A whole frame of another kind is no request either: an echo of what this board sent.
-            Ok(_) | Err(_) => {
-                count(&mut self.counters.bad_frames);
-                None
-            }
+            Some(Ok(_) | Err(_)) => count(&mut self.counters.bad_frames),
         }
     }
 
-    fn take(&mut self, packet: &Packet) -> Option<Incoming> {
+    /// Whether a request waits to be looked at.
+    pub(crate) fn has_request(&self) -> bool {
+        !self.frames.is_empty()
+    }
+
+    /// Looks at the next request; gives it where it is new and was made for this boot and this session. What it is answered has
+    /// room, and so has its refusal.
+    pub(crate) fn next_request(&mut self) -> Option<Incoming> {
+        let packet = self.frames.pop_front()?;
         let id = packet.header.id;
-        if self.waiting.is_full() {
-            count(&mut self.counters.overflowed);
-            let _ = self.refused.push_back(id); // without room for that either, being counted is all
-            return None;
-        }
-        match self.admit(packet) {
+        match self.admit(&packet) {
             Ok(incoming) => incoming,
             Err(error) => {
                 if matches!(error, RequestError::NotInSession | RequestError::IdNotNew { .. }) {
@@ -128,7 +143,7 @@ impl Session {
                 }
                 // Without being remembered: nothing was done, and the same will be refused again.
                 if let Some(reply) = frame::encode(self.header(Kind::Error, id), &error) {
-                    let _ = self.waiting.push_back(reply); // not full, see above
+                    let _ = self.waiting.push_back(reply); // not full, see `receive`
                 }
                 None
             }
@@ -177,7 +192,7 @@ impl Session {
             Some(answered) if answered.request == *request => {
                 count(&mut self.counters.repeated);
                 self.heard = self.heard.wrapping_add(1);
-                let _ = self.waiting.push_back(answered.reply.clone()); // not full, see `take`
+                let _ = self.waiting.push_back(answered.reply.clone()); // not full, see `receive`
                 Ok(())
             }
             Some(_) => Err(RequestError::IdReused),
@@ -185,9 +200,25 @@ impl Session {
         }
     }
 
-    /// Answers a request and remembers the answer.
-    pub(crate) fn answer(&mut self, incoming: Incoming, answer: &Result<Response, RequestError>) {
-        let reply = match answer {
+    /// Answers a request: with the next [`Self::put_answer`].
+    pub(crate) fn answer(&mut self, incoming: Incoming, answer: Result<Response, RequestError>) {
+        self.done = Some((incoming, answer));
+    }
+
+    /// Whether a step is to be taken for the host.
+    pub(crate) fn has_work(&self) -> bool {
+        self.has_answer() || self.has_request()
+    }
+
+    /// Whether an answer waits to be put into a frame.
+    pub(crate) const fn has_answer(&self) -> bool {
+        self.done.is_some()
+    }
+
+    /// Puts the answer into a frame and remembers it.
+    pub(crate) fn put_answer(&mut self) {
+        let Some((incoming, answer)) = self.done.take() else { return };
+        let reply = match &answer {
             Ok(response) => frame::encode(self.header(Kind::Response, incoming.id), response),
             Err(error) => frame::encode(self.header(Kind::Error, incoming.id), error),
         };
@@ -220,7 +251,8 @@ impl Session {
 
     /// Whether no answers wait to be sent.
     pub(crate) fn all_sent(&self) -> bool {
-        self.waiting.is_empty() && self.refused.is_empty()
+        let looked_at = self.frames.is_empty() && self.done.is_none();
+        looked_at && self.waiting.is_empty() && self.refused.is_empty()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a running rig can be asked from other threads, and where it puts what comes out of it.
 
-use std::sync::mpsc::Sender;
+use std::sync::{Arc, atomic::AtomicUsize, mpsc::Sender};
 
 use crate::{access::RigAccess, report::Report, wiring::Shot};
 
@@ -37,4 +37,6 @@ pub struct Outlets {
     pub bytes: Option<Sender<Vec<u8>>>,
     /// Exposures, when they end.
     pub shots: Sender<Shot>,
+    /// How many of them still wait for their picture to be rendered and fetched, where that is done beside the board.
+    pub pictures: Option<Arc<AtomicUsize>>,
 }

@@ -1,7 +1,11 @@
 //! Joins the emulator to the plant and to the outside: what happens whenever the firmware touches a pin, and at each
 //! moment at which the emulator stops.
 
-use std::{path::PathBuf, sync::mpsc::Receiver};
+use std::{
+    path::PathBuf,
+    sync::mpsc::{Receiver, RecvTimeoutError},
+    time::Duration,
+};
 
 use rigless::{
     emulator::{self, AccessKind, Host, Settled, Stop},
@@ -20,6 +24,7 @@ use crate::{
     kept_memory,
     memory::MemoryChip,
     pacing::Pacing,
+    pictures::Pictures,
     plant::StageName,
     report::{Report, StageReport},
     serial::Line,
@@ -30,6 +35,9 @@ use crate::{
 /// SPI4's registers: the memory hangs there, and its supply may be set to fail in the middle of a write.
 const SPI4: std::ops::Range<u64> = 0x4001_3400..0x4001_3800;
 
+/// From one look for fetched pictures to the next.
+const PICTURE: Duration = Duration::from_millis(2);
+
 /// See the module.
 pub struct Driver {
     commands: Receiver<Command>,
@@ -38,6 +46,7 @@ pub struct Driver {
     line: Line,
     wiring: Wiring,
     pacing: Pacing,
+    pictures: Pictures,
     to_board: NoisyLine,
     to_host: NoisyLine,
     faults: Faults,
@@ -65,6 +74,7 @@ impl Driver {
         trace: Option<Trace>,
     ) -> Self {
         let rate = config.faults.bit_error_rate;
+        let pictures = Pictures::new(outlets.pictures.clone());
         let mut driver = Self {
             commands,
             outlets,
@@ -72,6 +82,7 @@ impl Driver {
             line,
             wiring,
             pacing: Pacing::new(config.pace),
+            pictures,
             to_board: NoisyLine::new(rate, config.seed, "line to the board"),
             to_host: NoisyLine::new(rate, config.seed, "line to the host"),
             faults: config.faults.clone(),
@@ -154,6 +165,7 @@ impl Driver {
             }
         });
         for shot in shots {
+            self.pictures.add();
             let _ = self.outlets.shots.send(shot); // whoever looked may have gone
         }
     }
@@ -255,6 +267,11 @@ impl Driver {
         self.pacing.lockstep.reset(at.0);
     }
 
+    /// Whether the board has taken more pictures than are fetched. A host that asks something is answered all the same.
+    fn stands_for_pictures(&mut self, now_ns: u64) -> bool {
+        !self.pacing.is_told(now_ns) && !self.pacing.lockstep.is_asked() && self.pictures.are_awaited()
+    }
+
     /// Carries out what is asked until time may pass; `false` ends the run.
     fn serve(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let now_ns = stop.at.0;
@@ -276,7 +293,13 @@ impl Driver {
                     let _ = done.send(report); // whoever asked may have gone
                 }
             }
-            let command = if self.pacing.may_pass(now_ns, at_work) {
+            let command = if self.stands_for_pictures(now_ns) {
+                match self.commands.recv_timeout(PICTURE) {
+                    Ok(command) => command,
+                    Err(RecvTimeoutError::Timeout) => continue,
+                    Err(RecvTimeoutError::Disconnected) => Command::End,
+                }
+            } else if self.pacing.may_pass(now_ns, at_work) {
                 let Some(command) = self.pacing.keep_pace(now_ns, &self.commands) else { return true };
                 command
             } else {

@@ -1,7 +1,7 @@
 //! The camera endpoint: loopback TCP that hands out frames and takes control messages.
 //!
 //! One client at a time; a second one is told so ([`IN_USE`]) and sent away. Frames without a client wait, the newest 32
-//! of them; each frame is handed out once.
+//! of them; with one that fetches slowly the frames behind them wait, too. Each frame is handed out once.
 
 use std::{
     collections::VecDeque,
@@ -127,8 +127,9 @@ fn listen(mut reader: TcpStream, control: &impl Fn(Control)) {
 
 fn keep(frames: Receiver<Vec<u8>>, shared: &Shared) {
     for frame in frames {
-        let mut state = lock(shared);
-        if state.frames.len() == WAITING {
+        let full = |state: &mut State| state.frames.len() >= WAITING && state.client.is_some();
+        let mut state = shared.1.wait_while(lock(shared), full).unwrap_or_else(PoisonError::into_inner);
+        if state.frames.len() >= WAITING {
             state.frames.pop_front();
         }
         state.frames.push_back(frame);
@@ -143,6 +144,7 @@ fn send(shared: &Shared) {
             state = shared.1.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         let frame = state.frames.pop_front();
+        shared.1.notify_all();
         let client = state.client.as_ref().map(|(number, client)| (*number, client.try_clone()));
         drop(state);
         let (Some(frame), Some((number, Ok(mut client)))) = (frame, client) else { continue };

@@ -1,8 +1,12 @@
 //! The camera's images: renders each exposure at the place where the sensor really was, on a thread of its own,
-//! so that the emulator never waits for a picture.
+//! so that the emulator waits for a picture only where many are due ([`crate::pictures`]).
 
 use std::{
-    sync::mpsc::{Receiver, Sender},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+        mpsc::{Receiver, SyncSender},
+    },
     thread::JoinHandle,
 };
 
@@ -60,14 +64,15 @@ impl Imager {
         Ok(bytes)
     }
 
-    /// Renders what comes until nothing can come any more.
+    /// Renders what comes until nothing can come any more; counts `waiting` down with each.
     ///
     /// # Errors
     /// [`SimError::Io`] where no thread can be started.
     pub fn watch(
         mut self,
         shots: Receiver<Shot>,
-        frames: Sender<Vec<u8>>,
+        frames: SyncSender<Vec<u8>>,
+        waiting: Arc<AtomicUsize>,
     ) -> Result<JoinHandle<()>, SimError> {
         std::thread::Builder::new()
             .name("camera".into())
@@ -81,6 +86,7 @@ impl Imager {
                         }
                         Err(error) => eprintln!("exposure {}: {error}", shot.id),
                     }
+                    waiting.fetch_sub(1, Ordering::Relaxed);
                 }
             })
             .map_err(|source| SimError::Io { what: "cannot start the camera's thread".into(), source })

@@ -37,6 +37,7 @@ pub mod lockstep;
 pub mod memory;
 pub mod pacing;
 pub mod parts;
+pub mod pictures;
 pub mod plant;
 pub mod port;
 pub mod processor;

@@ -18,7 +18,8 @@ use farnear_protocol::{
 
 /// A request without an answer after this long was lost on the line (the board answers within milliseconds).
 const ANSWER_NS: u64 = 60_000_000;
-/// Work without a terminal event after this long will never end: the longest exposure program is far shorter.
+/// Work without a terminal event after this long will never end: the longest exposure program is far shorter. A continuous run
+/// tells of each frame, and so long after the last of them it will never end either.
 const WORK_NS: u64 = 600_000_000_000;
 /// A reset without the started event after this long: the firmware does not run.
 pub const BOOT_NS: u64 = 2_000_000_000;
@@ -73,6 +74,7 @@ impl Work {
             Request::Home { .. }
             | Request::Move { .. }
             | Request::RunProgram { .. }
+            | Request::RunContinuously { .. }
             | Request::Calibrate { .. } => Self::Long,
             Request::ResumeProgram => Self::Resume,
             Request::Reboot => Self::Reset,
@@ -139,6 +141,11 @@ impl Lockstep {
         self.waits_for_host = false;
     }
 
+    /// Whether a request waits for its answer.
+    pub fn is_asked(&self) -> bool {
+        !self.asked.is_empty()
+    }
+
     /// Whether time stands because the board waits for its host, though it owes something itself.
     pub fn waits_for_host(&self) -> bool {
         self.waits_for_host
@@ -172,14 +179,14 @@ impl Lockstep {
             }
             Kind::Event => {
                 if let Some(event) = packet.message::<Event>() {
-                    self.event(&event, packet.header.boot);
+                    self.event(&event, packet.header.boot, now_ns);
                 }
             }
             Kind::Request | Kind::Log => {}
         }
     }
 
-    fn event(&mut self, event: &Event, boot: u32) {
+    fn event(&mut self, event: &Event, boot: u32, now_ns: u64) {
         let ended = match event.kind {
             EventKind::Started { .. } => {
                 // Only a new boot ends the wait: the old one's first event may be asked for again.
@@ -197,6 +204,12 @@ impl Lockstep {
                 self.paused = Some(request);
                 return;
             }
+            EventKind::FrameTaken { request, .. } | EventKind::FrameDropped { request, .. } => {
+                if let Some(until_ns) = self.running.get_mut(&request) {
+                    *until_ns = now_ns + WORK_NS;
+                }
+                return;
+            }
             EventKind::ShotDone { .. }
             | EventKind::Alarm(_)
             | EventKind::AlarmCleared { .. }
@@ -204,6 +217,7 @@ impl Lockstep {
             EventKind::Homed { request, .. }
             | EventKind::MoveDone { request, .. }
             | EventKind::ProgramDone { request, .. }
+            | EventKind::ContinuousDone { request, .. }
             | EventKind::Calibrated { request, .. }
             | EventKind::Failed { request, .. } => request,
         };

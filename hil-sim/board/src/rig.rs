@@ -53,7 +53,8 @@ impl EmulatedRig {
     pub fn new(config: &RigConfig) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
-        let (commands, thread) = launch(config, Outlets { bytes: Some(bytes_out), shots: shots_out })?;
+        let outlets = Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: None };
+        let (commands, thread) = launch(config, outlets)?;
         Ok(Self { commands, thread: Some(thread), bytes, shots, decoder: Decoder::new() })
     }
 

@@ -2,7 +2,11 @@
 
 use std::{
     net::SocketAddr,
-    sync::mpsc::{self, Sender},
+    sync::{
+        Arc,
+        atomic::AtomicUsize,
+        mpsc::{self, Sender},
+    },
     thread::JoinHandle,
 };
 
@@ -36,9 +40,13 @@ impl ServedRig {
     pub fn start(config: &RigConfig, imager: Imager) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
-        let (commands, thread) = launch(config, Outlets { bytes: Some(bytes_out), shots: shots_out })?;
-        let (frames_out, frames) = mpsc::channel();
-        imager.watch(shots, frames_out)?;
+        let pictures = Arc::new(AtomicUsize::new(0));
+        let outlets =
+            Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: Some(Arc::clone(&pictures)) };
+        let (commands, thread) = launch(config, outlets)?;
+        // One picture at a time is handed on: what is not fetched holds the imager up, and the imager the board.
+        let (frames_out, frames) = mpsc::sync_channel(1);
+        imager.watch(shots, frames_out, pictures)?;
         let control = commands.clone();
         let camera = endpoint::open(frames, move |asked| {
             let command = match asked {

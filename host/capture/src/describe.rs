@@ -4,7 +4,7 @@ mod alarm;
 mod refusal;
 
 use farnear_protocol::{
-    message::{Axis, PositionState, ProgramState, RecordName, ResetCause, Routine, TriggerMode},
+    message::{Axis, DropReason, PositionState, ProgramState, RecordName, ResetCause, Routine, TriggerMode},
     units::Nanometres,
 };
 
@@ -50,6 +50,15 @@ pub fn trigger_name(mode: TriggerMode) -> &'static str {
         TriggerMode::Hardware => "hardware",
         TriggerMode::Software => "software",
         TriggerMode::FreeRunning => "free-running",
+    }
+}
+
+/// Why a frame of a continuous run was dropped.
+pub fn drop_text(reason: DropReason) -> String {
+    match reason {
+        DropReason::NotSettled { error } => format!("not settled, {:.3} um off", um(error)),
+        DropReason::CameraBusy => "the camera was not ready".into(),
+        DropReason::NoStrobe => "the camera's exposure signal did not come".into(),
     }
 }
 

@@ -66,9 +66,12 @@ pub(crate) fn request_of(kind: &EventKind) -> Option<(u32, bool)> {
         EventKind::Homed { request, .. }
         | EventKind::MoveDone { request, .. }
         | EventKind::ProgramDone { request, .. }
+        | EventKind::ContinuousDone { request, .. }
         | EventKind::Calibrated { request, .. }
         | EventKind::Failed { request, .. } => Some((request, true)),
         EventKind::ShotDone { request, .. }
+        | EventKind::FrameTaken { request, .. }
+        | EventKind::FrameDropped { request, .. }
         | EventKind::ShotReady { request, .. }
         | EventKind::Paused { request, .. }
         | EventKind::StillThere { request } => Some((request, false)),

@@ -113,7 +113,8 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     Ok(camera.finish().map_err(camera_failed)?)
 }
 
-fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), CaptureError> {
+/// How the exposures of a program come about, and the length of the first.
+pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), CaptureError> {
     let Some(first) = shots.first() else { return Ok((TriggerMode::Hardware, Micros(0))) };
     match shots.iter().position(|shot| shot.mode != first.mode) {
         None => Ok((first.mode, first.exposure)),
@@ -130,7 +131,8 @@ pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
     sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
 }
 
-fn wait_for_image(
+/// The image of an exposure, or why it cannot be had; an interruption by the user ends the wait.
+pub(crate) fn wait_for_image(
     client: &Client,
     camera: &mut dyn Camera,
     record: &ShotRecord,

@@ -7,6 +7,7 @@
 //! - [`camera`]: where images come from.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, where the axes go for a pair, taking it, and the folder it is kept in.
 //! - [`expose`], [`focus`], [`sequence`]: programs with a camera: finding the focus, focus stacks, programs from a file.
+//! - [`continuous`]: a cycle of shots without an end, for live depth: a stream of exposures with their images.
 //! - [`board_correction`]: depth correction by the board's own mathematics.
 //! - [`timing`]: how long the host waits, and why.
 //! - [`error`], [`describe`]: what can go wrong, in words.
@@ -36,6 +37,7 @@
 pub mod board_correction;
 pub mod camera;
 pub mod client;
+pub mod continuous;
 pub mod describe;
 pub mod error;
 mod events;

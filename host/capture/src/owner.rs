@@ -63,6 +63,8 @@ pub(crate) struct Listener {
     pub notes: Sender<Note>,
     /// Gone when nobody holds the work any more.
     pub held: Weak<()>,
+    /// Events that are lost for ever are no reason to give it up.
+    pub bears_loss: bool,
 }
 
 /// What handles ask of the owner.
@@ -328,11 +330,17 @@ impl Owner {
                 self.events.arrived.insert(number, event);
             }
             Err(ClientError::Refused { error: RequestError::EventGone { oldest, next }, .. }) => {
-                let to = oldest.saturating_sub(1).max(number);
-                self.events.due = (to + 1).min(next.max(number + 1));
-                for (_, work) in std::mem::take(&mut self.works) {
-                    let _ = work.notes.send(Note::EventsLost { from: number, to });
-                }
+                // What has arrived by itself is not lost, whatever the board remembers.
+                let arrived = self.events.arrived.keys().next().copied();
+                let forgotten = oldest.min(next).max(number + 1);
+                self.events.due = arrived.map_or(forgotten, |first| first.clamp(number + 1, forgotten));
+                let to = self.events.due - 1;
+                self.works.retain(|_, work| {
+                    if !work.bears_loss {
+                        let _ = work.notes.send(Note::EventsLost { from: number, to });
+                    }
+                    work.bears_loss
+                });
             }
             // Nobody answers: pass over the event, so that the rest is given out. The session's end is known already.
             Ok(_) | Err(_) => self.events.due += 1,

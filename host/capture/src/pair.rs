@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use farnear_protocol::{
     Settle,
-    message::{Axis, Shot, ShotRecord, TriggerMode},
+    message::{Axis, Limits, Shot, ShotRecord, TriggerMode},
     units::Micros,
 };
 
@@ -75,6 +75,46 @@ impl Pair {
     }
 }
 
+/// A rig that stands where its piezo reaches both places of a pair.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Reach {
+    /// The coarse stage.
+    pub coarse: Moved,
+    /// The far and the near shot.
+    pub shots: [Shot; 2],
+}
+
+/// Brings the coarse stage where the piezo reaches both places; homes where needed.
+///
+/// # Errors
+/// [`CaptureError`]; what the stage cannot reach is said before anything moves.
+pub fn reach(
+    client: &Client,
+    sensor: &SensorPair,
+    exposures: &Exposures,
+    say: &mut dyn FnMut(&str),
+) -> Result<Reach, CaptureError> {
+    let limits = client.hello().limits;
+    coarse_for(sensor, base_when_homed_nm(client, &client.status()?), &limits)?;
+    ensure_homed(client, say)?;
+    let base = base_nm(client, &client.status()?);
+    let target = coarse_for(sensor, base, &limits)?;
+    say(&format!("moving the coarse stage to {:.3} um", um(target)));
+    let coarse = client.move_to(Axis::SensorCoarse, target)?;
+    let shot = |sensor_mm| -> Result<Shot, CaptureError> {
+        Ok(Shot {
+            axis: Axis::SensorFine,
+            target: fine_for(sensor_mm, base, coarse.measured, &limits)?,
+            exposure: exposures.exposure,
+            settle_window: exposures.settle.window,
+            settle_dwell: exposures.settle.dwell,
+            repeat: 1,
+            mode: TriggerMode::Hardware,
+        })
+    };
+    Ok(Reach { coarse, shots: [shot(sensor.far_mm)?, shot(sensor.near_mm)?] })
+}
+
 /// Takes a pair. `say` is told in words what is being done.
 pub fn capture_pair(
     client: &Client,
@@ -83,40 +123,42 @@ pub fn capture_pair(
     exposures: &Exposures,
     say: &mut dyn FnMut(&str),
 ) -> Result<Pair, CaptureError> {
-    let limits = client.hello().limits;
-    // Before anything moves: what the stage cannot reach is said at once.
-    coarse_for(sensor, base_when_homed_nm(client, &client.status()?), &limits)?;
-    ensure_homed(client, say)?;
-    let base = base_nm(client, &client.status()?);
-    let target = coarse_for(sensor, base, &limits)?;
-    say(&format!("moving the coarse stage to {:.3} um", um(target)));
-    let coarse = client.move_to(Axis::SensorCoarse, target)?;
-    let fine_far = fine_for(sensor.far_mm, base, coarse.measured, &limits)?;
-    let fine_near = fine_for(sensor.near_mm, base, coarse.measured, &limits)?;
-    let shot = |target| Shot {
-        axis: Axis::SensorFine,
-        target,
-        exposure: exposures.exposure,
-        settle_window: exposures.settle.window,
-        settle_dwell: exposures.settle.dwell,
-        repeat: 1,
-        mode: TriggerMode::Hardware,
-    };
-    say(&format!("exposing far (piezo at {:.3} um) and near ({:.3} um)", um(fine_far), um(fine_near)));
-    let mut asked = [sensor.far_mm, sensor.near_mm].into_iter();
+    let reach = reach(client, sensor, exposures, say)?;
+    let [far, near] = reach.shots.map(|shot| um(shot.target));
+    say(&format!("exposing far (piezo at {far:.3} um) and near ({near:.3} um)"));
     let mut taken = Vec::new();
-    let shots = [shot(fine_far), shot(fine_near)];
-    expose(client, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
-        if let Some(sensor_asked_mm) = asked.next() {
-            let sensor_measured_mm = sensor_mm(&record, &limits);
-            taken.push(Taken { image, sensor_asked_mm, sensor_measured_mm, record });
-        }
-        Ok(())
-    })?;
+    expose(
+        client,
+        camera,
+        &reach.shots,
+        exposures.image_wait,
+        |record, image| -> Result<(), CaptureError> {
+            taken.push((record, image));
+            Ok(())
+        },
+    )?;
     let told = taken.len();
-    let Ok([far, near]) = <[Taken; 2]>::try_from(taken) else {
+    let Ok(both) = <[(ShotRecord, Image); 2]>::try_from(taken) else {
         return Err(CaptureError::Count { told, asked: 2 });
     };
+    pair_of(both, sensor, reach.coarse, &client.hello().limits)
+}
+
+/// A pair of a far and a near exposure.
+///
+/// # Errors
+/// [`CaptureError::Unlike`].
+pub fn pair_of(
+    [far, near]: [(ShotRecord, Image); 2],
+    sensor: &SensorPair,
+    coarse: Moved,
+    limits: &Limits,
+) -> Result<Pair, CaptureError> {
+    let taken = |(record, image): (ShotRecord, Image), sensor_asked_mm| {
+        let sensor_measured_mm = sensor_mm(&record, limits);
+        Taken { image, sensor_asked_mm, sensor_measured_mm, record }
+    };
+    let (far, near) = (taken(far, sensor.far_mm), taken(near, sensor.near_mm));
     alike(&far.image, &near.image)?;
     Ok(Pair { far, near, coarse })
 }

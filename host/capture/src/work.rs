@@ -175,6 +175,11 @@ impl Work {
             return Err(self.stop_with(ClientError::Nonsense { during: during(), answer }));
         }
         match kind {
+            // Whoever wished it may have told the board, too, and that word may come first.
+            EventKind::Failed { reason: Failure::Stopped, .. } if self.client.interrupted() => {
+                self.over = true;
+                Err(ClientError::Interrupted { during: during() })
+            }
             EventKind::Failed { axis, reason, .. } => {
                 self.over = true;
                 Err(ClientError::Failed { during: during(), axis, reason, alarm: self.alarm_of(reason) })
@@ -182,11 +187,15 @@ impl Work {
             EventKind::Homed { .. }
             | EventKind::MoveDone { .. }
             | EventKind::ProgramDone { .. }
+            | EventKind::ContinuousDone { .. }
             | EventKind::Calibrated { .. } => {
                 self.over = true;
                 Ok(Step::Done(kind))
             }
             kind => {
+                if self.is_continuous() {
+                    self.left = self.allowed;
+                }
                 self.paused = matches!(kind, EventKind::Paused { .. });
                 if let EventKind::Alarm(record) = kind {
                     self.alarm = Some(record);
@@ -200,6 +209,11 @@ impl Work {
     fn alarm_of(&self, reason: Failure) -> Option<AlarmRecord> {
         let Failure::Alarm { number } = reason else { return self.alarm };
         self.alarm.filter(|record| record.number == number).or_else(|| self.client.alarm(number).ok())
+    }
+
+    /// It has no end to wait for: the deadline is that of its next event.
+    fn is_continuous(&self) -> bool {
+        matches!(self.request, Request::RunContinuously { .. })
     }
 
     fn stop_with(&mut self, error: ClientError) -> ClientError {
@@ -222,12 +236,18 @@ impl Drop for Work {
 }
 
 impl Client {
-    fn start_work(&self, request: &Request, work: Duration, during: String) -> Result<Work, ClientError> {
+    pub(crate) fn start_work(
+        &self,
+        request: &Request,
+        work: Duration,
+        during: String,
+    ) -> Result<Work, ClientError> {
         if self.interrupted() {
             return Err(ClientError::Interrupted { during });
         }
         let ((notes, receiver), held) = (channel(), Arc::new(()));
-        let listener = Listener { notes, held: Arc::downgrade(&held) };
+        let bears_loss = matches!(request, Request::RunContinuously { .. });
+        let listener = Listener { notes, held: Arc::downgrade(&held), bears_loss };
         let (id, response) = self.ask(request, &during, Some(listener))?;
         if response != Response::Accepted {
             return Err(nonsense(&during, &response));
@@ -249,7 +269,7 @@ impl Client {
     }
 
     /// The keep-alive timeout that goes with work, within what the board allows.
-    fn keep_alive(&self) -> Micros {
+    pub(crate) fn keep_alive(&self) -> Micros {
         let limits = &self.hello().limits;
         let asked = Micros(u32::try_from(self.timing().keep_alive.as_micros()).unwrap_or(u32::MAX));
         asked.max(limits.silence_min).min(limits.silence_max)
@@ -344,6 +364,13 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub fn start_program(&self, shots: &[Shot]) -> Result<Work, ClientError> {
+        let work = self.program_time(shots)?;
+        let during = "running the exposure program".to_string();
+        self.start_work(&Request::RunProgram { silence: self.keep_alive() }, work, during)
+    }
+
+    /// Longest time that a healthy board takes for a run of the armed program.
+    pub(crate) fn program_time(&self, shots: &[Shot]) -> Result<Duration, ClientError> {
         let status = self.status()?;
         if status.program.state == ProgramState::Idle {
             return Err(ClientError::NotArmed);
@@ -354,9 +381,7 @@ impl Client {
                 paces.push((axis, self.pace(axis)?));
             }
         }
-        let work = program_time(shots, &status, &paces);
-        let during = "running the exposure program".to_string();
-        self.start_work(&Request::RunProgram { silence: self.keep_alive() }, work, during)
+        Ok(program_time(shots, &status, &paces))
     }
 
     /// Arms and runs an exposure program. `on_event` is told of each exposure
@@ -394,11 +419,13 @@ fn belongs(kind: &EventKind, request: &Request) -> bool {
             Request::Home { axis: of, .. } | Request::Move { axis: of, .. },
         ) => axis == of,
         (EventKind::ProgramDone { .. }, Request::RunProgram { .. })
+        | (EventKind::ContinuousDone { .. }, Request::RunContinuously { .. })
         | (EventKind::Calibrated { .. }, Request::Calibrate { .. }) => true,
         (
             EventKind::Homed { .. }
             | EventKind::MoveDone { .. }
             | EventKind::ProgramDone { .. }
+            | EventKind::ContinuousDone { .. }
             | EventKind::Calibrated { .. },
             _,
         ) => false,

@@ -272,7 +272,8 @@ struct Shared {
     models: Models,
 }
 
-struct Models(Kept<Stamp, Model>);
+/// By path, and by what lies there; nothing does where the path is the name of a model that comes with the program.
+struct Models(Kept<(PathBuf, Option<Stamp>), Model>);
 
 impl Default for Models {
     fn default() -> Self {
@@ -283,7 +284,8 @@ impl Default for Models {
 impl Shared {
     /// As [`Model::read`].
     fn model(&self, path: &Path) -> Result<Arc<Model>> {
-        self.models.0.get(Stamp::of("the model", path)?, || Model::read(path))
+        let stamp = Model::file(path).map(|path| Stamp::of("the model", path)).transpose()?;
+        self.models.0.get((path.into(), stamp), || Model::read(path))
     }
 }
 

@@ -4,13 +4,15 @@
 //! - [`camera`]: a rig with its camera; [`pair`], [`sequence`], [`focus`], [`targets`]: what is done with both.
 //! - [`mechanics`], [`correction_fit`], [`correct`], [`sun`]: what the board measures and calculates.
 //! - [`check`]: the bring-up checklist.
-//! - [`open`]: a rig that is held open between jobs; [`live`], [`live_depth`]: images and depth as they come; [`series`]: pair after pair;
+//! - [`open`]: a rig that is held open between jobs; [`live`], [`live_depth`]: images and depth as they come; [`series`]: pair after pair; [`continuous`]: at a pace that
+//!   the board holds;
 //!   [`goto`]: to the far or the near focus; [`quality`]: how good depth is.
 
 pub mod alarms;
 pub mod board;
 pub mod camera;
 pub mod check;
+pub mod continuous;
 pub mod correct;
 pub mod correction_fit;
 pub mod focus;

@@ -158,4 +158,9 @@ pub enum RequestError {
         /// How many may wait.
         outstanding: u8,
     },
+    /// The pace of a continuous run is faster than the camera.
+    Period {
+        /// The longest exposure of the armed shots and the camera's read-out.
+        min: Micros,
+    },
 }

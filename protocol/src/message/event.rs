@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{AlarmRecord, Axis, Calibration, RecordName, ResetCause, ShotRecord};
+use super::{AlarmRecord, Axis, Calibration, DropReason, RecordName, ResetCause, ShotRecord};
 use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// Something that happened, with the board's time. Events are numbered from 0 at each boot; the number travels
@@ -112,6 +112,38 @@ pub enum EventKind {
         record: RecordName,
         /// The version of the copy in use.
         sequence: u32,
+    },
+    /// One exposure of a continuous run was taken.
+    FrameTaken {
+        /// The request that runs the program.
+        request: u32,
+        /// Which moment of the pace, from 0; one more than that of the event before, for each has its own event.
+        frame: u32,
+        /// Largest distance of the measured position from the one asked for, from the trigger's order to the end of the exposure;
+        /// beyond the shot's settle window the picture was taken of a position that moved.
+        deviation: Nanometres,
+        /// What was measured.
+        shot: ShotRecord,
+    },
+    /// A moment of a continuous run's pace passed without an exposure; the same shot is due at the next.
+    FrameDropped {
+        /// The request that runs the program.
+        request: u32,
+        /// Which moment of the pace, from 0.
+        frame: u32,
+        /// Place of the shot in the program.
+        index: u8,
+        /// Why.
+        reason: DropReason,
+    },
+    /// Terminal event of [`super::Request::RunContinuously`] with a number of exposures.
+    ContinuousDone {
+        /// The request that this ends.
+        request: u32,
+        /// Exposures taken.
+        exposures: u32,
+        /// Frames dropped.
+        dropped: u32,
     },
 }
 

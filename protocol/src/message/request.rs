@@ -167,4 +167,17 @@ pub enum Request {
     /// [`super::Hello::last_id`]. What the session before had begun ends as by [`Request::Stop`], and its requests are
     /// refused from now on. Answer: [`super::Response::Accepted`].
     OpenSession,
+    /// Run the armed program again and again, from its last shot to its first: move, settle, trigger, time-stamp. Each exposure is
+    /// told by [`super::EventKind::FrameTaken`], each moment of the pace without one by [`super::EventKind::FrameDropped`]. Answer:
+    /// [`super::Response::Accepted`]; ends with [`super::EventKind::ContinuousDone`] after so many exposures, with
+    /// [`super::EventKind::Failed`] where it is stopped or breaks.
+    RunContinuously {
+        /// From one trigger to the next, to the microsecond; 0 = each exposure as soon as position and camera are ready. At least
+        /// the longest exposure and the camera's read-out, else refused with [`super::RequestError::Period`].
+        period: Micros,
+        /// Exposures after which it ends; 0 = none, it goes on until it is stopped.
+        exposures: u32,
+        /// How long the host may say nothing, see [`Request::Move`].
+        silence: Micros,
+    },
 }

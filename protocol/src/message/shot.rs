@@ -82,6 +82,20 @@ impl ShotRecord {
     }
 }
 
+/// Why a moment of a continuous run's pace passed without an exposure.
+#[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DropReason {
+    /// The position was still on its way, or had not settled.
+    NotSettled {
+        /// Asked minus measured then.
+        error: Nanometres,
+    },
+    /// The camera still exposed, or read the frame before out.
+    CameraBusy,
+    /// The camera was triggered, and its exposure-active signal did not come.
+    NoStrobe,
+}
+
 /// How an exposure comes about.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TriggerMode {
@@ -103,7 +117,7 @@ pub struct ProgramStatus {
     pub shots: u8,
     /// The shot that is under way, or comes next.
     pub index: u8,
-    /// Exposures taken in this run.
+    /// Exposures taken in this run; 65,535 where a continuous run has taken more.
     pub exposures: u16,
 }
 

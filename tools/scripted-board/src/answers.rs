@@ -102,6 +102,7 @@ impl Board {
             Request::Home { .. }
             | Request::Move { .. }
             | Request::RunProgram { .. }
+            | Request::RunContinuously { .. }
             | Request::Calibrate { .. } => self.work(id, request),
             Request::LoadShot { .. }
             | Request::ArmProgram { .. }

@@ -54,6 +54,8 @@ pub struct Faults {
     pub silent_reset: bool,
     /// The line breaks at the first request of this kind.
     pub gone_at_program: bool,
+    /// A continuous run drops the frames with these numbers.
+    pub drop_frames: Vec<u32>,
     /// Work is taken on and never ends.
     pub never_ends: bool,
     /// Work that was taken on asks so often whether the host is still there, and ends at the last answer.

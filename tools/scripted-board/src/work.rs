@@ -4,13 +4,16 @@
 use farnear_protocol::{
     Request, RequestError, Response,
     message::{
-        Alarm, AlarmRecord, Axis, Calibration, EventKind, Failure, Limits, PositionState, ProgramState,
-        ResetCause, Routine, Shot, ShotFault, ShotRecord, TriggerMode,
+        Alarm, AlarmRecord, Axis, Calibration, DropReason, EventKind, Failure, Limits, PositionState,
+        ProgramState, ResetCause, Routine, Shot, ShotFault, ShotRecord, TriggerMode,
     },
     units::{BoardMicros, Micros, Nanometres},
 };
 
 use crate::Board;
+
+/// Exposures of a continuous run that nobody ends.
+const UNTIL_STOPPED: u32 = 40;
 
 impl Board {
     pub(super) fn prepare(&mut self, id: u32, request: Request) {
@@ -70,6 +73,7 @@ impl Board {
             Request::Home { silence, .. }
             | Request::Move { silence, .. }
             | Request::RunProgram { silence }
+            | Request::RunContinuously { silence, .. }
             | Request::Calibrate { silence, .. } => *silence,
             _ => Micros(0),
         };
@@ -79,7 +83,8 @@ impl Board {
             return Some(RequestError::Silence { min: silence_min, max: silence_max });
         }
         self.keep_alives.push(silence);
-        if matches!(request, Request::RunProgram { .. }) && self.armed == 0 {
+        let runs = matches!(request, Request::RunProgram { .. } | Request::RunContinuously { .. });
+        if runs && self.armed == 0 {
             return Some(RequestError::Program { state: ProgramState::Idle });
         }
         let Request::Move { axis, target, .. } = *request else { return None };
@@ -157,6 +162,9 @@ impl Board {
                 };
                 self.event(EventKind::Calibrated { request: id, result });
             }
+            Request::RunContinuously { period, exposures, .. } => {
+                self.run_continuously(id, (period, exposures), &request);
+            }
             _ => self.run(id),
         }
     }
@@ -175,28 +183,61 @@ impl Board {
                     self.event(kind);
                 }
                 self.time += 20_000;
-                self.triggers += 1;
                 exposures += 1;
-                let trigger = BoardMicros(self.time);
-                let strobe_start = BoardMicros(self.time + 20);
-                let record = ShotRecord {
-                    index,
-                    repeat,
-                    trigger_number,
-                    axis: shot.axis,
-                    asked: shot.target,
-                    coarse: self.coarse,
-                    fine: self.fine,
-                    lens: self.lens,
-                    settle: Micros(9_000),
-                    trigger,
-                    strobe_start,
-                    strobe_end: BoardMicros(strobe_start.0 + u64::from(shot.exposure.0)),
-                    exposure: shot.exposure,
-                };
-                self.event(EventKind::ShotDone { request: id, shot: record });
+                let shot = self.expose(index, repeat, shot);
+                self.event(EventKind::ShotDone { request: id, shot });
             }
         }
         self.event(EventKind::ProgramDone { request: id, exposures });
+    }
+
+    /// Takes an exposure, now.
+    fn expose(&mut self, index: u8, repeat: u16, shot: &Shot) -> ShotRecord {
+        let trigger_number = self.triggers;
+        self.triggers += 1;
+        let strobe_start = BoardMicros(self.time + 20);
+        ShotRecord {
+            index,
+            repeat,
+            trigger_number,
+            axis: shot.axis,
+            asked: shot.target,
+            coarse: self.coarse,
+            fine: self.fine,
+            lens: self.lens,
+            settle: Micros(9_000),
+            trigger: BoardMicros(self.time),
+            strobe_start,
+            strobe_end: BoardMicros(strobe_start.0 + u64::from(shot.exposure.0)),
+            exposure: shot.exposure,
+        }
+    }
+
+    /// Frames at a pace, of which some are dropped; without an end it has taken [`UNTIL_STOPPED`] when it waits for the stop.
+    fn run_continuously(&mut self, id: u32, (period, wanted): (Micros, u32), request: &Request) {
+        let shots: Vec<Shot> =
+            self.program[..usize::from(self.armed)].iter().map(|shot| shot.unwrap()).collect();
+        let (mut exposures, mut dropped) = (0, 0);
+        let mut cycle = (0..).zip(&shots).cycle().peekable();
+        while exposures < if wanted == 0 { UNTIL_STOPPED } else { wanted } {
+            let (frame, (index, shot)) = (exposures + dropped, *cycle.peek().unwrap());
+            self.time += u64::from(period.0.max(20_000));
+            if self.faults.drop_frames.contains(&frame) {
+                dropped += 1;
+                let reason = DropReason::CameraBusy;
+                self.event(EventKind::FrameDropped { request: id, frame, index, reason });
+                continue;
+            }
+            cycle.next();
+            exposures += 1;
+            self.place(shot.axis, shot.target);
+            let shot = self.expose(index, 0, shot);
+            self.event(EventKind::FrameTaken { request: id, frame, deviation: Nanometres(7), shot });
+        }
+        if wanted == 0 {
+            self.active = Some((id, request.clone()));
+        } else {
+            self.event(EventKind::ContinuousDone { request: id, exposures, dropped });
+        }
     }
 }

@@ -16,7 +16,7 @@ use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
 use heapless::Deque;
 
-use crate::io::{MotorOutputs, Segment, StepperState, TICK_US};
+use crate::io::{MotorOutputs, STEP_TIMER_HZ, Segment, StepperState, TICK_HZ, TICK_US};
 use crate::motion::ramp::{self, Ramp, RampLimits};
 use crate::motion::steps;
 use crate::motion::switch::{self, Place, Switch};
@@ -24,6 +24,10 @@ use crate::settings::StepperSettings;
 
 /// Segments that may be under way at once: those that wait in the board and the one that runs.
 const OUTSTANDING: usize = 6;
+
+/// Motion that is planned in one control tick, in ticks of the step timer: two control ticks of it, so that the queue grows, and no more than
+/// that, for a tick in which several segments are planned is a long one.
+const PLANNED_TICKS: u32 = STEP_TIMER_HZ / TICK_HZ * 2;
 
 /// What a motion is for: how fast it may change its speed, and which switch may close on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -342,11 +346,13 @@ impl Stepper {
                 }
             }
             Motion::Stepping { ramp, .. } => {
+                let mut planned = 0;
                 for _ in 0..stepper.room {
-                    if outputs.segments.is_full() || self.outstanding.is_full() {
+                    if outputs.segments.is_full() || self.outstanding.is_full() || planned >= PLANNED_TICKS {
                         break;
                     }
                     let Some(segment) = ramp.next() else { break };
+                    planned += u32::from(segment.pulses) * u32::from(segment.period_ticks);
                     feed(&mut self.outstanding, outputs, segment);
                 }
             }

@@ -49,7 +49,7 @@ impl Positioning {
         if !stage.is_still(self.axis) {
             return None;
         }
-        let error = Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0));
+        let error = self.error(stage);
         let at_rest = self.axis != Axis::SensorFine || stage.fine.arrived() && stage.fine.gauge_fresh();
         if at_rest {
             self.settling.push(error, stage.fine.measured());
@@ -57,10 +57,22 @@ impl Positioning {
             self.settling.interrupt();
         }
         if self.settling.is_settled() {
+            // A knock much later is borne as one on the way is.
+            self.waiting_since = Some(now);
             return Some(Ok(since(self.started, now)));
         }
         let waiting_since = *self.waiting_since.get_or_insert(now);
         (since(waiting_since, now) > self.patience).then_some(Err(Failure::NotSettled { error }))
+    }
+
+    /// Asked minus measured.
+    pub(crate) fn error(&self, stage: &Stage) -> Nanometres {
+        Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0))
+    }
+
+    /// Distance of the measured position from the target.
+    pub(crate) fn deviation(&self, stage: &Stage) -> Nanometres {
+        Nanometres(self.error(stage).0.saturating_abs())
     }
 
     /// Gauge position, mean over the last whole dwell.

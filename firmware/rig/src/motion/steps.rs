@@ -8,14 +8,25 @@ use farnear_protocol::Nanometres;
 use crate::io::ENCODER_NM_PER_COUNT;
 use crate::settings::STEP_PM;
 
+/// Four pulses in nanometres: in whole numbers, so that one way divides by 4 and the other fits 32 bits. A division of 64 bits takes the
+/// processor 100 instructions and more, and a tick makes many.
+const FOUR_STEPS_NM: i32 = 625;
+const _: () = assert!(STEP_PM as i64 * 4 == FOUR_STEPS_NM as i64 * 1_000);
+
 /// The pulses nearest to a position.
 pub(crate) const fn to_steps(position: Nanometres) -> i32 {
-    divide_rounded(position.0 as i64 * 1_000, STEP_PM as i64) as i32 // smaller than the nanometres
+    const HALF: i32 = FOUR_STEPS_NM / 2;
+    let nm = position.0;
+    if nm >= i32::MIN / 8 && nm <= i32::MAX / 8 {
+        let four = 4 * nm;
+        return (if four < 0 { four - HALF } else { four + HALF }) / FOUR_STEPS_NM;
+    }
+    divide_rounded(nm as i64 * 4, FOUR_STEPS_NM as i64) as i32 // smaller than the nanometres
 }
 
 /// The position of a pulse, to the nanometre; saturates beyond 2 m.
 pub(crate) const fn to_nanometres(steps: i32) -> Nanometres {
-    saturate(divide_rounded(steps as i64 * STEP_PM as i64, 1_000))
+    saturate(divide_rounded(steps as i64 * FOUR_STEPS_NM as i64, 4))
 }
 
 /// The position of an encoder count; saturates beyond 2 m.

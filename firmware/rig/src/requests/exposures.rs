@@ -4,7 +4,7 @@ use farnear_protocol::message::{Axis, RecordName, RequestError, Response, Shot, 
 use farnear_protocol::{BoardMicros, Micros};
 
 use super::Answer;
-use crate::program::{Run, SHOTS_MAX};
+use crate::program::{Run, SHOTS_MAX, pace::Pace};
 use crate::rig::Rig;
 use crate::work::{Active, WholeWork};
 
@@ -21,31 +21,52 @@ impl Rig {
 
     pub(super) fn arm_program(&mut self, count: u8) -> Answer {
         self.no_program_runs()?;
-        self.check_program(count)?;
+        self.check_program(count, 1)?;
         self.shots.arm(count);
         Ok(Response::Accepted)
     }
 
-    pub(super) fn run_program(&mut self, (request, silence): (u32, Micros), now: BoardMicros) -> Answer {
+    pub(super) fn run_program(&mut self, request: (u32, Micros), now: BoardMicros) -> Answer {
+        self.run(None, request, now)
+    }
+
+    pub(super) fn run_continuously(
+        &mut self,
+        period: Micros,
+        exposures: u32,
+        request: (u32, Micros),
+        now: BoardMicros,
+    ) -> Answer {
+        let shots = (0..self.shots.armed()).filter_map(|index| self.shots.get(index));
+        let min = shots.map(|shot| self.camera.period(shot.exposure)).max().unwrap_or_default();
+        if period.0 > 0 && period < min {
+            return Err(RequestError::Period { min });
+        }
+        self.run(Some(Pace::new(period, exposures)), request, now)
+    }
+
+    /// Runs the armed program; with a pace for ever.
+    fn run(&mut self, pace: Option<Pace>, (request, silence): (u32, Micros), now: BoardMicros) -> Answer {
         self.may_move(silence)?;
         self.all_must_be_free()?;
         let count = self.shots.armed();
         let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
             return Err(RequestError::Program { state: self.program_status().state });
         };
-        self.check_program(count)?; // since it was armed axes may have lost their positions, or moved
-        let run = Run::start(count, first, &mut self.stage, &self.settings, now);
+        // Since it was armed axes may have lost their positions, or moved. The second round begins where the first one ends.
+        self.check_program(count, if pace.is_some() { 2 } else { 1 })?;
+        let run = Run::start((count, first), pace, &mut self.stage, &self.settings, now);
         self.works.whole = Some(Active { request, silence, work: WholeWork::Program(run) });
         Ok(Response::Accepted)
     }
 
-    /// Whether the first `count` shots can be run from here.
-    pub(super) fn check_program(&self, count: u8) -> Result<(), RequestError> {
+    /// Whether the first `count` shots can be run from here, so often.
+    pub(super) fn check_program(&self, count: u8, rounds: u8) -> Result<(), RequestError> {
         if count == 0 || usize::from(count) > SHOTS_MAX {
             return Err(RequestError::Shot { index: count, reason: ShotFault::Index });
         }
         let mut at = Axis::ALL.map(|axis| self.lowest(axis));
-        for index in 0..count {
+        for index in (0..rounds).flat_map(|_| 0..count) {
             let missing = RequestError::Shot { index, reason: ShotFault::Missing };
             let shot = self.shots.get(index).ok_or(missing)?;
             self.must_be_inside(shot.axis, shot.target)?; // the limits may have changed

@@ -211,7 +211,8 @@ impl Bench {
     /// Puts bytes on the line.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            self.rig.receive(*byte, BoardMicros(self.now));
+            self.rig.receive(*byte);
+            while self.rig.serve(BoardMicros(self.now)) {}
         }
     }
 
@@ -303,6 +304,7 @@ pub fn ends(kind: &EventKind, id: u32) -> bool {
         EventKind::Homed { request, .. }
         | EventKind::MoveDone { request, .. }
         | EventKind::ProgramDone { request, .. }
+        | EventKind::ContinuousDone { request, .. }
         | EventKind::Calibrated { request, .. }
         | EventKind::Failed { request, .. } => *request == id,
         _ => false,

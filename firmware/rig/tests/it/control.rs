@@ -17,9 +17,9 @@ use crate::bench::{self, BOOT};
 
 /// All that happens in a tick in which there is an event and a line of the log to send.
 const TICK: [Call; 13] = [
-    Call::Gauge,
-    Call::Now,
+    Call::SampleGauge,
     Call::Receive,
+    Call::Gauge,
     Call::Now,
     Call::Coarse,
     Call::Lens,
@@ -147,7 +147,7 @@ fn the_log_takes_the_room_that_is_left() {
     run(&mut control, &mut fake, 3);
     assert_eq!((fake.sent.len(), fake.logs.len()), (1, 1), "the log waits for a session");
     fake.ask(&Request::Status);
-    run(&mut control, &mut fake, 4);
+    run(&mut control, &mut fake, 10);
     let kinds: Vec<Kind> = packets(&fake).iter().map(|packet| packet.header.kind).collect();
     assert_eq!(kinds, [Kind::Event, Kind::Response, Kind::Response, Kind::Log]);
     let packet = packets(&fake).pop().expect("the log");
@@ -159,7 +159,8 @@ fn a_host_that_asks_without_a_pause_gets_the_log_too() {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     fake.logs.push_back(log());
-    for _ in 0..20 {
+    // An answer is sent every third tick, and eight of them go before the log.
+    for _ in 0..40 {
         fake.room = 1;
         fake.ask(&Request::Status);
         run(&mut control, &mut fake, 1);

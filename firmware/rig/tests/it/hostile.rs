@@ -72,7 +72,7 @@ struct Ledger {
 /// Each kind of request that does something, and one of those that only ask.
 fn request(ledger: &mut Ledger, enemy: &mut Enemy) -> Request {
     let silence = Micros(500_000);
-    match enemy.below(14) {
+    match enemy.below(15) {
         0 => Request::Home { axis: Axis::SensorCoarse, silence },
         1 => Request::Home { axis: Axis::Lens, silence },
         2 => Request::Move { axis: Axis::SensorCoarse, target: Nanometres(2_000_000), silence },
@@ -101,12 +101,19 @@ fn request(ledger: &mut Ledger, enemy: &mut Enemy) -> Request {
         10 => Request::ArmProgram { shots: 1 },
         11 => Request::RunProgram { silence },
         12 => Request::ReadCounters,
+        13 => Request::RunContinuously { period: Micros(20_000), exposures: 3, silence },
         _ => Request::Status,
     }
 }
 
 const fn is_long(request: &Request) -> bool {
-    matches!(request, Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. })
+    matches!(
+        request,
+        Request::Home { .. }
+            | Request::Move { .. }
+            | Request::RunProgram { .. }
+            | Request::RunContinuously { .. }
+    )
 }
 
 /// A host opens a session, asks for some things, and is killed: says nothing more.
@@ -178,7 +185,10 @@ fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
                     EventKind::Homed { request, .. }
                     | EventKind::MoveDone { request, .. }
                     | EventKind::ProgramDone { request, .. }
+                    | EventKind::ContinuousDone { request, .. }
                     | EventKind::ShotDone { request, .. }
+                    | EventKind::FrameTaken { request, .. }
+                    | EventKind::FrameDropped { request, .. }
                     | EventKind::Failed { request, .. } => {
                         assert!(known(request), "nobody asked for {request}")
                     }

@@ -3,6 +3,7 @@
 mod bench;
 mod calibration;
 mod coarse;
+mod continuous;
 mod control;
 mod faults;
 mod hostile;

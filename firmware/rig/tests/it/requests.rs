@@ -91,6 +91,9 @@ fn requests() -> impl Strategy<Value = Request> {
             .prop_map(|(index, shot)| Request::LoadShot { index: index % 5 * (1 + index / 64 * 60), shot }),
         2 => (0u8..5).prop_map(|shots| Request::ArmProgram { shots }),
         3 => silences().prop_map(|silence| Request::RunProgram { silence }),
+        2 => (0u32..60_000, 0u32..4, silences()).prop_map(|(period, exposures, silence)| {
+            Request::RunContinuously { period: Micros(period), exposures, silence }
+        }),
         1 => Just(Request::PauseProgram),
         1 => Just(Request::ResumeProgram),
         2 => (routines(), silences()).prop_map(|(routine, silence)| Request::Calibrate { routine, silence }),
@@ -106,7 +109,11 @@ fn requests() -> impl Strategy<Value = Request> {
 const fn is_long(request: &Request) -> bool {
     matches!(
         request,
-        Request::Home { .. } | Request::Move { .. } | Request::RunProgram { .. } | Request::Calibrate { .. }
+        Request::Home { .. }
+            | Request::Move { .. }
+            | Request::RunProgram { .. }
+            | Request::RunContinuously { .. }
+            | Request::Calibrate { .. }
     )
 }
 

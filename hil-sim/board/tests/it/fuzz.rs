@@ -70,6 +70,10 @@ impl Fuzz {
                 shot.mode = mode[self.below(3) as usize];
                 Request::LoadShot { index: small % 70, shot }
             }
+            8 if small % 2 == 0 => {
+                let period = Micros(self.number() as u32);
+                Request::RunContinuously { period, exposures: u32::from(small % 3), silence }
+            }
             8 => Request::RunProgram { silence },
             9 => Request::ReadEvent { number: self.number() as u32 },
             10 => Request::Halt,

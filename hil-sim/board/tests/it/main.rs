@@ -5,6 +5,7 @@ mod accuracy;
 mod bad_line;
 mod bench;
 mod calibration;
+mod continuous;
 mod fuzz;
 mod maths;
 mod memory;

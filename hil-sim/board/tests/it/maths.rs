@@ -68,7 +68,8 @@ impl Here {
         self.id += 1;
         let boot = if *request == Request::Hello { 0 } else { self.rig.boot() };
         for byte in request_frame(self.id, boot, request) {
-            self.rig.receive(byte, BoardMicros(self.now));
+            self.rig.receive(byte);
+            while self.rig.serve(BoardMicros(self.now)) {}
         }
         let mut decoder = Decoder::new();
         for _ in 0..100 {

@@ -250,16 +250,15 @@ fn busy(bench: &mut Bench) -> u32 {
 }
 
 #[test]
-fn on_a_processor_as_slow_as_any_was_measured_nothing_breaks_and_no_tick_takes_two() {
+fn on_a_processor_as_slow_as_any_was_measured_no_tick_takes_seven_tenths_of_its_period() {
     let mut bench = rig_with(|parts| parts.processor.cycles_per_instruction = 1.9);
     let longest = busy(&mut bench);
     let share = 100.0 * f64::from(longest) / f64::from(TICK_CYCLES);
     println!(
         "at 1.9 cycles an instruction the longest tick takes {longest} cycles, {share:.1} % of its period"
     );
-    // Wanted are 70 %. Reached are 130 %, in a tick in which a request comes to its last byte and is carried out while both
-    // stages move; the tick after it makes up for that.
-    assert!(longest <= TICK_CYCLES * 14 / 10, "{longest} cycles");
+    // A tick has time for one thing beside motion: a write to the memory, a frame that comes to its end, or one that is answered or sent.
+    assert!(longest < TICK_CYCLES * 7 / 10, "{longest} cycles");
     assert_eq!(bench.alarm(), None);
 }
 

@@ -36,6 +36,8 @@ pub struct SimCamera {
     // Reads all the time, so that the simulator is not held up while the host waits for the board's events.
     reader: Option<JoinHandle<()>>,
     runs_freely: bool,
+    /// An image that came where an earlier one was due.
+    early: Option<Frame>,
 }
 
 struct Frame {
@@ -125,7 +127,8 @@ impl SimCamera {
                 }
             }
         });
-        Ok(Self { address: address.into(), stream, queue, reader: Some(reader), runs_freely: false })
+        let reader = Some(reader);
+        Ok(Self { address: address.into(), stream, queue, reader, runs_freely: false, early: None })
     }
 
     /// Lets virtual time pass in the simulator though nothing is under way there.
@@ -182,17 +185,18 @@ impl Camera for SimCamera {
         let until = Instant::now() + wait;
         let wanted = shot.trigger_number;
         loop {
-            let frame = match self.queue.pop(until) {
-                Ok(Some(frame)) => frame?,
-                Ok(None) => {
-                    return Err(CameraError::Late {
-                        camera: format!("simulator at {}", self.address),
-                        trigger_number: wanted,
-                        waited: wait,
-                    });
-                }
-                Err(()) => return Err(self.ended()),
-            };
+            let frame =
+                match self.early.take().map_or_else(|| self.queue.pop(until), |frame| Ok(Some(Ok(frame)))) {
+                    Ok(Some(frame)) => frame?,
+                    Ok(None) => {
+                        return Err(CameraError::Late {
+                            camera: format!("simulator at {}", self.address),
+                            trigger_number: wanted,
+                            waited: wait,
+                        });
+                    }
+                    Err(()) => return Err(self.ended()),
+                };
             let FrameHeader { shot_id, exposure, .. } = frame.header;
             let later = if shot_id == FREE_RUNNING {
                 let apart = exposure.0.abs_diff(shot.strobe_start.0) > SAME_MOMENT_US;
@@ -203,7 +207,10 @@ impl Camera for SimCamera {
             match later {
                 ..0 => {}
                 0 => return self.image_of(frame),
-                _ => return Err(CameraError::Skipped { wanted, came: shot_id }),
+                _ => {
+                    self.early = Some(frame);
+                    return Err(CameraError::Skipped { wanted, came: shot_id });
+                }
             }
         }
     }

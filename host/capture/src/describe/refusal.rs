@@ -27,6 +27,9 @@ pub fn refusal_text(error: &RequestError) -> String {
         RequestError::QueueFull { outstanding } => {
             format!("more than {outstanding} requests wait for their answers: ask again")
         }
+        RequestError::Period { min } => {
+            format!("the camera takes {} us for an exposure and its read-out; ask for a longer period", min.0)
+        }
         RequestError::OutOfRange { axis, asked, min, max } => format!(
             "{:.3} um is outside the limits of the {}, {:.3} to {:.3} um",
             um(*asked),

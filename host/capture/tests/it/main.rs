@@ -3,6 +3,7 @@
 
 mod cameras;
 mod command_camera;
+mod continuous;
 #[cfg(feature = "genicam")]
 mod genicam_camera;
 mod line;

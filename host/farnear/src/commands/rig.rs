@@ -5,6 +5,7 @@ mod board;
 mod calibrate;
 mod capture;
 mod check;
+mod continuous;
 mod correct;
 mod focus;
 mod info;
@@ -38,6 +39,7 @@ enum Job {
     Halt(motion::HaltArguments),
     Focus(focus::Arguments),
     Capture(capture::Arguments),
+    Continuous(continuous::Arguments),
     Sequence(sequence::Arguments),
     Calibrate(calibrate::Arguments),
     Sun(sun::Arguments),
@@ -60,6 +62,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Job::Halt(arguments) => motion::halt(arguments),
         Job::Focus(arguments) => focus::run(arguments),
         Job::Capture(arguments) => capture::run(arguments),
+        Job::Continuous(arguments) => continuous::run(arguments),
         Job::Sequence(arguments) => sequence::run(arguments),
         Job::Calibrate(arguments) => calibrate::run(arguments),
         Job::Sun(arguments) => sun::run(arguments),

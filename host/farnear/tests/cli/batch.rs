@@ -242,37 +242,39 @@ fn each_kind_gives_what_its_command_gives() {
     }
     let manifest = folder.file(
         "all.csv",
-        "do,far,near,depth,file,video,masks,views,method,out,fill,correction,learn_first,centred,template,camera,lat,lon,time,model\n\
-         depth,pair/far.png,pair/near.png,,,,,,whitened,b/depth,true,,,,,,,,,\n\
-         correct,,,a.npy,,,,,,b/corrected.npy,,learned.toml,,,,,,,,\n\
-         silhouettes-video,,,,,video,,,,b/video,,,true,true,,,,,,\n\
-         silhouettes-markers,,,,walk.csv,,,2,,b/markers,,,,,suit.toml,,,,,\n\
-         shadow-remove,,,,,,masks,,,b/clean,,,,,,camera.toml,52.38,-1.56,2014-06-23T11:30:00Z,\n\
-         recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm\n",
+        "do,far,near,depth,file,video,masks,views,method,out,fill,correction,learn_first,centred,template,camera,lat,lon,time,model,among\n\
+         depth,pair/far.png,pair/near.png,,,,,,whitened,b/depth,true,,,,,,,,,,\n\
+         correct,,,a.npy,,,,,,b/corrected.npy,,learned.toml,,,,,,,,,\n\
+         silhouettes-video,,,,,video,,,,b/video,,,true,true,,,,,,,\n\
+         silhouettes-markers,,,,walk.csv,,,2,,b/markers,,,,,suit.toml,,,,,,\n\
+         shadow-remove,,,,,,masks,,,b/clean,,,,,,camera.toml,52.38,-1.56,2014-06-23T11:30:00Z,,\n\
+         recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm,\n\
+         recognise,,,,,,,people/p01-dig-1/view1,,b/shipped,,,,,,,,,,everyday,dig;kick\n",
     );
-    assert_eq!(states(&["batch", &manifest]), ["done"; 6]);
-    assert_eq!(states(&["batch", &manifest]), ["already"; 6]);
+    assert_eq!(states(&["batch", &manifest]), ["done"; 7]);
+    assert_eq!(states(&["batch", &manifest]), ["already"; 7]);
     let mut made = files(&folder.path("b"));
-    let answer = made.remove("answer/recognition.json").expect("an answer");
-    assert_eq!(made.remove("answer/answers.jsonl").expect("answers").split(|byte| *byte == b'\n').count(), {
-        let (stdout, _) = succeeds(
-            farnear(&["activity", "recognise", "people/p01-dig-1/view1", "--model", "model.fnm"])
-                .current_dir(folder.path("")),
-        );
-        stdout.lines().count()
-    });
+    for (place, model) in [("answer", &["model.fnm"][..]), ("shipped", &["everyday", "--among", "dig,kick"])]
+    {
+        let recognise = || {
+            let mut command = farnear(&["activity", "recognise", "people/p01-dig-1/view1", "--model"]);
+            command.args(model).current_dir(folder.path(""));
+            command
+        };
+        let answers = made.remove(&format!("{place}/answers.jsonl")).expect("answers");
+        let (stdout, _) = succeeds(&mut recognise());
+        assert_eq!(answers.split(|byte| *byte == b'\n').count(), stdout.lines().count());
+        let answer = made.remove(&format!("{place}/recognition.json")).expect("an answer");
+        let mut answer: Value = serde_json::from_slice(&answer).expect("JSON");
+        let whole = figures(recognise().arg("--json"));
+        answer["seconds_per_frame"] = whole["seconds_per_frame"].clone();
+        assert_eq!(answer, whole);
+    }
     made.retain(|name, _| !name.ends_with("batch.toml"));
     let expected = files(&folder.path("c"));
     assert_eq!(made.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>());
     let other: Vec<&String> = made.keys().filter(|name| made[*name] != expected[*name]).collect();
     assert!(other.is_empty(), "other bytes than the command's: {other:?}");
-    let whole = figures(
-        farnear(&["activity", "recognise", "people/p01-dig-1/view1", "--model", "model.fnm", "--json"])
-            .current_dir(folder.path("")),
-    );
-    let mut answer: Value = serde_json::from_slice(&answer).expect("JSON");
-    answer["seconds_per_frame"] = whole["seconds_per_frame"].clone();
-    assert_eq!(answer, whole);
 }
 
 #[test]

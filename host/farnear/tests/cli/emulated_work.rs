@@ -81,6 +81,29 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_continuous_capture_leaves_pairs_and_a_row_for_each_frame() {
+    let folder = Folder::new();
+    let out = folder.text("run");
+    let run =
+        ["continuous", "--optics", rig_optics(), "--rate", "40", "--frames", "7", "--out", &out, "--json"];
+    let found = figures(&mut on_the_rig(&run));
+    assert_eq!((number(&found, "exposures"), number(&found, "cycles")), (7.0, 3.0), "{found}");
+    assert_eq!((number(&found, "jitter_us"), number(&found, "rate_hz")), (0.0, 40.0), "{found}");
+    assert_eq!(number(&found, "exposures_outside_window"), 0.0, "{found}");
+    let table = fs::read_to_string(folder.path("run/frames.csv")).expect("a table");
+    assert_eq!(table.lines().count(), 1 + 7, "{table}");
+    for pair in 0..3 {
+        let record = folder.path(&format!("run/pair-{pair:05}/capture.toml"));
+        let record: toml::Table = fs::read_to_string(record).expect("a record").parse().expect("TOML");
+        assert_eq!(record["exposure"].as_array().map(Vec::len), Some(2));
+    }
+    // Faster than the camera: refused, with what is possible.
+    let run = ["continuous", "--optics", rig_optics(), "--rate", "100", "--frames", "7"];
+    fails(&mut on_the_rig(&run), 1, &["refused", "15500 us"]);
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn flat_targets_are_captured_listed_and_not_captured_twice() {
     let folder = Folder::new();
     let out = folder.text("series");

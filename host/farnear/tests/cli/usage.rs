@@ -38,6 +38,7 @@ const COMMANDS: &[&[&str]] = &[
     &["rig", "focus"],
     &["rig", "capture"],
     &["rig", "sequence"],
+    &["rig", "continuous"],
     &["rig", "calibrate"],
     &["rig", "calibrate", "travel"],
     &["rig", "calibrate", "backlash"],

@@ -41,14 +41,22 @@ impl Model {
     /// # Errors
     /// A file that cannot be read, is damaged, or of another version; a path that is neither.
     pub fn read(path: &Path) -> Result<Self> {
-        let named = path.to_str().and_then(Shipped::named).filter(|_| !path.exists());
-        if let Some(shipped) = named {
+        if let Some(shipped) = Self::shipped(path) {
             let [recogniser, cut_out] = shipped.recognisers()?;
             return Ok(Self { path: path.into(), recogniser, cut_out: Some(cut_out) });
         }
         let bytes = fs::read(path).map_err(WorkflowError::read("the model", path))?;
         let recogniser = Recogniser::from_bytes(&bytes).about(|| path.display().to_string())?;
         Ok(Self { path: path.into(), recogniser, cut_out: None })
+    }
+
+    fn shipped(path: &Path) -> Option<&'static Shipped> {
+        path.to_str().and_then(Shipped::named).filter(|_| !path.exists())
+    }
+
+    /// The file that [`Model::read`] reads; none for a model that comes with the program.
+    pub fn file(path: &Path) -> Option<&Path> {
+        Self::shipped(path).is_none().then_some(path)
     }
 
     /// What recognises masks of that kind.

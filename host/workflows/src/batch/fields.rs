@@ -80,12 +80,19 @@ impl Fields {
         }
     }
 
+    /// A list of texts, in CSV separated by `;`; empty where it is not there.
+    pub fn texts(&mut self, name: &'static str) -> Vec<String> {
+        self.taken.insert(name);
+        let parts = self.values.get(name).into_iter().flatten().flat_map(|value| value.split(';'));
+        parts.map(str::trim).filter(|part| !part.is_empty()).map(Into::into).collect()
+    }
+
     /// A list of paths, in CSV separated by `;`.
     pub fn paths(&mut self, name: &'static str) -> Result<Vec<PathBuf>, BatchError> {
-        self.taken.insert(name);
-        let values = self.values.get(name).ok_or(BatchError::MissingField { name })?;
-        let parts = values.iter().flat_map(|value| value.split(';')).map(str::trim);
-        Ok(parts.filter(|part| !part.is_empty()).map(|part| self.base.join(part)).collect())
+        if !self.values.contains_key(name) {
+            return Err(BatchError::MissingField { name });
+        }
+        Ok(self.texts(name).into_iter().map(|part| self.base.join(part)).collect())
     }
 
     /// A path that must be there, relative to the manifest.

@@ -4,25 +4,16 @@ use std::{path::PathBuf, time::Instant};
 
 use farnear_capture::{
     camera::Image,
-    expose::expose,
-    plan::{SensorPair, coarse_for, fine_for},
-    ready::{base_nm, base_when_homed_nm, ensure_homed},
-    sequence::ShotDefaults,
+    continuous::{Continuous, Cycles, Frame, Outcome, Pace},
+    pair::{Exposures, reach},
+    plan::SensorPair,
 };
 use farnear_depth::pipeline::{DepthMap, Processor, Settings};
-use farnear_protocol::message::{Axis, Shot};
+use farnear_protocol::{Micros, Settle, message::Axis};
 use ndarray::Array2;
 
 use super::{RigAddress, camera::CameraSettings, camera::EquippedRig};
-use crate::{
-    context::Context,
-    error::{Result, WorkflowError},
-    operators,
-    optics::GivenOptics,
-};
-
-/// Pairs of one program: the board takes up to 64 shots, and one program costs one arming.
-const PAIRS: usize = 8;
+use crate::{context::Context, error::Result, operators, optics::GivenOptics};
 
 /// What is looked at, and how depth is computed.
 #[derive(Clone, PartialEq, Debug)]
@@ -63,48 +54,37 @@ pub fn watch(
     let designed = operators::find(None, &optics.optics)?;
     let mut processor = Processor::new(&designed, &optics.optics, &settings.computation)?;
     let mut equipped = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
-    let shots = ready(&equipped, &optics, settings, context)?;
-    let EquippedRig { camera, rig } = &mut equipped;
-    loop {
-        let mut far: Option<(Image, u64)> = None;
-        expose(&rig.client, camera.as_mut(), &shots, settings.camera.image_wait, |record, image| {
-            context.cancel.check("watching depth")?;
-            let Some((far_image, begin_us)) = far.take() else {
-                far = Some((image, record.strobe_start.0));
-                return Ok(());
-            };
-            let arrived = Instant::now();
-            let map = processor.run(grey(&far_image).view(), grey(&image).view())?;
-            let pair_ms = record.strobe_end.0.saturating_sub(begin_us) as f64 / 1e3;
-            let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
-            on_depth(LiveDepth { far: &far_image, map, pair_ms, latency_ms })
-        })
-        .map_err(|error: WorkflowError| error)?;
-    }
-}
-
-/// Brings the stage where the piezo reaches both focus settings, and gives the program.
-fn ready(
-    equipped: &EquippedRig,
-    optics: &GivenOptics,
-    settings: &LiveDepthSettings,
-    context: &Context<'_>,
-) -> Result<Vec<Shot>> {
-    let client = &equipped.rig.client;
-    let limits = client.hello().limits;
     let range = optics.optics.working_range();
-    let pair = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-    coarse_for(&pair, base_when_homed_nm(client, &client.status()?), &limits)?;
-    ensure_homed(client, &mut |what| context.say(what))?;
-    let base = base_nm(client, &client.status()?);
-    let coarse = client.move_to(Axis::SensorCoarse, coarse_for(&pair, base, &limits)?)?;
-    let defaults = ShotDefaults { exposure: settings.camera.exposure, ..ShotDefaults::default() };
-    let shot = |sensor_mm| -> Result<Shot> {
-        Ok(defaults.shot(Axis::SensorFine, fine_for(sensor_mm, base, coarse.measured, &limits)?))
+    let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
+    let exposures = Exposures {
+        exposure: settings.camera.exposure,
+        settle: Settle::of_shot(Axis::SensorFine),
+        ..Exposures::default()
     };
-    let both = [shot(pair.far_mm)?, shot(pair.near_mm)?];
-    let pairs = PAIRS.min(usize::from(limits.shots_max) / 2).max(1);
-    Ok(both.iter().copied().cycle().take(2 * pairs).collect())
+    let EquippedRig { camera, rig } = &mut equipped;
+    let shots = reach(&rig.client, &sensor, &exposures, &mut |what| context.say(what))?.shots;
+    let pace = Pace { period: Micros(0), exposures: 0 };
+    let wait = settings.camera.image_wait;
+    let mut stream = Continuous::start(&rig.client, camera.as_mut(), &shots, pace, wait)?;
+    let mut cycles = Cycles::of(&shots);
+    while let Some(outcome) = stream.outcome()? {
+        context.cancel.check("watching depth")?;
+        let Outcome::Taken(frame) = outcome else { continue };
+        let Some([far, near]) = cycles.push(*frame).and_then(|cycle| <[Frame; 2]>::try_from(cycle).ok())
+        else {
+            continue;
+        };
+        // Where this computer is slower than the rig, the newest pair is shown and not one from long ago.
+        if stream.waiting()? >= shots.len() {
+            continue;
+        }
+        let arrived = Instant::now();
+        let map = processor.run(grey(&far.image).view(), grey(&near.image).view())?;
+        let pair_us = near.record.strobe_end.0.saturating_sub(far.record.strobe_start.0);
+        let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+        on_depth(LiveDepth { far: &far.image, map, pair_ms: pair_us as f64 / 1e3, latency_ms })?;
+    }
+    Ok(())
 }
 
 /// Grey values from 0 to 1.

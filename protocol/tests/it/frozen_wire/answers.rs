@@ -150,6 +150,7 @@ fn errors() -> Vec<RequestError> {
         RequestError::NotInSession,
         RequestError::IdNotNew { last: 300 },
         RequestError::QueueFull { outstanding: 8 },
+        RequestError::Period { min: Micros(15_500) },
     ]
 }
 
@@ -210,6 +211,7 @@ fn errors_are_frozen() {
             "0403030101010a0403020114d14059e900",
             "0403030101010c0403020115ac0296b6584200",
             "0403030101010b0403020116083fbed21f00",
+            "0403030101010c04030201178c79eeee8f1300",
         ],
     );
 }

@@ -3,7 +3,7 @@
 use farnear_protocol::{
     BoardMicros, Event, EventKind, Micros, Nanometres,
     frame::Kind,
-    message::{Axis, Calibration, Failure, RecordName, ResetCause},
+    message::{Axis, Calibration, DropReason, Failure, RecordName, ResetCause},
 };
 
 use super::{
@@ -28,6 +28,10 @@ fn failures() -> Vec<Failure> {
         Failure::Alarm { number: 12 },
         Failure::Implausible,
     ]
+}
+
+fn drop_reasons() -> [DropReason; 3] {
+    [DropReason::NotSettled { error: Nanometres(-120) }, DropReason::CameraBusy, DropReason::NoStrobe]
 }
 
 fn calibrations() -> Vec<Calibration> {
@@ -69,7 +73,11 @@ fn table() -> Vec<EventKind> {
         },
         EventKind::Paused { request: 9, index: 2 },
         EventKind::RecordRepaired { record: RecordName::Correction, sequence: 41 },
+        EventKind::FrameTaken { request: 4, frame: 300, deviation: Nanometres(11), shot: RECORD },
     ]);
+    let dropped = |reason| EventKind::FrameDropped { request: 4, frame: 301, index: 1, reason };
+    table.extend(drop_reasons().map(dropped));
+    table.push(EventKind::ContinuousDone { request: 4, exposures: 300, dropped: 1 });
     table
 }
 
@@ -77,6 +85,7 @@ fn table() -> Vec<EventKind> {
 fn events() {
     lists_every_variant(&failures());
     lists_every_variant(&calibrations());
+    lists_every_variant(&drop_reasons());
     lists_every_variant(&table());
     let event = |kind: &EventKind| Event { time: BoardMicros(1_000_000), kind: kind.clone() };
     let found: Vec<_> = table().iter().map(|kind| wire(Kind::Event, 7, &event(kind))).collect();
@@ -128,6 +137,11 @@ fn events() {
             "0403040701011604030201c0843d0a0901ac02f0a2048827f99d758700",
             "0403040701010f04030201c0843d0b09026cbda09a00",
             "0403040701010f04030201c0843d0c0429e42cfd8600",
+            "0403040701010e04030201c0843d0d04ac021601200201b0df15be93c505b8df15f901f06080897a94897a9cb07a882763f9aa3600",
+            "0403040701010d04030201c0843d0e04ad020107ef01c9e3ce8a00",
+            "0403040701011204030201c0843d0e04ad0201013911fce900",
+            "0403040701011204030201c0843d0e04ad0201028340f57000",
+            "0403040701011104030201c0843d0f04ac0201a63f7cac00",
         ],
     );
 }

@@ -149,6 +149,8 @@ fn an_event_fits_an_answer_too() {
     };
     let event = Event { time: TIME, kind: EventKind::ShotDone { request: u32::MAX, shot } };
     length(Kind::Response, &Response::Event(event));
+    let kind = EventKind::FrameTaken { request: u32::MAX, frame: u32::MAX, deviation: NM, shot };
+    length(Kind::Response, &Response::Event(Event { time: TIME, kind }));
 }
 
 #[test]

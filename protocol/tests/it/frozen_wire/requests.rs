@@ -54,6 +54,7 @@ pub fn table() -> Vec<Request> {
         Request::CorrectRow { row: 479 },
         Request::GetRow { first: 568, count: 72 },
         Request::OpenSession,
+        Request::RunContinuously { period: Micros(40_000), exposures: 15_000, silence },
     ]
 }
 
@@ -107,6 +108,7 @@ fn requests() {
             "1603010d0c0b0a04030201080706051cdf03e1c64b4a00",
             "1303010d0c0b0a04030201080706051db80448049327c700",
             "1403010d0c0b0a04030201080706051e15e0768c00",
+            "1c03010d0c0b0a04030201080706051fc0b802987580897a199a08ce00",
         ],
     );
 }

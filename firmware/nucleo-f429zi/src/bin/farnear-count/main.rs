@@ -46,7 +46,7 @@ impl Routine {
 #[path = "../../clock_tree.rs"]
 mod clock_tree;
 
-const ROUTINES: usize = 19;
+const ROUTINES: usize = 21;
 
 /// What is counted.
 // SAFETY: no other symbol has this name.
@@ -79,7 +79,9 @@ pub static FARNEAR_ROUTINES: [Routine; ROUTINES] = [
     Routine::new("control tick, both steppers at 40 kHz and the piezo, the longest", "tick", 1, || {
         rig::longest_tick(&[Work::Coarse, Work::Lens, Work::Fine])
     }),
-    Routine::new("a move request carried out, its last byte", "request", 1, rig::move_request),
+    Routine::new("a move request, its last byte", "request", 1, || rig::move_request(0)),
+    Routine::new("a move request carried out", "request", 1, || rig::move_request(1)),
+    Routine::new("a move request's answer as a frame", "request", 1, || rig::move_request(2)),
     Routine::new("start of the rig from its memory", "start", 1, rig::start),
 ];
 

@@ -174,18 +174,18 @@ impl Bench {
         while self.rig.transmit().is_some() {}
     }
 
-    /// Sends a request; gives the cycles of its last byte.
-    fn ask(&mut self, request: &Request) -> u32 {
+    /// Sends a request; gives the cycles of its last byte, of carrying it out, and of its answer's frame.
+    fn ask(&mut self, request: &Request) -> [u32; 3] {
         self.id += 1;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.id, boot: 1 };
         let Some(bytes) = encode(header, &Call { session: 1, request: request.clone() }) else { fail() };
         let now = BoardMicros(self.now);
         let mut last = 0;
+        let rig = &mut self.rig;
         for byte in bytes {
-            let rig = &mut self.rig;
-            last = cycles(|| rig.receive(byte, now));
+            last = cycles(|| rig.receive(byte));
         }
-        last
+        [last, cycles(|| rig.serve(now)), cycles(|| rig.serve(now))]
     }
 
     fn run(&mut self, ticks: u32) {
@@ -236,10 +236,11 @@ pub fn longest_tick(works: &[Work]) -> u32 {
     bench.longest
 }
 
-pub fn move_request() -> u32 {
+/// A step of a move request: its last byte, carrying it out, its answer's frame.
+pub fn move_request(step: usize) -> u32 {
     let mut bench = Bench::new();
     bench.home(Axis::SensorCoarse);
-    bench.ask(&go(Axis::SensorCoarse, 3_000_000))
+    bench.ask(&go(Axis::SensorCoarse, 3_000_000))[step]
 }
 
 pub fn start() -> u32 {

@@ -1,7 +1,9 @@
 //! A model of the rig's hardware: two stepper axes, piezo, gauge, camera, the safety inputs. And its faults.
 
 use farnear_protocol::{BoardMicros, Micros};
-use farnear_rig::io::{DAC_FULL_SCALE_NM, ExposureEdges, GAUGE_CODE_ZERO, Inputs, Outputs, StrobeEdges};
+use farnear_rig::io::{
+    DAC_FULL_SCALE_NM, ExposureEdges, GAUGE_CODE_ZERO, Inputs, Outputs, StrobeEdges, Trigger,
+};
 
 use super::motor::Motor;
 
@@ -131,11 +133,12 @@ impl Hardware {
         self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
         self.lens.run(&outputs.lens, now, self.faults.emergency_stop);
         self.dac = outputs.piezo_dac.unwrap_or(self.dac);
-        if let Some(length) = outputs.trigger {
+        if let Some(Trigger { at, length }) = outputs.trigger {
             assert!(self.exposure.is_none(), "triggered while exposing");
             assert!(!outputs.listen, "triggered while listening");
-            self.exposure = Some((BoardMicros(now + 10), length));
-            self.triggers.push((now + 10, length));
+            let rises = at.0.max(now + 10);
+            self.exposure = Some((BoardMicros(rises), length));
+            self.triggers.push((rises, length));
             self.piezo_at_trigger.push(self.piezo_nm);
         }
         if outputs.listen {

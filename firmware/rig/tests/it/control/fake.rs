@@ -15,6 +15,7 @@ use crate::bench::{BOOT, SESSION, request_frame};
 pub enum Call {
     Now,
     Receive,
+    SampleGauge,
     Gauge,
     Coarse,
     Lens,
@@ -119,6 +120,10 @@ impl Board for Fake {
         self.did(Call::Receive);
         self.received.drain(..).for_each(take);
         self.hardware.faults.link_overflow
+    }
+
+    fn sample_gauge(&mut self) {
+        self.did(Call::SampleGauge);
     }
 
     fn gauge(&mut self) -> Option<u32> {

@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::{BatchError, Call, Fields, Shared, Work, value};
 use crate::{
     activity::{
-        recognition::{Recognition, RecognitionSettings},
+        recognition::{Model, Recognition, RecognitionSettings},
         views::{View, ViewKind},
     },
     context::Context,
@@ -129,12 +129,13 @@ struct Recognising {
     model: PathBuf,
     views: Vec<PathBuf>,
     kind: Option<ViewKind>,
+    among: Vec<String>,
     window: Option<usize>,
 }
 
 pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Work>> {
     let settings = Recognising {
-        model: fields.path("model")?,
+        model: fields.name_or_file("model")?.ok_or(BatchError::MissingField { name: "model" })?,
         views: fields.paths("views")?,
         kind: match fields.optional_text("as")?.as_deref() {
             None => None,
@@ -142,11 +143,13 @@ pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Work>> {
             Some("video") => Some(ViewKind::Video),
             Some(other) => return Err(BatchError::field("as", other, "expected masks or video").into()),
         },
+        among: fields.texts("among"),
         window: fields.optional("window")?,
     };
     fields.path("out")?;
     let mut inputs = settings.views.clone();
-    inputs.push(settings.model.clone());
+    // One that comes with the program is the program's version.
+    inputs.extend(Model::file(&settings.model).map(Path::to_path_buf));
     Ok(Box::new(Call { inputs, settings, run: recognised }))
 }
 
@@ -158,7 +161,7 @@ fn recognised(settings: &Recognising, out: &Path, shared: &Shared, context: &Con
         Ok(View { path: path.clone(), kind })
     };
     let views = settings.views.iter().map(view).collect::<Result<Vec<View>>>()?;
-    let settings = RecognitionSettings { views, window: settings.window };
+    let settings = RecognitionSettings { views, among: settings.among.clone(), window: settings.window };
     let mut work = Recognition::begin(&model, &settings)?;
     let mut answers = String::new();
     while let Some(answer) = work.next(context)? {

@@ -1,0 +1,117 @@
+//! Continuous capture with a scripted board: what comes, what is dropped, what is lost on the way, and how it ends.
+
+use std::time::Duration;
+
+use farnear_capture::{
+    ClientError,
+    camera::{Camera, CameraError, Image},
+    continuous::{Continuous, Loss, Outcome, Pace},
+    expose::CaptureError,
+};
+use farnear_protocol::{
+    message::{DropReason, RequestError, Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
+};
+use farnear_scripted_board::Faults;
+use ndarray::Array2;
+
+use crate::scripted::{SHOT, connect};
+
+const WAIT: Duration = Duration::from_millis(20);
+const PAIR: [Shot; 2] = [SHOT, Shot { target: Nanometres(150_000), ..SHOT }];
+
+/// Gives each exposure a picture that tells its trigger number, but for those that it loses.
+#[derive(Default)]
+struct Losing {
+    lost: Vec<u32>,
+}
+
+impl Camera for Losing {
+    fn kind(&self) -> &'static str {
+        "losing"
+    }
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn image(&mut self, shot: &ShotRecord, waited: Duration) -> Result<Image, CameraError> {
+        let trigger_number = shot.trigger_number;
+        if self.lost.contains(&trigger_number) {
+            return Err(CameraError::Late { camera: "it".into(), trigger_number, waited });
+        }
+        Ok(Image { pixels: Array2::from_elem((3, 4), trigger_number as u16), bits: 8 })
+    }
+}
+
+/// Runs so many exposures; of each frame its picture, or why there is none.
+fn run(faults: Faults, mut camera: Losing, exposures: u32) -> Result<Vec<Result<u16, Loss>>, CaptureError> {
+    let (client, _peer) = connect(faults);
+    let pace = Pace { period: Micros(40_000), exposures };
+    let mut stream = Continuous::start(&client, &mut camera, &PAIR, pace, WAIT)?;
+    let mut found = Vec::new();
+    while let Some(outcome) = stream.outcome()? {
+        let (number, what) = match outcome {
+            Outcome::Taken(frame) => (frame.number, Ok(frame.image.pixels[[0, 0]])),
+            Outcome::Dropped { number, loss } => (number, Err(loss)),
+        };
+        assert_eq!(number as usize, found.len(), "a frame was passed over");
+        found.push(what);
+    }
+    Ok(found)
+}
+
+#[test]
+fn every_frame_comes_with_its_picture_or_its_reason() {
+    let dropped = Faults { drop_frames: vec![2, 3], ..Faults::default() };
+    let frames = run(dropped, Losing { lost: vec![3] }, 5).unwrap();
+    let busy = || Err(Loss::Board(DropReason::CameraBusy));
+    assert_eq!(frames[..4], [Ok(0), Ok(1), busy(), busy()]);
+    assert_eq!((&frames[4], &frames[6]), (&Ok(2), &Ok(4)));
+    assert!(matches!(&frames[5], Err(Loss::Image { trigger_number: 3, .. })), "{:?}", frames[5]);
+    assert_eq!(frames.len(), 7);
+}
+
+#[test]
+fn events_that_the_board_forgot_are_told_and_do_not_end_it() {
+    // Event 0 is the start: 3 and 4 tell of the frames 2 and 3.
+    let faults = Faults { lose_events: vec![3, 4], forgetful: true, ..Faults::default() };
+    let frames = run(faults, Losing::default(), 6).unwrap();
+    assert_eq!(frames, [Ok(0), Ok(1), Err(Loss::Untold), Err(Loss::Untold), Ok(4), Ok(5)]);
+}
+
+#[test]
+fn a_camera_that_gives_nothing_ends_it() {
+    let error = run(Faults::default(), Losing { lost: (0..100).collect() }, 30).unwrap_err();
+    assert!(matches!(error, CaptureError::Camera(CameraError::Late { .. })), "{error:?}");
+}
+
+#[test]
+fn it_is_stopped_by_letting_go_and_what_waits_is_counted() {
+    let (client, peer) = connect(Faults::default());
+    let mut camera = Losing::default();
+    let pace = Pace { period: Micros(0), exposures: 0 };
+    let mut stream = Continuous::start(&client, &mut camera, &PAIR, pace, WAIT).unwrap();
+    for number in 0..3 {
+        let Some(Outcome::Taken(frame)) = stream.outcome().unwrap() else { panic!("no exposure {number}") };
+        assert_eq!((frame.number, frame.record.index), (number, (number % 2) as u8));
+    }
+    while stream.waiting().unwrap() < 37 {
+        std::thread::yield_now(); // the scripted board takes 40 at once
+    }
+    assert_eq!(peer.board().stops, 0);
+    drop(stream);
+    assert_eq!(peer.board().stops, 1);
+    assert!(client.status().is_ok());
+}
+
+#[test]
+fn a_refusal_is_told() {
+    let (client, _peer) = connect(Faults::default());
+    let pace = Pace { period: Micros(0), exposures: 1 };
+    let refused = Continuous::start(&client, &mut Losing::default(), &[], pace, WAIT).err().unwrap();
+    let CaptureError::Board(ClientError::Refused { error: RequestError::Shot { .. }, .. }) = refused else {
+        panic!("{refused:?}")
+    };
+}

@@ -1,0 +1,102 @@
+//! What a continuous capture leaves behind: a capture folder for each pair, or an image for each exposure, and `frames.csv` with
+//! a row for each frame, taken or not.
+
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+};
+
+use farnear_capture::{
+    Client,
+    continuous::{Frame, Loss, Outcome},
+    describe::drop_text,
+    pair::pair_of,
+    plan::SensorPair,
+    record::{Circumstances, begin_folder, finish_folder, record_of},
+    work::Moved,
+};
+use farnear_files::{
+    image_file::encode_png,
+    staging::{Staging, write_file},
+};
+
+use crate::error::{Result, WorkflowError};
+
+/// The folder.
+pub struct Folder {
+    path: PathBuf,
+    rows: String,
+    pairs: u32,
+}
+
+impl Folder {
+    /// Begins a new folder; one that holds something already is refused. What is whole stays, also where the capture ends early.
+    pub fn begin(path: &Path) -> Result<Self> {
+        Staging::new_folder(path)
+            .and_then(Staging::finish)
+            .map_err(farnear_capture::record::RecordError::from)?;
+        let rows =
+            "frame,shot,repeat,trigger_number,trigger_us,strobe_end_us,settle_us,deviation_nm,dropped\n"
+                .into();
+        Ok(Self { path: path.into(), rows, pairs: 0 })
+    }
+
+    /// Keeps a frame's row.
+    pub fn note(&mut self, outcome: &Outcome) {
+        // Writing to a string cannot fail.
+        let _ = match outcome {
+            Outcome::Taken(frame) => {
+                let (record, deviation) = (&frame.record, frame.deviation.0);
+                writeln!(
+                    self.rows,
+                    "{},{},{},{},{},{},{},{deviation},",
+                    frame.number,
+                    record.index,
+                    record.repeat,
+                    record.trigger_number,
+                    record.trigger.0,
+                    record.strobe_end.0,
+                    record.settle.0
+                )
+            }
+            Outcome::Dropped { number, loss } => {
+                let why = match loss {
+                    Loss::Board(reason) => drop_text(*reason),
+                    Loss::Untold => "the board's word was lost".into(),
+                    Loss::Image { reason, .. } => reason.clone(),
+                };
+                writeln!(self.rows, "{number},,,,,,,,\"{}\"", why.replace('"', "'"))
+            }
+        };
+    }
+
+    /// Writes a pair's capture folder.
+    pub fn pair(
+        &mut self,
+        cycle: Vec<Frame>,
+        (sensor, coarse): (&SensorPair, Moved),
+        client: &Client,
+        circumstances: &Circumstances,
+    ) -> Result<()> {
+        let both = cycle.into_iter().map(|frame| (frame.record, frame.image)).collect::<Vec<_>>();
+        let Ok(both) = both.try_into() else { return Ok(()) }; // a cycle of another length is no pair
+        let pair = pair_of(both, sensor, coarse, &client.hello().limits)?;
+        let folder = begin_folder(&self.path.join(format!("pair-{:05}", self.pairs)))?;
+        finish_folder(folder, &pair, &record_of(&pair, client, circumstances.clone()))?;
+        self.pairs += 1;
+        Ok(())
+    }
+
+    /// Writes an image.
+    pub fn image(&self, frame: &Frame) -> Result<()> {
+        let path = self.path.join(format!("frame-{:06}-shot-{:02}.png", frame.number, frame.record.index));
+        let image = encode_png(frame.image.pixels.view(), frame.image.bits)
+            .map_err(farnear_capture::record::RecordError::from)?;
+        Ok(write_file(&path, &image)?)
+    }
+
+    /// Writes the table.
+    pub fn finish(self) -> Result<()> {
+        write_file(&self.path.join("frames.csv"), self.rows.as_bytes()).map_err(WorkflowError::from)
+    }
+}
