@@ -7,7 +7,7 @@
 //!
 //! A pause waits for the exposure that is under way; a resumed program settles anew.
 //!
-//! A continuous run goes from the last shot to the first, at a pace ([`pace`]) or as fast as it can, until it is stopped.
+//! A continuous run goes from the last shot to the first, at a pace or as fast as it can, until it is stopped.
 
 pub(crate) mod pace;
 

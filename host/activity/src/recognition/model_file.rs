@@ -50,7 +50,7 @@ enum SavedMap {
 enum SavedPattern {
     Thesis(OccupancyGrid),
     Codebook(Codebook),
-    Network(Network),
+    Network(Box<Network>),
 }
 
 impl Recogniser {

@@ -112,7 +112,7 @@ pub enum Pattern {
     /// A codebook of frame vectors.
     Codebook(Codebook),
     /// A network over frame vectors.
-    Network(Network),
+    Network(Box<Network>),
 }
 
 /// The learned space of frames and patterns.

@@ -44,7 +44,7 @@ pub struct LiveDepth<'a> {
 /// stopped before this returns.
 ///
 /// # Errors
-/// Optics, operators, camera, rig, computation; [`WorkflowError::Cancelled`] at the wished end; what `on_depth` gives.
+/// Optics, operators, camera, rig, computation; [`crate::WorkflowError::Cancelled`] at the wished end; what `on_depth` gives.
 pub fn watch(
     settings: &LiveDepthSettings,
     context: &Context<'_>,

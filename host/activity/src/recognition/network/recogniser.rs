@@ -51,7 +51,7 @@ impl Recogniser {
             train(&vectors, &labels, activities.len(), network, watch).ok_or(EmbeddingError::Stopped)?;
         let patterns: Vec<Array1<f32>> =
             vectors.par_iter().map(|frames| network.pattern(frames.view())).collect();
-        space.pattern = Pattern::Network(network);
+        space.pattern = Pattern::Network(Box::new(network));
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
         let mut recogniser = Self {
