@@ -8,7 +8,7 @@
 //! 2. Bytes from the link go to the rig, where whole requests wait. Then the rest of the hardware is read. The
 //!    emergency stop comes after the step timers: its circuit stops them by itself, and one that opens between the two
 //!    readings must not look like a timer that ran dry.
-//! 3. The rig decides, and its outputs are carried out.
+//! 3. A request to stop waits for nothing but what was asked before it. The rig decides, and its outputs are carried out.
 //! 4. One thing is done for the host, for a tick has time for one beside two motors and the piezo: a frame is sent where the link
 //!    takes one and there is something to say, answers and events first, then the log, which a host that asks without
 //!    a pause does not keep waiting for ever; or else an answer is put into its frame; or else a request is carried out. In a tick in
@@ -132,6 +132,9 @@ impl<'r> Control<'r> {
         let gauge_code = board.gauge();
         let inputs = read(board, gauge_code, link_overflow);
         self.tell_of_dry_queues(board, &inputs);
+        if self.rig.stop_waits() {
+            self.rig.serve(inputs.now);
+        }
         let outputs = self.rig.tick(&inputs);
         board.apply(&outputs);
         // Frames without a pause put it off by a tick at most; the memory's writes leave a tick out by themselves.

@@ -198,6 +198,11 @@ impl Rig {
         self.session.has_work()
     }
 
+    /// Whether a request to stop is among what waits for [`Self::serve`].
+    pub(crate) fn stop_waits(&self) -> bool {
+        self.session.stop_waits()
+    }
+
     /// Frames that came to their end, good and bad ones; wraps.
     pub(crate) const fn frames_received(&self) -> u32 {
         let link = self.session.counters();

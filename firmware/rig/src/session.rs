@@ -23,6 +23,8 @@ use heapless::Deque;
 
 use self::ids::Ids;
 
+/// Bytes of a [`Call`] whose request has no fields: the session and the request's number.
+const BARE_CALL: usize = 5;
 /// Answers remembered for retries.
 pub const REMEMBERED: usize = 8;
 /// Answers that may wait for the UART: what [`farnear_protocol::message::Hello::outstanding`] promises.
@@ -128,6 +130,15 @@ impl Session {
     /// Whether a request waits to be looked at.
     pub(crate) fn has_request(&self) -> bool {
         !self.frames.is_empty()
+    }
+
+    /// Whether a request to stop waits to be looked at. It has no fields, so its frame is among the shortest, and looking into those costs
+    /// next to nothing.
+    pub(crate) fn stop_waits(&self) -> bool {
+        let short = self.frames.iter().filter(|packet| packet.body.len() == BARE_CALL);
+        short
+            .filter_map(Packet::message)
+            .any(|call: Call| matches!(call.request, Request::Stop | Request::Halt))
     }
 
     /// Looks at the next request; gives it where it is new and was made for this boot and this session. What it is answered has

@@ -7,12 +7,14 @@ use farnear_protocol::{
 };
 
 const DEADLINE: Micros = Micros(400_000);
+/// Within this long a request is answered.
+const ANSWER_US: u64 = 2_000;
 
 fn move_off(bench: &mut Bench, silence: Micros) -> u32 {
     bench.home_axis(Axis::SensorCoarse);
     let move_off = Request::Move { axis: Axis::SensorCoarse, target: Nanometres(12_000_000), silence };
     let id = bench.send(&move_off);
-    bench.rig.advance_us(1_000).expect("runs");
+    bench.rig.advance_us(ANSWER_US).expect("runs");
     assert_eq!(bench.answers(), [(id, Ok(Response::Accepted))]);
     id
 }
@@ -22,7 +24,7 @@ fn a_silent_host_stops_the_move_within_its_deadline() {
     let mut bench = Bench::new(1);
     let begin_ns = bench.report().now_ns;
     let request = move_off(&mut bench, DEADLINE);
-    let begin_ns = begin_ns.max(bench.report().now_ns - 1_000_000);
+    let begin_ns = begin_ns.max(bench.report().now_ns - 1_000 * ANSWER_US);
     let end = bench.settle();
     assert!(matches!(end, EventKind::Failed { reason: Failure::Alarm { .. }, .. }), "{end:?}");
     let asked = bench.events.iter().filter(|event| event.kind == EventKind::StillThere { request });
