@@ -15,6 +15,7 @@ mod install;
 mod instructions;
 mod python;
 mod run;
+mod site;
 mod sizes;
 mod test;
 mod test_programs;
@@ -59,6 +60,8 @@ enum Job {
     Bench(bench::Arguments),
     /// Measure the accuracy on rendered (and, where present, real) scenes and write the accuracy pages.
     Evaluate(evaluate::Arguments),
+    /// The documents as a site, with search and every command: out/site/html.
+    Site,
     /// Install farnear and farnear-sim (with the firmware's ELF beside it) into cargo's bin folder.
     Install,
 }
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Job::Fuzz { seconds } => fuzz::run(seconds),
         Job::Bench(arguments) => bench::run(&arguments),
         Job::Evaluate(arguments) => evaluate::run(&arguments),
+        Job::Site => site::run(),
         Job::Install => install::run(),
     };
     match result {

@@ -28,7 +28,7 @@ const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3,
 pub fn run(elf: &Path) -> Result<Counts> {
     let tests = ROOT.join("python/tests");
     let folder = target_folder().join("python-tests");
-    let python = match environment(&folder) {
+    let python = match environment(&folder, &NEEDS) {
         Ok(python) => python,
         Err(missing) => {
             eprintln!("skipped: the Python package ({missing})");
@@ -61,11 +61,11 @@ pub fn run(elf: &Path) -> Result<Counts> {
     })
 }
 
-/// The Python of an environment with what the tests need, made where it is not there; else what is missing.
-fn environment(folder: &Path) -> Result<PathBuf, String> {
+/// The Python of an environment with what is needed, made where it is not there; else what is missing.
+pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     let venv = folder.join("venv");
     let (python, whole) = (venv.join("bin/python"), folder.join("needs"));
-    if fs::read_to_string(&whole).is_ok_and(|needs| needs == NEEDS.join("\n"))
+    if fs::read_to_string(&whole).is_ok_and(|made| made == needs.join("\n"))
         && quiet(Command::new(&python).arg("-V"))
     {
         return Ok(python);
@@ -78,12 +78,12 @@ fn environment(folder: &Path) -> Result<PathBuf, String> {
     if !quiet(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
         return Err("python3 -m venv makes no environment; Debian's package is python3-venv".into());
     }
-    eprintln!("fetching {}", NEEDS.join(", "));
+    eprintln!("fetching {}", needs.join(", "));
     let fetch = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:"];
-    if !quiet(Command::new(&python).args(fetch).args(NEEDS)) {
-        return Err(format!("pip cannot fetch {}", NEEDS.join(", ")));
+    if !quiet(Command::new(&python).args(fetch).args(needs)) {
+        return Err(format!("pip cannot fetch {}", needs.join(", ")));
     }
-    fs::write(&whole, NEEDS.join("\n")).map_err(|error| format!("{}: {error}", whole.display()))?;
+    fs::write(&whole, needs.join("\n")).map_err(|error| format!("{}: {error}", whole.display()))?;
     Ok(python)
 }
 

@@ -10,6 +10,7 @@ pub mod correct;
 pub mod depth;
 pub mod doctor;
 pub mod focus_stack;
+pub mod man;
 pub mod measure;
 pub mod operators;
 pub mod optics;

@@ -55,6 +55,7 @@ enum Command {
     Serve(commands::serve::Arguments),
     Doctor(commands::doctor::Arguments),
     Completions(commands::completions::Arguments),
+    Man(commands::man::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -79,6 +80,7 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => commands::serve::run(arguments),
         Command::Doctor(arguments) => commands::doctor::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),
+        Command::Man(arguments) => commands::man::run::<Arguments>(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

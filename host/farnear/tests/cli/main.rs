@@ -14,6 +14,7 @@ mod calibration;
 mod camera;
 mod captures;
 mod doctor;
+mod documents;
 mod emulated_rig;
 mod emulated_work;
 mod focus_stack;

@@ -74,6 +74,7 @@ const COMMANDS: &[&[&str]] = &[
     &["batch"],
     &["doctor"],
     &["completions"],
+    &["man"],
 ];
 
 #[test]

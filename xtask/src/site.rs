@@ -1,0 +1,35 @@
+//! The documents as a site: pages, the root's files and every command's help, laid out by `docs/site/stage.py` and built by a generator
+//! that is fetched into an environment of its own.
+
+use std::{fs, process::Command};
+
+use anyhow::{Context, Result, bail};
+
+use crate::{
+    host, python,
+    run::{ROOT, finish, step, target_folder},
+};
+
+/// The generator, and what makes MathML of formulas.
+const NEEDS: [&str; 2] = ["zensical==0.0.73", "latex2mathml>=3.77"];
+
+/// Builds the site and prints where it is.
+///
+/// # Errors
+/// No Python, nothing to fetch from, or pages with links that lead nowhere.
+pub fn run() -> Result<()> {
+    let built = host::build()?;
+    step("the site");
+    let python = match python::environment(&target_folder().join("site"), &NEEDS) {
+        Ok(python) => python,
+        Err(missing) => bail!("the site cannot be built: {missing}"),
+    };
+    let (sources, out) = (ROOT.join("docs/site"), ROOT.join("out/site"));
+    fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
+    fs::copy(sources.join("zensical.toml"), out.join("zensical.toml")).context("cannot copy the settings")?;
+    let stage = sources.join("stage.py");
+    finish(Command::new(&python).arg(stage).arg(built.join("farnear")).arg(out.join("pages")))?;
+    finish(Command::new(&python).args(["-m", "zensical", "build", "--strict"]).current_dir(&out))?;
+    println!("{}", out.join("html/index.html").display());
+    Ok(())
+}
