@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, atomic::AtomicUsize, mpsc::Sender};
 
-use crate::{access::RigAccess, report::Report, wiring::Shot};
+use crate::{access::RigAccess, report::Report, wiring::Shot, witness::Sight};
 
 /// Work to be done on a rig between two instructions.
 pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
@@ -27,6 +27,13 @@ pub enum Command {
     Access(Work),
     /// Something that the camera's host asks of the camera; the host of the rig has spoken.
     Camera(Work),
+    /// Take back what the scenario did to the rig; nothing more of it happens.
+    Heal,
+    /// Give what was seen since the last time.
+    Sights {
+        /// Told.
+        done: Sender<Vec<Sight>>,
+    },
     /// End.
     End,
 }

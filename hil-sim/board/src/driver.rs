@@ -20,16 +20,19 @@ use crate::{
     command::{Command, Outlets},
     config::RigConfig,
     error::SimError,
-    faults::{Faults, Happening, NoisyLine},
+    faults::{Lines, Moment, Schedule},
     kept_memory,
     memory::MemoryChip,
     pacing::Pacing,
+    parts::Parts,
     pictures::Pictures,
     plant::StageName,
     report::{Report, StageReport},
+    scenario::Scenario,
     serial::Line,
     trace::Trace,
     wiring::Wiring,
+    witness::{Seen, Truth, Witness},
 };
 
 /// SPI4's registers: the memory hangs there, and its supply may be set to fail in the middle of a write.
@@ -37,6 +40,22 @@ const SPI4: std::ops::Range<u64> = 0x4001_3400..0x4001_3800;
 
 /// From one look for fetched pictures to the next.
 const PICTURE: Duration = Duration::from_millis(2);
+
+/// What the driver saw when it looked last.
+#[derive(Debug, Default)]
+struct Last {
+    /// STEP edges of both motors, and when one of them was seen.
+    step_edges: [(u64, u64); 2],
+    /// Exposures begun.
+    exposures: u64,
+    /// Bytes written to the memory, and when.
+    memory: (u64, u64),
+}
+
+/// A motor that steps after so long has set off anew.
+const MOTION_GAP_NS: u64 = 20_000_000;
+/// A byte that is written to the memory after so long begins a write.
+const WRITE_GAP_NS: u64 = 5_000_000;
 
 /// See the module.
 pub struct Driver {
@@ -47,11 +66,14 @@ pub struct Driver {
     wiring: Wiring,
     pacing: Pacing,
     pictures: Pictures,
-    to_board: NoisyLine,
-    to_host: NoisyLine,
-    faults: Faults,
+    lines: Lines,
+    scenario: Scenario,
+    parts: Parts,
     /// What is still to happen.
-    happens: Vec<Happening>,
+    schedule: Schedule,
+    witness: Witness,
+    /// What was seen at the last stop: STEP edges, exposures begun and ended, bytes of the memory and when they were written.
+    last: Last,
     trace: Option<Trace>,
     /// Where the memory's contents are kept at the end, and what they are then.
     memory: Option<(PathBuf, Vec<u8>)>,
@@ -73,7 +95,6 @@ impl Driver {
         wiring: Wiring,
         trace: Option<Trace>,
     ) -> Self {
-        let rate = config.faults.bit_error_rate;
         let pictures = Pictures::new(outlets.pictures.clone());
         let mut driver = Self {
             commands,
@@ -83,10 +104,12 @@ impl Driver {
             wiring,
             pacing: Pacing::new(config.pace),
             pictures,
-            to_board: NoisyLine::new(rate, config.seed, "line to the board"),
-            to_host: NoisyLine::new(rate, config.seed, "line to the host"),
-            faults: config.faults.clone(),
-            happens: config.faults.happens.clone(),
+            lines: Lines::new(config.scenario.bit_error_rate, config.seed),
+            scenario: config.scenario.clone(),
+            parts: config.parts.clone(),
+            schedule: Schedule::new(&config.scenario.happens, config.seed),
+            witness: Witness::new(config.witness),
+            last: Last::default(),
             trace,
             memory: config.memory.clone().map(|path| (path, Vec::new())),
             held: Vec::new(),
@@ -94,7 +117,7 @@ impl Driver {
             powered: true,
             failed: None,
         };
-        driver.hand_out(config.faults.garbage.clone());
+        driver.hand_out(config.scenario.garbage.clone());
         driver
     }
 
@@ -127,7 +150,7 @@ impl Driver {
             piezo_um: with_plant(&self.plant, |plant| plant.piezo().position_um()),
             triggers: self.wiring.camera().triggers(),
             missed_triggers: self.wiring.camera().missed(),
-            flipped_bits: self.to_board.flipped() + self.to_host.flipped(),
+            flipped_bits: self.lines.to_board.flipped() + self.lines.to_host.flipped(),
         }
     }
 
@@ -151,9 +174,22 @@ impl Driver {
     fn exchange(&mut self, now_ns: u64) {
         let mut bytes = self.line.take();
         self.pacing.lockstep.received(&bytes, now_ns);
-        self.to_host.carry(&mut bytes);
+        let truth = with_plant(&self.plant, |plant| {
+            plant.advance(now_ns);
+            Truth::of(plant)
+        });
+        for moment in self.witness.received(now_ns, &bytes, truth) {
+            if matches!(moment, Moment::Alarm | Moment::Answer) {
+                // Pulses before it and after it are two bursts.
+                for burst in self.wiring.take_bursts(now_ns, true) {
+                    self.witness.note(burst.last_ns, Seen::Stepped(burst));
+                }
+            }
+            self.schedule.notice(moment, now_ns);
+        }
+        self.lines.to_host.carry(&mut bytes);
         self.hand_out(bytes);
-        if self.faults.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
+        if self.scenario.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
             self.outlets.bytes = None;
         }
         let shots = self.wiring.take_shots();
@@ -165,6 +201,8 @@ impl Driver {
             }
         });
         for shot in shots {
+            self.schedule.notice(Moment::ExposureEnds, now_ns);
+            self.witness.note(shot.end_ns, Seen::Exposed(shot));
             self.pictures.add();
             let _ = self.outlets.shots.send(shot); // whoever looked may have gone
         }
@@ -193,6 +231,18 @@ impl Driver {
                 self.pacing.lockstep.host_spoke();
                 self.access(work, session, stop, host);
             }
+            Command::Heal => {
+                for due in self.schedule.end() {
+                    self.access(|rig| due.happen(rig), session, stop, host);
+                }
+                self.witness.note(now_ns, Seen::Healed);
+            }
+            Command::Sights { done } => {
+                for burst in self.wiring.take_bursts(now_ns, true) {
+                    self.witness.note(burst.last_ns, Seen::Stepped(burst));
+                }
+                let _ = done.send(self.witness.take()); // whoever asked may have gone
+            }
             Command::End => return false,
         }
         true
@@ -205,7 +255,8 @@ impl Driver {
         stop: Stop,
         host: &mut dyn Host,
     ) {
-        work(&mut RigAccess { session, host, stop, plant: &self.plant, wiring: &mut self.wiring });
+        let Self { plant, wiring, line, lines, parts, .. } = self;
+        work(&mut RigAccess { session, host, stop, plant, wiring, line, lines, parts });
         self.note_resets(session, stop.at);
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.pause_at(self.wiring.next_ns().map(VirtualNanos));
@@ -214,13 +265,36 @@ impl Driver {
     /// Lets happen what is due.
     fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
         let now_ns = stop.at.0;
-        let is_due = |after_ms: u64| now_ns >= after_ms.saturating_mul(1_000_000);
-        let (mut due, later): (Vec<_>, Vec<_>) =
-            self.happens.drain(..).partition(|happening| is_due(happening.after_ms));
-        self.happens = later;
-        due.sort_by_key(|happening| happening.after_ms);
-        for happening in due {
-            self.access(|rig| happening.happen(rig), session, stop, host);
+        self.notice(session, now_ns);
+        for due in self.schedule.take_due(now_ns) {
+            self.witness.note(now_ns, Seen::Happened { what: due.happening.what.name, mends: due.mends });
+            self.access(|rig| due.happen(rig), session, stop, host);
+        }
+    }
+
+    /// Looks for the moments of a run that no frame tells of.
+    fn notice(&mut self, session: &mut Session<RigBoard>, now_ns: u64) {
+        for burst in self.wiring.take_bursts(now_ns, false) {
+            self.witness.note(burst.last_ns, Seen::Stepped(burst));
+        }
+        let Last { step_edges, exposures, memory } = &mut self.last;
+        for (edges, stage) in step_edges.iter_mut().zip([StageName::Sensor, StageName::Lens]) {
+            let (before, now) = (*edges, self.wiring.step_edges(stage));
+            *edges = (now, if now == before.0 { before.1 } else { now_ns });
+            if now != before.0 && (before.0 == 0 || now_ns > before.1 + MOTION_GAP_NS) {
+                self.schedule.notice(Moment::MotionBegins, now_ns);
+            }
+        }
+        for _ in *exposures..self.wiring.exposures_begun() {
+            self.schedule.notice(Moment::ExposureBegins, now_ns);
+        }
+        *exposures = self.wiring.exposures_begun();
+        let written = session.board_mut().chip.memory().map_or(0, |memory| memory.written());
+        if written != memory.0 {
+            if now_ns > memory.1 + WRITE_GAP_NS {
+                self.schedule.notice(Moment::MemoryWrite, now_ns);
+            }
+            *memory = (written, now_ns);
         }
     }
 
@@ -237,7 +311,10 @@ impl Driver {
                 bytes = frames.filter(|frame| !lockstep.repeats(frame)).flatten().copied().collect();
             }
             self.pacing.lockstep.sent(&bytes, now_ns);
-            self.to_board.carry(&mut bytes);
+            self.lines.to_board.carry(&mut bytes);
+            for _ in 0..self.witness.sent(now_ns, &bytes) {
+                self.schedule.notice(Moment::Request, now_ns);
+            }
             self.line.send(&bytes);
         }
     }
@@ -253,7 +330,7 @@ impl Driver {
 
     /// Whether something is to happen by itself: an exposure, or what was asked of the faults.
     fn is_awaited(&self) -> bool {
-        self.wiring.next_ns().is_some() || !self.happens.is_empty() || self.faults.unplug_after_ms.is_some()
+        self.wiring.next_ns().is_some() || !self.schedule.is_over() || self.scenario.unplug_after_ms.is_some()
     }
 
     /// Whether the chip was reset since the last look.
@@ -262,6 +339,13 @@ impl Driver {
         if (resets, powered) == (self.resets, self.powered) {
             return;
         }
+        if resets != self.resets {
+            self.witness.note(at.0, Seen::Reset);
+        }
+        if powered != self.powered {
+            self.witness.note(at.0, Seen::Powered(powered));
+        }
+        self.witness.reset();
         (self.resets, self.powered) = (resets, powered);
         self.wiring.board_reset(at);
         self.pacing.lockstep.reset(at.0);
@@ -358,7 +442,10 @@ impl emulator::Driver<RigBoard> for Driver {
         session.board_mut().chip.join_breaks(stop.at);
         self.happen(session, stop, host);
         if self.serve(session, stop, host) {
-            return Some(VirtualNanos(self.pacing.next_look_ns(stop.at.0)));
+            // What the scenario wants at a moment happens at that moment.
+            let look_ns = self.pacing.next_look_ns(stop.at.0);
+            let next_ns = self.schedule.next_ns().map_or(look_ns, |due_ns| look_ns.min(due_ns));
+            return Some(VirtualNanos(next_ns.max(stop.at.0 + 1)));
         }
         if let (Some((_, kept)), Some(memory)) = (&mut self.memory, session.board_mut().chip.memory()) {
             *kept = memory.contents().to_vec();

@@ -34,6 +34,7 @@ use crate::{
     serial::Line,
     trace::Trace,
     wiring::{Shot, Wiring},
+    witness::Sight,
 };
 
 /// A running emulated rig; ends when dropped.
@@ -80,6 +81,24 @@ impl EmulatedRig {
     /// As [`EmulatedRig::advance_us`].
     pub fn settle(&mut self) -> Result<Report, SimError> {
         self.ask(|done| Command::Settle { done })
+    }
+
+    /// Takes back what the scenario did to the rig, and lets nothing more of it happen.
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn heal(&mut self) -> Result<(), SimError> {
+        self.commands.send(Command::Heal).map_err(|_| SimError::Stopped)
+    }
+
+    /// What was seen since the last call, where the rig was asked to keep it ([`RigConfig::witness`]).
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn take_sights(&mut self) -> Result<Vec<Sight>, SimError> {
+        let (done, wait) = mpsc::channel();
+        self.commands.send(Command::Sights { done }).map_err(|_| SimError::Stopped)?;
+        wait.recv().map_err(|_| SimError::Stopped)
     }
 
     /// The plant and the wires as they are now.
@@ -159,7 +178,7 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
     let image = Image::read(&path, None).map_err(|error| unusable(error.to_string()))?;
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
 
-    let plant = SharedPlant::new(Plant::new(config.seed, &config.parts).into());
+    let plant = SharedPlant::new(Plant::new(config.seed, &config.parts, config.scenario.start_um).into());
     let line = Line::default();
     let costs = if config.costs_by_kind {
         Costs::by_kind(image.bytes()).ok_or_else(|| unusable("it has no program in the flash".into()))?
