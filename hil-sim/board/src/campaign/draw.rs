@@ -139,13 +139,22 @@ impl Waits {
 }
 
 fn when(noise: &mut Noise, what: &Kind) -> When {
+    let moment = one_of(noise, &Moment::ALL);
+    // So often it comes in most runs.
+    let most = match moment {
+        Moment::Started | Moment::Alarm => 1,
+        Moment::Homed | Moment::MoveDone => 3,
+        Moment::ExposureBegins | Moment::ExposureEnds => 4,
+        Moment::MotionBegins | Moment::MemoryWrite => 8,
+        Moment::Request | Moment::Answer => 30,
+    };
     match below(noise, 10) {
         // Most of it happens while something is under way: the start takes 0.1 s, homing a second.
         0..=3 => When::After { ms: rounded(noise.between(0.0, 3_500.0)) },
         4 if what.mend.is_some() => When::Chance { per_s: rounded(over_orders(noise, 0.2, 5.0)) },
         _ => When::On {
-            moment: one_of(noise, &Moment::ALL),
-            nth: 1 + below(noise, 6) as u32,
+            moment,
+            nth: 1 + below(noise, most) as u32,
             delay_ms: if happens(noise, 0.3) { 0.0 } else { rounded(over_orders(noise, 0.01, 300.0)) },
         },
     }

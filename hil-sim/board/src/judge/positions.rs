@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use farnear_protocol::{
-    EventKind, Response,
-    message::{Axis, PositionState},
+    EventKind, Request, Response,
+    message::{Axis, PositionState, Routine},
 };
 
 use super::{Broken, Case};
@@ -45,11 +45,12 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
     let mut broken = Vec::new();
     for sight in case.sights {
         let off = match &sight.seen {
-            Seen::Told { boot, event, truth, .. } => match &event.kind {
-                EventKind::Homed { axis, .. } => {
-                    homed.insert((*boot, axis.name()));
-                    continue;
-                }
+            // The edge is found some time before the end of the homing; calibrations home, too.
+            Seen::Asked { boot, call, .. } => {
+                homed.extend(homes(&call.request).map(|axis| (*boot, axis.name())));
+                continue;
+            }
+            Seen::Told { event, truth, .. } => match &event.kind {
                 EventKind::MoveDone { axis, measured, .. } => {
                     off(case, *axis, measured.0, truth).map(|what| format!("a move is done, {what}"))
                 }
@@ -73,6 +74,19 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
         broken.extend(off.map(|what| Broken { property: "position", at_ns: sight.at_ns, what }));
     }
     broken
+}
+
+/// The axis that a request homes.
+fn homes(request: &Request) -> Option<Axis> {
+    match request {
+        Request::Home { axis, .. } => Some(*axis),
+        Request::Calibrate { routine, .. } => match routine {
+            Routine::Travel { axis } | Routine::Backlash { axis } => Some(*axis),
+            Routine::Gauge => Some(Axis::SensorCoarse),
+            Routine::Piezo => None,
+        },
+        _ => None,
+    }
 }
 
 /// How far what is told lies beside the truth, where that is too far.
