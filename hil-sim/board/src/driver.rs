@@ -17,7 +17,7 @@ use crate::{
     access::{RigAccess, forget},
     board::{NOTHING, RigBoard},
     chips::{SharedPlant, with_plant},
-    command::{Command, Outlets},
+    command::{CameraOrder, Command, Outlets},
     config::RigConfig,
     error::SimError,
     faults::{Lines, Moment, Schedule},
@@ -27,10 +27,11 @@ use crate::{
     parts::Parts,
     pictures::Pictures,
     plant::StageName,
+    replay::{Entry, Script},
     report::{Report, StageReport},
     scenario::Scenario,
     serial::Line,
-    trace::Trace,
+    trace::{Trace, vcd::Vcd},
     wiring::Wiring,
     witness::{Seen, Truth, Witness},
 };
@@ -75,6 +76,10 @@ pub struct Driver {
     /// What was seen at the last stop: STEP edges, exposures begun and ended, bytes of the memory and when they were written.
     last: Last,
     trace: Option<Trace>,
+    /// A run that is made again.
+    script: Option<Script>,
+    /// The moment at which somebody's time ends.
+    looks_at_ns: Option<u64>,
     /// Where the memory's contents are kept at the end, and what they are then.
     memory: Option<(PathBuf, Vec<u8>)>,
     /// Bytes for the board that came while time passes on request.
@@ -111,6 +116,8 @@ impl Driver {
             witness: Witness::new(config.witness),
             last: Last::default(),
             trace,
+            script: None,
+            looks_at_ns: None,
             memory: config.memory.clone().map(|path| (path, Vec::new())),
             held: Vec::new(),
             resets: 0,
@@ -187,6 +194,9 @@ impl Driver {
             }
             self.schedule.notice(moment, now_ns);
         }
+        if let Some(vcd) = self.vcd() {
+            vcd.received(now_ns, &bytes);
+        }
         self.lines.to_host.carry(&mut bytes);
         self.hand_out(bytes);
         if self.scenario.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
@@ -196,8 +206,7 @@ impl Driver {
         with_plant(&self.plant, |plant| {
             plant.advance(now_ns);
             if let Some(trace) = &mut self.trace {
-                trace.tick(now_ns, plant, &self.wiring);
-                shots.iter().for_each(|shot| trace.shot(shot, plant, &self.wiring));
+                trace.look(now_ns, plant, &mut self.wiring, &shots);
             }
         });
         for shot in shots {
@@ -226,17 +235,17 @@ impl Driver {
             }
             Command::Advance { nanos, done } => self.pacing.advance(now_ns, nanos, done),
             Command::Settle { done } => self.pacing.settle(done),
-            Command::Access(work) => self.access(work, session, stop, host),
-            Command::Camera(work) => {
-                self.pacing.lockstep.host_spoke();
+            Command::Access(work) => {
+                if let Some(vcd) = self.vcd() {
+                    vcd.touched(now_ns);
+                }
                 self.access(work, session, stop, host);
             }
-            Command::Heal => {
-                for due in self.schedule.end() {
-                    self.access(|rig| due.happen(rig), session, stop, host);
-                }
-                self.witness.note(now_ns, Seen::Healed);
+            Command::Camera(order) => {
+                self.pacing.lockstep.host_spoke();
+                self.order(order, session, stop, host);
             }
+            Command::Heal => self.heal(session, stop, host),
             Command::Sights { done } => {
                 for burst in self.wiring.take_bursts(now_ns, true) {
                     self.witness.note(burst.last_ns, Seen::Stepped(burst));
@@ -262,12 +271,77 @@ impl Driver {
         session.pause_at(self.wiring.next_ns().map(VirtualNanos));
     }
 
+    fn vcd(&mut self) -> Option<&mut Vcd> {
+        self.trace.as_mut().and_then(Trace::vcd)
+    }
+
+    /// Does from now on what a trace says, to its end, and holds what comes of it against it.
+    pub fn follow(&mut self, mut script: Script) {
+        let comparer = std::mem::take(&mut script.comparer);
+        self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));
+        self.script = Some(script);
+    }
+
+    /// Does what the script has for this moment; gives until when the emulator may run, `None` at the end.
+    fn next_of_script(
+        &mut self,
+        session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<u64> {
+        let now_ns = stop.at.0;
+        while let Some(entry) = self.script.as_mut().and_then(|script| script.take_due(now_ns)) {
+            match entry {
+                Entry::Sent(bytes) => self.put_on_the_line(bytes, now_ns),
+                Entry::Ordered(order) => self.order(order, session, stop, host),
+                Entry::Healed => self.heal(session, stop, host),
+                Entry::Looked { asked_ns } => {
+                    if let Some(vcd) = self.vcd() {
+                        vcd.looked(now_ns, asked_ns);
+                    }
+                }
+            }
+        }
+        let departs = self.vcd().is_some_and(|vcd| vcd.departs());
+        let next_ns = self.script.as_ref()?.next_ns(now_ns).filter(|_| !departs)?;
+        Some(next_ns.min(now_ns + self.pacing.quantum_ns()))
+    }
+
+    /// The camera's host gives an order.
+    fn order(
+        &mut self,
+        order: CameraOrder,
+        session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) {
+        if let Some(vcd) = self.vcd() {
+            vcd.ordered(stop.at.0, order);
+        }
+        self.access(|rig| order.give(rig), session, stop, host);
+    }
+
+    /// Takes back what the scenario did.
+    fn heal(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
+        if let Some(vcd) = self.vcd() {
+            vcd.healed(stop.at.0);
+        }
+        for due in self.schedule.end() {
+            self.access(|rig| due.happen(rig), session, stop, host);
+        }
+        self.witness.note(stop.at.0, Seen::Healed);
+    }
+
     /// Lets happen what is due.
     fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
         let now_ns = stop.at.0;
         self.notice(session, now_ns);
         for due in self.schedule.take_due(now_ns) {
-            self.witness.note(now_ns, Seen::Happened { what: due.happening.what.name, mends: due.mends });
+            let what = due.happening.what.name;
+            if let Some(vcd) = self.vcd() {
+                vcd.happened(now_ns, what, due.mends);
+            }
+            self.witness.note(now_ns, Seen::Happened { what, mends: due.mends });
             self.access(|rig| due.happen(rig), session, stop, host);
         }
     }
@@ -310,13 +384,21 @@ impl Driver {
                 let frames = bytes.split_inclusive(|byte| *byte == 0);
                 bytes = frames.filter(|frame| !lockstep.repeats(frame)).flatten().copied().collect();
             }
-            self.pacing.lockstep.sent(&bytes, now_ns);
-            self.lines.to_board.carry(&mut bytes);
-            for _ in 0..self.witness.sent(now_ns, &bytes) {
-                self.schedule.notice(Moment::Request, now_ns);
-            }
-            self.line.send(&bytes);
+            self.put_on_the_line(bytes, now_ns);
         }
+    }
+
+    /// Bytes of the host go on the line to the board.
+    fn put_on_the_line(&mut self, mut bytes: Vec<u8>, now_ns: u64) {
+        if let Some(vcd) = self.vcd() {
+            vcd.sent(now_ns, &bytes);
+        }
+        self.pacing.lockstep.sent(&bytes, now_ns);
+        self.lines.to_board.carry(&mut bytes);
+        for _ in 0..self.witness.sent(now_ns, &bytes) {
+            self.schedule.notice(Moment::Request, now_ns);
+        }
+        self.line.send(&bytes);
     }
 
     /// Whether time passes for a motor alone, which brakes behind the end of its work. What the host says meanwhile comes when
@@ -326,6 +408,15 @@ impl Driver {
             && self.wiring.is_stepping(now_ns)
             && !self.line.is_sending()
             && !self.pacing.lockstep.is_busy(now_ns)
+    }
+
+    /// Until when the emulator runs; where somebody asked for time, that is noted.
+    fn next_look_ns(&mut self, now_ns: u64) -> u64 {
+        let look_ns = self.pacing.next_look_ns(now_ns);
+        if look_ns < now_ns + self.pacing.quantum_ns() {
+            self.looks_at_ns = Some(look_ns);
+        }
+        look_ns
     }
 
     /// Whether something is to happen by itself: an exposure, or what was asked of the faults.
@@ -338,6 +429,10 @@ impl Driver {
         let (resets, powered) = (session.resets().len(), !session.unpowered());
         if (resets, powered) == (self.resets, self.powered) {
             return;
+        }
+        let power = (powered != self.powered).then_some(powered);
+        if let Some(vcd) = self.vcd() {
+            vcd.reset(at.0, power);
         }
         if resets != self.resets {
             self.witness.note(at.0, Seen::Reset);
@@ -441,9 +536,17 @@ impl emulator::Driver<RigBoard> for Driver {
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.board_mut().chip.join_breaks(stop.at);
         self.happen(session, stop, host);
-        if self.serve(session, stop, host) {
+        if let Some(vcd) = self.trace.as_mut().and_then(Trace::vcd)
+            && let Some(at_ns) = self.looks_at_ns.take_if(|at_ns| *at_ns <= stop.at.0)
+        {
+            vcd.looked(stop.at.0, at_ns);
+        }
+        let runs = match &self.script {
+            Some(_) => self.next_of_script(session, stop, host),
+            None => self.serve(session, stop, host).then(|| self.next_look_ns(stop.at.0)),
+        };
+        if let Some(look_ns) = runs {
             // What the scenario wants at a moment happens at that moment.
-            let look_ns = self.pacing.next_look_ns(stop.at.0);
             let next_ns = self.schedule.next_ns().map_or(look_ns, |due_ns| look_ns.min(due_ns));
             return Some(VirtualNanos(next_ns.max(stop.at.0 + 1)));
         }

@@ -55,6 +55,14 @@ pub enum SimError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A trace cannot be replayed.
+    #[error("{}: {reason}", path.display())]
+    Replay {
+        /// The trace.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
+    },
     /// The emulator's description of the chip, or the emulation itself, failed.
     #[error("the emulator stopped: {0}")]
     Emulator(String),

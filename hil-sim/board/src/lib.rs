@@ -44,6 +44,7 @@ pub mod plant;
 pub mod player;
 pub mod port;
 pub mod processor;
+pub mod replay;
 pub mod report;
 pub mod rig;
 pub mod run;

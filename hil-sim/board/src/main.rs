@@ -39,6 +39,15 @@ enum Job {
     /// property. Fails where one does.
     #[command(after_help = "Example:\n  farnear-sim campaign --seeds 200 --shard 2/8 --out broken/")]
     Campaign(Seeds),
+    /// Make a run again from its trace, and say where it departs from it.
+    #[command(after_help = "Example:\n  farnear-sim run --trace run.vcd ...\n  farnear-sim replay run.vcd")]
+    Replay {
+        /// The trace, a VCD file of `farnear-sim run --trace`.
+        trace: PathBuf,
+        /// The firmware; without it the one that lies beside this program.
+        #[arg(long, value_name = "ELF")]
+        firmware: Option<PathBuf>,
+    },
     /// Count the instructions of the on-board routines: runs the counting firmware and prints its table.
     #[command(after_help = "Example:\n  farnear-sim count farnear-count.elf")]
     Count {
@@ -111,7 +120,8 @@ struct Run {
     /// Give the serial port this name too, a link that is removed at the end: a client finds a rig again that was started anew.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Write what the mechanics really did to this CSV file.
+    /// Write what the mechanics really did to this file: CSV, or by the ending .vcd a value change dump that `replay` can
+    /// make again.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
 }
@@ -120,6 +130,7 @@ fn main() -> ExitCode {
     let done = match Program::parse().job {
         Job::Run(run) => serve(&run),
         Job::Campaign(seeds) => play_seeds(&seeds),
+        Job::Replay { trace, firmware } => play_again(&trace, firmware.as_deref()),
         Job::Count { elf } => count(&elf),
     };
     match done {
@@ -162,6 +173,24 @@ fn play_seeds(seeds: &Seeds) -> Result<()> {
         summary.broken.len(),
         summary.played
     );
+    Ok(())
+}
+
+fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
+    let (end_ns, departure) = farnear_sim::replay::replay(trace, firmware)?;
+    if let Some(departure) = departure {
+        let line = |line: Option<String>| line.unwrap_or_else(|| "nothing more".into());
+        anyhow::bail!(
+            "the run departs from the trace at {:.6} s, line {} ({}): the trace has {:?}, the run now {:?}",
+            departure.at_ns as f64 * 1e-9,
+            departure.line,
+            departure.signal,
+            line(departure.recorded),
+            line(departure.now)
+        );
+    }
+    let mut stdout = std::io::stdout();
+    writeln!(stdout, "the same run to its end, {:.6} s of the board's time", end_ns as f64 * 1e-9)?;
     Ok(())
 }
 

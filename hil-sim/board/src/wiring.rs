@@ -365,6 +365,11 @@ impl Wiring {
         self.stages.iter_mut().filter_map(|stage| stage.burst.take_if(ended)).collect()
     }
 
+    /// When the exposure began that is under way.
+    pub fn begun_ns(&self) -> Option<u64> {
+        self.begun.map(|(_, _, at_ns)| at_ns)
+    }
+
     /// Exposures that have begun since power-on.
     pub fn exposures_begun(&self) -> u64 {
         self.exposures_begun
@@ -396,6 +401,13 @@ impl Wiring {
     pub fn set_glitches_per_s(&mut self, now_ns: u64, name: StageName, per_s: f64) {
         for contact in &mut self.stage_mut(name).contacts {
             contact.set_glitches_per_s(now_ns, per_s);
+        }
+    }
+
+    /// Begins to note when each STEP edge comes, unless that is done already.
+    pub fn record_steps_once(&mut self) {
+        for stage in &mut self.stages {
+            stage.record.get_or_insert_default();
         }
     }
 
