@@ -183,6 +183,11 @@ impl Rig {
         &self.identity
     }
 
+    /// A loaded shot, for whoever looks behind the protocol.
+    pub fn shot(&self, index: u8) -> Option<&farnear_protocol::message::Shot> {
+        self.shots.get(index)
+    }
+
     /// The number of this boot.
     pub const fn boot(&self) -> u32 {
         self.boot

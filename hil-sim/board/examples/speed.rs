@@ -10,7 +10,7 @@ use farnear_protocol::{
     frame::{Header, Kind, encode},
     message::{Axis, Shot, TriggerMode},
 };
-use farnear_sim::{EmulatedRig, RigConfig, SimError};
+use farnear_sim::{EmulatedRig, RigConfig, SimError, campaign::cpu_time as cpu};
 
 const SESSION: u32 = 1;
 const SILENCE: Micros = Micros(60_000_000);
@@ -18,15 +18,6 @@ const SILENCE: Micros = Micros(60_000_000);
 struct Host {
     rig: EmulatedRig,
     id: u32,
-}
-
-/// CPU time of this process, all threads. The kernel counts it in hundredths of a second.
-fn cpu() -> Duration {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name, which stands in brackets and may hold spaces, come the fields from 3 on; 14 and 15 are the times.
-    let fields = stat.rsplit(") ").next().unwrap_or_default().split(' ');
-    let ticks: u64 = fields.skip(11).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
-    Duration::from_millis(10 * ticks)
 }
 
 impl Host {

@@ -12,8 +12,10 @@ use rigless::{
 use crate::{
     board::{Chip, RAM, RigBoard, SpiChip, pins},
     chips::{SharedPlant, with_plant},
-    parts::MemoryMake,
+    faults::Lines,
+    parts::{MemoryMake, Parts},
     plant::{Noise, Plant, StageName},
+    serial::Line,
     wiring::Wiring,
 };
 
@@ -34,6 +36,9 @@ pub struct RigAccess<'a, 'h> {
     pub(crate) stop: Stop,
     pub(crate) plant: &'a SharedPlant,
     pub(crate) wiring: &'a mut Wiring,
+    pub(crate) line: &'a Line,
+    pub(crate) lines: &'a mut Lines,
+    pub(crate) parts: &'a Parts,
 }
 
 impl RigAccess<'_, '_> {
@@ -80,6 +85,9 @@ impl RigAccess<'_, '_> {
     /// Takes the power away: what is in the volatile memory is lost. Or gives it back.
     pub fn set_power(&mut self, on: bool) {
         let at = self.stop.at;
+        if on && !self.session.unpowered() {
+            return;
+        }
         self.chip().power(at, on);
         if !on {
             forget(self.host);
@@ -116,6 +124,13 @@ impl RigAccess<'_, '_> {
     pub fn fail_power_after_memory_bytes(&mut self, bytes: u64) {
         if let Some(memory) = self.chip().memory() {
             memory.fail_after(bytes);
+        }
+    }
+
+    /// The power does not fail after all.
+    pub fn keep_power(&mut self) {
+        if let Some(memory) = self.chip().memory() {
+            memory.keep_supply();
         }
     }
 
@@ -189,6 +204,55 @@ impl RigAccess<'_, '_> {
     /// The STEP edges noted so far, stage A's and stage B's, in virtual nanoseconds.
     pub fn take_steps(&mut self) -> [Vec<u64>; 2] {
         self.wiring.take_steps()
+    }
+
+    /// What goes wrong on the line, in both directions.
+    pub fn lines(&mut self) -> &mut Lines {
+        self.lines
+    }
+
+    /// Puts so many random bytes on the line to the board.
+    pub fn send_noise(&mut self, bytes: usize) {
+        let mut noise = Noise::new(self.stop.at.0, "noise on the line");
+        let bytes: Vec<u8> = (0..bytes).map(|_| noise.bits() as u8).collect();
+        self.line.send(&bytes);
+    }
+
+    /// Of a million bytes that the board hears so many come with a framing error.
+    pub fn set_framing_errors(&mut self, per_million: u32) {
+        let seed = self.stop.at.0;
+        self.chip().set_framing_errors(per_million, seed);
+    }
+
+    /// The encoder counts what its shaft has not done.
+    pub fn slip_encoder(&mut self, stage: StageName, counts: i64) {
+        self.wiring.slip_encoder(stage, counts);
+    }
+
+    /// Cuts the encoder's wires, or mends them.
+    pub fn cut_encoder(&mut self, stage: StageName, cut: bool) {
+        self.wiring.cut_encoder(stage, cut);
+    }
+
+    /// So many false openings of the stage's switches a second while its driver is on; `None`: as its parts have it.
+    pub fn set_switch_noise(&mut self, stage: StageName, per_s: Option<f64>) {
+        let per_s = per_s.unwrap_or(self.parts.switches.glitches_per_s);
+        self.wiring.set_glitches_per_s(self.stop.at.0, stage, per_s);
+    }
+
+    /// The camera hears no trigger, or hears them again.
+    pub fn set_camera_deaf(&mut self, deaf: bool) {
+        self.wiring.camera_mut().set_deaf(deaf);
+    }
+
+    /// The camera takes so much longer to read a frame out.
+    pub fn set_camera_delay_ns(&mut self, delay_ns: u64) {
+        self.wiring.camera_mut().set_delay_ns(delay_ns);
+    }
+
+    /// Cuts the wire of the strobe, or mends it.
+    pub fn cut_strobe(&mut self, cut: bool) {
+        self.wiring.cut_strobe(cut);
     }
 
     /// The camera's host triggers it by software, for an image of this name.

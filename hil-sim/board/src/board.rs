@@ -240,6 +240,13 @@ impl Chip {
         }
     }
 
+    /// Of a million bytes that the link hears so many come with a framing error; the seed says which.
+    pub fn set_framing_errors(&mut self, per_million: u32, seed: u64) {
+        let errors = self.part.usart[USART3].errors_mut();
+        errors.framing = rigless::chip::uart::Rate { name: "framing", per_million };
+        errors.seed = seed;
+    }
+
     /// Cuts the part's supply or gives it back.
     pub fn power(&mut self, at: VirtualNanos, on: bool) {
         if on && let Some(memory) = self.memory() {

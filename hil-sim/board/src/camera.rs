@@ -46,6 +46,9 @@ pub struct Camera {
     free_run: Option<FreeRun>,
     triggers: u32,
     missed: u32,
+    deaf: bool,
+    /// A frame's read-out takes so much longer.
+    delay_ns: u64,
 }
 
 impl Camera {
@@ -60,6 +63,8 @@ impl Camera {
             free_run: None,
             triggers: 0,
             missed: 0,
+            deaf: false,
+            delay_ns: 0,
         }
     }
 
@@ -76,14 +81,14 @@ impl Camera {
         let end_ns = begin_ns + exposure_ns.max(1);
         self.coming.insert(begin_ns, Edge::Begin(id));
         self.coming.insert(end_ns, Edge::End);
-        self.busy_until_ns = end_ns + READOUT_NS;
+        self.busy_until_ns = end_ns + READOUT_NS + self.delay_ns;
     }
 
     /// An edge of the trigger line.
     pub fn trigger(&mut self, now_ns: u64, rising: bool) {
         if rising {
             self.triggers += 1;
-            if self.is_busy(now_ns) {
+            if self.deaf || self.is_busy(now_ns) {
                 self.missed += 1;
                 return;
             }
@@ -96,7 +101,7 @@ impl Camera {
             let begin = self.coming.keys().next_back().copied().unwrap_or(0);
             let end = (now_ns + self.latency_ns).max(begin + 1);
             self.coming.insert(end, Edge::End);
-            self.busy_until_ns = end + READOUT_NS;
+            self.busy_until_ns = end + READOUT_NS + self.delay_ns;
         }
     }
 
@@ -149,6 +154,21 @@ impl Camera {
     /// Triggers that came while the camera was busy, since the start.
     pub fn missed(&self) -> u32 {
         self.missed
+    }
+
+    /// It hears no trigger, or hears them again.
+    pub fn set_deaf(&mut self, deaf: bool) {
+        self.deaf = deaf;
+    }
+
+    /// A frame's read-out takes so much longer than it should.
+    pub fn set_delay_ns(&mut self, delay_ns: u64) {
+        self.delay_ns = delay_ns;
+    }
+
+    /// Whether it collects light, or is about to.
+    pub fn is_exposing(&self) -> bool {
+        self.armed || !self.coming.is_empty()
     }
 
     /// The board was reset: the triggers are counted anew.

@@ -166,7 +166,7 @@ mod tests {
     /// The 32 bits that are read of a result.
     fn read(result: u32, (low_ns, read_ns): (u64, u64)) -> u32 {
         let parts = Parts::default();
-        let plant = SharedPlant::new(Plant::new(1, &parts).into());
+        let plant = SharedPlant::new(Plant::new(1, &parts, None).into());
         let mut chip = GaugeConverter::new(plant, parts.gauge_converter);
         (chip.result, chip.low_ns) = (result, low_ns);
         (chip.output(read_ns) >> 32) as u32

@@ -2,10 +2,39 @@
 
 use std::sync::{Arc, atomic::AtomicUsize, mpsc::Sender};
 
-use crate::{access::RigAccess, report::Report, wiring::Shot};
+use crate::{access::RigAccess, report::Report, wiring::Shot, witness::Sight};
 
 /// Work to be done on a rig between two instructions.
 pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
+
+/// What the camera's host can ask of the camera.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum CameraOrder {
+    /// Expose once.
+    Expose {
+        /// For so long.
+        exposure_us: u64,
+        /// The image's name.
+        id: u32,
+    },
+    /// Run freely, or (period 0) stop that.
+    FreeRun {
+        /// From one exposure to the next.
+        period_us: u64,
+        /// For so long.
+        exposure_us: u64,
+    },
+}
+
+impl CameraOrder {
+    /// Gives the order.
+    pub fn give(self, rig: &mut RigAccess<'_, '_>) {
+        match self {
+            Self::Expose { exposure_us, id } => rig.expose(exposure_us, id),
+            Self::FreeRun { period_us, exposure_us } => rig.run_camera_freely(period_us, exposure_us),
+        }
+    }
+}
 
 /// What the rig can be asked.
 pub enum Command {
@@ -26,7 +55,14 @@ pub enum Command {
     /// Do something with the rig between two instructions.
     Access(Work),
     /// Something that the camera's host asks of the camera; the host of the rig has spoken.
-    Camera(Work),
+    Camera(CameraOrder),
+    /// Take back what the scenario did to the rig; nothing more of it happens.
+    Heal,
+    /// Give what was seen since the last time.
+    Sights {
+        /// Told.
+        done: Sender<Vec<Sight>>,
+    },
     /// End.
     End,
 }

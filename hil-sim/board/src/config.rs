@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{faults::Faults, parts::Parts};
+use crate::{parts::Parts, scenario::Scenario};
 
 /// How virtual time passes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -27,13 +27,15 @@ pub struct RigConfig {
     pub parts: Parts,
     /// Each instruction takes what its kind takes, instead of the average: some hundred times slower, for measuring.
     pub costs_by_kind: bool,
-    /// What goes wrong.
-    pub faults: Faults,
+    /// What happens to it. Its seed, its parts and its host's steps are the caller's business ([`RigConfig::of`]).
+    pub scenario: Scenario,
     /// How time passes.
     pub pace: Pace,
     /// What the board's memory holds at power-on, and where it is kept when the rig ends; a new one is made where there is
     /// none. `None`: a blank memory, which is forgotten.
     pub memory: Option<PathBuf>,
+    /// Note what crosses the line, what the plant does and what happens, for a judge ([`crate::judge`]).
+    pub witness: bool,
     /// Where to write what the plant really did, as CSV.
     pub trace: Option<PathBuf>,
 }
@@ -46,10 +48,26 @@ impl Default for RigConfig {
             seed: 1,
             parts: Parts::default(),
             costs_by_kind: false,
-            faults: Faults::default(),
+            scenario: Scenario::default(),
             pace: Pace::Told,
             memory: None,
+            witness: false,
             trace: None,
         }
+    }
+}
+
+impl RigConfig {
+    /// The rig of a scenario, with its own seed (or 1) and parts, whose time passes when told to.
+    ///
+    /// # Errors
+    /// Which number of its parts is wrong.
+    pub fn of(scenario: &Scenario) -> Result<Self, String> {
+        Ok(Self {
+            seed: scenario.seed.unwrap_or(1),
+            parts: scenario.parts()?,
+            scenario: scenario.clone(),
+            ..Self::default()
+        })
     }
 }

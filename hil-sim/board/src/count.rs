@@ -133,7 +133,7 @@ pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
     // Instructions are what is counted here, not cycles.
     let processor = ProcessorParts { cycles_per_instruction: 1.0, without_accelerator: 1.0 };
     let parts = Parts { processor, ..Parts::default() };
-    let plant = SharedPlant::new(Plant::new(1, &parts).into());
+    let plant = SharedPlant::new(Plant::new(1, &parts, None).into());
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
     let costs = Costs::Average(parts.processor);
     let board = RigBoard::new(&plant, Line::default(), 1, &parts, costs).map_err(|error| emulator(&error))?;

@@ -17,19 +17,23 @@ use crate::{
     access::{RigAccess, forget},
     board::{NOTHING, RigBoard},
     chips::{SharedPlant, with_plant},
-    command::{Command, Outlets},
+    command::{CameraOrder, Command, Outlets},
     config::RigConfig,
     error::SimError,
-    faults::{Faults, Happening, NoisyLine},
+    faults::{Lines, Moment, Schedule},
     kept_memory,
     memory::MemoryChip,
     pacing::Pacing,
+    parts::Parts,
     pictures::Pictures,
     plant::StageName,
+    replay::{Entry, Script},
     report::{Report, StageReport},
+    scenario::Scenario,
     serial::Line,
-    trace::Trace,
+    trace::{Trace, vcd::Vcd},
     wiring::Wiring,
+    witness::{Seen, Truth, Witness},
 };
 
 /// SPI4's registers: the memory hangs there, and its supply may be set to fail in the middle of a write.
@@ -37,6 +41,22 @@ const SPI4: std::ops::Range<u64> = 0x4001_3400..0x4001_3800;
 
 /// From one look for fetched pictures to the next.
 const PICTURE: Duration = Duration::from_millis(2);
+
+/// What the driver saw when it looked last.
+#[derive(Debug, Default)]
+struct Last {
+    /// STEP edges of both motors, and when one of them was seen.
+    step_edges: [(u64, u64); 2],
+    /// Exposures begun.
+    exposures: u64,
+    /// Bytes written to the memory, and when.
+    memory: (u64, u64),
+}
+
+/// A motor that steps after so long has set off anew.
+const MOTION_GAP_NS: u64 = 20_000_000;
+/// A byte that is written to the memory after so long begins a write.
+const WRITE_GAP_NS: u64 = 5_000_000;
 
 /// See the module.
 pub struct Driver {
@@ -47,12 +67,19 @@ pub struct Driver {
     wiring: Wiring,
     pacing: Pacing,
     pictures: Pictures,
-    to_board: NoisyLine,
-    to_host: NoisyLine,
-    faults: Faults,
+    lines: Lines,
+    scenario: Scenario,
+    parts: Parts,
     /// What is still to happen.
-    happens: Vec<Happening>,
+    schedule: Schedule,
+    witness: Witness,
+    /// What was seen at the last stop: STEP edges, exposures begun and ended, bytes of the memory and when they were written.
+    last: Last,
     trace: Option<Trace>,
+    /// A run that is made again.
+    script: Option<Script>,
+    /// The moment at which somebody's time ends.
+    looks_at_ns: Option<u64>,
     /// Where the memory's contents are kept at the end, and what they are then.
     memory: Option<(PathBuf, Vec<u8>)>,
     /// Bytes for the board that came while time passes on request.
@@ -73,7 +100,6 @@ impl Driver {
         wiring: Wiring,
         trace: Option<Trace>,
     ) -> Self {
-        let rate = config.faults.bit_error_rate;
         let pictures = Pictures::new(outlets.pictures.clone());
         let mut driver = Self {
             commands,
@@ -83,18 +109,22 @@ impl Driver {
             wiring,
             pacing: Pacing::new(config.pace),
             pictures,
-            to_board: NoisyLine::new(rate, config.seed, "line to the board"),
-            to_host: NoisyLine::new(rate, config.seed, "line to the host"),
-            faults: config.faults.clone(),
-            happens: config.faults.happens.clone(),
+            lines: Lines::new(config.scenario.bit_error_rate, config.seed),
+            scenario: config.scenario.clone(),
+            parts: config.parts.clone(),
+            schedule: Schedule::new(&config.scenario.happens, config.seed),
+            witness: Witness::new(config.witness),
+            last: Last::default(),
             trace,
+            script: None,
+            looks_at_ns: None,
             memory: config.memory.clone().map(|path| (path, Vec::new())),
             held: Vec::new(),
             resets: 0,
             powered: true,
             failed: None,
         };
-        driver.hand_out(config.faults.garbage.clone());
+        driver.hand_out(config.scenario.garbage.clone());
         driver
     }
 
@@ -127,7 +157,7 @@ impl Driver {
             piezo_um: with_plant(&self.plant, |plant| plant.piezo().position_um()),
             triggers: self.wiring.camera().triggers(),
             missed_triggers: self.wiring.camera().missed(),
-            flipped_bits: self.to_board.flipped() + self.to_host.flipped(),
+            flipped_bits: self.lines.to_board.flipped() + self.lines.to_host.flipped(),
         }
     }
 
@@ -151,20 +181,37 @@ impl Driver {
     fn exchange(&mut self, now_ns: u64) {
         let mut bytes = self.line.take();
         self.pacing.lockstep.received(&bytes, now_ns);
-        self.to_host.carry(&mut bytes);
+        let truth = with_plant(&self.plant, |plant| {
+            plant.advance(now_ns);
+            Truth::of(plant)
+        });
+        for moment in self.witness.received(now_ns, &bytes, truth) {
+            if matches!(moment, Moment::Alarm | Moment::Answer) {
+                // Pulses before it and after it are two bursts.
+                for burst in self.wiring.take_bursts(now_ns, true) {
+                    self.witness.note(burst.last_ns, Seen::Stepped(burst));
+                }
+            }
+            self.schedule.notice(moment, now_ns);
+        }
+        if let Some(vcd) = self.vcd() {
+            vcd.received(now_ns, &bytes);
+        }
+        self.lines.to_host.carry(&mut bytes);
         self.hand_out(bytes);
-        if self.faults.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
+        if self.scenario.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
             self.outlets.bytes = None;
         }
         let shots = self.wiring.take_shots();
         with_plant(&self.plant, |plant| {
             plant.advance(now_ns);
             if let Some(trace) = &mut self.trace {
-                trace.tick(now_ns, plant, &self.wiring);
-                shots.iter().for_each(|shot| trace.shot(shot, plant, &self.wiring));
+                trace.look(now_ns, plant, &mut self.wiring, &shots);
             }
         });
         for shot in shots {
+            self.schedule.notice(Moment::ExposureEnds, now_ns);
+            self.witness.note(shot.end_ns, Seen::Exposed(shot));
             self.pictures.add();
             let _ = self.outlets.shots.send(shot); // whoever looked may have gone
         }
@@ -188,10 +235,22 @@ impl Driver {
             }
             Command::Advance { nanos, done } => self.pacing.advance(now_ns, nanos, done),
             Command::Settle { done } => self.pacing.settle(done),
-            Command::Access(work) => self.access(work, session, stop, host),
-            Command::Camera(work) => {
-                self.pacing.lockstep.host_spoke();
+            Command::Access(work) => {
+                if let Some(vcd) = self.vcd() {
+                    vcd.touched(now_ns);
+                }
                 self.access(work, session, stop, host);
+            }
+            Command::Camera(order) => {
+                self.pacing.lockstep.host_spoke();
+                self.order(order, session, stop, host);
+            }
+            Command::Heal => self.heal(session, stop, host),
+            Command::Sights { done } => {
+                for burst in self.wiring.take_bursts(now_ns, true) {
+                    self.witness.note(burst.last_ns, Seen::Stepped(burst));
+                }
+                let _ = done.send(self.witness.take()); // whoever asked may have gone
             }
             Command::End => return false,
         }
@@ -205,22 +264,111 @@ impl Driver {
         stop: Stop,
         host: &mut dyn Host,
     ) {
-        work(&mut RigAccess { session, host, stop, plant: &self.plant, wiring: &mut self.wiring });
+        let Self { plant, wiring, line, lines, parts, .. } = self;
+        work(&mut RigAccess { session, host, stop, plant, wiring, line, lines, parts });
         self.note_resets(session, stop.at);
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.pause_at(self.wiring.next_ns().map(VirtualNanos));
     }
 
+    fn vcd(&mut self) -> Option<&mut Vcd> {
+        self.trace.as_mut().and_then(Trace::vcd)
+    }
+
+    /// Does from now on what a trace says, to its end, and holds what comes of it against it.
+    pub fn follow(&mut self, mut script: Script) {
+        let comparer = std::mem::take(&mut script.comparer);
+        self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));
+        self.script = Some(script);
+    }
+
+    /// Does what the script has for this moment; gives until when the emulator may run, `None` at the end.
+    fn next_of_script(
+        &mut self,
+        session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<u64> {
+        let now_ns = stop.at.0;
+        while let Some(entry) = self.script.as_mut().and_then(|script| script.take_due(now_ns)) {
+            match entry {
+                Entry::Sent(bytes) => self.put_on_the_line(bytes, now_ns),
+                Entry::Ordered(order) => self.order(order, session, stop, host),
+                Entry::Healed => self.heal(session, stop, host),
+                Entry::Looked { asked_ns } => {
+                    if let Some(vcd) = self.vcd() {
+                        vcd.looked(now_ns, asked_ns);
+                    }
+                }
+            }
+        }
+        let departs = self.vcd().is_some_and(|vcd| vcd.departs());
+        let next_ns = self.script.as_ref()?.next_ns(now_ns).filter(|_| !departs)?;
+        Some(next_ns.min(now_ns + self.pacing.quantum_ns()))
+    }
+
+    /// The camera's host gives an order.
+    fn order(
+        &mut self,
+        order: CameraOrder,
+        session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) {
+        if let Some(vcd) = self.vcd() {
+            vcd.ordered(stop.at.0, order);
+        }
+        self.access(|rig| order.give(rig), session, stop, host);
+    }
+
+    /// Takes back what the scenario did.
+    fn heal(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
+        if let Some(vcd) = self.vcd() {
+            vcd.healed(stop.at.0);
+        }
+        for due in self.schedule.end() {
+            self.access(|rig| due.happen(rig), session, stop, host);
+        }
+        self.witness.note(stop.at.0, Seen::Healed);
+    }
+
     /// Lets happen what is due.
     fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
         let now_ns = stop.at.0;
-        let is_due = |after_ms: u64| now_ns >= after_ms.saturating_mul(1_000_000);
-        let (mut due, later): (Vec<_>, Vec<_>) =
-            self.happens.drain(..).partition(|happening| is_due(happening.after_ms));
-        self.happens = later;
-        due.sort_by_key(|happening| happening.after_ms);
-        for happening in due {
-            self.access(|rig| happening.happen(rig), session, stop, host);
+        self.notice(session, now_ns);
+        for due in self.schedule.take_due(now_ns) {
+            let what = due.happening.what.name;
+            if let Some(vcd) = self.vcd() {
+                vcd.happened(now_ns, what, due.mends);
+            }
+            self.witness.note(now_ns, Seen::Happened { what, mends: due.mends });
+            self.access(|rig| due.happen(rig), session, stop, host);
+        }
+    }
+
+    /// Looks for the moments of a run that no frame tells of.
+    fn notice(&mut self, session: &mut Session<RigBoard>, now_ns: u64) {
+        for burst in self.wiring.take_bursts(now_ns, false) {
+            self.witness.note(burst.last_ns, Seen::Stepped(burst));
+        }
+        let Last { step_edges, exposures, memory } = &mut self.last;
+        for (edges, stage) in step_edges.iter_mut().zip([StageName::Sensor, StageName::Lens]) {
+            let (before, now) = (*edges, self.wiring.step_edges(stage));
+            *edges = (now, if now == before.0 { before.1 } else { now_ns });
+            if now != before.0 && (before.0 == 0 || now_ns > before.1 + MOTION_GAP_NS) {
+                self.schedule.notice(Moment::MotionBegins, now_ns);
+            }
+        }
+        for _ in *exposures..self.wiring.exposures_begun() {
+            self.schedule.notice(Moment::ExposureBegins, now_ns);
+        }
+        *exposures = self.wiring.exposures_begun();
+        let written = session.board_mut().chip.memory().map_or(0, |memory| memory.written());
+        if written != memory.0 {
+            if now_ns > memory.1 + WRITE_GAP_NS {
+                self.schedule.notice(Moment::MemoryWrite, now_ns);
+            }
+            *memory = (written, now_ns);
         }
     }
 
@@ -236,10 +384,21 @@ impl Driver {
                 let frames = bytes.split_inclusive(|byte| *byte == 0);
                 bytes = frames.filter(|frame| !lockstep.repeats(frame)).flatten().copied().collect();
             }
-            self.pacing.lockstep.sent(&bytes, now_ns);
-            self.to_board.carry(&mut bytes);
-            self.line.send(&bytes);
+            self.put_on_the_line(bytes, now_ns);
         }
+    }
+
+    /// Bytes of the host go on the line to the board.
+    fn put_on_the_line(&mut self, mut bytes: Vec<u8>, now_ns: u64) {
+        if let Some(vcd) = self.vcd() {
+            vcd.sent(now_ns, &bytes);
+        }
+        self.pacing.lockstep.sent(&bytes, now_ns);
+        self.lines.to_board.carry(&mut bytes);
+        for _ in 0..self.witness.sent(now_ns, &bytes) {
+            self.schedule.notice(Moment::Request, now_ns);
+        }
+        self.line.send(&bytes);
     }
 
     /// Whether time passes for a motor alone, which brakes behind the end of its work. What the host says meanwhile comes when
@@ -251,9 +410,18 @@ impl Driver {
             && !self.pacing.lockstep.is_busy(now_ns)
     }
 
+    /// Until when the emulator runs; where somebody asked for time, that is noted.
+    fn next_look_ns(&mut self, now_ns: u64) -> u64 {
+        let look_ns = self.pacing.next_look_ns(now_ns);
+        if look_ns < now_ns + self.pacing.quantum_ns() {
+            self.looks_at_ns = Some(look_ns);
+        }
+        look_ns
+    }
+
     /// Whether something is to happen by itself: an exposure, or what was asked of the faults.
     fn is_awaited(&self) -> bool {
-        self.wiring.next_ns().is_some() || !self.happens.is_empty() || self.faults.unplug_after_ms.is_some()
+        self.wiring.next_ns().is_some() || !self.schedule.is_over() || self.scenario.unplug_after_ms.is_some()
     }
 
     /// Whether the chip was reset since the last look.
@@ -262,6 +430,17 @@ impl Driver {
         if (resets, powered) == (self.resets, self.powered) {
             return;
         }
+        let power = (powered != self.powered).then_some(powered);
+        if let Some(vcd) = self.vcd() {
+            vcd.reset(at.0, power);
+        }
+        if resets != self.resets {
+            self.witness.note(at.0, Seen::Reset);
+        }
+        if powered != self.powered {
+            self.witness.note(at.0, Seen::Powered(powered));
+        }
+        self.witness.reset();
         (self.resets, self.powered) = (resets, powered);
         self.wiring.board_reset(at);
         self.pacing.lockstep.reset(at.0);
@@ -357,8 +536,19 @@ impl emulator::Driver<RigBoard> for Driver {
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.board_mut().chip.join_breaks(stop.at);
         self.happen(session, stop, host);
-        if self.serve(session, stop, host) {
-            return Some(VirtualNanos(self.pacing.next_look_ns(stop.at.0)));
+        if let Some(vcd) = self.trace.as_mut().and_then(Trace::vcd)
+            && let Some(at_ns) = self.looks_at_ns.take_if(|at_ns| *at_ns <= stop.at.0)
+        {
+            vcd.looked(stop.at.0, at_ns);
+        }
+        let runs = match &self.script {
+            Some(_) => self.next_of_script(session, stop, host),
+            None => self.serve(session, stop, host).then(|| self.next_look_ns(stop.at.0)),
+        };
+        if let Some(look_ns) = runs {
+            // What the scenario wants at a moment happens at that moment.
+            let next_ns = self.schedule.next_ns().map_or(look_ns, |due_ns| look_ns.min(due_ns));
+            return Some(VirtualNanos(next_ns.max(stop.at.0 + 1)));
         }
         if let (Some((_, kept)), Some(memory)) = (&mut self.memory, session.board_mut().chip.memory()) {
             *kept = memory.contents().to_vec();

@@ -39,9 +39,9 @@ pub enum SimError {
         /// How long it was given.
         millis: u64,
     },
-    /// The faults file is wrong.
-    #[error("faults file {}: {reason}", path.display())]
-    Faults {
+    /// The scenario's file is wrong.
+    #[error("scenario {}: {reason}", path.display())]
+    Scenario {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
@@ -53,6 +53,14 @@ pub enum SimError {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
+        reason: String,
+    },
+    /// A trace cannot be replayed.
+    #[error("{}: {reason}", path.display())]
+    Replay {
+        /// The trace.
+        path: PathBuf,
+        /// Why not.
         reason: String,
     },
     /// The emulator's description of the chip, or the emulation itself, failed.

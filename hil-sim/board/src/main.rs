@@ -11,7 +11,13 @@ use std::{
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, standard};
-use farnear_sim::{Pace, Parts, RigConfig, faults::Faults, imager::Imager, run::ServedRig};
+use farnear_sim::{
+    Pace, Parts, RigConfig, Scenario,
+    campaign::{self, Campaign, Shard, cpu_time},
+    imager::Imager,
+    player,
+    run::ServedRig,
+};
 
 /// The farnear rig without hardware: the real firmware on an emulated board.
 #[derive(Parser)]
@@ -29,12 +35,50 @@ enum Job {
         farnear-sim run --scene staircase --psf gaussian:k=0.4578 --noise 8bit --seed 1\n  \
         {\"port\": \"/dev/pts/3\", \"camera\": \"127.0.0.1:40123\"}")]
     Run(Box<Run>),
+    /// Play random scenarios, one for each seed, on all cores; judge each, and make small and write those that break a
+    /// property. Fails where one does.
+    #[command(after_help = "Example:\n  farnear-sim campaign --seeds 200 --shard 2/8 --out broken/")]
+    Campaign(Seeds),
+    /// Make a run again from its trace, and say where it departs from it.
+    #[command(after_help = "Example:\n  farnear-sim run --trace run.vcd ...\n  farnear-sim replay run.vcd")]
+    Replay {
+        /// The trace, a VCD file of `farnear-sim run --trace`.
+        trace: PathBuf,
+        /// The firmware; without it the one that lies beside this program.
+        #[arg(long, value_name = "ELF")]
+        firmware: Option<PathBuf>,
+    },
     /// Count the instructions of the on-board routines: runs the counting firmware and prints its table.
     #[command(after_help = "Example:\n  farnear-sim count farnear-count.elf")]
     Count {
         /// The counting firmware, which `cargo xtask firmware` builds.
         elf: PathBuf,
     },
+}
+
+#[derive(Args)]
+struct Seeds {
+    /// How many scenarios.
+    #[arg(long, default_value_t = 100)]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+    /// Only every so manieth of them, e.g. 2/8: for several machines.
+    #[arg(long, default_value = "1/1")]
+    shard: Shard,
+    /// Rigs that run at a time; as many as there are cores, unless told.
+    #[arg(long)]
+    jobs: Option<usize>,
+    /// The firmware; without it the one that lies beside this program.
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
+    /// Where the small scenarios are written that break a property.
+    #[arg(long, default_value = "campaign", value_name = "FOLDER")]
+    out: PathBuf,
+    /// Write the scenario of the first seed to the standard output instead of playing any.
+    #[arg(long)]
+    show: bool,
 }
 
 #[derive(Args)]
@@ -51,16 +95,16 @@ struct Run {
     /// The camera's noise and bits: none, 8bit or 12bit.
     #[arg(long, default_value_t = standard::NOISE)]
     noise: Noise,
-    /// Decides everything random.
-    #[arg(long, default_value_t = standard::SEED)]
-    seed: u64,
+    /// Decides everything random; 1 unless it or the scenario says otherwise.
+    #[arg(long)]
+    seed: Option<u64>,
     /// The firmware; without it the one that lies beside this program.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// TOML file with faults: bit_error_rate, garbage, unplug_after_ms, and [[happens]] tables (after_ms, what, stage), e.g.
-    /// what = "emergency-stop", "power-loss" or "motor-stalls"; a wrong one is answered with all of them.
-    #[arg(long, value_name = "FILE")]
-    faults: Option<PathBuf>,
+    /// TOML file with what happens to the rig, when and how long (docs/hil.md); with [[host]] steps in it this program is
+    /// its own host, carries them out, judges the run and ends.
+    #[arg(long, visible_alias = "faults", value_name = "FILE")]
+    scenario: Option<PathBuf>,
     /// TOML file with what the parts are like where they differ from the standard rig's; `parts.toml` in the sources has all of
     /// it, with the source of each number.
     #[arg(long, value_name = "FILE")]
@@ -76,7 +120,8 @@ struct Run {
     /// Give the serial port this name too, a link that is removed at the end: a client finds a rig again that was started anew.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Write what the mechanics really did to this CSV file.
+    /// Write what the mechanics really did to this file: CSV, or by the ending .vcd a value change dump that `replay` can
+    /// make again.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
 }
@@ -84,6 +129,8 @@ struct Run {
 fn main() -> ExitCode {
     let done = match Program::parse().job {
         Job::Run(run) => serve(&run),
+        Job::Campaign(seeds) => play_seeds(&seeds),
+        Job::Replay { trace, firmware } => play_again(&trace, firmware.as_deref()),
         Job::Count { elf } => count(&elf),
     };
     match done {
@@ -95,6 +142,87 @@ fn main() -> ExitCode {
     }
 }
 
+fn play_seeds(seeds: &Seeds) -> Result<()> {
+    let mut stdout = std::io::stdout();
+    if seeds.show {
+        stdout.write_all(campaign::draw(seeds.first).text().as_bytes())?;
+        return Ok(());
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let campaign = Campaign {
+        seeds: seeds.first..seeds.first.saturating_add(seeds.seeds),
+        shard: seeds.shard,
+        jobs: seeds.jobs.unwrap_or(cores),
+        firmware: seeds.firmware.clone(),
+        out: seeds.out.clone(),
+    };
+    let mut played = 0;
+    let summary = campaign::run(&campaign, |seed, outcome| {
+        played += 1;
+        if let Some(broken) = outcome.broken.first() {
+            eprintln!("seed {seed} breaks {}: {}", broken.property, broken.what);
+        }
+        if played % 20 == 0 {
+            eprintln!("{played} scenarios, {:.0} s of CPU", cpu_time().as_secs_f64());
+        }
+    })?;
+    stdout.write_all(summary.table(cpu_time()).as_bytes())?;
+    anyhow::ensure!(
+        summary.broken.is_empty(),
+        "{} of {} scenarios break a property; play one again: farnear-sim run --scenario FILE",
+        summary.broken.len(),
+        summary.played
+    );
+    Ok(())
+}
+
+fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
+    let (end_ns, departure) = farnear_sim::replay::replay(trace, firmware)?;
+    if let Some(departure) = departure {
+        let line = |line: Option<String>| line.unwrap_or_else(|| "nothing more".into());
+        anyhow::bail!(
+            "the run departs from the trace at {:.6} s, line {} ({}): the trace has {:?}, the run now {:?}",
+            departure.at_ns as f64 * 1e-9,
+            departure.line,
+            departure.signal,
+            line(departure.recorded),
+            line(departure.now)
+        );
+    }
+    let mut stdout = std::io::stdout();
+    writeln!(stdout, "the same run to its end, {:.6} s of the board's time", end_ns as f64 * 1e-9)?;
+    Ok(())
+}
+
+/// Plays the steps of a scenario's own host.
+fn play(config: &RigConfig) -> Result<()> {
+    let outcome = player::play(&config.scenario, config)?;
+    let mut stdout = std::io::stdout();
+    writeln!(
+        stdout,
+        "{:.3} s of the board's time: {} requests answered, {} works done and {} failed, {} alarms, {} exposures, {} resets",
+        outcome.board_ns as f64 * 1e-9,
+        outcome.answered,
+        outcome.done,
+        outcome.failed,
+        outcome.alarms,
+        outcome.exposures,
+        outcome.resets
+    )?;
+    for broken in &outcome.broken {
+        writeln!(
+            stdout,
+            "broken at {:.6} s: {}: {}",
+            broken.at_ns as f64 * 1e-9,
+            broken.property,
+            broken.what
+        )?;
+    }
+    anyhow::ensure!(outcome.broken.is_empty(), "{} properties do not hold", outcome.broken.len());
+    writeln!(stdout, "every property holds")?;
+    Ok(())
+}
+
 /// Prints a line per routine: instructions, units, unit, name; separated by tabs.
 fn count(elf: &Path) -> Result<()> {
     let mut stdout = std::io::stdout();
@@ -104,7 +232,33 @@ fn count(elf: &Path) -> Result<()> {
     Ok(())
 }
 
+/// The rig that was asked for. The command line's seed and parts go before the scenario's.
+fn config(run: &Run) -> Result<RigConfig> {
+    let scenario = run.scenario.as_deref().map(Scenario::read).transpose()?.unwrap_or_default();
+    let own = scenario.parts().map_err(anyhow::Error::msg)?;
+    Ok(RigConfig {
+        firmware: run.firmware.clone(),
+        seed: run.seed.or(scenario.seed).unwrap_or(standard::SEED),
+        parts: run.parts.as_deref().map(Parts::read).transpose()?.unwrap_or(own),
+        costs_by_kind: false,
+        // A host of one's own lets time pass itself.
+        pace: match (run.paced, scenario.host.is_empty()) {
+            (_, false) => Pace::Told,
+            (true, true) => Pace::Realtime,
+            (false, true) => Pace::Lockstep,
+        },
+        scenario,
+        memory: run.memory.clone(),
+        witness: false,
+        trace: run.trace.clone(),
+    })
+}
+
 fn serve(run: &Run) -> Result<()> {
+    let config = config(run)?;
+    if !config.scenario.host.is_empty() {
+        return play(&config);
+    }
     let optics = match &run.optics {
         Some(path) => {
             let text =
@@ -115,17 +269,7 @@ fn serve(run: &Run) -> Result<()> {
     };
     let lens = Lens::from_optics(&optics)?;
     let camera = Camera::new(standard::SIZE_PX.0, standard::SIZE_PX.1, run.noise);
-    let imager = Imager::new(&run.scene, &lens, &run.psf, camera, run.seed)?;
-    let config = RigConfig {
-        firmware: run.firmware.clone(),
-        seed: run.seed,
-        parts: run.parts.as_deref().map(Parts::read).transpose()?.unwrap_or_default(),
-        costs_by_kind: false,
-        faults: run.faults.as_deref().map(Faults::read).transpose()?.unwrap_or_default(),
-        pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
-        memory: run.memory.clone(),
-        trace: run.trace.clone(),
-    };
+    let imager = Imager::new(&run.scene, &lens, &run.psf, camera, config.seed)?;
     let rig = ServedRig::start(&config, imager)?;
     let link = run.link.as_deref().map(|path| Link::new(path, &rig.port)).transpose()?;
     let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());

@@ -74,6 +74,11 @@ impl MemoryChip {
         self.fails_at = Some(self.written + bytes);
     }
 
+    /// The supply does not fail after all.
+    pub fn keep_supply(&mut self) {
+        self.fails_at = None;
+    }
+
     /// Whether the supply has failed as [`MemoryChip::fail_after`] asked; said once.
     pub fn take_failure(&mut self) -> bool {
         self.failed && self.fails_at.take().is_some()

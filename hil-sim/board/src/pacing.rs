@@ -148,10 +148,14 @@ impl Pacing {
         }
     }
 
+    /// Until when the emulator runs where nobody asked for less.
+    pub fn quantum_ns(&self) -> u64 {
+        if self.is_realtime() { REALTIME_QUANTUM_NS } else { QUANTUM_NS }
+    }
+
     /// Until when the emulator may run before it is asked again.
     pub fn next_look_ns(&self, now_ns: u64) -> u64 {
-        let quantum = if self.is_realtime() { REALTIME_QUANTUM_NS } else { QUANTUM_NS };
-        let until = now_ns + quantum;
+        let until = now_ns + self.quantum_ns();
         if self.is_told(now_ns) { until.min(self.told_ns) } else { until }
     }
 }

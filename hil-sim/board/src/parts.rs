@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use rigless::chip::fram::DEVICE_ID;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
 
@@ -13,7 +13,7 @@ use crate::error::SimError;
 const STANDARD: &str = include_str!("../parts.toml");
 
 /// All parts.
-#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parts {
     /// What instructions cost.
@@ -33,7 +33,7 @@ pub struct Parts {
 }
 
 /// What instructions cost.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessorParts {
     /// Cycles of an instruction, on average.
@@ -43,7 +43,7 @@ pub struct ProcessorParts {
 }
 
 /// The converter behind the strain gauge, and the released line of its data.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConverterParts {
     /// Shortest conversion: CNV is low again before that, or there is no busy indicator.
@@ -67,7 +67,7 @@ impl ConverterParts {
 }
 
 /// The strain gauge with its amplifier.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GaugeParts {
     /// What it says for a micrometre, 1 = as its data sheet has it.
@@ -79,7 +79,7 @@ pub struct GaugeParts {
 }
 
 /// The FRAM.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MemoryParts {
     /// Which one it is.
@@ -87,7 +87,7 @@ pub struct MemoryParts {
 }
 
 /// A make of FRAM.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum MemoryMake {
     /// Cypress FM25V02.
     #[serde(rename = "FM25V02")]
@@ -112,7 +112,7 @@ impl MemoryMake {
 }
 
 /// The chip's own supervision of its supply.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupplyParts {
     /// What its option bytes say at the first power-on.
@@ -124,7 +124,7 @@ pub struct SupplyParts {
 }
 
 /// Levels of the brown-out reset.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BrownOut {
     /// As the chip comes from its factory.
@@ -165,7 +165,7 @@ impl SupplyParts {
 }
 
 /// End switches.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SwitchParts {
     /// How long a contact bounces that has changed.
@@ -179,7 +179,7 @@ pub struct SwitchParts {
 }
 
 /// The motors' driver chips.
-#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriverParts {
     /// From a change of DIR to the next STEP.

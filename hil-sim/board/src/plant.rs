@@ -69,12 +69,13 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The mechanics as they stand at power-on; the seed decides where the stages stand and how their screws err.
-    pub fn new(seed: u64, parts: &Parts) -> Self {
+    /// The mechanics as they stand at power-on; the seed decides how their screws err. Where the sensor's and the lens' stage stand it
+    /// draws it unless `start_um` says otherwise.
+    pub fn new(seed: u64, parts: &Parts, start_um: Option<[f64; 2]>) -> Self {
         Self {
             now_ns: 0,
-            sensor_stage: Stage::new(StageName::Sensor, seed),
-            lens_stage: Stage::new(StageName::Lens, seed),
+            sensor_stage: Stage::new(StageName::Sensor, seed, start_um.map(|[sensor, _]| sensor)),
+            lens_stage: Stage::new(StageName::Lens, seed, start_um.map(|[_, lens]| lens)),
             piezo: Piezo::new(),
             gauge: parts.gauge,
             gauge_noise: Noise::new(seed, "gauge"),
@@ -191,7 +192,7 @@ mod tests {
 
     #[test]
     fn an_exposure_sees_the_mean_of_what_moved() {
-        let mut plant = Plant::new(1, &Parts::default());
+        let mut plant = Plant::new(1, &Parts::default(), None);
         let start_um = plant.stage(StageName::Sensor).position_um();
         let lens_um = plant.stage(StageName::Lens).position_um();
         plant.begin_exposure(1_000_000);
@@ -211,7 +212,7 @@ mod tests {
 
     #[test]
     fn the_gauge_reads_its_zero_with_its_noise() {
-        let mut plant = Plant::new(7, &Parts::default());
+        let mut plant = Plant::new(7, &Parts::default(), None);
         let codes: Vec<f64> =
             (1..=2000u32).map(|i| f64::from(plant.sample_gauge(u64::from(i) * 200_000))).collect();
         let mean = codes.iter().sum::<f64>() / codes.len() as f64;

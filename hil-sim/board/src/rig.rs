@@ -30,10 +30,12 @@ use crate::{
     lockstep::BOOT_NS,
     plant::Plant,
     processor::Costs,
+    replay::Script,
     report::Report,
     serial::Line,
     trace::Trace,
     wiring::{Shot, Wiring},
+    witness::Sight,
 };
 
 /// A running emulated rig; ends when dropped.
@@ -54,7 +56,7 @@ impl EmulatedRig {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
         let outlets = Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: None };
-        let (commands, thread) = launch(config, outlets)?;
+        let (commands, thread) = launch(config, outlets, None)?;
         Ok(Self { commands, thread: Some(thread), bytes, shots, decoder: Decoder::new() })
     }
 
@@ -80,6 +82,24 @@ impl EmulatedRig {
     /// As [`EmulatedRig::advance_us`].
     pub fn settle(&mut self) -> Result<Report, SimError> {
         self.ask(|done| Command::Settle { done })
+    }
+
+    /// Takes back what the scenario did to the rig, and lets nothing more of it happen.
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn heal(&mut self) -> Result<(), SimError> {
+        self.commands.send(Command::Heal).map_err(|_| SimError::Stopped)
+    }
+
+    /// What was seen since the last call, where the rig was asked to keep it ([`RigConfig::witness`]).
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn take_sights(&mut self) -> Result<Vec<Sight>, SimError> {
+        let (done, wait) = mpsc::channel();
+        self.commands.send(Command::Sights { done }).map_err(|_| SimError::Stopped)?;
+        wait.recv().map_err(|_| SimError::Stopped)
     }
 
     /// The plant and the wires as they are now.
@@ -149,17 +169,24 @@ impl Drop for EmulatedRig {
 /// A rig's thread and the way to command it.
 type Launched = (Sender<Command>, JoinHandle<Result<(), SimError>>);
 
-/// Starts the rig's thread, with the board started to its first idle moment.
+/// FNV-1a, 64 bit (Fowler, Noll, Vo): tells two firmwares apart.
+fn fnv(bytes: &[u8]) -> u64 {
+    let hash = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, hash)
+}
+
+/// Starts the rig's thread, with the board started to its first idle moment. With a `script` it does what that says, to its end.
 ///
 /// # Errors
 /// As [`EmulatedRig::new`].
-pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError> {
+pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> Result<Launched, SimError> {
+    let script_given = script.is_some();
     let path = firmware::find(config.firmware.as_deref())?;
     let unusable = |reason: String| SimError::Firmware { path: path.clone(), reason };
     let image = Image::read(&path, None).map_err(|error| unusable(error.to_string()))?;
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
 
-    let plant = SharedPlant::new(Plant::new(config.seed, &config.parts).into());
+    let plant = SharedPlant::new(Plant::new(config.seed, &config.parts, config.scenario.start_um).into());
     let line = Line::default();
     let costs = if config.costs_by_kind {
         Costs::by_kind(image.bytes()).ok_or_else(|| unusable("it has no program in the flash".into()))?
@@ -170,15 +197,32 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
         .map_err(|error| emulator(&error))?;
     if let Some(file) = &config.memory
         && let Some(contents) = kept_memory::read(file)?
+        && !script_given
         && let Some(memory) = board.chip.memory()
     {
         memory.set_contents(&contents);
     }
+    if let Some(contents) = script.as_ref().and_then(|script| script.memory.as_deref())
+        && let Some(memory) = board.chip.memory()
+    {
+        memory.set_contents(contents);
+    }
     let wiring =
         Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip, (config.seed, &config.parts));
-    let trace = config.trace.as_deref().map(Trace::create).transpose()?;
+    let fingerprint = fnv(image.bytes());
+    let trace = match script {
+        Some(_) => None,
+        None => config.trace.as_deref().map(|path| Trace::create(path, config, fingerprint)).transpose()?,
+    };
     let (commands, receiver) = mpsc::channel();
-    let driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);
+    let mut driver = Driver::new(config, receiver, outlets, plant, line, wiring, trace);
+    if let Some(script) = script {
+        if script.firmware != fingerprint {
+            let reason = "the run was made with another firmware".into();
+            return Err(SimError::Firmware { path, reason });
+        }
+        driver.follow(script);
+    }
     let mut session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
     session.fail_next(NOTHING.start, NOTHING.end);
 
@@ -193,6 +237,9 @@ pub fn launch(config: &RigConfig, outlets: Outlets) -> Result<Launched, SimError
         })
         .map_err(|source| SimError::Io { what: "cannot start the emulator's thread".into(), source })?;
 
+    if script_given {
+        return Ok((commands, thread));
+    }
     let (done, wait) = mpsc::channel();
     let started =
         commands.send(Command::Settle { done }).is_ok() && wait.recv().is_ok_and(|report| report.started);

@@ -13,7 +13,7 @@ use std::{
 use farnear_protocol::camera::Control;
 
 use crate::{
-    command::{Command, Outlets},
+    command::{CameraOrder, Command, Outlets},
     config::RigConfig,
     endpoint,
     error::SimError,
@@ -43,7 +43,7 @@ impl ServedRig {
         let pictures = Arc::new(AtomicUsize::new(0));
         let outlets =
             Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: Some(Arc::clone(&pictures)) };
-        let (commands, thread) = launch(config, outlets)?;
+        let (commands, thread) = launch(config, outlets, None)?;
         // One picture at a time is handed on: what is not fetched holds the imager up, and the imager the board.
         let (frames_out, frames) = mpsc::sync_channel(1);
         imager.watch(shots, frames_out, pictures)?;
@@ -54,12 +54,13 @@ impl ServedRig {
                 Control::AdvanceMicros(micros) => {
                     Command::Advance { nanos: micros.saturating_mul(1000), done: mpsc::channel().0 }
                 }
-                Control::Expose { shot_id, exposure } => Command::Camera(Box::new(move |rig| {
-                    rig.expose(u64::from(exposure.0), shot_id);
-                })),
-                Control::FreeRun { period, exposure } => Command::Camera(Box::new(move |rig| {
-                    rig.run_camera_freely(u64::from(period.0), u64::from(exposure.0));
-                })),
+                Control::Expose { shot_id, exposure } => {
+                    Command::Camera(CameraOrder::Expose { exposure_us: u64::from(exposure.0), id: shot_id })
+                }
+                Control::FreeRun { period, exposure } => Command::Camera(CameraOrder::FreeRun {
+                    period_us: u64::from(period.0),
+                    exposure_us: u64::from(exposure.0),
+                }),
             };
             let _ = control.send(command); // the rig may have ended
         })?;

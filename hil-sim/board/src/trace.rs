@@ -1,82 +1,56 @@
-//! What the plant really did, as CSV: `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
-//!
-//! A `tick` row each millisecond of virtual time in which something moved, and a row `shot` per exposure with its
-//! mean positions.
+//! What the plant really did, as a file: CSV for tables and plots, VCD for waveform viewers and for
+//! [`crate::replay`]. The name's ending says which.
 
-use std::{
-    fs::File,
-    io::{BufWriter, Write},
-    path::Path,
-};
+mod csv;
+pub mod vcd;
 
+use std::path::Path;
+
+use self::{csv::Csv, vcd::Vcd};
 use crate::{
+    config::RigConfig,
     error::SimError,
-    plant::{Plant, StageName},
-    wiring::Wiring,
+    plant::Plant,
+    wiring::{Shot, Wiring},
 };
 
-/// Virtual time between two looks.
-const PERIOD_NS: u64 = 1_000_000;
-
-/// The file, and what was written last.
-pub struct Trace {
-    file: BufWriter<File>,
-    next_ns: u64,
-    last: String,
-    failed: Option<std::io::Error>,
+/// A file of either kind.
+pub enum Trace {
+    /// `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
+    Csv(Csv),
+    /// Value change dump (IEEE 1364-2005, section 18).
+    Vcd(Box<Vcd>),
 }
 
 impl Trace {
-    /// Opens the file and writes the heading.
+    /// Opens the file and writes its heading.
     ///
     /// # Errors
     /// [`SimError::Io`].
-    pub fn create(path: &Path) -> Result<Self, SimError> {
-        let wrong =
-            |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };
-        let mut file = BufWriter::new(File::create(path).map_err(wrong)?);
-        writeln!(file, "time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers").map_err(wrong)?;
-        Ok(Self { file, next_ns: 0, last: String::new(), failed: None })
+    pub fn create(path: &Path, config: &RigConfig, firmware: u64) -> Result<Self, SimError> {
+        let vcd = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("vcd"));
+        if vcd {
+            return Ok(Self::Vcd(Box::new(Vcd::create(path, config, firmware)?)));
+        }
+        Csv::create(path).map(Self::Csv)
     }
 
-    /// Looks at the plant, if it is time and something has moved.
-    pub fn tick(&mut self, now_ns: u64, plant: &Plant, wiring: &Wiring) {
-        if now_ns < self.next_ns {
-            return;
-        }
-        self.next_ns = now_ns + PERIOD_NS;
-        let row = format!(
-            "{:.3},{:.3},{:.4},{},{},{}",
-            plant.stage(StageName::Sensor).position_um(),
-            plant.stage(StageName::Lens).position_um(),
-            plant.piezo().position_um(),
-            plant.piezo().dac(),
-            step_edges(wiring),
-            wiring.camera().triggers()
-        );
-        if row != self.last {
-            self.write(&format!("{},tick,{row}", now_ns / 1000));
-            self.last = row;
+    /// Looks at everything at a stop of the emulator.
+    pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
+        match self {
+            Self::Csv(csv) => {
+                csv.tick(now_ns, plant, wiring);
+                shots.iter().for_each(|shot| csv.shot(shot, plant, wiring));
+            }
+            Self::Vcd(vcd) => vcd.look(now_ns, plant, wiring, shots),
         }
     }
 
-    /// An exposure has ended.
-    pub fn shot(&mut self, shot: &crate::wiring::Shot, plant: &Plant, wiring: &Wiring) {
-        self.write(&format!(
-            "{},shot,{:.3},{:.3},{:.4},{},{},{}",
-            shot.begin_ns / 1000,
-            shot.truth.coarse_um,
-            shot.truth.lens_um,
-            shot.truth.piezo_um,
-            plant.piezo().dac(),
-            step_edges(wiring),
-            wiring.camera().triggers()
-        ));
-    }
-
-    fn write(&mut self, row: &str) {
-        if self.failed.is_none() {
-            self.failed = writeln!(self.file, "{row}").err();
+    /// The VCD, if it is one: a CSV holds nothing of what went in.
+    pub fn vcd(&mut self) -> Option<&mut Vcd> {
+        match self {
+            Self::Csv(_) => None,
+            Self::Vcd(vcd) => Some(vcd),
         }
     }
 
@@ -84,13 +58,10 @@ impl Trace {
     ///
     /// # Errors
     /// The first error of all.
-    pub fn finish(mut self) -> Result<(), SimError> {
-        let result = self.failed.take().map_or_else(|| self.file.flush(), Err);
-        result.map_err(|source| SimError::Io { what: "cannot write the trace".into(), source })
+    pub fn finish(self) -> Result<(), SimError> {
+        match self {
+            Self::Csv(csv) => csv.finish(),
+            Self::Vcd(vcd) => vcd.finish(),
+        }
     }
-}
-
-/// Edges on both STEP pins.
-fn step_edges(wiring: &Wiring) -> u64 {
-    wiring.step_edges(StageName::Sensor) + wiring.step_edges(StageName::Lens)
 }

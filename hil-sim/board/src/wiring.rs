@@ -45,6 +45,19 @@ pub struct Shot {
     pub truth: ExposureTruth,
 }
 
+/// STEP pulses of one motor, one behind the other.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Burst {
+    /// Whose.
+    pub stage: StageName,
+    /// When the first came.
+    pub first_ns: u64,
+    /// When the last came.
+    pub last_ns: u64,
+    /// How many.
+    pub steps: u64,
+}
+
 /// The wires of a stage, with the levels they had when last looked at.
 #[derive(Debug)]
 struct StageWires {
@@ -55,6 +68,10 @@ struct StageWires {
     contacts: [Contact; 2],
     due_ns: u64,
     counts: i64,
+    /// Counts that the encoder's wires have and its shaft has not, and whether they are cut.
+    slip: i64,
+    cut: bool,
+    burst: Option<Burst>,
     step_edges: u64,
     last_step_ns: u64,
     /// When each edge of STEP came, while somebody wants to know.
@@ -68,6 +85,8 @@ pub struct Wiring {
     camera: Camera,
     stages: [StageWires; 2],
     trigger: bool,
+    strobe_cut: bool,
+    exposures_begun: u64,
     begun: Option<(u32, u64, u64)>,
     shots: Vec<Shot>,
 }
@@ -142,6 +161,9 @@ impl StageWires {
             contacts: [contact(purposes[0], home), contact(purposes[1], far)],
             due_ns: 0,
             counts,
+            slip: 0,
+            cut: false,
+            burst: None,
             step_edges: 0,
             last_step_ns: 0,
             record: None,
@@ -166,6 +188,9 @@ impl StageWires {
         }
         self.step_edges += 1;
         self.last_step_ns = at.0;
+        let (stage, first_ns) = (self.name, at.0);
+        let burst = self.burst.get_or_insert(Burst { stage, first_ns, last_ns: first_ns, steps: 0 });
+        (burst.last_ns, burst.steps) = (at.0, burst.steps + 1);
         if let Some(record) = &mut self.record {
             record.push(at.0);
         }
@@ -183,6 +208,10 @@ impl StageWires {
             let stage = plant.stage(self.name);
             (stage.encoder_counts(), stage.home_closed(), stage.far_closed())
         });
+        if self.cut {
+            self.slip = self.counts - counts;
+        }
+        let counts = counts + self.slip;
         let ([a, b], _) = pins(self.name).encoder;
         if self.counts != counts {
             let connected = [a, b].iter().all(|pin| chip.function(*pin) == Some(ENCODER_FUNCTION));
@@ -216,7 +245,16 @@ impl Wiring {
     /// Connects the board to the plant at power-on; the seed decides when contacts bounce.
     pub fn new(plant: SharedPlant, camera: Camera, chip: &mut Chip, parts: (u64, &Parts)) -> Self {
         let stages = [StageName::Sensor, StageName::Lens].map(|name| StageWires::new(&plant, name, parts));
-        let mut wiring = Self { plant, camera, stages, trigger: false, begun: None, shots: Vec::new() };
+        let mut wiring = Self {
+            plant,
+            camera,
+            stages,
+            trigger: false,
+            strobe_cut: false,
+            exposures_begun: 0,
+            begun: None,
+            shots: Vec::new(),
+        };
         for stage in &mut wiring.stages {
             stage.put_encoder(chip, VirtualNanos(0));
             stage.put(&wiring.plant, chip, VirtualNanos(0));
@@ -258,6 +296,7 @@ impl Wiring {
     fn expose(&mut self, chip: &mut Chip, at: VirtualNanos, at_ns: u64, edge: Edge) {
         match edge {
             Edge::Begin(id) => {
+                self.exposures_begun += 1;
                 with_plant(&self.plant, |plant| plant.begin_exposure(at_ns));
                 let low = Operate::peek(chip, at, TIM2_CNT, Width::W32).unwrap_or(0);
                 // The counter has the lower 32 bits of about the virtual time; a run has few of their periods.
@@ -270,6 +309,9 @@ impl Wiring {
                     self.shots.push(Shot { id, board_us, begin_ns, end_ns: at_ns, truth });
                 }
             }
+        }
+        if self.strobe_cut {
+            return;
         }
         let level = Level::from(edge != Edge::End);
         chip.drive_pin(at, STROBE, level);
@@ -315,6 +357,58 @@ impl Wiring {
     /// Whether a motor is on its way: the slowest steps of a ramp are nearer to each other than `STANDS_NS`.
     pub fn is_stepping(&self, now_ns: u64) -> bool {
         self.stages.iter().any(|stage| stage.step_edges > 0 && now_ns < stage.last_step_ns + STANDS_NS)
+    }
+
+    /// Takes the bursts of pulses that have come to their end, or (`all`) are under way.
+    pub fn take_bursts(&mut self, now_ns: u64, all: bool) -> Vec<Burst> {
+        let ended = |burst: &mut Burst| all || now_ns >= burst.last_ns + STANDS_NS;
+        self.stages.iter_mut().filter_map(|stage| stage.burst.take_if(ended)).collect()
+    }
+
+    /// When the exposure began that is under way.
+    pub fn begun_ns(&self) -> Option<u64> {
+        self.begun.map(|(_, _, at_ns)| at_ns)
+    }
+
+    /// Exposures that have begun since power-on.
+    pub fn exposures_begun(&self) -> u64 {
+        self.exposures_begun
+    }
+
+    /// Cuts the wire of the strobe, or mends it.
+    pub fn cut_strobe(&mut self, cut: bool) {
+        self.strobe_cut = cut;
+    }
+
+    fn stage_mut(&mut self, name: StageName) -> &mut StageWires {
+        match name {
+            StageName::Sensor => &mut self.stages[0],
+            StageName::Lens => &mut self.stages[1],
+        }
+    }
+
+    /// The encoder counts what its shaft has not done.
+    pub fn slip_encoder(&mut self, name: StageName, counts: i64) {
+        self.stage_mut(name).slip += counts;
+    }
+
+    /// Cuts the encoder's wires, or mends them.
+    pub fn cut_encoder(&mut self, name: StageName, cut: bool) {
+        self.stage_mut(name).cut = cut;
+    }
+
+    /// So many false openings of the switches a second from now on.
+    pub fn set_glitches_per_s(&mut self, now_ns: u64, name: StageName, per_s: f64) {
+        for contact in &mut self.stage_mut(name).contacts {
+            contact.set_glitches_per_s(now_ns, per_s);
+        }
+    }
+
+    /// Begins to note when each STEP edge comes, unless that is done already.
+    pub fn record_steps_once(&mut self) {
+        for stage in &mut self.stages {
+            stage.record.get_or_insert_default();
+        }
     }
 
     /// Begins to note when each STEP edge comes.

@@ -113,7 +113,11 @@ impl Restored {
             restored.alarms = Alarms::restored(u32_at(&head, 0), head[4], records);
         }
         if let Some(copy) = copy(RecordName::Settings) {
+            let kept = record::values(memory, RecordName::Settings, copy);
             let values = core::array::from_fn::<i32, KEYS, _>(|i| {
+                if i >= kept {
+                    return Values::DEFAULT.raw()[i];
+                }
                 let block = record::block(memory, RecordName::Settings, copy, i / VALUES);
                 u32_at(&block, i % VALUES * 4) as i32
             });
@@ -210,6 +214,46 @@ mod tests {
     use super::*;
     use farnear_protocol::message::{Alarm, Axis, TriggerMode};
     use farnear_protocol::{BoardMicros, Micros, Nanometres};
+
+    /// A memory whose settings were written by a firmware of this version that had so many of them.
+    fn of_version(version: u8, kept: usize, write: [i32; KEYS]) -> std::boxed::Box<[u8; MEMORY_BYTES]> {
+        let mut memory = std::boxed::Box::new([0; MEMORY_BYTES]);
+        let mut header = record::header(RecordName::Settings, 9);
+        header[5] = version;
+        header[7] = if version == 1 { 0 } else { kept as u8 };
+        let mut checksum = record::Checksum::new(&header);
+        let at = record::address(RecordName::Settings, 1);
+        for index in 0..record::blocks(RecordName::Settings) {
+            let block = values(&write[..kept], index);
+            checksum.push(&block);
+            memory[at + (1 + index) * BLOCK..][..BLOCK].copy_from_slice(&block);
+        }
+        memory[at..at + BLOCK].copy_from_slice(&checksum.finish(header));
+        memory
+    }
+
+    #[test]
+    fn settings_of_an_older_firmware_are_taken_over_and_those_it_did_not_have_are_at_their_defaults() {
+        let mut write = *Values::DEFAULT.raw();
+        write[0] = 48_000_000;
+        // The backlash may be 0, and is not where the older firmware knew nothing of it.
+        let backlash = farnear_protocol::message::SettingKey::CoarseBacklashNm as usize;
+        write[backlash] = 7_000;
+        for (version, kept) in [(1, KEYS), (2, KEYS), (2, backlash)] {
+            let memory = of_version(version, kept, write);
+            assert!(matches!(record::find(&memory, RecordName::Settings), Found::Good { sequence: 9, .. }));
+            let restored = Restored::from(&memory, &Settings::DEFAULT).values;
+            let expected = if kept == KEYS { 7_000 } else { Values::DEFAULT.raw()[backlash] };
+            assert_eq!(
+                (restored.raw()[0], restored.raw()[backlash]),
+                (48_000_000, expected),
+                "{version} {kept}"
+            );
+        }
+        // What is to come is not known, and not guessed at.
+        let memory = of_version(3, KEYS, write);
+        assert_eq!(record::find(&memory, RecordName::Settings), Found::Blank, "the other copy is blank");
+    }
 
     #[test]
     fn the_longest_messages_fit_a_block() {

@@ -2,12 +2,18 @@
 //!
 //! A copy is a header and the record's blocks, 32 bytes each, little-endian:
 //! ```text
-//! header: magic "fnR1" | record u8 | version u8 | blocks u8 | 0 | sequence u32 | CRC-32 | 0...
+//! header: magic "fnR1" | record u8 | version u8 | blocks u8 | values u8 | sequence u32 | CRC-32 | 0...
 //! ```
 //! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two copies, one behind
 //! the other, and a place of its own from address 0 up. The copy with the newer sequence number counts; the other
 //! is the one that is written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and
 //! the one before untouched. A record's first write is of both copies, one after the other.
+//!
+//! A copy of an older version is read as that version had it, and the next write is of the present one: over the other copy,
+//! as always, so that a firmware that is exchanged loses nothing, whenever the power goes. So a new version may give
+//! blocks another meaning but not another place: a record that outgrows its place gets a place of its own behind all others.
+//! Version 1 did not say how many values a list had; version 2 does, so that a setting that came later is at its default
+//! and not at the 0 behind the list. A version that is not known yet (an older firmware was put back) is no good copy.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use farnear_protocol::message::RecordName;
@@ -15,6 +21,7 @@ use farnear_protocol::message::RecordName;
 use crate::correction::COEFFICIENTS;
 use crate::io::MEMORY_BYTES;
 use crate::program::SHOTS_MAX;
+use crate::settings::KEYS;
 
 /// Bytes of a block.
 pub(crate) const BLOCK: usize = 32;
@@ -24,8 +31,10 @@ pub(crate) const VALUES: usize = BLOCK / 4;
 pub(crate) type Block = [u8; BLOCK];
 /// How many records there are.
 pub(crate) const RECORDS: usize = 5;
-/// Version of the records' contents; another one is not read.
-const VERSION: u8 = 1;
+/// Version of the records' contents; older ones are read too.
+const VERSION: u8 = 2;
+/// Settings that a record of version 1 holds.
+const SETTINGS_OF_VERSION_1: usize = 25;
 const MAGIC: [u8; 4] = *b"fnR1";
 /// Bytes of the header that the CRC covers.
 const COVERED: usize = 12;
@@ -120,7 +129,11 @@ impl core::fmt::Debug for Checksum {
 pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
     let mut header = [0; BLOCK];
     header[..4].copy_from_slice(&MAGIC);
-    header[4..7].copy_from_slice(&[index(record) as u8, VERSION, blocks(record) as u8]);
+    let values = match record {
+        RecordName::Settings => KEYS,
+        _ => 0,
+    };
+    header[4..8].copy_from_slice(&[index(record) as u8, VERSION, blocks(record) as u8, values as u8]);
     header[8..COVERED].copy_from_slice(&sequence.to_le_bytes());
     header
 }
@@ -173,6 +186,12 @@ pub(crate) fn block(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize
     at(memory, address(record, copy) + (1 + block) * BLOCK)
 }
 
+/// How many values the list in a good copy has.
+pub(crate) fn values(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> usize {
+    let [.., version, _, values] = *at(memory, address(record, copy)).first_chunk::<8>().unwrap_or(&[0; 8]);
+    if version == 1 { SETTINGS_OF_VERSION_1 } else { usize::from(values) }
+}
+
 fn at(memory: &[u8; MEMORY_BYTES], address: usize) -> Block {
     let mut block = [0; BLOCK];
     if let Some(bytes) = memory.get(address..address + BLOCK) {
@@ -187,7 +206,11 @@ fn look(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> Copy {
         return Copy::Blank;
     }
     let sequence = u32::from_le_bytes([found[8], found[9], found[10], found[11]]);
-    let expected = header(record, sequence);
+    let mut expected = header(record, sequence);
+    if (1..=VERSION).contains(&found[5]) {
+        // The checksum covers both: as that version had them.
+        (expected[5], expected[7]) = (found[5], found[7]);
+    }
     let mut checksum = Checksum::new(&expected);
     for index in 0..blocks(record) {
         checksum.push(&block(memory, record, copy, index));

@@ -55,6 +55,8 @@ pub struct Bench {
     /// The next write to the FRAM ends after this many bytes; whether one has.
     pub tear: Option<usize>,
     pub torn: bool,
+    /// The power goes when so many more bytes have been written to the FRAM; nothing is written after that.
+    pub cut_after: Option<usize>,
     pub now: u64,
     pub next_id: u32,
     decoder: Decoder,
@@ -84,6 +86,7 @@ impl Bench {
             memory,
             tear: None,
             torn: false,
+            cut_after: None,
             now: 0,
             next_id: 1,
             decoder: Decoder::new(),
@@ -149,6 +152,14 @@ impl Bench {
         if let Some(write) = &outputs.memory {
             let at = usize::from(write.address);
             let written = self.tear.take().map_or(write.bytes.len(), |bytes| bytes.min(write.bytes.len()));
+            let written = match &mut self.cut_after {
+                None => written,
+                Some(left) => {
+                    let last = written.min(*left);
+                    *left -= last;
+                    last
+                }
+            };
             self.torn |= written < write.bytes.len();
             self.memory[at..at + written].copy_from_slice(&write.bytes[..written]);
         }

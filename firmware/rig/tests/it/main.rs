@@ -9,6 +9,7 @@ mod faults;
 mod hostile;
 mod link;
 mod maths;
+mod power_cuts;
 mod program;
 mod requests;
 mod safety;

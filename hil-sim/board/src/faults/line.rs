@@ -1,26 +1,45 @@
-//! A serial line that flips bits.
+//! A serial line that flips bits, loses bytes and makes some up.
 
 use crate::plant::Noise;
 
-/// One direction of a line that flips bits.
-#[derive(Clone, Debug)]
-pub struct NoisyLine {
-    rate: f64,
-    noise: Noise,
-    /// Bits until the next one that is flipped.
-    gap: u64,
-    flipped: u64,
+/// What goes wrong on a line.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Rates {
+    /// Probability of each bit to flip.
+    pub flipped: f64,
+    /// Probability of each byte to get lost.
+    pub lost: f64,
+    /// Probability of a byte to come out of nothing in front of each byte.
+    pub inserted: f64,
+    /// Nothing passes.
+    pub cut: bool,
 }
 
-impl NoisyLine {
-    /// A line with this rate; `direction` names its stream of random numbers.
-    pub fn new(rate: f64, seed: u64, direction: &str) -> Self {
-        let mut line = Self { rate, noise: Noise::new(seed, direction), gap: 0, flipped: 0 };
-        line.gap = line.draw();
-        line
+/// Something that happens to a thing in a row with a probability.
+#[derive(Clone, Debug)]
+struct Chance {
+    rate: f64,
+    noise: Noise,
+    /// Things until the next that it happens to.
+    gap: u64,
+}
+
+impl Chance {
+    fn new(rate: f64, noise: Noise) -> Self {
+        let mut chance = Self { rate, noise, gap: 0 };
+        chance.gap = chance.draw();
+        chance
     }
 
-    /// Length of the run of good bits: geometric.
+    /// Another probability: the length of the run is drawn anew.
+    fn set_rate(&mut self, rate: f64) {
+        if rate != self.rate {
+            self.rate = rate;
+            self.gap = self.draw();
+        }
+    }
+
+    /// Length of the run to which nothing happens: geometric.
     fn draw(&mut self) -> u64 {
         if self.rate <= 0.0 {
             return u64::MAX;
@@ -30,16 +49,74 @@ impl NoisyLine {
         if good.is_finite() { good as u64 } else { 0 }
     }
 
+    /// Whether it happens to the next one.
+    fn strikes(&mut self) -> bool {
+        if self.gap == 0 {
+            self.gap = self.draw();
+            return true;
+        }
+        self.gap -= 1;
+        false
+    }
+}
+
+/// One direction of such a line.
+#[derive(Clone, Debug)]
+pub struct NoisyLine {
+    rates: Rates,
+    flip: Chance,
+    lose: Chance,
+    insert: Chance,
+    flipped: u64,
+}
+
+impl NoisyLine {
+    /// A line with this rate of flipped bits; `direction` names its streams of random numbers.
+    pub fn new(rate: f64, seed: u64, direction: &str) -> Self {
+        let chance = |of: &str, rate| Chance::new(rate, Noise::new(seed, &format!("{direction}{of}")));
+        Self {
+            rates: Rates { flipped: rate, ..Rates::default() },
+            flip: chance("", rate),
+            lose: chance(", lost", 0.0),
+            insert: chance(", inserted", 0.0),
+            flipped: 0,
+        }
+    }
+
+    /// Changes what goes wrong.
+    pub fn set_rates(&mut self, change: impl FnOnce(&mut Rates)) {
+        change(&mut self.rates);
+        self.flip.set_rate(self.rates.flipped);
+        self.lose.set_rate(self.rates.lost);
+        self.insert.set_rate(self.rates.inserted);
+    }
+
     /// Carries bytes over the line.
-    pub fn carry(&mut self, bytes: &mut [u8]) {
+    pub fn carry(&mut self, bytes: &mut Vec<u8>) {
+        if self.rates.cut {
+            bytes.clear();
+            return;
+        }
+        if self.rates.lost > 0.0 || self.rates.inserted > 0.0 {
+            let mut carried = Vec::with_capacity(bytes.len());
+            for byte in bytes.drain(..) {
+                while self.insert.strikes() {
+                    carried.push(self.insert.noise.bits() as u8);
+                    if self.rates.inserted >= 1.0 {
+                        break; // one a byte, not without end
+                    }
+                }
+                if !self.lose.strikes() {
+                    carried.push(byte);
+                }
+            }
+            *bytes = carried;
+        }
         for byte in bytes {
             for bit in 0..8 {
-                if self.gap == 0 {
+                if self.flip.strikes() {
                     *byte ^= 1 << bit;
                     self.flipped += 1;
-                    self.gap = self.draw();
-                } else {
-                    self.gap -= 1;
                 }
             }
         }
@@ -48,6 +125,31 @@ impl NoisyLine {
     /// Bits flipped so far.
     pub fn flipped(&self) -> u64 {
         self.flipped
+    }
+}
+
+/// Both directions.
+#[derive(Clone, Debug)]
+pub struct Lines {
+    /// From the host to the board.
+    pub to_board: NoisyLine,
+    /// From the board to the host.
+    pub to_host: NoisyLine,
+}
+
+impl Lines {
+    /// Lines with this rate of flipped bits.
+    pub fn new(rate: f64, seed: u64) -> Self {
+        Self {
+            to_board: NoisyLine::new(rate, seed, "line to the board"),
+            to_host: NoisyLine::new(rate, seed, "line to the host"),
+        }
+    }
+
+    /// Does the same with both.
+    pub fn each(&mut self, change: impl Fn(&mut NoisyLine)) {
+        change(&mut self.to_board);
+        change(&mut self.to_host);
     }
 }
 
@@ -65,8 +167,30 @@ mod tests {
         // Poisson with mean 8000: five standard deviations.
         assert!((f64::from(ones) - 8000.0).abs() < 450.0, "{ones}");
         let mut clean = NoisyLine::new(0.0, 1, "test");
-        let mut bytes = *b"unchanged";
+        let mut bytes = b"unchanged".to_vec();
         clean.carry(&mut bytes);
+        assert_eq!(&bytes, b"unchanged");
+    }
+
+    #[test]
+    fn loses_and_inserts_its_share_of_bytes_until_it_is_mended() {
+        let carry = |change: fn(&mut Rates)| {
+            let mut line = NoisyLine::new(0.0, 1, "test");
+            line.set_rates(change);
+            let mut bytes = vec![0u8; 100_000];
+            line.carry(&mut bytes);
+            bytes.len()
+        };
+        // Binomial with mean 1000: five standard deviations are 157.
+        assert!((98_843..99_157).contains(&carry(|rates| rates.lost = 0.01)));
+        assert!((100_843..101_157).contains(&carry(|rates| rates.inserted = 0.01)));
+        assert_eq!(carry(|rates| rates.cut = true), 0);
+        assert_eq!(carry(|rates| rates.lost = 1.0), 0);
+        let mut line = NoisyLine::new(0.0, 1, "test");
+        line.set_rates(|rates| rates.lost = 0.5);
+        line.set_rates(|rates| rates.lost = 0.0);
+        let mut bytes = b"unchanged".to_vec();
+        line.carry(&mut bytes);
         assert_eq!(&bytes, b"unchanged");
     }
 }

@@ -73,6 +73,13 @@ impl Contact {
         }
     }
 
+    /// So many false openings a second from now on.
+    pub fn set_glitches_per_s(&mut self, now_ns: u64, per_s: f64) {
+        self.parts.glitches_per_s = per_s;
+        self.glitch_ns = (now_ns, now_ns);
+        self.plan_glitch();
+    }
+
     /// When the wire may change by itself next.
     pub fn next_ns(&self, now_ns: u64, driven: bool) -> u64 {
         let (begin_ns, end_ns) = self.glitch_ns;

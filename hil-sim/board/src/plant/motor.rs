@@ -75,6 +75,13 @@ impl Motor {
         self.resting = false;
     }
 
+    /// The sequencer begins anew: at the whole period nearest to where it stood.
+    pub fn reset_sequencer(&mut self) {
+        let period = PERIOD as i64;
+        self.field = (self.field + period / 2).div_euclid(period) * period;
+        self.resting = false;
+    }
+
     /// Holds the rotor fast, or lets it go.
     pub fn set_blocked(&mut self, blocked: bool) {
         self.blocked = blocked;

@@ -14,6 +14,9 @@ use super::{
 const COUNTS_PER_TURN: f64 = 4000.0;
 /// The carriage runs against rubber this far beyond either switch: the motor stalls.
 const END_STOP_UM: f64 = 700.0;
+/// Where it holds the rotor, microsteps.
+const LOWEST: f64 = -END_STOP_UM / MICROSTEP_UM;
+const HIGHEST: f64 = (TRAVEL_UM + END_STOP_UM) / MICROSTEP_UM;
 /// The far switch closes this far beyond the travel.
 const FAR_SWITCH_UM: f64 = TRAVEL_UM + 150.0;
 /// Repeatability of the home switch, standard deviation in micrometres.
@@ -23,7 +26,7 @@ const HOME_SD_UM: f64 = 0.3;
 const HOME_DIFFERENTIAL_UM: f64 = 2.0;
 
 /// Which of the two stages.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StageName {
     /// Stage A: carries the sensor with its piezo.
@@ -61,36 +64,55 @@ pub struct Stage {
     /// How far a piezo on the stage carries what the home switch sees.
     carried_um: f64,
     stuck_home: Option<bool>,
+    stuck_far: Option<bool>,
+    /// Microsteps that the driver made against a hard stop.
+    pressed: u64,
 }
 
 impl Stage {
-    /// A stage somewhere in the first half of its travel.
-    pub fn new(name: StageName, seed: u64) -> Self {
+    /// A stage at `start_um`, or somewhere in the first half of its travel.
+    pub fn new(name: StageName, seed: u64, start_um: Option<f64>) -> Self {
         let (screw, switch) = match name {
             StageName::Sensor => ("screw", "home switch"),
             StageName::Lens => ("lens screw", "lens home switch"),
         };
         let mut noise = Noise::new(seed, screw);
-        let start_um = noise.between(500.0, TRAVEL_UM / 2.0);
+        let drawn_um = noise.between(500.0, TRAVEL_UM / 2.0);
+        let start_um = start_um.unwrap_or(drawn_um);
         let mut home = HomeSwitch { noise: Noise::new(seed, switch), offset_um: 0.0, closed: false };
         home.offset_um = HOME_SD_UM * home.noise.normal();
         let microsteps = libm::round(start_um / MICROSTEP_UM) as i64;
         let mut screw = Screw::new(&mut noise);
         // It came from its lower end.
         screw.turn(microsteps as f64);
-        Self { motor: Motor::new(microsteps), screw, home, carried_um: 0.0, stuck_home: None }
+        Self {
+            motor: Motor::new(microsteps),
+            screw,
+            home,
+            carried_um: 0.0,
+            stuck_home: None,
+            stuck_far: None,
+            pressed: 0,
+        }
     }
 
     /// A STEP pulse reaches the driver while it is on.
     pub fn step(&mut self, away: bool) {
+        let rotor = self.motor.rotor();
+        self.pressed += u64::from(if away { rotor >= HIGHEST } else { rotor <= LOWEST });
         self.motor.step(away);
+    }
+
+    /// Microsteps that its driver made against a hard stop, since power-on.
+    pub fn pressed(&self) -> u64 {
+        self.pressed
     }
 
     /// Lets time pass until `now_ns`.
     pub fn advance(&mut self, now_ns: u64) {
         let Self { motor, screw, home, carried_um, .. } = self;
         motor.advance(now_ns, |rotor| {
-            let held = rotor.clamp(-END_STOP_UM / MICROSTEP_UM, (TRAVEL_UM + END_STOP_UM) / MICROSTEP_UM);
+            let held = rotor.clamp(LOWEST, HIGHEST);
             screw.turn(held);
             home.update(screw.stage_um() + *carried_um);
             held
@@ -130,7 +152,7 @@ impl Stage {
 
     /// The far switch is closed.
     pub fn far_closed(&self) -> bool {
-        self.position_um() >= FAR_SWITCH_UM
+        self.stuck_far.unwrap_or_else(|| self.position_um() >= FAR_SWITCH_UM)
     }
 
     /// Blocks the motor, or frees it.
@@ -146,6 +168,16 @@ impl Stage {
     /// Another play of the screw's nut.
     pub fn set_backlash_um(&mut self, um: f64) {
         self.screw.set_backlash_um(um);
+    }
+
+    /// The driver's sequencer begins anew, at the whole period nearest to where it stood.
+    pub fn reset_sequencer(&mut self) {
+        self.motor.reset_sequencer();
+    }
+
+    /// Breaks the far switch so that it says this for ever, or repairs it.
+    pub fn set_stuck_far(&mut self, says: Option<bool>) {
+        self.stuck_far = says;
     }
 
     /// Breaks the home switch so that it says this for ever, or repairs it.
@@ -166,7 +198,7 @@ mod tests {
 
     impl Turned {
         fn new(seed: u64) -> Self {
-            Self { stage: Stage::new(StageName::Sensor, seed), now_ns: 0 }
+            Self { stage: Stage::new(StageName::Sensor, seed, None), now_ns: 0 }
         }
 
         fn step(&mut self, away: bool) {
@@ -214,7 +246,7 @@ mod tests {
 
     #[test]
     fn the_two_stages_are_not_the_same() {
-        let at = |name| Stage::new(name, 1).position_um();
+        let at = |name| Stage::new(name, 1, None).position_um();
         assert_ne!(at(StageName::Sensor), at(StageName::Lens));
     }
 }

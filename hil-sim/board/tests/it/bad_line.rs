@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{EventKind, Request, Response};
-use farnear_sim::{RigConfig, faults::Faults};
+use farnear_sim::{RigConfig, Scenario};
 
 const REQUESTS: u32 = 10_000;
 /// Every so many requests one that acts.
@@ -10,8 +10,8 @@ const RUN_EVERY: u32 = 50;
 
 #[test]
 fn ten_thousand_requests_over_a_bad_line() {
-    let faults = Faults { bit_error_rate: 1e-4, ..Faults::default() };
-    let mut bench = Bench::with(&RigConfig { seed: 5, faults, ..RigConfig::default() });
+    let scenario = Scenario { bit_error_rate: 1e-4, ..Scenario::default() };
+    let mut bench = Bench::with(&RigConfig { seed: 5, scenario, ..RigConfig::default() });
     let shot = |target| fine_shot(target, 200, 1_000, 200);
     let (mut asked, mut unanswered, mut runs) = (1, 0, 0u32);
     let mut index = 0;

@@ -1,0 +1,241 @@
+//! Campaigns: scenarios drawn from seeds, played on all cores, judged, and those that break a property made small.
+
+mod draw;
+mod shrink;
+
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    str::FromStr,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+        mpsc,
+    },
+    time::Duration,
+};
+
+pub use self::{draw::draw, shrink::shrink};
+use crate::{
+    RigConfig, SimError,
+    judge::Broken,
+    player::{Outcome, play},
+    scenario::Scenario,
+};
+
+/// A part of a campaign's seeds: the `index`th of `count` parts.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Shard {
+    /// From 1.
+    pub index: u64,
+    /// Of so many.
+    pub count: u64,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text:?} is no shard: 2/8 is the second of eight");
+        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+        let (index, count) = (index.parse().map_err(|_| wrong())?, count.parse().map_err(|_| wrong())?);
+        if index == 0 || index > count {
+            return Err(wrong());
+        }
+        Ok(Self { index, count })
+    }
+}
+
+/// What a campaign is to do.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    /// Seeds: the first, and the one behind the last.
+    pub seeds: std::ops::Range<u64>,
+    /// Which part of them.
+    pub shard: Shard,
+    /// How many rigs run at a time.
+    pub jobs: usize,
+    /// The firmware; `None`: the one beside the program.
+    pub firmware: Option<PathBuf>,
+    /// Where the small scenarios of what broke are written.
+    pub out: PathBuf,
+}
+
+/// What came of a campaign.
+#[derive(Clone, Default, Debug)]
+pub struct Summary {
+    /// Scenarios played.
+    pub played: u64,
+    /// Those of them that broke a property: seed, first broken property, file.
+    pub broken: Vec<(u64, Broken, PathBuf)>,
+    /// Board time, seconds.
+    pub board_s: f64,
+    /// Requests answered, long work done and failed, alarms, exposures, resets.
+    pub counts: [u64; 6],
+}
+
+impl Summary {
+    fn add(&mut self, outcome: &Outcome) {
+        self.played += 1;
+        self.board_s += outcome.board_ns as f64 * 1e-9;
+        let seen = [
+            outcome.answered,
+            u64::from(outcome.done),
+            u64::from(outcome.failed),
+            u64::from(outcome.alarms),
+            u64::from(outcome.exposures),
+            outcome.resets as u64,
+        ];
+        self.counts.iter_mut().zip(seen).for_each(|(sum, one)| *sum += one);
+    }
+
+    /// As a table for people. `cpu`: what it took.
+    pub fn table(&self, cpu: Duration) -> String {
+        let [answered, done, failed, alarms, exposures, resets] = self.counts;
+        let per = cpu.as_secs_f64() / (self.played.max(1) as f64);
+        let mut text = String::from("| what | |\n|---|---|\n");
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "| scenarios | {} |\n| broken | {} |\n| board time | {:.0} s |\n| CPU time | {:.0} s, {per:.2} s a scenario |\n\
+             | requests answered | {answered} |\n| work done, failed | {done}, {failed} |\n| alarms | {alarms} |\n\
+             | exposures | {exposures} |\n| resets | {resets} |\n",
+            self.played,
+            self.broken.len(),
+            self.board_s,
+            cpu.as_secs_f64(),
+        );
+        for (seed, broken, file) in &self.broken {
+            let _ = writeln!(
+                text,
+                "| seed {seed}: {} at {:.3} s | {}; {} |",
+                broken.property,
+                broken.at_ns as f64 * 1e-9,
+                broken.what,
+                file.display()
+            );
+        }
+        text
+    }
+}
+
+/// CPU time of this process, all threads; the kernel counts it in hundredths of a second. Linux only, 0 elsewhere.
+pub fn cpu_time() -> Duration {
+    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // Behind the name, which stands in brackets and may hold spaces, come the fields from 3 on; 14 and 15 are the times.
+    let fields = stat.rsplit(") ").next().unwrap_or_default().split(' ');
+    let ticks: u64 = fields.skip(11).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
+    Duration::from_millis(10 * ticks)
+}
+
+/// Plays a scenario with its own seed and parts.
+///
+/// # Errors
+/// [`SimError`] where the rig cannot start, or its parts are wrong.
+pub fn play_alone(scenario: &Scenario, firmware: Option<&Path>) -> Result<Outcome, SimError> {
+    let config =
+        RigConfig::of(scenario).map_err(|reason| SimError::Scenario { path: "scenario".into(), reason })?;
+    play(scenario, &RigConfig { firmware: firmware.map(Into::into), ..config })
+}
+
+/// Carries a campaign out. `progress` hears of each scenario, in the order in which they end.
+///
+/// # Errors
+/// [`SimError`] where a rig cannot start or a file cannot be written; scenarios that break a property are no error.
+pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Result<Summary, SimError> {
+    let Shard { index, count } = campaign.shard;
+    let seeds: Vec<u64> = campaign.seeds.clone().filter(|seed| seed % count == index - 1).collect();
+    let next = AtomicU64::new(0);
+    let stopped = Mutex::new(None);
+    let mut summary = Summary::default();
+    std::thread::scope(|scope| {
+        let (tell, told) = mpsc::channel();
+        for _ in 0..campaign.jobs.max(1) {
+            let (tell, next, seeds, stopped) = (tell.clone(), &next, &seeds, &stopped);
+            scope.spawn(move || {
+                while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
+                    match one(campaign, *seed) {
+                        Ok(result) => drop(tell.send((*seed, result))), // whoever counts may have gone
+                        Err(error) => {
+                            *stopped.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                            next.store(u64::MAX / 2, Ordering::Relaxed);
+                        }
+                    }
+                }
+            });
+        }
+        drop(tell);
+        for (seed, (outcome, file)) in told {
+            summary.add(&outcome);
+            progress(seed, &outcome);
+            if let (Some(broken), Some(file)) = (outcome.broken.first(), file) {
+                summary.broken.push((seed, broken.clone(), file));
+            }
+        }
+    });
+    summary.broken.sort_by_key(|(seed, ..)| *seed);
+    let stopped = stopped.into_inner().unwrap_or_else(PoisonError::into_inner);
+    stopped.map_or(Ok(summary), Err)
+}
+
+/// One seed; what breaks a property is made small and written.
+fn one(campaign: &Campaign, seed: u64) -> Result<(Outcome, Option<PathBuf>), SimError> {
+    let scenario = draw(seed);
+    let firmware = campaign.firmware.as_deref();
+    let outcome = play_alone(&scenario, firmware)?;
+    let Some(broken) = outcome.broken.first() else { return Ok((outcome, None)) };
+    let small = shrink(&scenario, broken.property, |scenario| play_alone(scenario, firmware))?;
+    let path = campaign.out.join(format!("{}-{seed}.toml", broken.property));
+    let io = |source| SimError::Io { what: format!("cannot write {}", path.display()), source };
+    fs::create_dir_all(&campaign.out).map_err(io)?;
+    let text = format!("# Breaks \"{}\": {}\n\n{}", broken.property, broken.what, small.text());
+    fs::write(&path, text).map_err(io)?;
+    Ok((outcome, Some(path)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shard_is_read_and_a_wrong_one_refused() {
+        assert_eq!("2/8".parse(), Ok(Shard { index: 2, count: 8 }));
+        for text in ["", "2", "0/8", "9/8", "a/b", "1/0"] {
+            let refused = text.parse::<Shard>().expect_err(text);
+            assert!(refused.contains("second of eight"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn every_seed_gives_a_scenario_of_its_own_that_a_file_holds() {
+        let mut kinds = std::collections::BTreeSet::new();
+        for seed in 0..2_000 {
+            let scenario = draw(seed);
+            assert_eq!(scenario, draw(seed));
+            assert_eq!(Scenario::parse(&scenario.text()).as_ref(), Ok(&scenario), "{}", scenario.text());
+            kinds.extend(scenario.happens.iter().map(|happening| happening.what.name));
+        }
+        assert_ne!(draw(1), draw(2));
+        // All but those that only take another back.
+        assert_eq!(kinds.len(), crate::faults::KINDS.len() - 5, "{kinds:?}");
+    }
+
+    #[test]
+    fn a_scenario_is_made_as_small_as_what_breaks_it() {
+        let text = "seed = 1\n[[happens]]\nafter_ms = 123.456\nwhat = \"motor-stalls\"\nfor_ms = 7\n\
+                    [[happens]]\non = \"alarm\"\nnth = 3\ndelay_ms = 2\nwhat = \"reset-button\"\n\
+                    [[host]]\ndoes = \"home\"\n[[host]]\ndoes = \"halt\"\n[[host]]\ndoes = \"stop\"\n";
+        let scenario = Scenario::parse(text).expect("a scenario");
+        // Broken as long as it resets and halts.
+        let breaks = |scenario: &Scenario| {
+            let text = scenario.text();
+            let broken = text.contains("reset-button") && text.contains("halt");
+            let broken = broken.then(|| Broken { property: "position", at_ns: 0, what: String::new() });
+            Ok(Outcome { broken: broken.into_iter().collect(), ..Outcome::default() })
+        };
+        let small = shrink(&scenario, "position", breaks).expect("it runs");
+        let expected = "[[happens]]\non = \"alarm\"\nwhat = \"reset-button\"\n\n[[host]]\ndoes = \"halt\"\n";
+        assert_eq!(small.text(), format!("seed = 1\n\n{expected}"));
+    }
+}

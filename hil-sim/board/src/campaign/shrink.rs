@@ -1,0 +1,82 @@
+//! Makes a scenario that breaks a property as small as it still does: parts of it are left out, one after the other, as
+//! long as the same property breaks (Zeller & Hildebrandt, IEEE Trans. Software Engineering 28, 2002, in its simplest form).
+
+use crate::{
+    SimError,
+    faults::When,
+    player::Outcome,
+    scenario::{Scenario, Step},
+};
+
+/// Runs that it may take: each costs seconds.
+const RUNS: u32 = 60;
+
+/// Everything that is one thing smaller.
+fn smaller(scenario: &Scenario) -> Vec<Scenario> {
+    let mut found = Vec::new();
+    let mut with = |change: &dyn Fn(&mut Scenario)| {
+        let mut other = scenario.clone();
+        change(&mut other);
+        if other != *scenario {
+            found.push(other);
+        }
+    };
+    for place in (0..scenario.happens.len()).rev() {
+        with(&|other| {
+            other.happens.remove(place);
+        });
+    }
+    for place in (0..scenario.host.len()).rev() {
+        with(&|other| {
+            other.host.remove(place);
+        });
+    }
+    with(&|other| other.parts = toml::Table::new());
+    with(&|other| other.bit_error_rate = 0.0);
+    for place in 0..scenario.happens.len() {
+        with(&|other| other.happens[place].for_ms = None);
+        with(&|other| other.happens[place].when = simpler(other.happens[place].when));
+    }
+    for place in 0..scenario.host.len() {
+        with(&|other| {
+            let step = &mut other.host[place];
+            *step = Step { goes_on_after_ms: None, ..step.clone() };
+        });
+    }
+    found
+}
+
+/// A rounder moment.
+fn simpler(when: When) -> When {
+    match when {
+        When::After { ms } => When::After { ms: ms.round() },
+        When::On { moment, .. } => When::On { moment, nth: 1, delay_ms: 0.0 },
+        When::Chance { per_s } => When::Chance { per_s },
+    }
+}
+
+/// Makes a scenario small in which `property` breaks. `play` tells what comes of one.
+///
+/// # Errors
+/// Those of `play`.
+pub fn shrink(
+    scenario: &Scenario,
+    property: &str,
+    mut play: impl FnMut(&Scenario) -> Result<Outcome, SimError>,
+) -> Result<Scenario, SimError> {
+    let mut small = scenario.clone();
+    let mut runs = 0;
+    'again: loop {
+        for other in smaller(&small) {
+            if runs == RUNS {
+                return Ok(small);
+            }
+            runs += 1;
+            if play(&other)?.broken.iter().any(|broken| broken.property == property) {
+                small = other;
+                continue 'again;
+            }
+        }
+        return Ok(small);
+    }
+}

@@ -1,0 +1,221 @@
+//! One thing that happens: when, what, to what, how long.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Kind, Moment};
+use crate::plant::StageName;
+
+/// When something happens.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum When {
+    /// At a moment of virtual time after power-on.
+    After {
+        /// How long after it, milliseconds.
+        ms: f64,
+    },
+    /// When something else has happened so many times.
+    On {
+        /// What.
+        moment: Moment,
+        /// Which time, from 1.
+        nth: u32,
+        /// How long after it, milliseconds.
+        delay_ms: f64,
+    },
+    /// Again and again, by chance (a Poisson process that the seed draws).
+    Chance {
+        /// So often a second, on average.
+        per_s: f64,
+    },
+}
+
+/// Something that happens, and to what.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Row", into = "Row")]
+pub struct Happening {
+    /// When.
+    pub when: When,
+    /// The kind of thing that happens.
+    pub what: Kind,
+    /// How long until it is taken back, milliseconds; `None`: for good.
+    pub for_ms: Option<f64>,
+    /// The stage concerned, if one is.
+    pub stage: StageName,
+    /// How much of it, in the unit of its kind.
+    pub amount: f64,
+    /// The address of the memory concerned, if one is.
+    pub address: u16,
+    /// The bit there, 0 to 7.
+    pub bit: u8,
+}
+
+/// A table `[[happens]]` of a file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    after_ms: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    on: Option<Moment>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nth: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    delay_ms: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    chance_per_s: Option<f64>,
+    what: Kind,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    for_ms: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stage: Option<StageName>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    amount: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    address: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bit: Option<u8>,
+}
+
+/// The longest time that a file may name: a day.
+const LONGEST_MS: f64 = 86_400_000.0;
+
+/// Checks that a number is in its range.
+fn within(name: &str, value: f64, (min, max): (f64, f64)) -> Result<f64, String> {
+    // Not a number is in no range.
+    if (min..=max).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{name} = {value} is not in {min} to {max}"))
+    }
+}
+
+impl Row {
+    fn when(&self) -> Result<When, String> {
+        let after_ms = self.after_ms.map(|ms| within("after_ms", ms, (0.0, LONGEST_MS))).transpose()?;
+        let delay_ms = self.delay_ms.map(|ms| within("delay_ms", ms, (0.0, LONGEST_MS))).transpose()?;
+        let per_s = self.chance_per_s.map(|rate| within("chance_per_s", rate, (1e-6, 1e4))).transpose()?;
+        if self.on.is_none() && (self.nth.is_some() || delay_ms.is_some()) {
+            return Err("nth and delay_ms belong to `on`, which is missing".into());
+        }
+        match (after_ms, self.on, per_s) {
+            (Some(ms), None, None) => Ok(When::After { ms }),
+            (None, Some(moment), None) => match self.nth.unwrap_or(1) {
+                0 => Err("nth = 0 is never: the first time is nth = 1".into()),
+                nth => Ok(When::On { moment, nth, delay_ms: delay_ms.unwrap_or(0.0) }),
+            },
+            (None, None, Some(per_s)) => Ok(When::Chance { per_s }),
+            (None, None, None) => {
+                Err("when does it happen? One of after_ms, on and chance_per_s is expected".into())
+            }
+            _ => Err("after_ms, on and chance_per_s exclude each other: name one of them".into()),
+        }
+    }
+
+    /// Fields that stand there and mean nothing to this kind.
+    fn superfluous(&self) -> Option<&'static str> {
+        let Takes { stage, amount, place } = self.what.takes;
+        let fields = [
+            ("stage", self.stage.is_some() && !stage),
+            ("amount", self.amount.is_some() && amount.is_none()),
+            ("address", self.address.is_some() && !place),
+            ("bit", self.bit.is_some() && !place),
+            ("for_ms", self.for_ms.is_some() && self.what.mend.is_none()),
+        ];
+        fields.into_iter().find_map(|(name, there)| there.then_some(name))
+    }
+}
+
+impl TryFrom<Row> for Happening {
+    type Error = String;
+
+    fn try_from(row: Row) -> Result<Self, String> {
+        let kind = row.what;
+        if let Some(field) = row.superfluous() {
+            return Err(format!("{field} means nothing to what = \"{}\": leave it out", kind.name));
+        }
+        let (address, bit) = (row.address.unwrap_or(0), row.bit.unwrap_or(0));
+        within("address", f64::from(address), (0.0, (rigless::chip::fram::SIZE - 1) as f64))?;
+        within("bit", f64::from(bit), (0.0, 7.0))?;
+        let amount = match (kind.takes.amount, row.amount) {
+            (Some(range), Some(amount)) => within("amount", amount, (range.min, range.max))?,
+            (Some(range), None) => range.usual,
+            (None, _) => 0.0,
+        };
+        Ok(Self {
+            when: row.when()?,
+            what: kind,
+            for_ms: row.for_ms.map(|ms| within("for_ms", ms, (0.0, LONGEST_MS))).transpose()?,
+            stage: row.stage.unwrap_or(StageName::Sensor),
+            amount,
+            address,
+            bit,
+        })
+    }
+}
+
+impl From<Happening> for Row {
+    fn from(happening: Happening) -> Self {
+        let Happening { when, what, for_ms, stage, amount, address, bit } = happening;
+        let (mut after_ms, mut on, mut chance_per_s) = (None, None, None);
+        match when {
+            When::After { ms } => after_ms = Some(ms),
+            When::On { moment, nth, delay_ms } => on = Some((moment, nth, delay_ms)),
+            When::Chance { per_s } => chance_per_s = Some(per_s),
+        }
+        let takes = what.takes;
+        Self {
+            after_ms,
+            on: on.map(|(moment, ..)| moment),
+            nth: on.map(|(_, nth, _)| nth).filter(|nth| *nth != 1),
+            delay_ms: on.map(|(_, _, ms)| ms).filter(|ms| *ms != 0.0),
+            chance_per_s,
+            what,
+            for_ms,
+            stage: takes.stage.then_some(stage),
+            amount: takes.amount.map(|_| amount),
+            address: takes.place.then_some(address),
+            bit: takes.place.then_some(bit),
+        }
+    }
+}
+
+/// Which fields beside the moment a kind has.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Takes {
+    /// `stage`.
+    pub stage: bool,
+    /// `amount`.
+    pub amount: Option<Amount>,
+    /// `address` and `bit`.
+    pub place: bool,
+}
+
+/// What `amount` may be.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Amount {
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+    /// Where nothing is said.
+    pub usual: f64,
+}
+
+impl Takes {
+    /// Nothing more.
+    pub const NOTHING: Self = Self { stage: false, amount: None, place: false };
+    /// The stage.
+    pub const STAGE: Self = Self { stage: true, ..Self::NOTHING };
+    /// An address and a bit of the memory.
+    pub const PLACE: Self = Self { place: true, ..Self::NOTHING };
+
+    /// How much, and what is usual.
+    pub const fn amount(min: f64, max: f64, usual: f64) -> Self {
+        Self { amount: Some(Amount { min, max, usual }), ..Self::NOTHING }
+    }
+
+    /// How much of it at which stage.
+    pub const fn stage_and_amount(min: f64, max: f64, usual: f64) -> Self {
+        Self { amount: Some(Amount { min, max, usual }), ..Self::STAGE }
+    }
+}

@@ -1,0 +1,129 @@
+//! Exposures: each is told, and where the sensor was.
+
+use farnear_protocol::{
+    EventKind,
+    camera::FREE_RUNNING,
+    message::{Axis, ShotRecord},
+};
+
+use super::{Broken, Case, positions};
+use crate::{
+    wiring::Shot,
+    witness::{Seen, Sight},
+};
+
+/// The board stamps whole microseconds, each end rounded by itself.
+const STAMP_US: u64 = 2;
+/// What ends a run is told within so long of an exposure that is not told itself.
+const TOLD_NS: u64 = 50_000_000;
+
+fn broken(at_ns: u64, what: String) -> Broken {
+    Broken { property: "exposure", at_ns, what }
+}
+
+/// Property `exposure`.
+pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
+    let mut found = Vec::new();
+    // The exposures since the last reset, and whether they were told.
+    let mut taken: Vec<(Shot, bool)> = Vec::new();
+    let mut shots: std::collections::BTreeMap<u32, u32> = std::collections::BTreeMap::new();
+    let mut windows: Vec<i32> = Vec::new();
+    for sight in case.sights {
+        match &sight.seen {
+            Seen::Asked { call, .. } => {
+                if let farnear_protocol::Request::LoadShot { shot, .. } = &call.request {
+                    windows.push(shot.settle_window.0);
+                }
+            }
+            Seen::Exposed(shot) => taken.push((*shot, false)),
+            Seen::Reset | Seen::Powered(_) => {
+                // A reset is told by the first event of the next boot.
+                taken.clear();
+                shots.clear();
+            }
+            Seen::Told { number, event, .. } => {
+                let (record, deviation) = match &event.kind {
+                    EventKind::ShotDone { shot, .. } => (shot, None),
+                    EventKind::FrameTaken { shot, deviation, .. } => (shot, Some(deviation.0)),
+                    _ => continue,
+                };
+                if *shots.entry(record.trigger_number).or_insert(*number) != *number {
+                    let what = format!("trigger {} was told by two events", record.trigger_number);
+                    found.push(broken(sight.at_ns, what));
+                    continue;
+                }
+                let Some((shot, told)) = taken.iter_mut().find(|(shot, _)| shot.id == record.trigger_number)
+                else {
+                    let what = format!("trigger {} was told and never taken", record.trigger_number);
+                    found.push(broken(sight.at_ns, what));
+                    continue;
+                };
+                *told = true;
+                // Which window was asked for does not stand in the record: the widest that was.
+                let window_nm = windows.iter().copied().max().unwrap_or(0);
+                let told_off = deviation.is_some_and(|nm| nm > window_nm);
+                found.extend(judge(case, sight, (shot, record), (window_nm, told_off)));
+            }
+            _ => {}
+        }
+        let untold = taken
+            .iter_mut()
+            .find(|(shot, told)| !told && shot.id != FREE_RUNNING && sight.at_ns > shot.end_ns + TOLD_NS);
+        if let Some((shot, told)) = untold {
+            *told = true;
+            if !is_excused(case.sights, shot) {
+                found
+                    .push(broken(shot.end_ns, format!("the exposure of trigger {} was never told", shot.id)));
+            }
+        }
+    }
+    found
+}
+
+/// Whether something told that the run had ended, or the exposure was missed.
+fn is_excused(sights: &[Sight], shot: &Shot) -> bool {
+    let near = |sight: &&Sight| {
+        sight.at_ns + TOLD_NS > shot.begin_ns && sight.at_ns < shot.end_ns + TOLD_NS + 500_000_000
+    };
+    sights.iter().filter(near).any(|sight| match &sight.seen {
+        Seen::Reset | Seen::Powered(_) => true,
+        Seen::Told { event, .. } => matches!(
+            event.kind,
+            EventKind::Failed { .. } | EventKind::FrameDropped { .. } | EventKind::Alarm(_)
+        ),
+        _ => false,
+    })
+}
+
+/// Holds one exposure against its record.
+fn judge(
+    case: &Case<'_>,
+    sight: &Sight,
+    (shot, record): (&Shot, &ShotRecord),
+    (window_nm, told_off): (i32, bool),
+) -> Option<Broken> {
+    let stamped = record.strobe_start.0;
+    if stamped.abs_diff(shot.board_us) > STAMP_US {
+        let what = format!(
+            "trigger {} is stamped {stamped} us and was taken at {} us",
+            record.trigger_number, shot.board_us
+        );
+        return Some(broken(sight.at_ns, what));
+    }
+    let asked_um = 1e-3 * f64::from(record.asked.0);
+    let truth = &shot.truth;
+    let off_um = match record.axis {
+        Axis::SensorFine => (truth.piezo_min_um - asked_um).abs().max((truth.piezo_max_um - asked_um).abs()),
+        Axis::SensorCoarse => (truth.coarse_um - asked_um).abs(),
+        Axis::Lens => (truth.lens_um - asked_um).abs(),
+    };
+    let allowed_um = 1e-3 * f64::from(window_nm) + positions::stated_um(case, record.axis, asked_um);
+    (off_um > allowed_um && !told_off).then(|| {
+        let what = format!(
+            "trigger {} was taken {off_um:.3} um off, its window and stated error are {allowed_um:.3} um, and nothing \
+             tells of it",
+            record.trigger_number
+        );
+        broken(sight.at_ns, what)
+    })
+}

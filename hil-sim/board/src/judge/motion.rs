@@ -1,0 +1,165 @@
+//! Motors: hard stops, alarms, and motion that nobody asked for.
+
+use farnear_protocol::{EventKind, Request, Response};
+
+use super::{Broken, Case};
+use crate::witness::Seen;
+
+/// Microsteps against a hard stop until a stall has ended the motion: 6 um of following error are 38, the running segment of
+/// a millisecond 26 at the speed of homing, and a rotor that snaps back by a period comes to it once more.
+const PRESSED_MAX: u64 = 150;
+/// From an alarm to the last STEP: the running segment lasts a millisecond, a tick 0.2 ms; the board's clock is known to half
+/// a millisecond.
+const LAST_STEP_NS: u64 = 2_000_000;
+/// A stop brakes along the ramp behind the event that ends the work.
+const BRAKING_NS: u64 = 400_000_000;
+
+/// Property `hard-stop`.
+pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
+    let dead = case.has(&["home-switch-dead"]);
+    let mut alarms = 0;
+    for sight in case.sights {
+        let truth = match &sight.seen {
+            Seen::Told { event, truth, .. } => {
+                alarms += u64::from(matches!(event.kind, EventKind::Alarm(_)));
+                truth
+            }
+            Seen::Answered { truth, .. } => truth,
+            _ => continue,
+        };
+        let allowed = if dead { PRESSED_MAX * (alarms + 1) } else { 0 };
+        for (pressed, stage) in truth.pressed.into_iter().zip(["sensor", "lens"]) {
+            if pressed > allowed {
+                let what = format!(
+                    "{pressed} microsteps of the {stage}'s stage against its hard stop, allowed are {allowed}"
+                );
+                return vec![Broken { property: "hard-stop", at_ns: sight.at_ns, what }];
+            }
+        }
+    }
+    Vec::new()
+}
+
+/// Property `step-after-alarm`.
+pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
+    let clocks = case.clocks();
+    // Since when an alarm is latched, and its number; and when the last was cleared or the board reset.
+    let mut spans: Vec<(u64, u64, u32)> = Vec::new();
+    let mut known = std::collections::BTreeSet::new();
+    for sight in case.sights {
+        match &sight.seen {
+            Seen::Told { boot, event, .. } => match &event.kind {
+                EventKind::Alarm(record) if record.boot == *boot && known.insert(record.number) => {
+                    let at_ns = clocks.get(boot).map_or(sight.at_ns, |zero| zero + record.time.0 * 1000);
+                    spans.push((at_ns.min(sight.at_ns), u64::MAX, record.number));
+                }
+                EventKind::AlarmCleared { number } => end(&mut spans, *number, sight.at_ns),
+                _ => {}
+            },
+            Seen::Reset => {
+                spans.iter_mut().filter(|span| span.1 == u64::MAX).for_each(|span| span.1 = sight.at_ns)
+            }
+            _ => {}
+        }
+    }
+    let bursts = case.sights.iter().filter_map(|sight| match &sight.seen {
+        Seen::Stepped(burst) => Some(burst),
+        _ => None,
+    });
+    bursts
+        .filter_map(|burst| {
+            let (since, _, number) = *spans
+                .iter()
+                .find(|(since, until, _)| burst.last_ns > since + LAST_STEP_NS && burst.first_ns < *until)?;
+            // Pulses before the alarm and after it was cleared are two bursts: an answer lies between them.
+            let late_us = (burst.last_ns - since) / 1000;
+            let what =
+                format!("the {:?} stage's last STEP came {late_us} us after alarm {number}", burst.stage);
+            Some(Broken { property: "step-after-alarm", at_ns: burst.last_ns, what })
+        })
+        .collect()
+}
+
+fn end(spans: &mut [(u64, u64, u32)], number: u32, at_ns: u64) {
+    for span in spans.iter_mut().filter(|span| span.2 == number) {
+        span.1 = span.1.min(at_ns);
+    }
+}
+
+/// Work that was asked for.
+struct Work {
+    id: u32,
+    boot: u32,
+    since_ns: u64,
+    until_ns: u64,
+}
+
+/// Property `moves-unasked`.
+pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
+    let mut works: Vec<Work> = Vec::new();
+    for sight in case.sights {
+        let at_ns = sight.at_ns;
+        match &sight.seen {
+            Seen::Asked { id, boot, call } if is_long(&call.request) => {
+                if !works.iter().any(|work| (work.id, work.boot) == (*id, *boot)) {
+                    works.push(Work { id: *id, boot: *boot, since_ns: at_ns, until_ns: u64::MAX });
+                }
+            }
+            Seen::Answered { id, boot, answer, .. } if !matches!(**answer, Ok(Response::Accepted)) => {
+                close(&mut works, (*id, *boot), at_ns);
+            }
+            Seen::Told { boot, event, .. } => {
+                if let Some(request) = ended(&event.kind) {
+                    close(&mut works, (request, *boot), at_ns + BRAKING_NS);
+                }
+            }
+            Seen::Reset => works.iter_mut().for_each(|work| work.until_ns = work.until_ns.min(at_ns)),
+            _ => {}
+        }
+    }
+    let bursts = case.sights.iter().filter_map(|sight| match &sight.seen {
+        Seen::Stepped(burst) => Some(burst),
+        _ => None,
+    });
+    bursts
+        .filter(|burst| {
+            !works.iter().any(|work| work.since_ns <= burst.first_ns && burst.last_ns <= work.until_ns)
+        })
+        .map(|burst| {
+            let what =
+                format!("{} pulses for the {:?} stage that no work asked for", burst.steps, burst.stage);
+            Broken { property: "moves-unasked", at_ns: burst.first_ns, what }
+        })
+        .collect()
+}
+
+fn close(works: &mut [Work], of: (u32, u32), at_ns: u64) {
+    for work in works.iter_mut().filter(|work| (work.id, work.boot) == of) {
+        work.until_ns = work.until_ns.min(at_ns);
+    }
+}
+
+/// Whether a request moves something.
+fn is_long(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::Home { .. }
+            | Request::Move { .. }
+            | Request::RunProgram { .. }
+            | Request::RunContinuously { .. }
+            | Request::Calibrate { .. }
+    )
+}
+
+/// The request whose work an event ends.
+pub fn ended(kind: &EventKind) -> Option<u32> {
+    match kind {
+        EventKind::Homed { request, .. }
+        | EventKind::MoveDone { request, .. }
+        | EventKind::ProgramDone { request, .. }
+        | EventKind::ContinuousDone { request, .. }
+        | EventKind::Calibrated { request, .. }
+        | EventKind::Failed { request, .. } => Some(*request),
+        _ => None,
+    }
+}

@@ -1,0 +1,99 @@
+//! Positions: what is called homed is so.
+
+use std::collections::BTreeSet;
+
+use farnear_protocol::{
+    EventKind, Request, Response,
+    message::{Axis, PositionState, Routine},
+};
+
+use super::{Broken, Case};
+use crate::witness::{Seen, Truth};
+
+/// Screw (2 um), home switch (three standard deviations, 0.9 um), a step and a count.
+const STEPPER_UM: f64 = 3.2;
+/// The screw's play, where a motion ended before its approach from below.
+const PLAY_UM: f64 = 4.0;
+/// What steps and encoder may differ before that is an alarm, and the rotor's swing.
+const FOLLOWING_UM: f64 = 6.5;
+/// Gauge (five standard deviations of its noise) and what the piezo moves until the answer has left.
+const PIEZO_UM: f64 = 0.1;
+
+/// The stated error of an axis at a position, micrometres.
+pub fn stated_um(case: &Case<'_>, axis: Axis, at_um: f64) -> f64 {
+    match axis {
+        Axis::SensorFine => {
+            let gauge = &case.parts.gauge;
+            // As it comes, before its calibration.
+            PIEZO_UM + (gauge.gain - 1.0).abs() * at_um.abs() + gauge.offset_um.abs() + 5.0 * gauge.noise_um
+        }
+        Axis::SensorCoarse | Axis::Lens => STEPPER_UM + PLAY_UM + FOLLOWING_UM,
+    }
+}
+
+fn truly_um(truth: &Truth, axis: Axis) -> f64 {
+    match axis {
+        Axis::SensorCoarse => truth.coarse_um,
+        Axis::SensorFine => truth.piezo_um,
+        Axis::Lens => truth.lens_um,
+    }
+}
+
+/// Property `position`.
+pub fn position(case: &Case<'_>) -> Vec<Broken> {
+    let mut homed: BTreeSet<(u32, &str)> = BTreeSet::new();
+    let mut broken = Vec::new();
+    for sight in case.sights {
+        let off = match &sight.seen {
+            // The edge is found some time before the end of the homing; calibrations home, too.
+            Seen::Asked { boot, call, .. } => {
+                homed.extend(homes(&call.request).map(|axis| (*boot, axis.name())));
+                continue;
+            }
+            Seen::Told { event, truth, .. } => match &event.kind {
+                EventKind::MoveDone { axis, measured, .. } => {
+                    off(case, *axis, measured.0, truth).map(|what| format!("a move is done, {what}"))
+                }
+                _ => continue,
+            },
+            Seen::Answered { boot, answer, truth, .. } => {
+                let Ok(Response::Status(status)) = &**answer else { continue };
+                Axis::ALL.into_iter().find_map(|axis| {
+                    let told = status.axis(axis);
+                    if told.state != PositionState::Homed {
+                        return None;
+                    }
+                    if axis != Axis::SensorFine && !homed.contains(&(*boot, axis.name())) {
+                        return Some(format!("{axis:?} is called homed and was not homed in boot {boot}"));
+                    }
+                    if told.moving { None } else { off(case, axis, told.measured.0, truth) }
+                })
+            }
+            _ => continue,
+        };
+        broken.extend(off.map(|what| Broken { property: "position", at_ns: sight.at_ns, what }));
+    }
+    broken
+}
+
+/// The axis that a request homes.
+fn homes(request: &Request) -> Option<Axis> {
+    match request {
+        Request::Home { axis, .. } => Some(*axis),
+        Request::Calibrate { routine, .. } => match routine {
+            Routine::Travel { axis } | Routine::Backlash { axis } => Some(*axis),
+            Routine::Gauge => Some(Axis::SensorCoarse),
+            Routine::Piezo => None,
+        },
+        _ => None,
+    }
+}
+
+/// How far what is told lies beside the truth, where that is too far.
+fn off(case: &Case<'_>, axis: Axis, measured_nm: i32, truth: &Truth) -> Option<String> {
+    let (told_um, true_um) = (1e-3 * f64::from(measured_nm), truly_um(truth, axis));
+    let stated_um = stated_um(case, axis, true_um);
+    ((told_um - true_um).abs() > stated_um).then(|| {
+        format!("{axis:?} is told at {told_um:.3} um and is at {true_um:.3} um; its stated error is {stated_um:.2} um")
+    })
+}

@@ -1,0 +1,99 @@
+//! Requests: none acts twice.
+
+use std::collections::BTreeMap;
+
+use farnear_protocol::{Request, RequestError, Response, camera::FREE_RUNNING};
+
+use super::{Broken, Case, motion::ended};
+use crate::witness::Seen;
+
+type Answer = Result<Response, RequestError>;
+
+/// Property `acts-twice`.
+pub fn acts_twice(case: &Case<'_>) -> Vec<Broken> {
+    let mut broken = ends(case);
+    broken.extend(answers(case));
+    broken.extend(exposures(case));
+    broken
+}
+
+fn twice(at_ns: u64, what: String) -> Broken {
+    Broken { property: "acts-twice", at_ns, what }
+}
+
+/// One end for each request.
+fn ends(case: &Case<'_>) -> Vec<Broken> {
+    let mut ends: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+    let mut broken = Vec::new();
+    for sight in case.sights {
+        let Seen::Told { boot, event, number, .. } = &sight.seen else { continue };
+        let Some(request) = ended(&event.kind) else { continue };
+        // The same event may be told again; another one with another number may not.
+        let first = *ends.entry((*boot, request)).or_insert(*number);
+        if first != *number {
+            let what =
+                format!("request {request} of boot {boot} ended twice, by events {first} and {number}");
+            broken.push(twice(sight.at_ns, what));
+        }
+    }
+    broken
+}
+
+/// The same answer to each repeat, or a refusal that says why there is none.
+fn answers(case: &Case<'_>) -> Vec<Broken> {
+    let mut given: BTreeMap<(u32, u32), &Answer> = BTreeMap::new();
+    let mut broken = Vec::new();
+    for sight in case.sights {
+        let Seen::Answered { id, boot, answer, .. } = &sight.seen else { continue };
+        let excused = matches!(
+            **answer,
+            Ok(Response::Hello(_))
+                | Err(RequestError::QueueFull { .. }
+                    | RequestError::IdNotNew { .. }
+                    | RequestError::IdReused
+                    | RequestError::NotInSession
+                    | RequestError::Boot { .. }
+                    | RequestError::Malformed
+                    | RequestError::Version { .. })
+        );
+        if excused {
+            continue;
+        }
+        let first = *given.entry((*boot, *id)).or_insert(answer);
+        if *first != **answer {
+            let what = format!("request {id} of boot {boot} was answered {first:?} and then {answer:?}");
+            broken.push(twice(sight.at_ns, what));
+        }
+    }
+    broken
+}
+
+/// No more exposures than were asked for.
+fn exposures(case: &Case<'_>) -> Vec<Broken> {
+    let mut runs: BTreeMap<(u32, u32), u64> = BTreeMap::new();
+    let (mut armed, mut taken) = (0, 0);
+    for sight in case.sights {
+        match &sight.seen {
+            Seen::Asked { id, boot, call } => {
+                let exposures = match call.request {
+                    Request::ArmProgram { shots } => {
+                        armed = armed.max(u64::from(shots));
+                        continue;
+                    }
+                    Request::RunProgram { .. } => armed,
+                    Request::RunContinuously { exposures, .. } => u64::from(exposures),
+                    _ => continue,
+                };
+                runs.entry((*boot, *id)).or_insert(exposures);
+            }
+            Seen::Exposed(shot) if shot.id != FREE_RUNNING => taken += 1,
+            _ => {}
+        }
+        let asked: u64 = runs.values().sum();
+        if taken > asked {
+            let what = format!("{taken} exposures were taken, {asked} were asked for");
+            return vec![twice(sight.at_ns, what)];
+        }
+    }
+    Vec::new()
+}

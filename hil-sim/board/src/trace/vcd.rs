@@ -1,0 +1,278 @@
+//! A run as a value change dump: positions, pulses, exposures, bytes of the line, what happened; and, in comments, all that is
+//! needed to run it again.
+//!
+//! Times are virtual nanoseconds. STEP pulses and exposures stand at their own moments, positions each millisecond in which
+//! something moved, bytes and happenings where the emulator stopped (every 0.1 ms at least).
+
+use std::{
+    fmt::Write as _,
+    fs::File,
+    io::{BufWriter, Write},
+    path::Path,
+};
+
+use crate::{
+    command::CameraOrder,
+    config::{Pace, RigConfig},
+    error::SimError,
+    plant::{Plant, StageName},
+    replay::Comparer,
+    scenario::Scenario,
+    wiring::{Shot, Wiring},
+};
+
+/// Virtual time between two looks at the positions.
+const PERIOD_NS: u64 = 1_000_000;
+/// Signals: type, size, letter, name.
+const SIGNALS: [(&str, u32, char, &str); 11] = [
+    ("real", 64, 'c', "coarse_um"),
+    ("real", 64, 'l', "lens_um"),
+    ("real", 64, 'p', "piezo_um"),
+    ("wire", 16, 'd', "dac"),
+    ("event", 1, 'C', "step_coarse"),
+    ("event", 1, 'L', "step_lens"),
+    ("wire", 1, 'e', "exposing"),
+    ("wire", 1, 'w', "powered"),
+    ("event", 1, 'r', "reset"),
+    ("string", 1, 'i', "to_board"),
+    ("string", 1, 'o', "to_host"),
+];
+/// What happens, by its name.
+const HAPPENS: (&str, u32, char, &str) = ("string", 1, 'h', "happens");
+/// The line that ends the heading.
+pub const END_OF_HEADING: &str = "$enddefinitions $end";
+/// Words behind which the heading has what the run was made of.
+pub const MADE_OF: [&str; 4] =
+    ["$comment firmware ", "$comment pace ", "$comment memory ", "$comment scenario "];
+
+/// The name of the signal of a letter.
+pub fn name_of(letter: char) -> &'static str {
+    let all = SIGNALS.iter().chain(std::iter::once(&HAPPENS));
+    all.copied().find(|signal| signal.2 == letter).map_or("?", |signal| signal.3)
+}
+
+/// Where the lines go.
+enum Sink {
+    File(BufWriter<File>),
+    /// Held against those of another run.
+    Compare(Comparer),
+}
+
+/// See the module.
+pub struct Vcd {
+    sink: Sink,
+    /// Changes since the last stop: when, and the line.
+    changes: Vec<(u64, String)>,
+    /// The moment of the last line.
+    at_ns: Option<u64>,
+    next_ns: u64,
+    last: [String; 4],
+    /// The beginning of the exposure that is under way is written.
+    exposing: bool,
+    failed: Option<std::io::Error>,
+}
+
+/// Bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}"); // a string takes everything
+        text
+    })
+}
+
+/// And back.
+pub fn unhex(text: &str) -> Option<Vec<u8>> {
+    if !text.is_ascii() || text.len() % 2 == 1 {
+        return None;
+    }
+    (0..text.len()).step_by(2).map(|at| u8::from_str_radix(&text[at..at + 2], 16).ok()).collect()
+}
+
+fn heading(config: &RigConfig, firmware: u64) -> Result<String, SimError> {
+    let scenario = Scenario {
+        seed: Some(config.seed),
+        parts: toml::Table::try_from(&config.parts).unwrap_or_default(), // they came out of such a table
+        ..config.scenario.clone()
+    };
+    let pace = if config.pace == Pace::Realtime { "paced" } else { "lockstep" };
+    let kept = config.memory.as_deref().map(crate::kept_memory::read).transpose()?.flatten();
+    let memory = kept.map_or(String::new(), |memory| hex(memory.as_slice()));
+    let [of_firmware, of_pace, of_memory, of_scenario] = MADE_OF;
+    let mut text = format!(
+        "$version farnear-sim {} $end\n{of_firmware}{firmware:016x} $end\n{of_pace}{pace} $end\n{of_memory}{memory} $end\n\
+         {of_scenario}\n{}$end\n$timescale 1 ns $end\n$scope module rig $end\n",
+        env!("CARGO_PKG_VERSION"),
+        scenario.text()
+    );
+    for (kind, size, letter, name) in SIGNALS.iter().chain(std::iter::once(&HAPPENS)) {
+        let _ = writeln!(text, "$var {kind} {size} {letter} {name} $end");
+    }
+    let _ = writeln!(text, "$upscope $end\n{END_OF_HEADING}");
+    Ok(text)
+}
+
+impl Vcd {
+    fn with(sink: Sink) -> Self {
+        let mut vcd = Self {
+            sink,
+            changes: Vec::new(),
+            at_ns: None,
+            next_ns: 0,
+            last: Default::default(),
+            exposing: false,
+            failed: None,
+        };
+        vcd.change(0, "1w".into());
+        vcd.change(0, "0e".into());
+        vcd
+    }
+
+    /// Opens the file and writes its heading.
+    ///
+    /// # Errors
+    /// [`SimError::Io`].
+    pub fn create(path: &Path, config: &RigConfig, firmware: u64) -> Result<Self, SimError> {
+        let wrong =
+            |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };
+        let heading = heading(config, firmware)?;
+        let mut file = BufWriter::new(File::create(path).map_err(wrong)?);
+        file.write_all(heading.as_bytes()).map_err(wrong)?;
+        Ok(Self::with(Sink::File(file)))
+    }
+
+    /// One whose lines are held against those of another run.
+    pub fn compare(with: Comparer) -> Self {
+        Self::with(Sink::Compare(with))
+    }
+
+    fn change(&mut self, at_ns: u64, line: String) {
+        self.changes.push((at_ns, line));
+    }
+
+    /// Bytes go on the line to the board, as the host sent them.
+    pub fn sent(&mut self, at_ns: u64, bytes: &[u8]) {
+        self.change(at_ns, format!("s{} i", hex(bytes)));
+    }
+
+    /// Bytes have come from the board.
+    pub fn received(&mut self, at_ns: u64, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.change(at_ns, format!("s{} o", hex(bytes)));
+        }
+    }
+
+    /// Something happens, or is taken back.
+    pub fn happened(&mut self, at_ns: u64, what: &str, mends: bool) {
+        let back = if mends { "/" } else { "" };
+        self.change(at_ns, format!("s{back}{what} h"));
+    }
+
+    /// The chip was reset, or its power has changed.
+    pub fn reset(&mut self, at_ns: u64, powered: Option<bool>) {
+        self.change(at_ns, powered.map_or("1r".into(), |on| format!("{}w", u8::from(on))));
+    }
+
+    /// The emulator stopped because somebody asked for time until a moment; it stops behind the instruction that crosses it.
+    pub fn looked(&mut self, at_ns: u64, asked_ns: u64) {
+        self.change(at_ns, format!("$comment look {asked_ns} $end"));
+    }
+
+    /// Everything is mended.
+    pub fn healed(&mut self, at_ns: u64) {
+        self.change(at_ns, "$comment heal $end".into());
+    }
+
+    /// The camera's host has given an order.
+    pub fn ordered(&mut self, at_ns: u64, order: CameraOrder) {
+        let line = match order {
+            CameraOrder::Expose { exposure_us, id } => format!("$comment expose {exposure_us} {id} $end"),
+            CameraOrder::FreeRun { period_us, exposure_us } => {
+                format!("$comment free-run {period_us} {exposure_us} $end")
+            }
+        };
+        self.change(at_ns, line);
+    }
+
+    /// Somebody has reached into the rig, which cannot be done again.
+    pub fn touched(&mut self, at_ns: u64) {
+        self.change(at_ns, "$comment touched $end".into());
+    }
+
+    /// Looks at everything at a stop of the emulator, and writes what has changed.
+    pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
+        wiring.record_steps_once();
+        for (edges, letter) in wiring.take_steps().into_iter().zip(['C', 'L']) {
+            self.changes.extend(edges.into_iter().map(|at_ns| (at_ns, format!("1{letter}"))));
+        }
+        for shot in shots {
+            if !std::mem::take(&mut self.exposing) {
+                self.change(shot.begin_ns, "1e".into());
+            }
+            self.change(shot.end_ns, "0e".into());
+        }
+        if let Some(begun_ns) = wiring.begun_ns().filter(|_| !self.exposing) {
+            self.exposing = true;
+            self.change(begun_ns, "1e".into());
+        }
+        if now_ns >= self.next_ns {
+            self.next_ns = now_ns + PERIOD_NS;
+            let values = [
+                format!("r{:.4} c", plant.stage(StageName::Sensor).position_um()),
+                format!("r{:.4} l", plant.stage(StageName::Lens).position_um()),
+                format!("r{:.5} p", plant.piezo().position_um()),
+                format!("b{:b} d", plant.piezo().dac()),
+            ];
+            for (value, last) in values.into_iter().zip(0..) {
+                if self.last[last] != value {
+                    self.last[last].clone_from(&value);
+                    self.change(now_ns, value);
+                }
+            }
+        }
+        self.flush();
+    }
+
+    /// Writes the changes in the order of time.
+    fn flush(&mut self) {
+        let mut changes = std::mem::take(&mut self.changes);
+        changes.sort_by_key(|(at_ns, _)| *at_ns);
+        for (at_ns, line) in changes {
+            let at_ns = at_ns.max(self.at_ns.unwrap_or(0));
+            if self.at_ns != Some(at_ns) {
+                self.at_ns = Some(at_ns);
+                self.write(&format!("#{at_ns}"));
+            }
+            self.write(&line);
+        }
+    }
+
+    fn write(&mut self, line: &str) {
+        match &mut self.sink {
+            Sink::File(file) if self.failed.is_none() => self.failed = writeln!(file, "{line}").err(),
+            Sink::File(_) => {}
+            Sink::Compare(comparer) => comparer.hold(line),
+        }
+    }
+
+    /// Whether the run that this is held against was another one.
+    pub fn departs(&self) -> bool {
+        matches!(&self.sink, Sink::Compare(comparer) if comparer.departs())
+    }
+
+    /// Writes what is left.
+    ///
+    /// # Errors
+    /// The first error of all.
+    pub fn finish(mut self) -> Result<(), SimError> {
+        self.flush();
+        let result = match (self.failed.take(), &mut self.sink) {
+            (Some(error), _) => Err(error),
+            (None, Sink::File(file)) => file.flush(),
+            (None, Sink::Compare(comparer)) => {
+                comparer.end();
+                Ok(())
+            }
+        };
+        result.map_err(|source| SimError::Io { what: "cannot write the trace".into(), source })
+    }
+}
