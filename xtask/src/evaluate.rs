@@ -1,4 +1,4 @@
-//! Measures the accuracy and writes docs/accuracy.md and docs/activity.md, by the program in host/evaluation.
+//! Measures the accuracy and writes docs/accuracy.md and its sisters, by the program in host/evaluation.
 
 use std::path::PathBuf;
 
@@ -16,11 +16,14 @@ pub struct Arguments {
     /// Only these parts, such as `planes` or `corrections`; printed, no page is written.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
+    /// Only these pages, written: `accuracy`, `robustness`, `activity`, `thesis` or `real`.
+    #[arg(long, value_name = "NAME", conflicts_with = "only")]
+    page: Vec<String>,
 }
 
 /// Runs the evaluation.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    step("render, measure, write docs/accuracy.md and docs/activity.md");
+    step("render, measure, write docs/accuracy.md and the pages beside it");
     let mut command = cargo(["run", "--release", "--locked", "--package", "farnear-evaluation", "--"]);
     command.arg("--docs").arg(ROOT.join("docs"));
     if let Some(data) = &arguments.data {
@@ -28,6 +31,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     for part in &arguments.only {
         command.args(["--only", part]);
+    }
+    for page in &arguments.page {
+        command.args(["--page", page]);
     }
     finish(&mut command)
 }

@@ -54,6 +54,14 @@ impl CellKernel {
         match *psf {
             _ if blur < POINT_RADIUS => Self::from_octant(reach, |x, y| spline(x as f64) * spline(y as f64)),
             Psf::PillBox => Self::from_octant(reach, |x, y| disc_weight(x as f64, y as f64, blur)),
+            Psf::Ring { inner } => {
+                let covered = inner * blur;
+                Self::from_octant(reach, |x, y| {
+                    let [x, y] = [x as f64, y as f64];
+                    let hidden = if covered < POINT_RADIUS { 0.0 } else { disc_weight(x, y, covered) };
+                    disc_weight(x, y, blur) - hidden
+                })
+            }
             Psf::Gaussian { k } => {
                 let line: Vec<f64> = (0..=reach).map(|d| gaussian_line_weight(d as f64, k * blur)).collect();
                 Self::from_octant(reach, |x, y| line[x] * line[y])
@@ -71,7 +79,7 @@ impl CellKernel {
         let blur = blur_px * CELLS_PER_PIXEL as f64;
         let extent = match *psf {
             _ if blur < POINT_RADIUS => 0.0,
-            Psf::PillBox => blur,
+            Psf::PillBox | Psf::Ring { .. } => blur,
             Psf::Gaussian { k } => Profile { p: 2.0, sigma: k * blur }.radius_at(TAIL_EXPONENT),
             Psf::Generalised { p, k } => Profile { p, sigma: k * blur }.radius_at(TAIL_EXPONENT),
         };
@@ -241,8 +249,9 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    const PSFS: [&str; 6] = [
+    const PSFS: [&str; 7] = [
         "pillbox",
+        "ring:inner=0.6",
         "gaussian:k=0.4578",
         "generalised:p=1.8,k=0.4802",
         "generalised:p=0.7,k=0.2",

@@ -135,7 +135,7 @@ impl OpticsFile {
         let pixel_um = positive("sensor", "pixel_um", raw.sensor.pixel_um, " of um")?;
         let far_mm = positive("focus", "far_mm", raw.focus.far_mm, " of mm")?;
         beyond_focal_length("far_mm", far_mm, focal_length_mm)?;
-        let psf = raw.psf.map(|psf| Psf::from_parts(&psf.model, psf.p, psf.k)).transpose()?;
+        let psf = raw.psf.map(|psf| Psf::from_parts(&psf.model, psf.p, psf.k, psf.inner)).transpose()?;
         let f_number = focal_length_mm / aperture_mm;
         let travel = Travel {
             focal_length_mm,
@@ -286,6 +286,7 @@ struct RawPsf {
     model: String,
     p: Option<f64>,
     k: Option<f64>,
+    inner: Option<f64>,
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@
 //!   = k R` (Claxton & Staunton 2008; the constant here is that of the plane, Li 2014, eq. 5.16 has that of
 //!   the line). At `p = 2` it is the Gaussian; for other `p` sigma is a scale, not the standard deviation.
 //!
+//! * Ring: constant between the radii `inner R` and `R`, the image of a round aperture whose middle is covered.
+//!
 //! Radii and scales in any one unit; the functions here have no sampling in them.
 
 use std::f64::consts::PI;
@@ -17,6 +19,7 @@ use thiserror::Error;
 /// Below, the tails reach over hundreds of pixels; above, it is a pill-box to three digits.
 const P_RANGE: std::ops::RangeInclusive<f64> = 0.5..=64.0;
 const K_RANGE: std::ops::RangeInclusive<f64> = 0.01..=10.0;
+const INNER_RANGE: std::ops::RangeInclusive<f64> = 0.0..=0.99;
 
 /// Shape of the blur; its size comes from the blur radius. Text form as in [`Psf::from_str`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,13 +38,20 @@ pub enum Psf {
         /// Scale / blur radius.
         k: f64,
     },
+    /// Constant over the blur disc outside of `inner` times its radius.
+    Ring {
+        /// Inner radius / blur radius.
+        inner: f64,
+    },
 }
 
 /// Why a PSF was refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PsfError {
     /// A name that is no PSF.
-    #[error("unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578 or generalised:p=1.8,k=0.4802")]
+    #[error(
+        "unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578, generalised:p=1.8,k=0.4802 or ring:inner=0.5"
+    )]
     Unknown(String),
     /// A parameter that the model needs is missing.
     #[error("PSF {model} needs {name}=NUMBER, for instance {example}")]
@@ -80,8 +90,28 @@ impl Psf {
     ///
     /// # Errors
     /// [`PsfError`] for an unknown model, missing, surplus or senseless parameters.
-    pub fn from_parts(model: &str, p: Option<f64>, k: Option<f64>) -> Result<Self, PsfError> {
+    pub fn from_parts(
+        model: &str,
+        p: Option<f64>,
+        k: Option<f64>,
+        inner: Option<f64>,
+    ) -> Result<Self, PsfError> {
         let surplus = |name: &str| PsfError::Unexpected { model: model.into(), name: name.into() };
+        if model == "ring" {
+            return match (p, k, inner) {
+                (None, None, Some(inner)) => {
+                    Ok(Self::Ring { inner: in_range("inner", inner, &INNER_RANGE)? })
+                }
+                (Some(_), ..) => Err(surplus("p")),
+                (None, Some(_), _) => Err(surplus("k")),
+                (None, None, None) => {
+                    Err(PsfError::Missing { model: "ring", name: "inner", example: "ring:inner=0.5" })
+                }
+            };
+        }
+        if inner.is_some() && ["pillbox", "gaussian", "generalised"].contains(&model) {
+            return Err(surplus("inner"));
+        }
         match (model, p, k) {
             ("pillbox", None, None) => Ok(Self::PillBox),
             ("pillbox", Some(_), _) => Err(surplus("p")),
@@ -114,6 +144,13 @@ impl Psf {
                     0.0
                 }
             }
+            Self::Ring { inner } => {
+                if (inner * radius..=radius).contains(&r) {
+                    1.0 / (PI * radius * radius * (1.0 - inner * inner))
+                } else {
+                    0.0
+                }
+            }
             Self::Gaussian { k } => Profile { p: 2.0, sigma: k * radius }.density(r),
             Self::Generalised { p, k } => Profile { p, sigma: k * radius }.density(r),
         }
@@ -124,6 +161,7 @@ impl Psf {
     pub fn second_moment(&self, radius: f64) -> f64 {
         match *self {
             Self::PillBox => 0.5 * radius * radius,
+            Self::Ring { inner } => 0.5 * radius * radius * (1.0 + inner * inner),
             Self::Gaussian { k } => 2.0 * (k * radius).powi(2),
             Self::Generalised { p, k } => {
                 (k * radius).powi(2) * p.powf(2.0 / p) * libm::tgamma(4.0 / p) / libm::tgamma(2.0 / p)
@@ -167,15 +205,16 @@ fn in_range(name: &'static str, value: f64, range: &std::ops::RangeInclusive<f64
 impl FromStr for Psf {
     type Err = PsfError;
 
-    /// `pillbox`, `gaussian:k=0.4578` or `generalised:p=1.8,k=0.4802`.
+    /// `pillbox`, `gaussian:k=0.4578`, `generalised:p=1.8,k=0.4802` or `ring:inner=0.5`.
     fn from_str(text: &str) -> Result<Self, PsfError> {
         let (model, parameters) = text.split_once(':').unwrap_or((text, ""));
-        let (mut p, mut k) = (None, None);
+        let (mut p, mut k, mut inner) = (None, None, None);
         for part in parameters.split(',').filter(|part| !part.is_empty()) {
             let (name, value) = part.split_once('=').unwrap_or((part, ""));
             let (slot, name, range) = match name {
                 "p" => (&mut p, "p", &P_RANGE),
                 "k" => (&mut k, "k", &K_RANGE),
+                "inner" => (&mut inner, "inner", &INNER_RANGE),
                 _ => return Err(PsfError::Unexpected { model: model.into(), name: name.into() }),
             };
             let number = value.parse::<f64>().map_err(|_| PsfError::Range {
@@ -188,7 +227,7 @@ impl FromStr for Psf {
                 return Err(PsfError::Unexpected { model: model.into(), name: name.into() });
             }
         }
-        Self::from_parts(model, p, k)
+        Self::from_parts(model, p, k, inner)
     }
 }
 
@@ -198,6 +237,7 @@ impl fmt::Display for Psf {
             Self::PillBox => write!(f, "pillbox"),
             Self::Gaussian { k } => write!(f, "gaussian:k={k}"),
             Self::Generalised { p, k } => write!(f, "generalised:p={p},k={k}"),
+            Self::Ring { inner } => write!(f, "ring:inner={inner}"),
         }
     }
 }
@@ -230,6 +270,7 @@ mod tests {
             "generalised:p=1.8,k=0.4802",
             "generalised:p=1,k=0.3",
             "generalised:p=6,k=0.6",
+            "ring:inner=0.6",
         ] {
             let psf: Psf = text.parse().unwrap();
             for radius in [0.4, 2.7] {
@@ -252,7 +293,7 @@ mod tests {
 
     #[test]
     fn text_round_trips_and_mistakes_are_named() {
-        for text in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802"] {
+        for text in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802", "ring:inner=0.6"] {
             assert_eq!(text.parse::<Psf>().unwrap().to_string(), text);
         }
         for (text, expected) in [

@@ -296,8 +296,8 @@ impl Search<'_> {
     fn blur_per_nm(&self) -> f64 {
         let k = match self.optics.psf() {
             Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
-            // Of a disc of radius R the standard deviation along an axis is R / 2.
-            Psf::PillBox => 0.5,
+            // Along an axis; of a disc of radius R that is R / 2.
+            psf => (0.5 * psf.second_moment()).sqrt(),
         };
         k / (2.0 * self.optics.f_number() * self.optics.pixel_um() * 1e3)
     }

@@ -59,23 +59,23 @@ pub struct Lost {
 }
 
 /// Judges a map: takes depths away that cannot be believed, sets each confidence to its probability. `estimate` is of the same
-/// prepared pair.
+/// prepared pair; its deviations become the judgement's.
 pub fn judge(
     map: &mut DepthMap,
     prepared: &Prepared,
-    estimate: &Estimate,
+    estimate: Estimate,
     optics: &Optics,
     settings: &JudgeSettings,
 ) -> Judgement {
     let size = map.depth_mm.dim();
     let mut reasons = prepared.reasons.clone();
-    let mut deviation_mm = estimate.deviation_mm.clone();
+    let Estimate { mut deviation_mm, misfit, .. } = estimate;
     let range = Range::new(optics);
     Zip::from(&mut reasons)
         .and(&mut map.depth_mm)
         .and(&mut map.confidence)
         .and(&mut deviation_mm)
-        .and(&estimate.misfit)
+        .and(&misfit)
         .for_each(|reason, depth, confidence, deviation, misfit| {
             if settings.filled && *confidence == FILLED_CONFIDENCE && depth.is_finite() {
                 (*reason, *deviation) = (0, f32::NAN);

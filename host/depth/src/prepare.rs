@@ -220,32 +220,56 @@ pub fn prepare(
     camera: Option<&CameraFrames>,
     settings: &PrepareSettings,
 ) -> Result<Prepared, PrepareError> {
+    check_sizes(far.dim(), near.dim())?;
+    prepare_owned([far, near].map(|image| image.as_standard_layout().into_owned()), optics, camera, settings)
+}
+
+/// As [`prepare`], of the images `[far, near]` themselves: nothing is copied that need not be, which counts where a map is as
+/// large as a machine's memory allows.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_owned(
+    [mut far, mut near]: [Array2<f32>; 2],
+    optics: &Optics,
+    camera: Option<&CameraFrames>,
+    settings: &PrepareSettings,
+) -> Result<Prepared, PrepareError> {
     let size = far.dim();
-    if near.dim() != size {
-        let ((far_height, far_width), (near_height, near_width)) = (size, near.dim());
-        return Err(crate::pipeline::RunError::SizeMismatch {
-            far_width,
-            far_height,
-            near_width,
-            near_height,
-        }
-        .into());
-    }
+    check_sizes(size, near.dim())?;
     if let Some(frames) = camera {
         frames.check(size)?;
     }
     let bad = camera.and_then(CameraFrames::bad);
-    let marks = [far, near].map(|image| defects::find(image, settings.limits, bad));
-    let mut mended = [far, near].map(|image| match camera {
-        Some(frames) => frames.apply(image),
-        None => image.as_standard_layout().into_owned(),
-    });
-    for (image, marks) in mended.iter_mut().zip(&marks) {
+    let marks = [&far, &near].map(|image| defects::find(image.view(), settings.limits, bad));
+    for (image, marks) in [&mut far, &mut near].into_iter().zip(&marks) {
+        if let Some(frames) = camera {
+            *image = frames.apply(image.view());
+        }
         if let Some(marks) = marks {
             defects::mend(image, marks);
         }
     }
-    let [far, mut near] = mended;
+    finish([far, near], marks, optics, settings)
+}
+
+fn check_sizes(
+    (far_height, far_width): (usize, usize),
+    (near_height, near_width): (usize, usize),
+) -> Result<(), PrepareError> {
+    if (far_height, far_width) == (near_height, near_width) {
+        return Ok(());
+    }
+    Err(crate::pipeline::RunError::SizeMismatch { far_width, far_height, near_width, near_height }.into())
+}
+
+/// What follows once single pixels are mended: geometry, brightness, agreement.
+fn finish(
+    [far, mut near]: [Array2<f32>; 2],
+    marks: [Option<Array2<u8>>; 2],
+    optics: &Optics,
+    settings: &PrepareSettings,
+) -> Result<Prepared, PrepareError> {
     let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let noise = measured.unwrap_or(PairNoise { constant: 0.0, per_unit: 0.0, mean_variance: 0.0 });
     let mut report = Report::default();
@@ -254,7 +278,7 @@ pub fn prepare(
         near = warp::resample(near.view(), warp);
     }
     brightness(&far, &mut near, settings.balance, &mut report);
-    let mut reasons = merged(&marks, warp.as_ref(), &near);
+    let mut reasons = merged(marks, warp.as_ref(), &near);
     report.saturated_fraction = part_of(&reasons, Reason::Saturated);
     let agreement = agreement::compare(far.view(), near.view(), &noise);
     (report.correlation, report.detailed_fraction) = (agreement.correlation, agreement.detailed);
@@ -354,12 +378,12 @@ fn brightness(far: &Array2<f32>, near: &mut Array2<f32>, balance: Balance, repor
 }
 
 /// The reasons of both images in the far one's pixels, and the edge that the near image does not reach.
-fn merged(marks: &[Option<Array2<u8>>; 2], warp: Option<&Warp>, near: &Array2<f32>) -> Array2<u8> {
+fn merged(marks: [Option<Array2<u8>>; 2], warp: Option<&Warp>, near: &Array2<f32>) -> Array2<u8> {
     let [far_marks, near_marks] = marks;
     let (height, width) = near.dim();
-    let mut reasons = far_marks.clone().unwrap_or_else(|| Array2::zeros((height, width)));
+    let mut reasons = far_marks.unwrap_or_else(|| Array2::zeros((height, width)));
     let Some(warp) = warp else {
-        if let Some(marks) = near_marks {
+        if let Some(marks) = &near_marks {
             reasons.zip_mut_with(marks, |to, mark| *to = if *to == 0 { *mark } else { *to });
         }
         return reasons;
@@ -370,7 +394,7 @@ fn merged(marks: &[Option<Array2<u8>>; 2], warp: Option<&Warp>, near: &Array2<f3
         }
         let [px, py] = warp.at([x as f64, y as f64]).map(f64::round);
         let inside = px >= 0.0 && py >= 0.0 && px < width as f64 && py < height as f64;
-        *reason = match near_marks {
+        *reason = match &near_marks {
             _ if !inside => Reason::Edge.code(),
             Some(marks) => marks[(py as usize, px as usize)],
             None => 0,

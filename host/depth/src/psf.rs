@@ -5,9 +5,13 @@
 //! - Gaussian: `exp(-(k R w)^2 / 2)`, `sigma = k R` (eqs. 5.9 to 5.11; the printed 5.12 lacks a factor 1/2 in sigma);
 //! - generalised Gaussian: the radial PSF `exp(-(r / sigma)^p / p)` (eq. 5.16 made radial), whose OTF has no closed
 //!   form and comes from a tabulated Hankel transform ([`crate::hankel`]). `p = 2` is the Gaussian, `p -> infinity`
-//!   the pill-box of radius `sigma`; for other `p`, `sigma` is a scale and not the standard deviation.
+//!   the pill-box of radius `sigma`; for other `p`, `sigma` is a scale and not the standard deviation;
+//! - ring: an aperture whose middle is covered, the difference of two pill-boxes;
+//! - radial: whatever was measured or drawn ([`RadialPsf`]).
 //!
 //! Cost: building an [`Otf`] is O(1), except for the generalised Gaussian (a few ms); an evaluation is O(1).
+
+mod radial;
 
 use std::fmt;
 use std::str::FromStr;
@@ -16,6 +20,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::hankel::HankelTable;
 
+pub use radial::{Drawn, RINGS, RadialPsf, RadialTable};
+
 /// Exponents of the generalised Gaussian: below, the tails reach over hundreds of pixels; above, it is a pill-box to three
 /// digits.
 const P_RANGE: [f64; 2] = [0.5, 64.0];
@@ -23,11 +29,16 @@ const P_RANGE: [f64; 2] = [0.5, 64.0];
 /// Blur constants: usual are 0.3 to 1.
 const K_RANGE: [f64; 2] = [0.01, 10.0];
 
+/// Inner radii of a ring: above, no light is left.
+const INNER_RANGE: [f64; 2] = [0.0, 0.99];
+
 /// What is wrong with a point-spread function's text or parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PsfError {
     /// The name is that of no model.
-    #[error("unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578 or generalised:p=1.8,k=0.4802")]
+    #[error(
+        "unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578, generalised:p=1.8,k=0.4802 or ring:inner=0.5"
+    )]
     Unknown(String),
     /// A parameter that the model needs is missing.
     #[error("PSF {model} needs {name}=NUMBER, for instance {example}")]
@@ -59,6 +70,9 @@ pub enum PsfError {
         /// Largest.
         high: f64,
     },
+    /// A profile that is none.
+    #[error("the PSF's profile or image has {0}")]
+    Profile(String),
 }
 
 /// A model of the point-spread function.
@@ -80,6 +94,13 @@ pub enum Psf {
         /// Blur constant k.
         k: f64,
     },
+    /// Uniform ring: an aperture whose middle is covered.
+    Ring {
+        /// Inner radius in blur radii.
+        inner: f64,
+    },
+    /// Any round PSF, measured or drawn.
+    Radial(RadialPsf),
 }
 
 /// A PSF as stored.
@@ -91,24 +112,54 @@ struct Parts {
     p: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     k: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    inner: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    extent: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rings: Option<Vec<f32>>,
 }
 
 impl TryFrom<Parts> for Psf {
     type Error = PsfError;
 
-    fn try_from(Parts { model, p, k }: Parts) -> Result<Self, PsfError> {
-        Self::from_parts(&model, p, k)
+    fn try_from(Parts { model, p, k, inner, extent, rings }: Parts) -> Result<Self, PsfError> {
+        if model != "radial" {
+            if rings.is_some() || extent.is_some() {
+                let name = if rings.is_some() { "rings" } else { "extent" };
+                return Err(PsfError::Unexpected { model, name: name.into() });
+            }
+            return Self::from_parts(&model, p, k, inner);
+        }
+        if let Some(name) = [("p", p), ("k", k), ("inner", inner)].iter().find(|(_, value)| value.is_some()) {
+            return Err(PsfError::Unexpected { model, name: name.0.into() });
+        }
+        let example = "farnear depth --psf FILE, whose depth.toml holds one";
+        let missing = |name| PsfError::Missing { model: "radial", name, example };
+        let rings = rings.ok_or_else(|| missing("rings"))?;
+        Ok(Self::Radial(RadialPsf::new(extent.ok_or_else(|| missing("extent"))?, &rings)?))
     }
 }
 
 impl From<Psf> for Parts {
     fn from(psf: Psf) -> Self {
-        let (model, p, k) = match psf {
-            Psf::PillBox => ("pillbox", None, None),
-            Psf::Gaussian { k } => ("gaussian", None, Some(k)),
-            Psf::Generalised { p, k } => ("generalised", Some(p), Some(k)),
+        let named = |model: &str| Self {
+            model: model.to_owned(),
+            p: None,
+            k: None,
+            inner: None,
+            extent: None,
+            rings: None,
         };
-        Self { model: model.to_owned(), p, k }
+        match psf {
+            Psf::PillBox => named("pillbox"),
+            Psf::Gaussian { k } => Self { k: Some(k), ..named("gaussian") },
+            Psf::Generalised { p, k } => Self { p: Some(p), k: Some(k), ..named("generalised") },
+            Psf::Ring { inner } => Self { inner: Some(inner), ..named("ring") },
+            Psf::Radial(psf) => {
+                Self { extent: Some(psf.extent()), rings: Some(psf.light().to_vec()), ..named("radial") }
+            }
+        }
     }
 }
 
@@ -117,8 +168,27 @@ impl Psf {
     ///
     /// # Errors
     /// [`PsfError`] for an unknown model, missing, surplus or unusable parameters.
-    pub fn from_parts(model: &str, p: Option<f64>, k: Option<f64>) -> Result<Self, PsfError> {
+    pub fn from_parts(
+        model: &str,
+        p: Option<f64>,
+        k: Option<f64>,
+        inner: Option<f64>,
+    ) -> Result<Self, PsfError> {
         let surplus = |name: &str| PsfError::Unexpected { model: model.to_owned(), name: name.to_owned() };
+        if model == "ring" {
+            return match (p, k, inner) {
+                (None, None, Some(inner)) => Self::Ring { inner }.checked(),
+                (Some(_), ..) => Err(surplus("p")),
+                (None, Some(_), _) => Err(surplus("k")),
+                (None, None, None) => {
+                    Err(PsfError::Missing { model: "ring", name: "inner", example: "ring:inner=0.5" })
+                }
+            };
+        }
+        let known = ["pillbox", "gaussian", "generalised"].contains(&model);
+        if inner.is_some() && known {
+            return Err(surplus("inner"));
+        }
         match (model, p, k) {
             ("pillbox", None, None) => Ok(Self::PillBox),
             ("pillbox", Some(_), _) => Err(surplus("p")),
@@ -150,8 +220,24 @@ impl Psf {
                 check_range("p", p, P_RANGE)?;
                 check_range("k", k, K_RANGE)?;
             }
+            Self::Ring { inner } => check_range("inner", inner, INNER_RANGE)?,
+            // Checked when it was made.
+            Self::Radial(_) => {}
         }
         Ok(self)
+    }
+
+    /// Mean square distance from its middle, in squared blur radii; along one axis it is half of that.
+    pub fn second_moment(self) -> f64 {
+        match self {
+            Self::PillBox => 0.5,
+            Self::Gaussian { k } => 2.0 * k * k,
+            Self::Generalised { p, k } => {
+                k * k * p.powf(2.0 / p) * libm::tgamma(4.0 / p) / libm::tgamma(2.0 / p)
+            }
+            Self::Ring { inner } => 0.5 * (1.0 + inner * inner),
+            Self::Radial(psf) => psf.second_moment(),
+        }
     }
 
     /// The OTF for blur radii up to `max_radius_px` and every frequency a pixel grid carries (up to `sqrt(2) pi`).
@@ -168,6 +254,8 @@ impl Psf {
             Self::Generalised { p, k } => {
                 Otf::Generalised { k, table: HankelTable::new(p, k * max_phase_rad) }
             }
+            Self::Ring { inner } => Otf::Ring { inner },
+            Self::Radial(psf) => Otf::Radial(RadialTable::new(psf, max_phase_rad)),
         }
     }
 }
@@ -186,6 +274,10 @@ impl fmt::Display for Psf {
             Self::PillBox => write!(f, "pillbox"),
             Self::Gaussian { k } => write!(f, "gaussian:k={k}"),
             Self::Generalised { p, k } => write!(f, "generalised:p={p},k={k}"),
+            Self::Ring { inner } => write!(f, "ring:inner={inner}"),
+            Self::Radial(psf) => {
+                write!(f, "a measured profile (SD {:.4} blur radii)", (0.5 * psf.second_moment()).sqrt())
+            }
         }
     }
 }
@@ -193,17 +285,18 @@ impl fmt::Display for Psf {
 impl FromStr for Psf {
     type Err = PsfError;
 
-    /// `pillbox`, `gaussian:k=0.4578` or `generalised:p=1.8,k=0.4802`.
+    /// `pillbox`, `gaussian:k=0.4578`, `generalised:p=1.8,k=0.4802` or `ring:inner=0.5`.
     fn from_str(text: &str) -> Result<Self, PsfError> {
         let (model, parameters) = text.trim().split_once(':').unwrap_or((text.trim(), ""));
         let model = model.trim();
-        let [mut p, mut k] = [None; 2];
+        let [mut p, mut k, mut inner] = [None; 3];
         for parameter in parameters.split(',').filter(|parameter| !parameter.trim().is_empty()) {
             let (name, value) = parameter.split_once('=').unwrap_or((parameter, ""));
             let (name, value) = (name.trim(), value.trim());
             let (slot, name, [low, high]) = match name {
                 "p" => (&mut p, "p", P_RANGE),
                 "k" => (&mut k, "k", K_RANGE),
+                "inner" => (&mut inner, "inner", INNER_RANGE),
                 _ => return Err(PsfError::Unexpected { model: model.to_owned(), name: name.to_owned() }),
             };
             let number = value.parse::<f64>().map_err(|_| PsfError::Range {
@@ -216,7 +309,7 @@ impl FromStr for Psf {
                 return Err(PsfError::Unexpected { model: model.to_owned(), name: name.to_owned() });
             }
         }
-        Self::from_parts(model, p, k)
+        Self::from_parts(model, p, k, inner)
     }
 }
 
@@ -237,6 +330,18 @@ pub enum Otf {
         /// Transform of the PSF of unit scale.
         table: HankelTable,
     },
+    /// Difference of two pill-boxes.
+    Ring {
+        /// Inner radius in blur radii.
+        inner: f64,
+    },
+    /// Tabulated transform of a profile.
+    Radial(RadialTable),
+}
+
+/// `2 J1(z) / z`.
+fn disc(z: f64) -> f64 {
+    if z < 1e-4 { 1.0 - z * z / 8.0 } else { 2.0 * libm::j1(z) / z }
 }
 
 impl Otf {
@@ -244,15 +349,14 @@ impl Otf {
     pub fn at(&self, radius_px: f64, w: f64) -> f64 {
         let z = (radius_px * w).abs();
         match self {
-            Self::PillBox => {
-                if z < 1e-4 {
-                    1.0 - z * z / 8.0
-                } else {
-                    2.0 * libm::j1(z) / z
-                }
-            }
+            Self::PillBox => disc(z),
             Self::Gaussian { k } => (-0.5 * (k * z) * (k * z)).exp(),
             Self::Generalised { k, table } => table.at(k * z),
+            Self::Ring { inner } => {
+                let covered = inner * inner;
+                (disc(z) - covered * disc(inner * z)) / (1.0 - covered)
+            }
+            Self::Radial(table) => table.at(z),
         }
     }
 }
@@ -263,7 +367,7 @@ mod tests {
 
     #[test]
     fn texts_and_models_map_onto_each_other() {
-        for text in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802"] {
+        for text in ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802", "ring:inner=0.5"] {
             assert_eq!(text.parse::<Psf>().unwrap().to_string(), text);
         }
         assert_eq!("generalised:k=0.5,p=4".parse::<Psf>().unwrap(), Psf::Generalised { p: 4.0, k: 0.5 });
@@ -271,6 +375,10 @@ mod tests {
             ("", "unknown PSF \"\""),
             ("airy", "unknown PSF \"airy\""),
             ("pillbox:k=1", "takes no \"k\""),
+            ("pillbox:inner=0.5", "takes no \"inner\""),
+            ("ring", "needs inner=NUMBER"),
+            ("ring:inner=1", "inner = 1"),
+            ("ring:inner=0.5,k=1", "takes no \"k\""),
             ("gaussian", "needs k=NUMBER"),
             ("gaussian:k", "k = , expected a number"),
             ("gaussian:k=a", "k = a"),

@@ -12,7 +12,7 @@ use crate::judge::{JudgeSettings, Judgement, Lost, judge};
 use crate::operators::{DesignError, Operators};
 use crate::optics::Optics;
 use crate::pipeline::{RunError, Settings, depth_from_pair, fill_rim, warnings_after};
-use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare};
+use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
 use crate::reason::Reason;
 use crate::windowed::{Bank, Estimate, Window, WindowSettings, check_pair, estimate};
@@ -183,11 +183,29 @@ pub fn depth_of_real_pair(
 ) -> Result<RealDepth, RealError> {
     // As they came: what is clipped everywhere is constant, and not full of holes.
     check_pair(far, near)?;
-    let prepared = prepare(far, near, optics, camera, &settings.prepare)?;
+    let images = [far, near].map(|image| image.as_standard_layout().into_owned());
+    depth_of_owned_pair(images, optics, method, camera, settings)
+}
+
+/// As [`depth_of_real_pair`], of the images `[far, near]` themselves. Memory: some 30 bytes a pixel at its peak, the images'
+/// eight included.
+///
+/// # Errors
+/// [`RealError`].
+pub fn depth_of_owned_pair(
+    images: [Array2<f32>; 2],
+    optics: &Optics,
+    method: RealMethod<'_>,
+    camera: Option<&CameraFrames>,
+    settings: &RealSettings,
+) -> Result<RealDepth, RealError> {
+    check_pair(images[0].view(), images[1].view())?;
+    let prepared = prepare_owned(images, optics, camera, &settings.prepare)?;
     let (mut map, estimate) = measure(&prepared, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
+    let (left_over, excess) = (estimate.left_over, estimate.excess);
     let judging = JudgeSettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
-    let judgement = judge(&mut map, &prepared, &estimate, optics, &judging);
+    let judgement = judge(&mut map, &prepared, estimate, optics, &judging);
     let lost =
         judgement.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
     findings.extend(lost.copied().map(Finding::Lost));
@@ -196,7 +214,7 @@ pub fn depth_of_real_pair(
         findings.retain(|finding| !matches!(finding, Finding::Unexplained { .. }));
     }
     map.warnings.clear();
-    let (report, left_over, excess) = (prepared.report, estimate.left_over, estimate.excess);
+    let report = prepared.report;
     Ok(RealDepth { map, judgement, report, findings, left_over, excess, prepared })
 }
 
@@ -216,15 +234,22 @@ fn measure(
     // Every method is judged by the white residual, whose deviation is known best.
     let white = Bank::whitened(optics)?;
     let mut judging = estimate(far, near, &white, optics, &of_windows)?;
+    // Of the others only deviation and misfit are wanted, and a map is large.
+    let white_depth_mm = std::mem::take(&mut judging.depth_mm);
+    let white_depth_mm = matches!(method, RealMethod::Whitened).then_some(white_depth_mm);
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
     let map = match (method, settings.window) {
-        (RealMethod::Whitened, _) => of_estimate(&judging, &white, optics, settings),
+        (RealMethod::Whitened, _) => {
+            let depth_mm = white_depth_mm.unwrap_or_default();
+            of_estimate(depth_mm, &judging.deviation_mm, &white, optics, settings)
+        }
         (RealMethod::Rational(operators), Window::Fixed(side)) => {
             depth_from_pair(far, near, operators, optics, &run(side))?
         }
         (RealMethod::Rational(operators), _) => {
             let bank = Bank::rational(operators);
-            of_estimate(&estimate(far, near, &bank, optics, &of_windows)?, &bank, optics, settings)
+            let Estimate { depth_mm, deviation_mm, .. } = estimate(far, near, &bank, optics, &of_windows)?;
+            of_estimate(depth_mm, &deviation_mm, &bank, optics, settings)
         }
         (RealMethod::Baseline(method), window) => {
             let side = if let Window::Fixed(side) = window { side } else { 7 };
@@ -268,20 +293,21 @@ fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Opt
 }
 
 /// A map of what windows found.
-fn of_estimate(estimate: &Estimate, bank: &Bank, optics: &Optics, settings: &RealSettings) -> DepthMap {
+fn of_estimate(
+    depth_mm: Array2<f32>,
+    deviation_mm: &Array2<f32>,
+    bank: &Bank,
+    optics: &Optics,
+    settings: &RealSettings,
+) -> DepthMap {
     let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
     // Evidence: the variance's reciprocal, which is what texture energy is to the run time.
-    let evidence: Array2<f32> = estimate.deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
-    let confidence =
-        evidence.mapv(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
-    let mut map = DepthMap {
-        depth_mm: estimate.depth_mm.clone(),
-        confidence,
-        low_texture_fraction: 0.0,
-        warnings: Vec::new(),
-    };
+    let mut confidence: Array2<f32> = deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
+    let evidence = settings.run.fill.then(|| confidence.clone());
+    confidence.mapv_inplace(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
+    let mut map = DepthMap { depth_mm, confidence, low_texture_fraction: 0.0, warnings: Vec::new() };
     fill_rim(&mut map, bank.reach_px() + 1);
-    if settings.run.fill {
+    if let Some(evidence) = evidence {
         fill_low_texture(&mut map, evidence.view(), bank.reach_px() + 3);
     }
     map.warnings.extend(warnings_after(&map, optics));

@@ -4,9 +4,10 @@
 //! every point spread function and noise, wrong point spread functions, corrections of the elliptical distortion on
 //! depths that taught nothing, calibration. Where real pairs and focal stacks are at hand their figures go to
 //! `docs/accuracy-real.md`. What [`people`] measures - activities recognised, shadows taken off, the sun - goes to
-//! `docs/activity.md`; what a disturbed pair comes to ([`robust`]) to `docs/robustness.md`.
+//! `docs/activity.md`; what a disturbed pair comes to ([`robust`]) to `docs/robustness.md`; Li's thesis redone ([`thesis`]) to
+//! `docs/thesis.md`.
 //!
-//! Everything is seeded and no clock enters, so that two runs on one kind of processor write the same bytes.
+//! Everything is seeded and no clock enters, except for the thesis' table of times, so that two runs on one kind of processor write the same bytes.
 //! One part per file in [`depth`]; [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes Markdown, [`chart`] and [`panels`]
 //! draw. It takes a few minutes on four cores; run it by `cargo xtask evaluate`.
 
@@ -18,6 +19,7 @@ mod people;
 mod rig;
 mod robust;
 mod sweep;
+mod thesis;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -39,7 +41,13 @@ struct Arguments {
     /// Measure only these parts and print them; no page is written.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
+    /// Write only these pages, such as `thesis`.
+    #[arg(long, value_name = "NAME", conflicts_with = "only")]
+    page: Vec<String>,
 }
+
+/// The pages by the names of `--page`; `real` is the page of the part `real`.
+const PAGES: [&str; 5] = ["accuracy", "robustness", "activity", "thesis", "real"];
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -61,12 +69,27 @@ fn run(arguments: &Arguments) -> Result<()> {
         .chain(&robust::PARTS)
         .map(|(name, _)| *name)
         .chain(["real"])
+        .chain(thesis::PARTS.iter().map(|(name, _)| *name))
         .chain(of_people)
         .collect::<Vec<_>>();
     if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
         bail!("no part is called {unknown:?}, there are {}", known.join(", "));
     }
-    let wanted = |name: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name);
+    if let Some(unknown) = arguments.page.iter().find(|name| !PAGES.contains(&name.as_str())) {
+        bail!("no page is called {unknown:?}, there are {}", PAGES.join(", "));
+    }
+    let page_of = |name: &str| match name {
+        "real" => "real",
+        _ if depth::RENDERED.iter().any(|(part, _)| *part == name) => "accuracy",
+        _ if robust::PARTS.iter().any(|(part, _)| *part == name) => "robustness",
+        _ if thesis::PARTS.iter().any(|(part, _)| *part == name) => "thesis",
+        _ => "activity",
+    };
+    let wanted = |name: &str| {
+        let listed =
+            |list: &[String], name: &str| list.is_empty() || list.iter().any(|wanted| wanted == name);
+        listed(&arguments.only, name) && listed(&arguments.page, page_of(name))
+    };
 
     if depth::RENDERED.iter().any(|(name, _)| wanted(name)) {
         let mut page = Page::new(&images, depth::INTRODUCTION);
@@ -101,6 +124,17 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
         }
         finish(page, arguments, "activity.md")?;
+    }
+    if thesis::PARTS.iter().any(|(name, _)| wanted(name)) {
+        let mut page = Page::new(&images, thesis::INTRODUCTION);
+        let data = people::data::Data(data.clone());
+        for (name, measure) in thesis::PARTS {
+            if wanted(name) {
+                eprintln!("{name}");
+                measure(&mut page, &data).with_context(|| format!("measuring {name}"))?;
+            }
+        }
+        finish(page, arguments, "thesis.md")?;
     }
     if !wanted("real") {
         return Ok(());

@@ -52,34 +52,44 @@ impl Scale {
 
 /// The panels in one row, as the bytes of a PNG.
 pub fn row(panels: &[Panel<'_>]) -> Result<Vec<u8>> {
+    grid(panels.len(), panels)
+}
+
+/// Panels of one size in rows of `across`, as the bytes of a PNG.
+pub fn grid(across: usize, panels: &[Panel<'_>]) -> Result<Vec<u8>> {
     let Some(first) = panels.first() else { bail!("a picture without panels") };
     let (rows, columns) = (first.map.nrows() / SHRINK, first.map.ncols() / SHRINK);
-    let size = (MARGIN + panels.len() * (columns + MARGIN), TITLE + rows + MARGIN);
+    let down = panels.len().div_ceil(across);
+    let size = (MARGIN + across * (columns + MARGIN), down * (TITLE + rows + MARGIN));
+    let place = |index: usize| {
+        (MARGIN + index % across * (columns + MARGIN), index / across * (TITLE + rows + MARGIN))
+    };
     let mut buffer = vec![255_u8; 3 * size.0 * size.1];
     for (index, panel) in panels.iter().enumerate() {
-        let left = MARGIN + index * (columns + MARGIN);
+        let (left, top) = place(index);
         for ((row, column), value) in shrunk(panel.map).indexed_iter() {
             if row < rows && column < columns {
-                let at = 3 * ((TITLE + row) * size.0 + left + column);
+                let at = 3 * ((top + TITLE + row) * size.0 + left + column);
                 buffer[at..at + 3].copy_from_slice(&panel.scale.colour(*value));
             }
         }
     }
     let size = (size.0 as u32, size.1 as u32);
-    titles(&mut buffer, size, columns, panels).map_err(|error| anyhow!("cannot write titles: {error}"))?;
+    titles(&mut buffer, size, place, panels).map_err(|error| anyhow!("cannot write titles: {error}"))?;
     encode(&buffer, size)
 }
 
 fn titles(
     buffer: &mut [u8],
     size: (u32, u32),
-    columns: usize,
+    place: impl Fn(usize) -> (usize, usize),
     panels: &[Panel<'_>],
 ) -> Result<(), Box<dyn std::error::Error>> {
     let area = BitMapBackend::with_buffer(buffer, size).into_drawing_area();
     for (index, panel) in panels.iter().enumerate() {
-        let left = (MARGIN + index * (columns + MARGIN)) as i32;
-        area.draw(&Text::new(panel.title.clone(), (left, 8), ("sans-serif", 13).into_font()))?;
+        let (left, top) = place(index);
+        let at = (left as i32, top as i32 + 8);
+        area.draw(&Text::new(panel.title.clone(), at, ("sans-serif", 13).into_font()))?;
     }
     area.present()?;
     Ok(())

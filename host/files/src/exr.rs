@@ -6,6 +6,8 @@
 //! Written by hand because the crate `exr` takes as long to compile as the rest of this one; tests read it back with that
 //! crate.
 
+use std::io::{self, Write};
+
 use ndarray::ArrayView2;
 
 use crate::EncodeError;
@@ -24,7 +26,21 @@ const FLOAT: i32 = 2;
 /// # Errors
 /// Maps of different sizes or without pixels; names that are empty, longer than 31 bytes or given twice.
 pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Result<Vec<u8>, EncodeError> {
-    let refused = |reason: String| EncodeError { what: "an EXR", reason };
+    let mut bytes = Vec::new();
+    write_to(channels, texts, &mut bytes).map_err(EncodeError::of("an EXR"))?;
+    Ok(bytes)
+}
+
+/// The same, row by row into a file.
+///
+/// # Errors
+/// As [`write()`], and what the system says.
+pub fn write_to(
+    channels: &[(&str, ArrayView2<f32>)],
+    texts: &[(&str, &str)],
+    to: &mut impl Write,
+) -> io::Result<()> {
+    let refused = |reason: String| io::Error::new(io::ErrorKind::InvalidInput, reason);
     let (height, width) = channels.first().map_or((0, 0), |(_, map)| map.dim());
     if let Some((name, map)) = channels.iter().find(|(_, map)| map.dim() != (height, width)) {
         let (rows, columns) = map.dim();
@@ -50,18 +66,20 @@ pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Re
     let row_bytes = channels.len() * width * size_of::<f32>();
     let block_bytes = 2 * size_of::<i32>() + row_bytes;
     let first_block = bytes.len() + height * size_of::<u64>();
-    bytes.reserve(height * (size_of::<u64>() + block_bytes));
     for row in 0..height {
         bytes.extend(((first_block + row * block_bytes) as u64).to_le_bytes());
     }
+    to.write_all(&bytes)?;
     for row in 0..height {
+        bytes.clear();
         bytes.extend((row as i32).to_le_bytes());
         bytes.extend((row_bytes as i32).to_le_bytes());
         for (_, map) in &channels {
             bytes.extend(map.row(row).iter().flat_map(|value| value.to_le_bytes()));
         }
+        to.write_all(&bytes)?;
     }
-    Ok(bytes)
+    Ok(())
 }
 
 /// Everything before the table of the rows' places.

@@ -6,7 +6,7 @@
 
 use std::{
     fs,
-    io::Cursor,
+    io::{Cursor, Write},
     path::{Path, PathBuf},
 };
 
@@ -178,6 +178,16 @@ fn grey(size: (usize, usize), values: Vec<f32>, samples: Samples) -> Result<Grey
 /// # Errors
 /// An encoder that refuses.
 pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeError> {
+    let mut png = Vec::new();
+    png_to(pixels, bits, &mut png)?;
+    Ok(png)
+}
+
+/// The same into a file.
+///
+/// # Errors
+/// What the system or the encoder says.
+pub fn png_to(pixels: ArrayView2<u16>, bits: u8, to: &mut impl Write) -> Result<(), EncodeError> {
     let (height, width) = pixels.dim();
     let (bytes, colour): (Vec<u8>, _) = if bits <= 8 {
         (pixels.iter().map(|value| (*value).min(255) as u8).collect(), ExtendedColorType::L8)
@@ -186,11 +196,9 @@ pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeEr
         // `image` takes 16-bit samples in the machine's byte order.
         (pixels.iter().flat_map(|value| (value << shift).to_ne_bytes()).collect(), ExtendedColorType::L16)
     };
-    let mut png = Vec::new();
-    PngEncoder::new(&mut png)
+    PngEncoder::new(to)
         .write_image(&bytes, width as u32, height as u32, colour)
-        .map_err(EncodeError::of("a PNG"))?;
-    Ok(png)
+        .map_err(EncodeError::of("a PNG"))
 }
 
 /// The same as the bytes of a grey TIFF of 8 or 16 bits, whose values stay as the camera gave them.

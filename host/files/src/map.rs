@@ -1,12 +1,15 @@
 //! Depth maps and masks in files: `.npy` (f32) and float TIFF.
 
 use std::{
-    io::Cursor,
+    io::{self, Cursor, Seek, Write},
     path::{Path, PathBuf},
 };
 
 use ndarray::{Array2, ArrayView2};
-use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+use tiff::{
+    TiffError,
+    encoder::{TiffEncoder, colortype::Gray32Float},
+};
 
 use crate::{
     EncodeError,
@@ -121,13 +124,25 @@ impl Format {
 /// # Errors
 /// An encoder that refuses.
 pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
-    let (height, width) = map.dim();
     let mut bytes = Cursor::new(Vec::new());
-    let values: Vec<f32> = map.iter().copied().collect();
-    TiffEncoder::new(&mut bytes)
-        .and_then(|mut file| file.write_image::<Gray32Float>(width as u32, height as u32, &values))
-        .map_err(EncodeError::of("a TIFF"))?;
+    tiff_to(map, &mut bytes).map_err(EncodeError::of("a TIFF"))?;
     Ok(bytes.into_inner())
+}
+
+/// The same into a file, without its bytes in memory.
+///
+/// # Errors
+/// What the system or the encoder says.
+pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result<()> {
+    let (height, width) = map.dim();
+    let standard = map.as_standard_layout();
+    let Some(values) = standard.as_slice() else { unreachable!("made in standard layout") };
+    TiffEncoder::new(to)
+        .and_then(|mut file| file.write_image::<Gray32Float>(width as u32, height as u32, values))
+        .map_err(|error| match error {
+            TiffError::IoError(error) => error,
+            other => io::Error::other(other),
+        })
 }
 
 /// How the codes of a 16-bit depth image stand for mm: `mm = offset_mm + scale_mm * code`, 0 = no value.
@@ -139,21 +154,26 @@ pub struct Scale {
     pub scale_mm: f64,
 }
 
-/// A map as 16-bit codes over its own range.
-pub fn codes(map: ArrayView2<f32>) -> (Array2<u16>, Scale) {
+/// The scale whose codes span a map's own range.
+pub fn scale(map: ArrayView2<f32>) -> Scale {
     let finite = || map.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f32::INFINITY, f32::min);
     let high = finite().fold(f32::NEG_INFINITY, f32::max);
     if low > high {
-        return (Array2::zeros(map.dim()), Scale { offset_mm: 0.0, scale_mm: 1.0 });
+        return Scale { offset_mm: 0.0, scale_mm: 1.0 };
     }
     // Code 1 is the nearest depth, code 65535 the farthest.
     let scale_mm = f64::from(high - low).max(1e-6) / 65_534.0;
-    let offset_mm = f64::from(low) - scale_mm;
-    let code = |value: f32| {
-        if value.is_finite() { ((f64::from(value) - offset_mm) / scale_mm).round() as u16 } else { 0 }
-    };
-    (map.mapv(code), Scale { offset_mm, scale_mm })
+    Scale { offset_mm: f64::from(low) - scale_mm, scale_mm }
+}
+
+/// A map as 16-bit codes.
+pub fn codes(map: ArrayView2<f32>, Scale { offset_mm, scale_mm }: Scale) -> Array2<u16> {
+    map.mapv(
+        |value| {
+            if value.is_finite() { ((f64::from(value) - offset_mm) / scale_mm).round() as u16 } else { 0 }
+        },
+    )
 }
 
 #[cfg(test)]
@@ -177,7 +197,8 @@ mod tests {
     #[test]
     fn codes_stand_for_the_depth_they_came_from() {
         let map = array![[933.0f32, f32::NAN], [887.0, 900.0]];
-        let (codes, scale) = codes(map.view());
+        let scale = scale(map.view());
+        let codes = codes(map.view(), scale);
         assert_eq!((codes[[0, 1]], codes[[1, 0]], codes[[0, 0]]), (0, 1, 65_535));
         let back = scale.offset_mm + scale.scale_mm * f64::from(codes[[1, 1]]);
         assert!((back - 900.0).abs() <= scale.scale_mm, "{back}");
@@ -185,7 +206,8 @@ mod tests {
 
     #[test]
     fn a_map_of_one_depth_and_a_map_of_none_have_codes() {
-        assert_eq!(codes(array![[5.0f32, 5.0]].view()).0, array![[1, 1]]);
-        assert_eq!(codes(array![[f32::NAN]].view()).0, array![[0]]);
+        let codes = |map: Array2<f32>| codes(map.view(), scale(map.view()));
+        assert_eq!(codes(array![[5.0f32, 5.0]]), array![[1, 1]]);
+        assert_eq!(codes(array![[f32::NAN]]), array![[0]]);
     }
 }

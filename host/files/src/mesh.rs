@@ -4,6 +4,8 @@
 //! through the front focus: a pixel of pitch p sees p (z - F) / F of the object, wherever the sensor stands. x to the
 //! right, y up, z towards the viewer; all in mm, the optical axis in the image's middle.
 
+use std::io::{self, Write};
+
 use ndarray::ArrayView2;
 
 /// Neighbours that differ by more than this part of the map's range belong to different surfaces.
@@ -18,66 +20,102 @@ pub struct Projection {
     pub pixel_um: f64,
 }
 
-/// The mesh of `depth_mm`, coloured by `grey` (any scale).
-pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, projection: Projection) -> Vec<u8> {
+/// Number of a place without a vertex.
+const NONE: u32 = u32::MAX;
+
+/// The mesh of `depth_mm`, coloured by `grey` (any scale), row by row into a file: 12 MP are half a gigabyte, which no memory
+/// is to hold.
+///
+/// # Errors
+/// What the system says.
+pub fn write(
+    depth_mm: ArrayView2<f32>,
+    grey: ArrayView2<f32>,
+    projection: Projection,
+    to: &mut impl Write,
+) -> io::Result<()> {
     let (height, width) = depth_mm.dim();
     let finite = || depth_mm.iter().copied().filter(|value| value.is_finite());
     let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
     let step = (high - low) * STEP;
     let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
 
-    const NONE: u32 = u32::MAX;
-    let mut index = vec![NONE; width * height];
-    let mut vertices = Vec::new();
-    let mut count = 0u32;
-    for ((row, column), &z) in depth_mm.indexed_iter() {
-        if !z.is_finite() {
-            continue;
-        }
-        index[row * width + column] = count;
-        count += 1;
+    let vertices = finite().count();
+    let mut faces = 0_usize;
+    for row in 1..height {
+        each_face(depth_mm, row, step, |_| {
+            faces += 1;
+            Ok(())
+        })?;
+    }
+    write!(
+        to,
+        "ply\nformat binary_little_endian 1.0\ncomment depth map in mm\nelement vertex {vertices}\n\
+         property float x\nproperty float y\nproperty float z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\n\
+         element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
+    )?;
+    for ((row, column), &z) in depth_mm.indexed_iter().filter(|(_, z)| z.is_finite()) {
         let scale = projection.pixel_um * 1e-3 * (f64::from(z) / projection.focal_length_mm - 1.0);
         let x = (column as f64 - 0.5 * (width - 1) as f64) * scale;
         let y = (0.5 * (height - 1) as f64 - row as f64) * scale;
-        for value in [x as f32, y as f32, -z] {
-            vertices.extend(value.to_le_bytes());
-        }
         let shade = (255.0 * (grey[[row, column]] / brightest).clamp(0.0, 1.0)).round() as u8;
-        vertices.extend([shade; 3]);
+        let mut vertex = [shade; 15];
+        for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
+            place.copy_from_slice(&value.to_le_bytes());
+        }
+        to.write_all(&vertex)?;
     }
+    // Vertices are numbered as they come, so that two rows of numbers are enough.
+    let mut next = 0;
+    let mut numbers = [vec![NONE; width], vec![NONE; width]];
+    for row in 0..height {
+        numbers.swap(0, 1);
+        for (number, z) in numbers[1].iter_mut().zip(depth_mm.row(row)) {
+            *number = if z.is_finite() { next } else { NONE };
+            next += u32::from(z.is_finite());
+        }
+        if row == 0 {
+            continue;
+        }
+        each_face(depth_mm, row, step, |corners| {
+            let mut face = [3_u8; 13];
+            for (place, (down, column)) in face[1..].chunks_exact_mut(4).zip(corners) {
+                place.copy_from_slice(&numbers[down][column].to_le_bytes());
+            }
+            to.write_all(&face)
+        })?;
+    }
+    Ok(())
+}
 
-    let mut faces = Vec::new();
-    let mut face_count = 0u32;
-    for row in 0..height.saturating_sub(1) {
-        for column in 0..width.saturating_sub(1) {
-            let at = |down: usize, right: usize| (row + down, column + right);
-            for corners in [[at(0, 0), at(1, 0), at(0, 1)], [at(0, 1), at(1, 0), at(1, 1)]] {
-                let vertex = corners.map(|(row, column)| index[row * width + column]);
-                let z = corners.map(|corner| depth_mm[corner]);
-                let spread =
-                    z.iter().fold(f32::MIN, |a, b| a.max(*b)) - z.iter().fold(f32::MAX, |a, b| a.min(*b));
-                if vertex.contains(&NONE) || spread > step {
-                    continue;
-                }
-                faces.push(3u8);
-                for number in vertex {
-                    faces.extend(number.to_le_bytes());
-                }
-                face_count += 1;
+/// The same as bytes, for what is thinned first.
+pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, projection: Projection) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write(depth_mm, grey, projection, &mut bytes).unwrap_or_else(|_| unreachable!("memory takes all bytes"));
+    bytes
+}
+
+/// The triangles between the row before `row` and this one, each as (0 = upper, 1 = lower row; column) of its corners.
+fn each_face(
+    depth_mm: ArrayView2<f32>,
+    row: usize,
+    step: f32,
+    mut face: impl FnMut([(usize, usize); 3]) -> io::Result<()>,
+) -> io::Result<()> {
+    let rows = [depth_mm.row(row - 1), depth_mm.row(row)];
+    for column in 0..depth_mm.ncols().saturating_sub(1) {
+        let right = column + 1;
+        for corners in [[(0, column), (1, column), (0, right)], [(0, right), (1, column), (1, right)]] {
+            let z = corners.map(|(down, column)| rows[down][column]);
+            let spread =
+                z.iter().fold(f32::MIN, |a, b| a.max(*b)) - z.iter().fold(f32::MAX, |a, b| a.min(*b));
+            if z.iter().all(|z| z.is_finite()) && spread <= step {
+                face(corners)?;
             }
         }
     }
-
-    let mut bytes = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment depth map in mm\nelement vertex {count}\n\
-         property float x\nproperty float y\nproperty float z\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\n\
-         element face {face_count}\nproperty list uchar uint vertex_indices\nend_header\n"
-    )
-    .into_bytes();
-    bytes.extend(vertices);
-    bytes.extend(faces);
-    bytes
+    Ok(())
 }
 
 #[cfg(test)]
@@ -95,5 +133,11 @@ mod tests {
         assert!(text.contains("element face 2\n"), "{text}");
         let header = text.find("end_header\n").unwrap() + "end_header\n".len();
         assert_eq!(bytes.len(), header + 5 * 15 + 2 * 13);
+        let faces = &bytes[header + 5 * 15..];
+        let corners = |face: &[u8]| -> Vec<u32> {
+            face[1..].chunks(4).map(|number| u32::from_le_bytes(number.try_into().unwrap())).collect()
+        };
+        // 0 1 . above 2 3 4.
+        assert_eq!([corners(&faces[..13]), corners(&faces[13..])], [vec![0, 2, 1], vec![1, 2, 3]]);
     }
 }

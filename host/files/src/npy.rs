@@ -7,6 +7,8 @@
 
 mod header;
 
+use std::io::{self, Write};
+
 use ndarray::{Array2, ArrayView2};
 
 use header::Header;
@@ -124,19 +126,40 @@ fn numbers<const SIZE: usize>(values: &[u8], number: fn([u8; SIZE]) -> f32) -> O
 
 /// A map of (height, width) as the bytes of a file: version 1.0, little-endian f32, row by row.
 pub fn write(map: ArrayView2<f32>) -> Vec<u8> {
-    let (height, width) = map.dim();
+    let mut bytes = header(map.dim());
+    bytes.reserve_exact(4 * map.len());
+    bytes.extend(map.iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
+/// The same, row by row into a file.
+///
+/// # Errors
+/// What the system says.
+pub fn write_to(map: ArrayView2<f32>, to: &mut impl Write) -> io::Result<()> {
+    to.write_all(&header(map.dim()))?;
+    let mut row_bytes = Vec::with_capacity(4 * map.ncols());
+    for row in map.rows() {
+        row_bytes.clear();
+        row_bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+        to.write_all(&row_bytes)?;
+    }
+    Ok(())
+}
+
+/// All before the values.
+fn header((height, width): (usize, usize)) -> Vec<u8> {
     let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width})}}");
     // At least one blank, then the line feed. Two numbers never make the header longer than 65,535 bytes.
     let values_from = (PREFIX + header.len() + 1) / BLOCK * BLOCK + BLOCK;
     let header_length = (values_from - PREFIX) as u16;
-    let mut bytes = Vec::with_capacity(values_from + 4 * map.len());
+    let mut bytes = Vec::with_capacity(values_from);
     bytes.extend(MAGIC);
     bytes.extend([1, 0]);
     bytes.extend(header_length.to_le_bytes());
     bytes.extend(header.bytes());
     bytes.resize(values_from - 1, b' ');
     bytes.push(b'\n');
-    bytes.extend(map.iter().flat_map(|value| value.to_le_bytes()));
     bytes
 }
 
@@ -233,7 +256,10 @@ mod tests {
             proptest::collection::vec(any::<u32>(), size.0 * size.1)
                 .prop_map(move |bits| Array2::from_shape_vec(size, bits).expect("as many").mapv(f32::from_bits))
         })) {
-            let back = read(&write(map.view())).unwrap();
+            let mut by_rows = Vec::new();
+            write_to(map.view(), &mut by_rows).unwrap();
+            prop_assert_eq!(&by_rows, &write(map.view()));
+            let back = read(&by_rows).unwrap();
             prop_assert_eq!(back.mapv(f32::to_bits), map.mapv(f32::to_bits));
         }
 

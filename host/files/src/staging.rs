@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io,
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -38,6 +38,9 @@ const PARTIAL: &str = ".partial-";
 const JUST_BEGUN: Duration = Duration::from_secs(10);
 /// Folders that killed programs left behind under one name, before the user is asked to look.
 const LEFT_BEHIND_MAX: u32 = 100;
+
+/// What a file that is written piece by piece gathers before the system is asked.
+const BUFFER_BYTES: usize = 1 << 18;
 
 /// A folder that becomes visible under its name only when all its files are written. Dropped before, it leaves
 /// nothing behind.
@@ -107,6 +110,24 @@ impl Staging {
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StagingError> {
         let path = self.path(name);
         fs::write(&path, bytes).map_err(StagingError::at(&self.target.join(name)))
+    }
+
+    /// Writes a file piece by piece.
+    ///
+    /// # Errors
+    /// [`StagingError::Io`] with what `fill` or the system says.
+    pub fn fill(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> Result<(), StagingError> {
+        let written = File::create(self.path(name)).and_then(|file| {
+            let mut file = BufWriter::with_capacity(BUFFER_BYTES, file);
+            fill(&mut file)?;
+            // Dropped, it would keep what the system says of its last bytes to itself.
+            file.flush()
+        });
+        written.map_err(StagingError::at(&self.target.join(name)))
     }
 
     /// Puts everything in place: a new folder with one rename, a set of files with one rename each.
@@ -264,7 +285,10 @@ mod tests {
         fs::write(root.path().join("old"), b"0").unwrap();
         fs::write(root.path().join("b"), b"0").unwrap();
         let staged = Staging::into_folder(root.path()).unwrap();
-        staged.write("b", b"1").unwrap();
+        staged.fill("b", |file| file.write_all(b"1")).unwrap();
+        let full = staged.fill("c", |_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
+        assert!(full.to_string().contains(&root.path().join("c").display().to_string()), "{full}");
+        fs::remove_file(staged.path("c")).unwrap();
         assert_eq!(fs::read(root.path().join("b")).unwrap(), b"0");
         staged.finish().unwrap();
         assert_eq!(names(root.path()), ["b", "old"]);

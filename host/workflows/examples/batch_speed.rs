@@ -93,6 +93,7 @@ fn by_loop(
             far: root.join(format!("far{number}.png")),
             near: root.join(format!("near{number}.png")),
             optics: Some(root.join("optics.toml")),
+            psf: None,
             operators: None,
             method: Default::default(),
             computation: Settings::default(),

@@ -11,11 +11,11 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use farnear_depth::{
     corrections::Correction,
-    judge::Judgement,
+    judge::{Judgement, Lost},
     optics::Optics,
     pipeline::{DepthMap, Settings},
     prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
-    real::{RealSettings, depth_of_real_pair},
+    real::{RealSettings, depth_of_owned_pair},
     reason::Reason,
     windowed::Window,
 };
@@ -27,6 +27,7 @@ use crate::{
     error::{About, Result, WorkflowError},
     figures::rounded,
     optics,
+    psf::PsfSource,
 };
 use farnear_files::image_file::Samples;
 use method::{Method, Prepared};
@@ -45,6 +46,8 @@ pub struct DepthSettings {
     pub near: PathBuf,
     /// The optics file; without it what `capture.toml` or `optics.toml` beside the far image says.
     pub optics: Option<PathBuf>,
+    /// Point spread function in place of that of the optics.
+    pub psf: Option<PsfSource>,
     /// Name (family:design) or file of the operators; without it they are designed for the optics.
     pub operators: Option<PathBuf>,
     /// How.
@@ -113,7 +116,7 @@ pub fn compute_sharing(
     context: &Context<'_>,
 ) -> Result<DepthFigures> {
     settings.check()?;
-    let inputs = Inputs::read(settings, shared)?;
+    let mut inputs = Inputs::read(settings, shared, context)?;
     let start = Instant::now();
     let computed = inputs.compute(settings, context)?;
     let seconds = start.elapsed().as_secs_f64();
@@ -189,15 +192,28 @@ struct Inputs {
 struct Computed {
     map: DepthMap,
     deviation: Option<(Array2<f32>, Uncertainty)>,
-    judgement: Judgement,
+    /// Why each pixel has no depth.
+    reasons: Array2<u8>,
+    /// How many pixels have none, by reason.
+    lost: Vec<Lost>,
+    /// The far image as it was measured, where an output shows it; else empty.
+    image: Array2<f32>,
     report: Report,
     window: Window,
     findings: Vec<String>,
 }
 
 impl Inputs {
-    fn read(settings: &DepthSettings, shared: &Shared) -> Result<Self> {
+    fn read(settings: &DepthSettings, shared: &Shared, context: &Context<'_>) -> Result<Self> {
         let (optics, doubts) = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
+        let (optics, doubts) = match &settings.psf {
+            // What there is to doubt then is that there was none.
+            Some(source) => {
+                let doubts = doubts.into_iter().filter(|doubt| !doubt.contains("[psf]")).collect();
+                (optics.with_psf(source.read(context)?), doubts)
+            }
+            None => (optics, doubts),
+        };
         let pair = Pair::read(&settings.far, &settings.near)?;
         let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, shared)?;
         let correction = settings.correction.as_deref().map(|file| shared.correction(file)).transpose()?;
@@ -208,13 +224,13 @@ impl Inputs {
         Ok(Self { optics, pair, method, correction, camera, doubts })
     }
 
-    fn compute(&self, settings: &DepthSettings, context: &Context<'_>) -> Result<Computed> {
+    /// Takes the images, which nothing needs afterwards.
+    fn compute(&mut self, settings: &DepthSettings, context: &Context<'_>) -> Result<Computed> {
         let cancel = |during| context.cancel.check(during);
         cancel("reading the pair")?;
         let real = self.settings(settings);
-        let found = depth_of_real_pair(
-            self.pair.far.view(),
-            self.pair.near.view(),
+        let found = depth_of_owned_pair(
+            [&mut self.pair.far, &mut self.pair.near].map(std::mem::take),
             &self.optics,
             self.method.as_real(),
             self.camera.as_deref(),
@@ -222,7 +238,7 @@ impl Inputs {
         )
         .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
         cancel("computing depth")?;
-        let (mut map, mut judgement) = (found.map, found.judgement);
+        let (mut map, judgement) = (found.map, found.judgement);
         let deviation = settings
             .uncertainty
             .map(|noise| {
@@ -239,12 +255,15 @@ impl Inputs {
             })
             .transpose()?;
         cancel("computing its deviation")?;
+        let image = if settings.write.show_image() { found.prepared.far } else { Array2::default((0, 0)) };
+        let Judgement { mut reasons, lost, .. } = judgement;
         if let Some(correction) = &self.correction {
-            correct(&mut map, &mut judgement, correction)?;
+            correct(&mut map, &mut reasons, correction)?;
         }
         let said = found.findings.iter().map(ToString::to_string);
         let findings = self.doubts.iter().cloned().chain(said).collect();
-        Ok(Computed { map, deviation, judgement, report: found.report, window: real.window, findings })
+        let report = found.report;
+        Ok(Computed { map, deviation, reasons, lost, image, report, window: real.window, findings })
     }
 
     /// As the library takes them.
@@ -283,9 +302,9 @@ fn valid_fraction(map: &Array2<f32>) -> f64 {
 }
 
 /// Corrects a map; what lies beyond the correction loses depth and confidence alike.
-fn correct(depth: &mut DepthMap, judgement: &mut Judgement, correction: &Correction) -> Result<()> {
+fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correction) -> Result<()> {
     correction.apply_in_place(depth.depth_mm.view_mut())?;
-    let pixels = depth.confidence.iter_mut().zip(&depth.depth_mm).zip(&mut judgement.reasons);
+    let pixels = depth.confidence.iter_mut().zip(&depth.depth_mm).zip(reasons);
     for ((confidence, depth_mm), reason) in pixels {
         if depth_mm.is_nan() {
             *confidence = 0.0;
@@ -335,6 +354,7 @@ mod tests {
             far: folder.join("near.png"),
             near: folder.join("far.png"),
             optics: None,
+            psf: None,
             operators: None,
             method: Method::default(),
             computation: Settings::default(),

@@ -82,6 +82,7 @@ pub mod operators;
 pub mod optics;
 mod parameters;
 pub mod picture;
+pub mod psf;
 pub mod report;
 pub mod rig;
 pub mod sessions;

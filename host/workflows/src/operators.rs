@@ -9,7 +9,6 @@ use std::{
 use farnear_depth::{
     operators::{self, Design, Family, Operators, Request},
     optics::Optics,
-    psf::Psf,
 };
 use farnear_files::staging;
 use serde::Serialize;
@@ -21,6 +20,7 @@ use crate::{
     operator_cache as cache,
     operator_plot::{self, Format},
     optics,
+    psf::PsfSource,
 };
 
 /// What a file of operators holds, as [`WorkflowError::File`] names it.
@@ -32,7 +32,7 @@ pub struct OperatorSettings {
     /// The optics file.
     pub optics: PathBuf,
     /// Point spread function; without it that of the optics.
-    pub psf: Option<Psf>,
+    pub psf: Option<PsfSource>,
     /// Family; without it the one that belongs to the point spread function.
     pub family: Option<Family>,
     /// Design procedure.
@@ -66,7 +66,7 @@ pub fn design(settings: &OperatorSettings, context: &Context<'_>) -> Result<Oper
         None => None,
     };
     let optics = optics::read(&settings.optics)?;
-    let psf = settings.psf.unwrap_or(optics.psf());
+    let psf = settings.psf.as_ref().map_or(Ok(optics.psf()), |source| source.read(context))?;
     let request = Request {
         family: settings.family.unwrap_or(Family::of(psf)),
         design: settings.design,

@@ -11,7 +11,6 @@ use crate::pipeline::{
     Backend, DepthMap, MAX_ALPHA, RunError, Settings, SwapEvidence, Warning, check, check_windows,
     warnings_after,
 };
-use crate::psf::Psf;
 
 /// A checked pair, each image divided by its mean; pixels without a value hold the mean.
 pub(super) struct Pair {
@@ -130,15 +129,6 @@ fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
         let middle = window.len() / 2;
         *window.select_nth_unstable_by(middle, f32::total_cmp).1
     })
-}
-
-/// Second moment of the PSF over the square of the blur radius: `sigma^2 = moment R^2`.
-pub(super) fn moment(psf: Psf) -> f64 {
-    match psf {
-        Psf::PillBox => 0.5,
-        Psf::Gaussian { k } => 2.0 * k * k,
-        Psf::Generalised { p, k } => k * k * p.powf(2.0 / p) * libm::tgamma(4.0 / p) / libm::tgamma(2.0 / p),
-    }
 }
 
 /// Which way a filter runs.

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use ndarray::{Array2, Zip};
 
-use super::common::{Along, Evidence, Pair, filter, moment, window_sum};
+use super::common::{Along, Evidence, Pair, filter, window_sum};
 use crate::optics::Optics;
 use crate::pipeline::Settings;
 
@@ -52,7 +52,7 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
         texture += &far;
         texture += &near;
     }
-    let scale = (1.0 / (moment(optics.psf()) * optics.max_blur_px().powi(2))) as f32;
+    let scale = (1.0 / (optics.psf().second_moment() * optics.max_blur_px().powi(2))) as f32;
     let mut alpha = Array2::from_elem(dim, f32::NAN);
     let mut misfit = Array2::zeros(dim);
     Zip::from(&mut alpha).and(&mut misfit).and(&xx).and(&xy).and(&yy).for_each(

@@ -10,7 +10,7 @@
 
 use ndarray::{Array2, Zip};
 
-use super::common::{Along, Evidence, Pair, filter, filter_both, moment, window_sum};
+use super::common::{Along, Evidence, Pair, filter, filter_both, window_sum};
 use crate::optics::Optics;
 use crate::pipeline::Settings;
 
@@ -32,7 +32,7 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
     let cross = sum(&difference * &laplacian);
     let energy = sum(&difference * &difference);
     // alpha = (sigma1^2 - sigma2^2) / (moment Rmax^2).
-    let scale = (4.0 / (moment(optics.psf()) * optics.max_blur_px().powi(2))) as f32;
+    let scale = (4.0 / (optics.psf().second_moment() * optics.max_blur_px().powi(2))) as f32;
     let mut alpha = Array2::from_elem(texture.dim(), f32::NAN);
     let mut misfit = Array2::zeros(texture.dim());
     Zip::from(&mut alpha).and(&mut misfit).and(&texture).and(&cross).and(&energy).for_each(

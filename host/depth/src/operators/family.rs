@@ -14,7 +14,7 @@ pub enum Family {
     Watanabe,
     /// Raj & Staunton 2012, pill-box, by their procedure ([`raj`](super::raj)) whatever the [`Design`].
     Raj,
-    /// Pill-box rational operators by the procedures of Li 2014.
+    /// Rational operators by the procedures of Li 2014 for the pill-box, a ring and any measured PSF.
     Ro,
     /// Gaussian rational operators (Li 2014, section 5.2.1).
     Gro,
@@ -29,7 +29,7 @@ impl Family {
     /// The family that a PSF gets if none is asked for.
     pub fn of(psf: Psf) -> Self {
         match psf {
-            Psf::PillBox => Self::Ro,
+            Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => Self::Ro,
             Psf::Gaussian { .. } => Self::Gro,
             Psf::Generalised { .. } => Self::Ggro,
         }

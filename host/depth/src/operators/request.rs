@@ -82,7 +82,11 @@ impl Request {
     fn check_family(&self) -> Result<(), DesignError> {
         let Self { family, psf, .. } = *self;
         let (expected, fits) = match family {
-            Family::Watanabe | Family::Raj | Family::Ro => ("pillbox", matches!(psf, Psf::PillBox)),
+            Family::Watanabe | Family::Raj => ("pillbox", matches!(psf, Psf::PillBox)),
+            Family::Ro => (
+                "pillbox, ring or a measured",
+                matches!(psf, Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_)),
+            ),
             Family::Gro => ("gaussian", matches!(psf, Psf::Gaussian { .. })),
             Family::Ggro => ("generalised", matches!(psf, Psf::Generalised { .. })),
         };

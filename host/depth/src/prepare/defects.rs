@@ -54,7 +54,8 @@ pub(super) fn find(
 /// Replaces defects that stand alone, and makes holes of the others.
 pub(super) fn mend(image: &mut Array2<f32>, marks: &Array2<u8>) {
     let (height, width) = image.dim();
-    let original = image.clone();
+    // Gathered first: no pixel is mended from a mended one.
+    let mut mended = Vec::new();
     for ((y, x), _) in marks.indexed_iter().filter(|(_, mark)| **mark != 0) {
         let around = |reach: isize| {
             (-reach..=reach).flat_map(move |dy| (-reach..=reach).map(move |dx| (dy, dx))).filter_map(
@@ -69,10 +70,13 @@ pub(super) fn mend(image: &mut Array2<f32>, marks: &Array2<u8>) {
         for (at, square) in around(NEIGHBOURHOOD_PX).filter(|(at, _)| marks[*at] == 0) {
             // The nearest count most: 1, 1/4, 1/16, 1/25 and 1/64.
             let weight = 1.0 / (square * square) as f32;
-            sum += weight * original[at];
+            sum += weight * image[at];
             weights += weight;
         }
-        image[(y, x)] = if defects <= ALONE && weights > 0.5 { sum / weights } else { f32::NAN };
+        mended.push(((y, x), if defects <= ALONE && weights > 0.5 { sum / weights } else { f32::NAN }));
+    }
+    for (at, value) in mended {
+        image[at] = value;
     }
 }
 

@@ -66,8 +66,8 @@ pub fn measure(page: &mut Page) -> Result<()> {
 
 fn k_of(psf: Psf) -> f64 {
     match psf {
-        Psf::PillBox => 1.0,
         Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
+        _ => 1.0,
     }
 }
 

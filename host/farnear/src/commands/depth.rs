@@ -9,7 +9,10 @@ use farnear_depth::{
     prepare::{Align, Balance},
     windowed::Window,
 };
-use farnear_workflows::depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs};
+use farnear_workflows::{
+    depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs},
+    psf::PsfSource,
+};
 
 use crate::{report, terminal};
 
@@ -27,6 +30,11 @@ pub struct Arguments {
     /// The optics file; without it what capture.toml or optics.toml beside the far image says.
     #[arg(long, value_name = "FILE")]
     optics: Option<PathBuf>,
+    /// Point spread function in place of the optics file's: pillbox, gaussian:k=K, generalised:p=P,k=K, ring:inner=I, or a
+    /// file with an image of it or of the (coded) aperture: FILE.png, .tiff or .npy, FILE,radius=PX where the blur radius is
+    /// not half its shorter side.
+    #[arg(long, value_name = "PSF|FILE")]
+    psf: Option<PsfSource>,
     /// Operators: a name such as gro:linear (family:design), or a file saved by `farnear operators`; without it they
     /// are designed for the optics.
     #[arg(long, value_name = "NAME|FILE")]
@@ -109,6 +117,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         far: arguments.far,
         near: arguments.near,
         optics: arguments.optics,
+        psf: arguments.psf,
         operators: arguments.operators,
         method: arguments.method,
         computation,

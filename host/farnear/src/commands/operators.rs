@@ -7,9 +7,11 @@ use clap::Args;
 use farnear_depth::{
     kernel::sizes_in_words,
     operators::{Design, Family},
-    psf::Psf,
 };
-use farnear_workflows::operators::{self, OperatorSettings};
+use farnear_workflows::{
+    operators::{self, OperatorSettings},
+    psf::PsfSource,
+};
 
 use crate::{report, terminal};
 
@@ -19,9 +21,11 @@ use crate::{report, terminal};
     after_help = "Example: farnear operators --psf gaussian:k=0.4578 --optics optics.toml --out operators.toml --json"
 )]
 pub struct Arguments {
-    /// Point spread function: pillbox, gaussian:k=K or generalised:p=P,k=K; without it the one of the optics file.
-    #[arg(long)]
-    psf: Option<Psf>,
+    /// Point spread function: pillbox, gaussian:k=K, generalised:p=P,k=K, ring:inner=I, or a file with an image of it or of
+    /// the aperture (FILE.png, .tiff or .npy; FILE,radius=PX where the blur radius is not half its shorter side); without
+    /// it the one of the optics file.
+    #[arg(long, value_name = "PSF|FILE")]
+    psf: Option<PsfSource>,
     /// Family; without it the one that belongs to the point spread function.
     #[arg(long)]
     family: Option<Family>,

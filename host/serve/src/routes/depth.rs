@@ -153,6 +153,7 @@ async fn compute(
         far: folder.join("far.png"),
         near: folder.join("near.png"),
         optics: None,
+        psf: None,
         operators: wish.operators.map(Into::into),
         method,
         computation: Settings {

@@ -115,6 +115,11 @@ impl Fields {
         }))
     }
 
+    /// What paths are relative to.
+    pub fn base(&self) -> &Path {
+        &self.base
+    }
+
     /// A value that may be there.
     pub fn optional<T: FromStr<Err: Display>>(
         &mut self,

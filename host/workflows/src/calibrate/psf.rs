@@ -72,9 +72,10 @@ pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> 
         context.say(&format!("wrote {}", out.display()));
     }
     let (p, k) = match psf {
-        Psf::PillBox => (None, 1.0),
         Psf::Gaussian { k } => (None, k),
         Psf::Generalised { p, k } => (Some(p), k),
+        // No model of a calibration.
+        Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => (None, 1.0),
     };
     let target_mm = found.alphas.first().map_or(f64::NAN, |alpha| optics.depth_mm(*alpha));
     Ok(PsfFigures {
@@ -100,7 +101,7 @@ fn alpha_at(depth_mm: f64, optics: &Optics) -> Result<f64> {
 fn rounded_psf(psf: Psf) -> Psf {
     let [of_p, of_k] = DECIMALS;
     match psf {
-        Psf::PillBox => Psf::PillBox,
+        Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => psf,
         Psf::Gaussian { k } => Psf::Gaussian { k: rounded(k, of_k) },
         Psf::Generalised { p, k } => Psf::Generalised { p: rounded(p, of_p), k: rounded(k, of_k) },
     }

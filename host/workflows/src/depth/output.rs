@@ -1,20 +1,31 @@
 //! The folder of results, and the table of what can be in it.
 
-use std::{collections::BTreeSet, fmt, path::Path, str::FromStr};
+use std::{
+    collections::BTreeSet,
+    fmt,
+    fs::File,
+    io::{self, BufWriter, Write},
+    path::Path,
+    str::FromStr,
+};
 
 use farnear_files::{
     exr,
-    image_file::encode_png,
+    image_file::png_to,
     map::{self, Scale},
     mesh::{self, Projection},
     npy,
     staging::Staging,
     view,
 };
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
+use rayon::prelude::*;
 
 use super::{Computed, DepthSettings, Inputs, record::record};
 use crate::{MADE_BY, context::Context, error::Result};
+
+/// A file being written.
+type Sink = BufWriter<File>;
 
 /// A file of results.
 struct Output {
@@ -22,25 +33,30 @@ struct Output {
     names: &'static [&'static str],
     /// The file.
     file: &'static str,
-    /// Its bytes; `None` where there is nothing for it.
-    bytes: fn(&Results<'_>) -> Result<Option<Vec<u8>>>,
+    /// Writes it, piece by piece: with several megapixels a file can be larger than all maps together.
+    write: fn(&Results<'_>, &mut Sink) -> io::Result<()>,
 }
 
 /// All that can be written: a new writer is a line here. Beside it there is always `depth.toml`, which says what made the
 /// map.
 #[rustfmt::skip]
 const OUTPUTS: &[Output] = &[
-    Output { names: &["npy"], file: "depth.npy", bytes: |results| Ok(Some(npy::write(results.depth()))) },
-    Output { names: &["tiff"], file: "depth.tiff", bytes: |results| Ok(Some(map::tiff(results.depth())?)) },
-    Output { names: &["png"], file: "depth.png", bytes: |results| results.png() },
+    Output { names: &["npy"], file: "depth.npy", write: |results, to| npy::write_to(results.depth(), to) },
+    Output { names: &["tiff"], file: "depth.tiff", write: |results, to| map::tiff_to(results.depth(), to) },
+    Output { names: &["png"], file: "depth.png", write: |results, to| results.png(to) },
     // A map does not travel without its confidence; depth.exr and view.png hold it themselves.
-    Output { names: &["npy", "tiff", "png"], file: "confidence.npy", bytes: |results| Ok(Some(npy::write(results.confidence()))) },
-    Output { names: &["npy", "tiff", "png"], file: "reason.png", bytes: |results| results.reasons() },
-    Output { names: &["npy", "tiff", "png"], file: "uncertainty.npy", bytes: |results| Ok(results.deviation().map(npy::write)) },
-    Output { names: &["mesh"], file: "mesh.ply", bytes: |results| Ok(Some(results.mesh())) },
-    Output { names: &["view"], file: "view.png", bytes: |results| Ok(Some(view::view_png(results.depth(), results.confidence())?)) },
-    Output { names: &["exr"], file: "depth.exr", bytes: |results| results.exr() },
+    Output { names: &["npy", "tiff", "png"], file: "confidence.npy", write: |results, to| npy::write_to(results.confidence(), to) },
+    Output { names: &["npy", "tiff", "png"], file: "reason.png", write: |results, to| results.reasons(to) },
+    Output { names: &["npy", "tiff", "png"], file: UNCERTAINTY, write: |results, to| results.uncertainty(to) },
+    Output { names: &[MESH], file: "mesh.ply", write: |results, to| results.mesh(to) },
+    Output { names: &["view"], file: "view.png", write: |results, to| results.view(to) },
+    Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
+
+/// The one that needs the image beside the maps.
+const MESH: &str = "mesh";
+/// The one that is there only where it was asked for otherwise.
+const UNCERTAINTY: &str = "uncertainty.npy";
 
 /// What is written where nothing else is asked for.
 const USUAL: [&str; 5] = ["npy", "tiff", "png", "mesh", "view"];
@@ -67,6 +83,11 @@ impl Outputs {
             }
         }
         names
+    }
+
+    /// Whether any of them shows the image.
+    pub(super) fn show_image(&self) -> bool {
+        self.0.contains(MESH)
     }
 
     fn outputs(&self) -> impl Iterator<Item = &'static Output> {
@@ -105,8 +126,8 @@ pub(super) struct Results<'a> {
     settings: &'a DepthSettings,
     inputs: &'a Inputs,
     computed: &'a Computed,
-    /// What depth.png holds, where that is written.
-    codes: Option<(Array2<u16>, Scale)>,
+    /// How depth.png's codes stand for mm, where that is written.
+    scale: Option<Scale>,
     /// What made the map, as TOML.
     record: String,
 }
@@ -118,10 +139,9 @@ impl<'a> Results<'a> {
         computed: &'a Computed,
         warnings: &[String],
     ) -> Result<Self> {
-        let codes = settings.write.0.contains("png").then(|| map::codes(computed.map.depth_mm.view()));
-        let scale = codes.as_ref().map(|(_, scale)| *scale);
+        let scale = settings.write.0.contains("png").then(|| map::scale(computed.map.depth_mm.view()));
         let record = record(settings, inputs, computed, warnings, scale)?;
-        Ok(Self { settings, inputs, computed, codes, record })
+        Ok(Self { settings, inputs, computed, scale, record })
     }
 
     /// Writes everything to the folder `out`, or nothing.
@@ -130,12 +150,13 @@ impl<'a> Results<'a> {
     /// Which file cannot be written; [`crate::WorkflowError::Cancelled`].
     pub(super) fn write(&self, out: &Path, context: &Context<'_>) -> Result<()> {
         let staged = Staging::into_folder(out)?;
-        for output in self.settings.write.outputs() {
-            context.cancel.check("writing the results")?;
-            if let Some(bytes) = (output.bytes)(self)? {
-                staged.write(output.file, &bytes)?;
-            }
-        }
+        let there = |output: &&Output| output.file != UNCERTAINTY || self.deviation().is_some();
+        let outputs: Vec<&Output> = self.settings.write.outputs().filter(there).collect();
+        let cancel = &context.cancel;
+        outputs.into_par_iter().try_for_each(|output| -> Result<()> {
+            cancel.check("writing the results")?;
+            Ok(staged.fill(output.file, |to| (output.write)(self, to))?)
+        })?;
         staged.write("depth.toml", self.record.as_bytes())?;
         context.cancel.check("writing the results")?;
         Ok(staged.finish()?)
@@ -153,34 +174,41 @@ impl<'a> Results<'a> {
         self.computed.deviation.as_ref().map(|(deviation, _)| deviation.view())
     }
 
-    fn png(&self) -> Result<Option<Vec<u8>>> {
-        let encoded = self.codes.as_ref().map(|(codes, _)| encode_png(codes.view(), 16));
-        Ok(encoded.transpose()?)
+    fn uncertainty(&self, to: &mut Sink) -> io::Result<()> {
+        self.deviation().map_or(Ok(()), |deviation| npy::write_to(deviation, to))
     }
 
-    fn reasons(&self) -> Result<Option<Vec<u8>>> {
-        let codes = self.computed.judgement.reasons.mapv(u16::from);
-        Ok(Some(encode_png(codes.view(), 8)?))
+    fn png(&self, to: &mut Sink) -> io::Result<()> {
+        let Some(scale) = self.scale else { return Ok(()) };
+        png_to(map::codes(self.depth(), scale).view(), 16, to).map_err(io::Error::other)
     }
 
-    fn mesh(&self) -> Vec<u8> {
+    fn reasons(&self, to: &mut Sink) -> io::Result<()> {
+        png_to(self.computed.reasons.mapv(u16::from).view(), 8, to).map_err(io::Error::other)
+    }
+
+    fn view(&self, to: &mut Sink) -> io::Result<()> {
+        to.write_all(&view::view_png(self.depth(), self.confidence()).map_err(io::Error::other)?)
+    }
+
+    fn mesh(&self, to: &mut Sink) -> io::Result<()> {
         let optics = &self.inputs.optics;
         let projection =
             Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um() };
-        mesh::ply(self.depth(), self.inputs.pair.far.view(), projection)
+        mesh::write(self.depth(), self.computed.image.view(), projection, to)
     }
 
     /// Depth as compositors expect it, `Z`, here in mm; what made it stands in the header.
-    fn exr(&self) -> Result<Option<Vec<u8>>> {
+    fn exr(&self, to: &mut Sink) -> io::Result<()> {
         let mut channels = vec![("Z", self.depth()), ("confidence", self.confidence())];
         channels.extend(self.deviation().map(|deviation| ("deviation", deviation)));
         let attributes = [
             ("farnear:made_by", MADE_BY),
             ("farnear:units", "mm"),
-            ("farnear:optics", &toml::to_string(&self.inputs.optics)?),
+            ("farnear:optics", &toml::to_string(&self.inputs.optics).map_err(io::Error::other)?),
             ("farnear:record", &self.record),
         ];
-        Ok(Some(exr::write(&channels, &attributes)?))
+        exr::write_to(&channels, &attributes, to)
     }
 }
 

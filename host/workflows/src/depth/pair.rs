@@ -25,7 +25,9 @@ impl Pair {
     /// # Errors
     /// [`WorkflowError::Image`]; [`WorkflowError::Pair`] for integers beside float and for one image given twice.
     pub fn read(far: &Path, near: &Path) -> Result<Self> {
-        let (far_image, near_image) = (read_grey(far)?, read_grey(near)?);
+        // Side by side: unpacking is what reading takes.
+        let (far_image, near_image) = rayon::join(|| read_grey(far), || read_grey(near));
+        let (far_image, near_image) = (far_image?, near_image?);
         let unfit = |reason| WorkflowError::Pair { far: far.into(), near: near.into(), reason };
         let samples = match (far_image.samples, near_image.samples) {
             (Samples::Integer(a), Samples::Integer(b)) => Samples::Integer(a.min(b)),

@@ -73,7 +73,7 @@ pub fn record(
         camera: settings.camera.as_deref().map(name_of),
         min_confidence: settings.min_confidence,
         prepared: computed.report,
-        no_depth: &computed.judgement.lost,
+        no_depth: &computed.lost,
         // The number of threads changes nothing in the result.
         settings: Settings { threads: Settings::default().threads, ..settings.computation },
         uncertainty: computed.deviation.as_ref().map(|(_, found)| found),

@@ -7,6 +7,7 @@ use crate::{
     depth::{self, DepthSettings, method::Method},
     error::{Result, WorkflowError},
     optics,
+    psf::PsfSource,
 };
 
 pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
@@ -22,6 +23,7 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
         far: fields.path("far")?,
         near: fields.path("near")?,
         optics: fields.optional_path("optics")?,
+        psf: fields.optional::<PsfSource>("psf")?.map(|psf| psf.relative_to(fields.base())),
         operators: fields.name_or_file("operators")?,
         method: fields.or("method", Method::default())?,
         computation,
@@ -45,6 +47,7 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
     let mut inputs = vec![settings.far.clone(), settings.near.clone()];
     inputs.extend(optics::file_of_pair(settings.optics.as_deref(), &settings.far));
     inputs.extend(settings.operators.clone().filter(|operators| operators.is_file()));
+    inputs.extend(settings.psf.as_ref().and_then(PsfSource::file).map(Into::into));
     inputs.extend(settings.correction.clone());
     inputs.extend(settings.camera.clone());
     Ok(Box::new(Call {
@@ -87,9 +90,9 @@ mod tests {
         assert_eq!(job(pair).expect("a job"), ["far.png", "near.png", CAPTURE_FILE]);
         fs::write(folder.path().join("mine.toml"), "").expect("a writable folder");
         let more = format!(
-            "{pair}operators = 'mine.toml'\ncorrection = 'c.toml'\ncamera = 'cam'\noptics = 'o.toml'\n"
+            "{pair}operators = 'mine.toml'\npsf = 'ring.png,radius=9'\ncorrection = 'c.toml'\ncamera = 'cam'\noptics = 'o.toml'\n"
         );
-        let all = ["far.png", "near.png", "o.toml", "mine.toml", "c.toml", "cam"];
+        let all = ["far.png", "near.png", "o.toml", "mine.toml", "ring.png", "c.toml", "cam"];
         assert_eq!(job(&more).expect("a job"), all);
         assert_eq!(job(&format!("{pair}operators = 'gro:linear'\n")).expect("a job").len(), 3);
         for (wrong, phrase) in [

@@ -1,0 +1,20 @@
+//! Li's thesis (University of Warwick, 2014) redone, chapter by chapter: the page `docs/thesis.md`.
+
+mod depth;
+
+use anyhow::Result;
+
+use crate::{page::Page, people::data::Data};
+
+/// A part's name and what measures it.
+type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
+
+/// In the order of the page.
+pub const PARTS: [Part; 1] = [("chapters-4-to-6", |page, _| depth::measure(page))];
+
+/// What a reader must know before the first figure.
+pub const INTRODUCTION: &str = "# The thesis, redone
+
+Written by `cargo xtask evaluate --page thesis`. Ang Li's PhD thesis (University of Warwick, 2014) is where this project comes from; its images were never
+published, so nobody could check its figures. Here each experiment is done again with pictures that anybody can make, each figure beside the thesis' own, which stands
+in brackets or under *Li 2014*. Seeds are fixed, so that two runs on one kind of processor write the same bytes, except for the table of times.";

@@ -1,0 +1,115 @@
+//! Point spread functions as a user gives them: by name, or as the file of an image of them.
+
+use std::path::{Path, PathBuf};
+
+use farnear_depth::psf::{Psf, RadialPsf};
+use farnear_files::map;
+
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// Part of an image's energy that is not round from which it is said.
+const NOT_ROUND: f64 = 0.1;
+
+/// What is asked for.
+#[derive(Clone, PartialEq, Debug)]
+pub enum PsfSource {
+    /// A model with its parameters.
+    Named(Psf),
+    /// A file with an image of the point spread function or of the aperture.
+    Image {
+        /// PNG, TIFF, JPEG, PGM or .npy.
+        file: PathBuf,
+        /// What the blur radius (the aperture's edge) has in it; without it half the shorter side.
+        radius_px: Option<f64>,
+    },
+}
+
+/// A text that is neither.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[error(
+    "{0}; or a file with an image of it: FILE.png or FILE.npy, and ,radius=PX where the blur radius is not half its shorter side"
+)]
+pub struct NoPsf(String);
+
+impl std::str::FromStr for PsfSource {
+    type Err = NoPsf;
+
+    fn from_str(text: &str) -> std::result::Result<Self, NoPsf> {
+        let (file, radius) = text.rsplit_once(",radius=").map_or((text, None), |(file, px)| (file, Some(px)));
+        let ending = Path::new(file).extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let is_image = ending.is_some_and(|ending| {
+            ["png", "npy", "tif", "tiff", "jpg", "jpeg", "pgm"].contains(&ending.as_str())
+        });
+        if !is_image {
+            return text.parse().map(Self::Named).map_err(|error| NoPsf(format!("{error}")));
+        }
+        let radius_px = radius.map(|px| {
+            let usable = px.parse().ok().filter(|px: &f64| px.is_finite() && *px >= 1.0);
+            usable.ok_or_else(|| NoPsf(format!("radius = {px}, expected a number of pixels from 1")))
+        });
+        Ok(Self::Image { file: file.into(), radius_px: radius_px.transpose()? })
+    }
+}
+
+impl PsfSource {
+    /// The file that is read, if one is.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Named(_) => None,
+            Self::Image { file, .. } => Some(file),
+        }
+    }
+
+    /// The same with its file beside `base`, unless its path is absolute.
+    #[must_use]
+    pub fn relative_to(self, base: &Path) -> Self {
+        match self {
+            Self::Image { file, radius_px } => Self::Image { file: base.join(file), radius_px },
+            named => named,
+        }
+    }
+
+    /// The point spread function. What is not round in an image is averaged over the circle, with a warning where that is
+    /// much.
+    ///
+    /// # Errors
+    /// Images; [`WorkflowError::Parameter`] for one that is no point spread function.
+    pub fn read(&self, context: &Context<'_>) -> Result<Psf> {
+        let (file, radius_px) = match self {
+            Self::Named(psf) => return Ok(*psf),
+            Self::Image { file, radius_px } => (file, *radius_px),
+        };
+        let drawn = RadialPsf::from_image(map::read(file)?.view(), radius_px)
+            .map_err(|error| WorkflowError::parameter("psf", file.display(), error.to_string()))?;
+        if drawn.not_round > NOT_ROUND {
+            context.progress.warn(&format!(
+                "{:.0} % of {} are not round: operators take its mean over each circle, and depth is biased by what the pattern's \
+                 direction does to the scene's",
+                100.0 * drawn.not_round,
+                file.display()
+            ));
+        }
+        Ok(Psf::Radial(drawn.psf))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_files_are_told_apart() {
+        assert_eq!("pillbox".parse(), Ok(PsfSource::Named(Psf::PillBox)));
+        assert_eq!("ring:inner=0.5".parse(), Ok(PsfSource::Named(Psf::Ring { inner: 0.5 })));
+        let image = |file: &str, radius_px| Ok(PsfSource::Image { file: file.into(), radius_px });
+        assert_eq!("a/ring.PNG".parse(), image("a/ring.PNG", None));
+        assert_eq!("psf.npy,radius=20.5".parse(), image("psf.npy", Some(20.5)));
+        for wrong in ["airy", "psf.npy,radius=x", "psf.npy,radius=0.2"] {
+            let error = wrong.parse::<PsfSource>().unwrap_err().to_string();
+            assert!(error.contains("FILE.npy"), "{error}");
+        }
+    }
+}
