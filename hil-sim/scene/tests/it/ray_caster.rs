@@ -27,6 +27,7 @@ pub fn radial_quantiles(psf: &Psf) -> Vec<f64> {
     let dr = limit / f64::from(steps);
     let density = |r: f64| match *psf {
         Psf::PillBox => f64::from(r <= 1.0),
+        Psf::Ring { inner } => f64::from((inner..=1.0).contains(&r)),
         Psf::Gaussian { k } => (-0.5 * (r / k).powi(2)).exp(),
         Psf::Generalised { p, k } => (-(r / k).powf(p) / p).exp(),
     };
