@@ -10,12 +10,15 @@ from ._farnear import (
     Operators,
     Optics,
     Processor,
+    Recogniser,
     RigError,
+    calibrate_psf,
     centroid_distance,
     depth,
     remove_shadow,
     render,
     sun_position,
+    synthetic_masks,
 )
 
 __all__ = [
@@ -25,10 +28,13 @@ __all__ = [
     "Operators",
     "Optics",
     "Processor",
+    "Recogniser",
     "RigError",
+    "calibrate_psf",
     "centroid_distance",
     "depth",
     "remove_shadow",
     "render",
     "sun_position",
+    "synthetic_masks",
 ]

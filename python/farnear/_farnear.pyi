@@ -199,6 +199,18 @@ class Correction:
     def range_mm(self) -> tuple[float, float]:
         """True distances of the farthest and the nearest target, mm."""
 
+def calibrate_psf(
+    pairs: Sequence[tuple[Image, Image, Optional[float]]],
+    optics: Optics,
+    *,
+    model: Literal["gaussian", "generalised"] = "gaussian",
+) -> dict[str, object]:
+    """The point spread function of a lens from pairs of flat, textured targets, all pairs together.
+
+    A pair is its far- and near-focused image and the target's distance in mm, or None where it stands at the focus of the sharper one. Gives
+    `psf` as `Optics` takes it, `residual`, the share of the images' energy that the model leaves over (0 to 1), and where each target stands (`alphas`).
+    """
+
 def render(
     optics: Optics,
     scene: str = "staircase",
@@ -258,6 +270,28 @@ class Rbf:
     @property
     def condition(self) -> float:
         """Condition number of the system that was solved."""
+
+def synthetic_masks(
+    activity: str, *, subject: int = 0, azimuth_deg: float = 90.0, rate_hz: float = 15.0
+) -> NDArray[np.bool_]:
+    """Silhouettes (frames, height, width), 10 mm a pixel, of a person made by a program: walk, drop, crouch, peer, mobile, place, bag, shoot, gun
+    or dig, seen from `azimuth_deg` (0 = from the front). A number of `subject` is always the same person."""
+
+class Recogniser:
+    """What a person does: a recogniser that comes with the package ("everyday", "everyday-order-free"), or a file of one's own."""
+
+    def __init__(self, model: Path = "everyday") -> None: ...
+    @property
+    def activities(self) -> list[str]:
+        """What it can answer."""
+    def recognise(
+        self, *views: Union[Sequence[Mask], NDArray[np.bool_]], among: Optional[Sequence[str]] = None
+    ) -> dict[str, object]:
+        """The activity in the masks (frames, height, width) of a clip, from one view or several; masks of 100x100 are taken for cut out.
+
+        Gives `activity` (None = unknown), `confidence` (its probability), `strangeness` (above 1 = unknown) and `probabilities` by name; with
+        `among` only these activities can be.
+        """
 
 class RigClient:
     """A connected board; use `farnear.rig.Rig`."""

@@ -2,6 +2,7 @@
 //! `docs/python.md`; arrays go in without a copy where they are `float32` and come out without one.
 
 mod arrays;
+mod calibrate;
 mod corrections;
 mod depth;
 mod embedding;
@@ -10,12 +11,16 @@ mod errors;
 mod measure;
 mod optics;
 mod people;
+mod recogniser;
 mod render;
 mod rig;
+mod synthetic;
 
 /// The module behind the package `farnear`.
 #[pyo3::pymodule]
 mod _farnear {
+    #[pymodule_export]
+    use super::calibrate::calibrate_psf;
     #[pymodule_export]
     use super::corrections::Correction;
     #[pymodule_export]
@@ -32,7 +37,11 @@ mod _farnear {
     #[pymodule_export]
     use super::people::{centroid_distance, remove_shadow, sun_position};
     #[pymodule_export]
+    use super::recogniser::Recogniser;
+    #[pymodule_export]
     use super::render::render;
     #[pymodule_export]
     use super::rig::RigClient;
+    #[pymodule_export]
+    use super::synthetic::synthetic_masks;
 }

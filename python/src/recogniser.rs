@@ -1,0 +1,84 @@
+//! Recognising what a person does.
+
+use std::path::{Path, PathBuf};
+
+use farnear_activity::{mask::centre::SIDE_PX, recognition::clip::Track};
+use farnear_workflows::activity::recognition::Model;
+use pyo3::{
+    prelude::*,
+    types::{PyDict, PyTuple},
+};
+
+use crate::{
+    arrays::Mask,
+    errors::{FarnearError, wrong},
+};
+
+/// A recogniser of activities: one that comes with the package, or a file of one's own.
+#[pyclass(frozen, module = "farnear")]
+pub struct Recogniser {
+    model: Model,
+    path: PathBuf,
+}
+
+#[pymethods]
+impl Recogniser {
+    #[new]
+    #[pyo3(signature = (model=PathBuf::from("everyday")))]
+    fn new(py: Python<'_>, model: PathBuf) -> PyResult<Self> {
+        let read = py.detach(|| Model::read(&model)).map_err(wrong)?;
+        Ok(Self { model: read, path: model })
+    }
+
+    #[getter]
+    fn activities(&self) -> Vec<String> {
+        self.model.activities().to_vec()
+    }
+
+    /// For pickle.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&Path,))> {
+        Ok((py.get_type::<Self>().into_any(), (&self.path,)))
+    }
+
+    #[pyo3(signature = (*views, among=None))]
+    fn recognise<'py>(
+        &self,
+        py: Python<'py>,
+        views: &Bound<'py, PyTuple>,
+        among: Option<Vec<String>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let read = |view: Bound<'py, PyAny>| -> PyResult<Vec<_>> {
+            view.try_iter()?.map(|mask| Ok(mask?.extract::<Mask>()?.0)).collect()
+        };
+        let views = views.iter().map(read).collect::<PyResult<Vec<_>>>()?;
+        if let Some(unknown) = among.iter().flatten().find(|name| !self.model.activities().contains(name)) {
+            let known = self.model.activities().join(", ");
+            return Err(FarnearError::new_err(format!(
+                "there is no activity {unknown:?}; the model knows {known}"
+            )));
+        }
+        let full =
+            views.first().and_then(|view| view.first()).is_none_or(|mask| mask.dim() != (SIDE_PX, SIDE_PX));
+        let recogniser = self.model.recogniser(full);
+        let answer = py.detach(|| {
+            let scaling = recogniser.settings.scaling;
+            let tracks: Vec<Track> =
+                views.iter().map(|masks| Track::from_masks(masks, scaling, full)).collect();
+            recogniser.recognise(&tracks)
+        });
+        let mut answer = answer.map_err(wrong)?;
+        if let Some(among) = among {
+            answer = answer.among(&among);
+        }
+        let said = PyDict::new(py);
+        said.set_item("activity", answer.activity)?;
+        said.set_item("confidence", answer.confidence)?;
+        said.set_item("strangeness", answer.outlier_score)?;
+        let probabilities = PyDict::new(py);
+        for (name, share) in answer.probabilities {
+            probabilities.set_item(name, share)?;
+        }
+        said.set_item("probabilities", probabilities)?;
+        Ok(said)
+    }
+}
