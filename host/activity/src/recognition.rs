@@ -16,6 +16,7 @@ pub mod frames;
 pub mod live;
 pub mod model;
 pub mod model_file;
+pub mod nearest;
 pub mod network;
 pub mod occupancy;
 pub(crate) mod patterns;

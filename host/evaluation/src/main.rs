@@ -60,7 +60,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         .iter()
         .chain(&robust::PARTS)
         .map(|(name, _)| *name)
-        .chain(["real"])
+        .chain(["real", "thesis-people"])
         .chain(of_people)
         .collect::<Vec<_>>();
     if let Some(unknown) = arguments.only.iter().find(|name| !known.contains(&name.as_str())) {
@@ -101,6 +101,13 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
         }
         finish(page, arguments, "activity.md")?;
+    }
+    if wanted("thesis-people") {
+        eprintln!("thesis-people");
+        let mut page = Page::new(&images, people::thesis::INTRODUCTION);
+        people::thesis::measure(&mut page, &people::data::Data(data.clone()))
+            .context("measuring thesis-people")?;
+        finish(page, arguments, "thesis-people.md")?;
     }
     if !wanted("real") {
         return Ok(());

@@ -3,6 +3,7 @@
 
 mod confusion_picture;
 pub mod evaluation;
+mod film;
 pub mod judging;
 pub mod method;
 pub mod motion;

@@ -153,7 +153,7 @@ mod tests {
         for (text, line) in [
             (String::new(), 1),
             ("2\n1\n71 0\n24\n".into(), 4),
-            (file().replacen("0.5 0.04 3", "0.5 x 3", 1), 32),
+            (file().replacen("0.5 0.04 3", "0.5 x 3", 1), 33),
             (file().lines().take(40).collect::<Vec<_>>().join("\n"), 41),
             ("99999999999\n".into(), 1),
         ] {

@@ -79,7 +79,7 @@ pub struct Answer {
 
 impl Answer {
     /// The answer where nobody was seen.
-    fn nobody(activities: &[String]) -> Self {
+    pub(super) fn nobody(activities: &[String]) -> Self {
         let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
     }
@@ -204,7 +204,7 @@ impl Recogniser {
     }
 
     /// Whether views fit the model.
-    fn check(&self, views: &[Track]) -> Result<(), ModelError> {
+    pub(super) fn check(&self, views: &[Track]) -> Result<(), ModelError> {
         let boxes = self.uses_boxes();
         let found_boxes = views.iter().all(|view| view.boxes.is_some());
         let any_view = self.views == 1 && views.len() > 1;
@@ -219,24 +219,35 @@ impl Recogniser {
         Ok(())
     }
 
-    /// The views of which each group has an answer of its own: all of them together, or for a model of one view each that sees somebody, a
-    /// network's with its mirror.
+    /// The views of which each group has an answer of its own, those that see somebody.
     pub(super) fn groups(&self, views: &[Track]) -> Vec<Vec<Track>> {
-        let seen = || views.iter().filter(|view| view.frames() > 0);
+        let mut groups = self.opinions(views);
+        groups.retain(|group| group.iter().any(|view| view.frames() > 0));
+        groups
+    }
+
+    /// The views of which each group has an answer of its own: all of them together, or for a model of one view each, a network's with
+    /// its mirror.
+    pub(super) fn opinions(&self, views: &[Track]) -> Vec<Vec<Track>> {
         if self.views > 1 {
-            return seen().next().map(|_| views.to_vec()).into_iter().collect();
+            return vec![views.to_vec()];
         }
         // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
         let mirrors = matches!(self.space.pattern, Pattern::Network(_) | Pattern::Features(_));
-        let opinions = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
-        seen().flat_map(opinions).map(|view| vec![view]).collect()
+        let both = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
+        views.iter().flat_map(both).map(|view| vec![view]).collect()
     }
 
     /// The answer for a pattern.
     pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
+        self.answer_by(pattern, self.distance(pattern))
+    }
+
+    /// The answer for a pattern whose squared distance to the nearest of what was learned is known.
+    pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
         let probabilities = self.classifier.probabilities(pattern);
         let (best, confidence) = largest(&probabilities);
-        let outlier_score = self.limits.score(best, self.distance(pattern));
+        let outlier_score = self.limits.score(best, squared_distance);
         Answer {
             activity: (outlier_score <= 1.0).then(|| self.activities[best].clone()),
             confidence,

@@ -10,6 +10,7 @@
 use super::clip::Track;
 use super::live::Segment;
 use super::model::{Answer, ModelError, Recogniser};
+use super::nearest::Nearest;
 use super::patterns::joined;
 use ndarray::{Array1, Array2, s};
 use rayon::prelude::*;
@@ -36,6 +37,8 @@ impl Default for Worth {
 
 /// Borders are looked for at so many places in a typical clip first.
 const PLACES: usize = 12;
+/// In long recordings at no more places than this in all.
+const MOST_PLACES: usize = 1500;
 /// From one length to the next.
 const LONGER: f32 = 1.15;
 /// Fewest frames of a segment.
@@ -50,10 +53,13 @@ struct Embedded {
 /// A recording whose stretches can be asked for.
 struct Recording<'a> {
     recogniser: &'a Recogniser,
+    nearest: Nearest<'a>,
     /// As [`Recogniser::groups`].
     groups: Vec<Vec<Embedded>>,
     among: &'a [String],
     typical: f32,
+    /// Between places where borders are looked for first, frames.
+    step: usize,
     worth: Worth,
 }
 
@@ -87,7 +93,8 @@ impl Recording<'_> {
             })
             .collect();
         let all: Vec<usize> = (0..patterns.len()).collect();
-        self.recogniser.answer(joined(&patterns, &all).view())
+        let pattern = joined(&patterns, &all);
+        self.recogniser.answer_by(pattern.view(), self.nearest.squared_distance(pattern.view()))
     }
 }
 
@@ -117,14 +124,16 @@ pub fn segmented(
     let groups: Result<Vec<Vec<Embedded>>, ModelError> =
         groups.iter().map(|group| group.iter().map(embedded).collect()).collect();
     let typical = recogniser.typical_frames.max(LEAST) as f32;
-    let recording = Recording { recogniser, groups: groups?, among, typical, worth };
+    let step = (typical as usize / PLACES).max(frames / MOST_PLACES).max(1);
+    let nearest = Nearest::new(recogniser.patterns.view());
+    let recording = Recording { recogniser, nearest, groups: groups?, among, typical, step, worth };
     let borders = refined(&recording, best_borders(&recording, frames));
     Ok(merged(&recording, &borders))
 }
 
 /// The borders of the row that is worth most, over a grid; first 0, last the number of frames.
 fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
-    let step = (recording.typical as usize / PLACES).max(1);
+    let step = recording.step;
     let places: Vec<usize> = (0..frames).step_by(step).chain([frames]).collect();
     let [shortest, longest] = recording.worth.lengths.map(|times| times * recording.typical);
     let lengths: Vec<usize> = std::iter::successors(Some(shortest.max(LEAST as f32)), |l| Some(l * LONGER))
@@ -166,7 +175,7 @@ fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
 
 /// Moves every border to the frame within a step at which both neighbours are worth most.
 fn refined(recording: &Recording, mut borders: Vec<usize>) -> Vec<usize> {
-    let step = (recording.typical as usize / PLACES).max(1);
+    let step = recording.step;
     let mut known: HashMap<(usize, usize), f32> = HashMap::new();
     for place in 1..borders.len().saturating_sub(1) {
         let (before, at, after) = (borders[place - 1], borders[place], borders[place + 1]);

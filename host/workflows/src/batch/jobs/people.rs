@@ -162,7 +162,8 @@ fn recognised(settings: &Recognising, out: &Path, shared: &Shared, context: &Con
         Ok(View { path: path.clone(), kind })
     };
     let views = settings.views.iter().map(view).collect::<Result<Vec<View>>>()?;
-    let settings = RecognitionSettings { views, among: settings.among.clone(), window: settings.window };
+    let settings =
+        RecognitionSettings { views, among: settings.among.clone(), window: settings.window, film: None };
     let mut work = Recognition::begin(&model, &settings)?;
     let mut answers = String::new();
     while let Some(answer) = work.next(context)? {
