@@ -13,7 +13,7 @@ pub mod landmark;
 pub mod neighbours;
 pub mod pca;
 pub mod rbf;
-mod spectral;
+pub(crate) mod spectral;
 
 use ndarray::{Array2, ArrayView2};
 

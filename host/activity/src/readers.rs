@@ -17,7 +17,9 @@
 pub mod bvh;
 pub mod c3d;
 pub mod csv;
+pub mod kinect;
 pub mod matlab;
+pub mod ntu;
 pub mod reader;
 pub mod recording;
 pub mod skeletons;
@@ -27,7 +29,8 @@ use reader::Reader;
 use recording::{Choices, Recording, RecordingError};
 
 /// All formats of motion capture.
-pub const READERS: [Reader; 4] = [bvh::READER, c3d::READER, csv::READER, trc::READER];
+pub const READERS: [Reader; 6] =
+    [bvh::READER, c3d::READER, csv::READER, kinect::READER, ntu::READER, trc::READER];
 
 /// Reads a recording with the reader of its file's ending (any case, without the dot). What the caller names in `choices` goes before what the
 /// file says or suggests; what was guessed is in [`Recording::remarks`].

@@ -1,5 +1,6 @@
 //! The parts of `docs/activity.md`: people's shadows, silhouettes and activities, like Li 2014, chapters 8 and 9.
 
+mod between;
 mod broken;
 pub mod data;
 mod everyday;
@@ -12,6 +13,8 @@ mod shadows;
 mod skeletons;
 mod strips;
 mod sun;
+pub mod thesis;
+mod unsegmented;
 
 use anyhow::Result;
 
@@ -22,11 +25,13 @@ use data::Data;
 type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
 
 /// In the order of the page.
-pub const PARTS: [Part; 10] = [
+pub const PARTS: [Part; 12] = [
     ("synthetic-people", |page, _| recognition::measure(page)),
     ("utkinect", |page, data| recognition::measure_real(page, data, sets::utkinect, "UTKinect")),
     ("florence", |page, data| recognition::measure_real(page, data, sets::florence, "Florence")),
     ("weizmann", |page, data| recognition::measure_real(page, data, sets::weizmann, "the Weizmann strips")),
+    ("between-sets", between::measure),
+    ("unsegmented", unsegmented::measure),
     ("robustness", robustness::measure),
     ("broken-silhouettes", broken::measure),
     ("everyday", everyday::measure),

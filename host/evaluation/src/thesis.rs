@@ -4,13 +4,17 @@ mod depth;
 
 use anyhow::Result;
 
-use crate::{page::Page, people::data::Data};
+use crate::{
+    page::Page,
+    people::{self, data::Data},
+};
 
 /// A part's name and what measures it.
 type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
 
 /// In the order of the page.
-pub const PARTS: [Part; 1] = [("chapters-4-to-6", |page, _| depth::measure(page))];
+pub const PARTS: [Part; 2] =
+    [("chapters-4-to-6", |page, _| depth::measure(page)), ("chapters-8-and-9", people::thesis::measure)];
 
 /// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# The thesis, redone

@@ -1,10 +1,12 @@
-//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`], using it ([`recognition`]), evaluating
+//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`]), evaluating
 //! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
 mod confusion_picture;
 pub mod evaluation;
+mod film;
 pub mod judging;
 pub mod method;
+pub mod motion;
 pub mod recognition;
 pub mod samples;
 pub mod shipped;

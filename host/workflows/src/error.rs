@@ -259,6 +259,9 @@ pub enum WorkflowError {
     /// Samples of activities.
     #[error(transparent)]
     Samples(#[from] crate::activity::samples::SamplesError),
+    /// A motion file that teaches nothing.
+    #[error(transparent)]
+    Motion(#[from] crate::activity::motion::MotionError),
     /// A model of activities.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -1,7 +1,8 @@
 //! Masks of a person: from [`video`], from a [motion-capture recording](markers), from body joints of a public set
-//! ([`skeletons`]), of made people ([`synthetic`]). One file per source; [`performances`] is what the last two share.
+//! ([`skeletons`]), of made people ([`synthetic`]); masks of others cut into [`passages`]. One file per source; [`performances`] is what the last two share.
 
 pub mod markers;
+pub mod passages;
 pub mod performances;
 pub mod skeletons;
 pub mod synthetic;
@@ -89,6 +90,14 @@ pub enum SilhouettesError {
         high_mm: f64,
         /// Millimetres per pixel asked for.
         mm_per_px: f64,
+    },
+    /// Nobody stays in the picture for long enough.
+    #[error("{}: nobody is seen in {least} frames in a row", path.display())]
+    NoPassage {
+        /// The folder.
+        path: PathBuf,
+        /// Frames that a passage has at least.
+        least: usize,
     },
     /// No performance was chosen.
     #[error("there is no performance to draw")]

@@ -16,11 +16,11 @@ const SPARE: usize = 5;
 const MOST_BLOCKS: usize = 24;
 
 /// Eigenvalues, falling, and as many eigenvectors of unit length.
-pub(super) type Pairs = (Vec<f64>, Vec<Vec<f64>>);
+pub(crate) type Pairs = (Vec<f64>, Vec<Vec<f64>>);
 
 /// The `wanted` algebraically largest POSITIVE eigenpairs of a symmetric row-major n x n matrix, falling; fewer if fewer are
 /// positive. Eigenvectors are rows, of unit length, with their largest entry positive so that results repeat.
-pub(super) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
+pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     let view = MatRef::from_row_major_slice(matrix, n, n);
     let apply = |block: &Mat<f64>| {
         let mut product = Mat::<f64>::zeros(n, block.ncols());

@@ -7,13 +7,16 @@
 
 use super::confusion::Confusion;
 use crate::embedding::EmbeddingError;
+use crate::recognition::alignment::{Alignment, Statistics};
 use crate::recognition::choice::{Views, choose, names};
-use crate::recognition::classifier::{Classifier, ClassifierKind};
+use crate::recognition::classifier::{ClassifierKind, largest};
 use crate::recognition::clip::Clip;
 use crate::recognition::experiment::Experiment;
 use crate::recognition::patterns::{gathered, patterns_of, vectors_of};
+use crate::recognition::self_training::{Labelled, self_trained};
 use crate::recognition::space::SpaceSettings;
 use crate::recognition::watch::{Unwatched, Watch};
+use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -177,15 +180,35 @@ fn one_fold(
     let asked: Vec<Views> =
         arrangements.iter().copied().filter(|arrangement| !doubled(arrangement)).collect();
     let chosen = choose(train, classes, experiment, &asked, watch)?;
-    let tested = patterns_of(&chosen.space, &vectors_of(&chosen.space, test)?, chosen.sharpness);
+    // What a network was taught mirrors for gives a second opinion of every clip.
+    let mirrors: Vec<Clip> = if experiment.features.is_some() {
+        test.iter().map(|clip| clip.mirrored()).collect()
+    } else {
+        Vec::new()
+    };
+    let all: Vec<&Clip> = test.iter().copied().chain(&mirrors).collect();
+    let seen = vectors_of(&chosen.space, &all)?;
+    let seen = match experiment.align {
+        Alignment::None => seen,
+        align => aligned(align, seen, &vectors_of(&chosen.space, train)?),
+    };
+    let tested = patterns_of(&chosen.space, &seen, chosen.sharpness);
     for arrangement in asked {
         let confusion = if arrangement == Views::Each { &mut outcome.each } else { &mut outcome.fused };
         for joint in arrangement.arrangements(views) {
             let training = gathered(&chosen.patterns, &joint);
-            let classifier =
-                Classifier::train(chosen.classifier, training.view(), &train_labels, classes.len());
-            for (row, &truth) in gathered(&tested, &joint).rows().into_iter().zip(&test_labels) {
-                confusion.count(truth, classifier.best(row).0);
+            let labelled =
+                Labelled { patterns: training.view(), labels: &train_labels, classes: classes.len() };
+            let rows = gathered(&tested, &joint);
+            let classifier = self_trained(chosen.classifier, labelled, rows.view(), experiment.self_training);
+            let opinions: Vec<Vec<f32>> =
+                rows.rows().into_iter().map(|row| classifier.probabilities(row)).collect();
+            for (clip, &truth) in test_labels.iter().enumerate() {
+                let mut joint = opinions[clip].clone();
+                if let Some(second) = opinions.get(test.len() + clip) {
+                    joint.iter_mut().zip(second).for_each(|(first, second)| *first *= second);
+                }
+                confusion.count(truth, largest(&joint).0);
             }
         }
         outcome.chosen.push(Choice {
@@ -203,4 +226,16 @@ fn one_fold(
         outcome.fused = outcome.each.clone();
     }
     Ok(outcome)
+}
+
+/// Frame vectors `[clip][view]` brought to those that were learned from.
+fn aligned(
+    align: Alignment,
+    seen: Vec<Vec<Array2<f32>>>,
+    learned: &[Vec<Array2<f32>>],
+) -> Vec<Vec<Array2<f32>>> {
+    let of = |clips: &[Vec<Array2<f32>>]| Statistics::of(clips.iter().flatten());
+    let (Some(own), Some(wanted)) = (of(&seen), of(learned)) else { return seen };
+    let brought = own.to(&wanted, align);
+    seen.iter().map(|views| views.iter().map(|view| brought.apply(view)).collect()).collect()
 }

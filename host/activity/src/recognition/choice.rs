@@ -154,7 +154,10 @@ impl Problem<'_> {
         if self.watch.is_stopped() {
             return Err(EmbeddingError::Stopped);
         }
-        let space = galleries.space(self.clips, settings)?;
+        let space = match &self.experiment.features {
+            Some(space) => space.with_features(self.clips)?,
+            None => galleries.space(self.clips, settings)?,
+        };
         let vectors = vectors_of(&space, self.clips)?;
         let mut best: Option<Candidate> = None;
         for &sharpness in &self.experiment.sharpness {

@@ -130,11 +130,16 @@ impl std::str::FromStr for Family {
 impl Classifier {
     /// The most probable class (the first of equals) and its probability.
     pub fn best(&self, pattern: ArrayView1<f32>) -> (usize, f32) {
-        let best = |best: (usize, f32), (class, probability)| {
-            if probability > best.1 { (class, probability) } else { best }
-        };
-        self.probabilities(pattern).into_iter().enumerate().fold((0, f32::NEG_INFINITY), best)
+        largest(&self.probabilities(pattern))
     }
+}
+
+/// The place of the largest value (the first of equals), and the value.
+pub(crate) fn largest(values: &[f32]) -> (usize, f32) {
+    let best = |best: (usize, f32), (place, value): (usize, &f32)| {
+        if *value > best.1 { (place, *value) } else { best }
+    };
+    values.iter().enumerate().fold((0, f32::NEG_INFINITY), best)
 }
 
 #[cfg(test)]

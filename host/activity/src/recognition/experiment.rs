@@ -4,9 +4,10 @@
 //! over the training subjects, so nothing is ever tuned on who is tested. Values were laid out by what they mean (factors of two or
 //! three about equal weight), not by what did best on any set.
 
+use super::alignment::Alignment;
 use super::classifier::{ClassifierKind, Family};
 use super::frames::{Mode, Weights};
-use super::space::{Layout, PatternKind, SpaceSettings};
+use super::space::{Layout, PatternKind, Space, SpaceSettings};
 
 /// One parameter of the space and the values it may take.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,6 +80,12 @@ pub struct Experiment {
     pub mirror: bool,
     /// Folds of the choice inside the training subjects.
     pub inner_folds: usize,
+    /// What of the clips that are recognised is brought to the training clips', without their labels.
+    pub align: Alignment,
+    /// Rounds of learning from one's own surest answers for the clips that are recognised ([`super::self_training`]); 0 for none.
+    pub self_training: usize,
+    /// A space that is learned already, of a model's network: then only the classifier is trained, and nothing about spaces is chosen.
+    pub features: Option<Box<Space>>,
 }
 
 impl Experiment {
@@ -91,6 +98,9 @@ impl Experiment {
             classifiers: Family::Svc.tried(),
             mirror: true,
             inner_folds: 4,
+            align: Alignment::None,
+            self_training: 0,
+            features: None,
         }
     }
 
@@ -124,6 +134,21 @@ impl Experiment {
             classifiers: vec![ClassifierKind::Knn(1), ClassifierKind::Knn(3)],
             mirror: false,
             inner_folds: 4,
+            align: Alignment::None,
+            self_training: 0,
+            features: None,
+        }
+    }
+
+    /// A classifier on what a network gives for every view: features that a model learned from thousands of clips serve
+    /// where one's own are few or look otherwise.
+    pub fn on_features(space: Space, family: Family) -> Self {
+        Self {
+            space: space.settings.clone(),
+            sharpness: vec![1.0],
+            classifiers: family.tried(),
+            features: Some(Box::new(space)),
+            ..Self::codebook(SpaceSettings::default())
         }
     }
 

@@ -7,7 +7,7 @@
 //! - Motion: central difference over two frames either way, over the clip's RMS difference: its direction and relative size stay
 //!   when the whole clip runs slower or faster.
 
-use super::clip::{BOX_NUMBERS, Track};
+use super::clip::BOX_NUMBERS;
 use ndarray::{Array2, ArrayView2, Axis, s};
 use serde::{Deserialize, Serialize};
 
@@ -53,10 +53,15 @@ impl Default for Weights {
 /// Frames before and after over which motion is taken.
 const REACH: usize = 2;
 
-/// The frame vectors of a track (frames x F) from its embedded points (frames x D, already over the gallery's spread).
-pub fn vectors(points: ArrayView2<f32>, track: &Track, mode: Mode, weights: Weights) -> Array2<f32> {
+/// The frame vectors of a track (frames x F) from its embedded points (frames x D, already over the gallery's spread) and its boxes.
+pub fn vectors(
+    points: ArrayView2<f32>,
+    boxes: Option<ArrayView2<f32>>,
+    mode: Mode,
+    weights: Weights,
+) -> Array2<f32> {
     let (frames, dimensions) = points.dim();
-    let boxed = track.boxes.as_ref().map_or(0, |_| BOX_NUMBERS);
+    let boxed = boxes.map_or(0, |_| BOX_NUMBERS);
     let still = dimensions + boxed;
     let motion_width = if mode == Mode::Ordered { still } else { 0 };
     let mut out = Array2::zeros((frames, still + motion_width + dimensions));
@@ -64,7 +69,7 @@ pub fn vectors(points: ArrayView2<f32>, track: &Track, mode: Mode, weights: Weig
     let relative = still + motion_width;
     let mean = points.sum_axis(Axis(0)) / frames.max(1) as f32;
     out.slice_mut(s![.., relative..]).assign(&((&points - &mean) * weights.relative_weight));
-    if let Some(boxes) = &track.boxes {
+    if let Some(boxes) = boxes {
         let largest = boxes.column(0).iter().fold(1.0_f32, |m, h| m.max(*h));
         let mean = |k: usize| boxes.column(k).sum() / frames.max(1) as f32;
         let centre = [0.0, 0.0, mean(2), mean(3)];
@@ -105,6 +110,11 @@ fn differences(rows: ArrayView2<f32>) -> Array2<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recognition::clip::Track;
+
+    fn boxes(track: &Track) -> Option<ArrayView2<'_, f32>> {
+        track.boxes.as_ref().map(|boxes| boxes.view())
+    }
 
     #[test]
     fn shuffled_frames_give_the_same_vectors_in_order_free_mode() {
@@ -116,12 +126,12 @@ mod tests {
         };
         let points = Array2::from_shape_fn((n, 3), |(f, k)| (f * (k + 2)) as f32 * 0.1);
         let order: Vec<usize> = (0..n).map(|i| (i * 5) % n).collect();
-        let a = vectors(points.view(), &track, Mode::OrderFree, Weights::default());
+        let a = vectors(points.view(), boxes(&track), Mode::OrderFree, Weights::default());
         let shuffled = points.select(ndarray::Axis(0), &order);
-        let b = vectors(shuffled.view(), &track.select(&order), Mode::OrderFree, Weights::default());
+        let b = vectors(shuffled.view(), boxes(&track.select(&order)), Mode::OrderFree, Weights::default());
         for (i, &from) in order.iter().enumerate() {
             assert!(b.row(i).iter().zip(a.row(from)).all(|(p, q)| (p - q).abs() < 1e-5));
         }
-        assert_eq!(vectors(points.view(), &track, Mode::Ordered, Weights::default()).ncols(), 17);
+        assert_eq!(vectors(points.view(), boxes(&track), Mode::Ordered, Weights::default()).ncols(), 17);
     }
 }

@@ -2,23 +2,38 @@
 
 use super::clip::Track;
 use super::model::{Answer, ModelError, Recogniser};
+use super::nearest::Nearest;
+use super::patterns::joined as in_order;
 use crate::mask::Mask;
-use ndarray::{Axis, concatenate};
+use ndarray::{Array1, Array2, Axis, concatenate};
 use std::collections::VecDeque;
 
-/// Keeps the last frames of every view and answers for them.
+/// Keeps the last frames of every view and answers for them. Every frame is embedded once, and the nearest of all training patterns is
+/// found by an index: a frame costs what its window's pattern costs.
 #[derive(Debug)]
 pub struct Live<'a> {
     recogniser: &'a Recogniser,
+    nearest: Nearest<'a>,
     window: usize,
     full_frames: bool,
-    frames: VecDeque<Vec<Track>>,
+    frames: VecDeque<Moment>,
+}
+
+/// What is known of a moment: `[opinion][view]`, as [`Recogniser::opinions`].
+type Moment = Vec<Vec<Seen>>;
+
+/// A frame of a view, embedded; no row where nobody is seen.
+#[derive(Debug)]
+struct Seen {
+    points: Array2<f32>,
+    boxes: Option<Array2<f32>>,
 }
 
 impl<'a> Live<'a> {
     /// Watches the last `window` frames (at least one).
     pub fn new(recogniser: &'a Recogniser, window: usize, full_frames: bool) -> Self {
-        Self { recogniser, window: window.max(1), full_frames, frames: VecDeque::new() }
+        let nearest = Nearest::new(recogniser.patterns.view());
+        Self { recogniser, nearest, window: window.max(1), full_frames, frames: VecDeque::new() }
     }
 
     /// Takes the masks of one moment, one per view, and answers for the window that ends with it. Empty masks are left out, so a moment
@@ -38,14 +53,51 @@ impl<'a> Live<'a> {
     /// # Errors
     /// Another number of views than the model's.
     pub fn push_described(&mut self, moment: Vec<Track>) -> Result<Answer, ModelError> {
-        let count = moment.len();
-        self.frames.push_back(moment);
+        self.recogniser.check(&moment)?;
+        let boxed = self.recogniser.uses_boxes();
+        let seen = |view: Track| -> Result<Seen, ModelError> {
+            Ok(Seen { points: self.recogniser.space.points(&view)?, boxes: view.boxes.filter(|_| boxed) })
+        };
+        let opinions = self.recogniser.opinions(&moment).into_iter();
+        let moment: Result<Moment, ModelError> =
+            opinions.map(|views| views.into_iter().map(seen).collect()).collect();
+        self.frames.push_back(moment?);
         if self.frames.len() > self.window {
             self.frames.pop_front();
         }
-        let views: Vec<Track> =
-            (0..count).map(|view| joined(self.frames.iter().filter_map(|moment| moment.get(view)))).collect();
-        self.recogniser.recognise(&views)
+        let opinions = self.frames.back().map_or(0, Vec::len);
+        let answers: Vec<Answer> = (0..opinions).filter_map(|opinion| self.answer(opinion)).collect();
+        Ok(if answers.is_empty() {
+            Answer::nobody(&self.recogniser.activities)
+        } else if let [one] = answers.as_slice() {
+            one.clone()
+        } else {
+            Answer::joint(&answers)
+        })
+    }
+
+    /// The answer of one opinion for the window; `None` where nobody is seen in it.
+    fn answer(&self, opinion: usize) -> Option<Answer> {
+        let Recogniser { space, settings, .. } = self.recogniser;
+        let frames: Vec<&Vec<Seen>> = self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();
+        let views = frames.last()?.len();
+        let mut seen = false;
+        let patterns: Vec<Array1<f32>> = (0..views)
+            .map(|view| {
+                let of_view = || frames.iter().filter_map(|moment| moment.get(view));
+                let points: Vec<_> = of_view().map(|frame| frame.points.view()).collect();
+                let boxes: Option<Vec<_>> =
+                    of_view().map(|frame| frame.boxes.as_ref().map(|boxes| boxes.view())).collect();
+                let points = concatenate(Axis(0), &points).unwrap_or_default();
+                let boxes = boxes.and_then(|boxes| concatenate(Axis(0), &boxes).ok());
+                seen |= points.nrows() > 0;
+                let vectors = space.vectors_of(points.view(), boxes.as_ref().map(|boxes| boxes.view()));
+                space.pattern_of(vectors.view(), settings.sharpness)
+            })
+            .collect();
+        let pattern = in_order(&patterns, &(0..views).collect::<Vec<_>>());
+        let distance = self.nearest.squared_distance(pattern.view());
+        seen.then(|| self.recogniser.answer_by(pattern.view(), distance))
     }
 
     /// Forgets all frames.

@@ -1,14 +1,15 @@
 //! A trained recogniser as one value, and what it answers; [`super::training`] makes it, [`super::model_file`] saves and reads it.
 
 use super::classifier::softmax::softmax;
-use super::classifier::{Classifier, ClassifierKind};
+use super::classifier::{Classifier, ClassifierKind, largest};
 use super::clip::Track;
 use super::frames::Mode;
 use super::patterns::joined;
+use super::self_training::{Labelled, self_trained};
 use super::space::{Map, Pattern, Space, SpaceSettings};
 use super::unknown::Limits;
-use crate::embedding::EmbeddingError;
 use crate::embedding::descriptor::Scaling;
+use crate::embedding::{EmbeddingError, squared_distance};
 use ndarray::{Array1, Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +57,8 @@ pub struct Recogniser {
     pub limits: Limits,
     /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
     pub patterns: Array2<f32>,
+    /// Class of each of [`Self::patterns`], where they are training clips or typical of one class; empty in models of older formats.
+    pub labels: Vec<usize>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
 }
@@ -76,13 +79,13 @@ pub struct Answer {
 
 impl Answer {
     /// The answer where nobody was seen.
-    fn nobody(activities: &[String]) -> Self {
+    pub(super) fn nobody(activities: &[String]) -> Self {
         let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
     }
 
     /// One answer from those of several views: probabilities by their geometric mean, the outlier score by its mean.
-    fn joint(answers: &[Self]) -> Self {
+    pub(super) fn joint(answers: &[Self]) -> Self {
         let n = answers.len().max(1) as f32;
         let mut values: Vec<f32> = (0..answers[0].probabilities.len())
             .map(|k| answers.iter().map(|answer| answer.probabilities[k].1.max(1e-9).ln()).sum::<f32>() / n)
@@ -164,6 +167,9 @@ pub enum ModelError {
         /// Whether the model uses box motion.
         expected_boxes: bool,
     },
+    /// A model without labelled patterns.
+    #[error("the model keeps no labelled patterns to learn on with: train it again")]
+    Unlabelled,
     /// Nothing to train on.
     #[error("a model needs clips of at least two activities, found {0}")]
     Activities(usize),
@@ -184,6 +190,21 @@ impl Recogniser {
     /// # Errors
     /// A clip with other views than the model's, or with cut-out silhouettes where the model knows full frames.
     pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
+        self.check(views)?;
+        let mut answers = self
+            .groups(views)
+            .iter()
+            .map(|group| Ok(self.answer(self.pattern(group)?.view())))
+            .collect::<Result<Vec<Answer>, ModelError>>()?;
+        Ok(match answers.len() {
+            0 => Answer::nobody(&self.activities),
+            1 => answers.swap_remove(0),
+            _ => Answer::joint(&answers),
+        })
+    }
+
+    /// Whether views fit the model.
+    pub(super) fn check(&self, views: &[Track]) -> Result<(), ModelError> {
         let boxes = self.uses_boxes();
         let found_boxes = views.iter().all(|view| view.boxes.is_some());
         let any_view = self.views == 1 && views.len() > 1;
@@ -195,42 +216,44 @@ impl Recogniser {
                 expected_boxes: boxes,
             });
         }
-        let seen = |view: &&Track| view.frames() > 0;
-        let mirrored: Vec<Track>;
-        let views = if self.views == 1 && matches!(self.space.pattern, Pattern::Network(_)) {
-            // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
-            mirrored = views.iter().flat_map(|view| [view.clone(), view.mirrored()]).collect();
-            mirrored.as_slice()
-        } else {
-            views
-        };
-        let mut answers = if self.views == 1 && views.len() > 1 {
-            let each = views.iter().filter(seen).map(|view| self.answer(std::slice::from_ref(view)));
-            each.collect::<Result<Vec<Answer>, ModelError>>()?
-        } else if views.iter().any(|view| seen(&view)) {
-            vec![self.answer(views)?]
-        } else {
-            Vec::new()
-        };
-        Ok(match answers.len() {
-            0 => Answer::nobody(&self.activities),
-            1 => answers.swap_remove(0),
-            _ => Answer::joint(&answers),
-        })
+        Ok(())
     }
 
-    /// The answer for views that fit the model.
-    fn answer(&self, views: &[Track]) -> Result<Answer, ModelError> {
-        let pattern = self.pattern(views)?;
-        let probabilities = self.classifier.probabilities(pattern.view());
-        let (best, confidence) = self.classifier.best(pattern.view());
-        let outlier_score = self.limits.score(best, self.distance(&pattern));
-        Ok(Answer {
+    /// The views of which each group has an answer of its own, those that see somebody.
+    pub(super) fn groups(&self, views: &[Track]) -> Vec<Vec<Track>> {
+        let mut groups = self.opinions(views);
+        groups.retain(|group| group.iter().any(|view| view.frames() > 0));
+        groups
+    }
+
+    /// The views of which each group has an answer of its own: all of them together, or for a model of one view each, a network's with
+    /// its mirror.
+    pub(super) fn opinions(&self, views: &[Track]) -> Vec<Vec<Track>> {
+        if self.views > 1 {
+            return vec![views.to_vec()];
+        }
+        // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
+        let mirrors = matches!(self.space.pattern, Pattern::Network(_) | Pattern::Features(_));
+        let both = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
+        views.iter().flat_map(both).map(|view| vec![view]).collect()
+    }
+
+    /// The answer for a pattern.
+    pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
+        self.answer_by(pattern, self.distance(pattern))
+    }
+
+    /// The answer for a pattern whose squared distance to the nearest of what was learned is known.
+    pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
+        let probabilities = self.classifier.probabilities(pattern);
+        let (best, confidence) = largest(&probabilities);
+        let outlier_score = self.limits.score(best, squared_distance);
+        Answer {
             activity: (outlier_score <= 1.0).then(|| self.activities[best].clone()),
             confidence,
             probabilities: self.activities.iter().cloned().zip(probabilities).collect(),
             outlier_score,
-        })
+        }
     }
 
     /// The pattern of views that fit the model. A model of cut-out silhouettes looks at shapes only, also in full frames.
@@ -242,8 +265,35 @@ impl Recogniser {
         pattern(&self.space, &shapes, self.settings.sharpness)
     }
 
+    /// The same recogniser for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled: its classifier is trained on
+    /// with its surest answers for them ([`super::self_training`]). What counts as unknown stays.
+    ///
+    /// # Errors
+    /// Clips that do not fit; [`ModelError::Unlabelled`].
+    pub fn adapted(&self, clips: &[Vec<Track>], rounds: usize) -> Result<Self, ModelError> {
+        if self.labels.is_empty() || self.labels.len() != self.patterns.nrows() {
+            return Err(ModelError::Unlabelled);
+        }
+        let mut rows = Vec::new();
+        for views in clips {
+            self.check(views)?;
+            for group in self.groups(views) {
+                rows.push(self.pattern(&group)?);
+            }
+        }
+        let others = Array2::from_shape_fn((rows.len(), self.patterns.ncols()), |(i, k)| rows[i][k]);
+        let labelled =
+            Labelled { patterns: self.patterns.view(), labels: &self.labels, classes: self.activities.len() };
+        let kind = match self.settings.classifier {
+            // A network's own classifier has no cost.
+            ClassifierKind::Softmax(cost) if cost <= 0.0 => ClassifierKind::Softmax(100.0),
+            kind => kind,
+        };
+        Ok(Self { classifier: self_trained(kind, labelled, others.view(), rounds), ..self.clone() })
+    }
+
     /// Squared distance of a pattern to the nearest of what was learned.
-    pub(super) fn distance(&self, pattern: &Array1<f32>) -> f32 {
+    pub(super) fn distance(&self, pattern: ArrayView1<f32>) -> f32 {
         nearest(self.patterns.rows().into_iter(), pattern)
     }
 
@@ -258,6 +308,7 @@ impl Recogniser {
             Pattern::Thesis(_) => false,
             Pattern::Codebook(book) => book.centres.ncols() > repeats * dimensions,
             Pattern::Network(network) => network.mean.len() > repeats * dimensions,
+            Pattern::Features(features) => features.network.mean.len() > repeats * dimensions,
         }
     }
 }
@@ -271,8 +322,17 @@ pub(super) fn pattern(space: &Space, views: &[Track], sharpness: f32) -> Result<
 }
 
 /// Squared distance to the nearest of some patterns.
-pub(super) fn nearest<'a>(patterns: impl Iterator<Item = ArrayView1<'a, f32>>, query: &Array1<f32>) -> f32 {
-    patterns
-        .map(|row| row.iter().zip(query).map(|(a, b)| (a - b) * (a - b)).sum())
-        .fold(f32::INFINITY, f32::min)
+pub(super) fn nearest<'a>(
+    patterns: impl Iterator<Item = ArrayView1<'a, f32>>,
+    query: ArrayView1<f32>,
+) -> f32 {
+    patterns.map(|row| squared_between(row, query)).fold(f32::INFINITY, f32::min)
+}
+
+/// Squared distance of two patterns.
+fn squared_between(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
+    match (a.as_slice(), b.as_slice()) {
+        (Some(a), Some(b)) => squared_distance(a, b),
+        _ => a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum(),
+    }
 }

@@ -1,7 +1,7 @@
 //! Models as files: bytes with a version and a checksum.
 //!
 //! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
-//! little-endian, then the body (postcard). Anything that does not fit is refused by name, never guessed; a body that decodes is
+//! little-endian, then the body (postcard), in version 3 followed by the classes of its patterns. Anything that does not fit is refused by name, never guessed; a body that decodes is
 //! also checked part against part, so that a crafted file cannot make recognition panic.
 
 use super::classifier::Classifier;
@@ -10,6 +10,8 @@ use super::codebook::Codebook;
 use super::frames::Mode;
 use super::model::{ModelError, Recogniser, RecogniserSettings};
 use super::network::Network;
+use super::network::features::Features;
+use super::network::recogniser::TYPICAL;
 use super::occupancy::OccupancyGrid;
 use super::space::{Map, Pattern, Space};
 use super::unknown::Limits;
@@ -20,7 +22,9 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
 /// Version of the file's format.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
+/// The version before, which is read too: it has no labels.
+const UNLABELLED_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
@@ -51,6 +55,7 @@ enum SavedPattern {
     Thesis(OccupancyGrid),
     Codebook(Codebook),
     Network(Box<Network>),
+    Features(Box<Features>),
 }
 
 impl Recogniser {
@@ -83,13 +88,15 @@ impl Recogniser {
                 Pattern::Thesis(grid) => SavedPattern::Thesis(grid.clone()),
                 Pattern::Codebook(book) => SavedPattern::Codebook(book.clone()),
                 Pattern::Network(network) => SavedPattern::Network(network.clone()),
+                Pattern::Features(features) => SavedPattern::Features(features.clone()),
             },
             classifier: self.classifier.clone(),
             limits: self.limits.clone(),
             patterns: self.patterns.clone(),
             typical_frames: self.typical_frames as u64,
         };
-        let body = postcard::to_stdvec(&body).map_err(|error| ModelError::Body(error.to_string()))?;
+        let body = postcard::to_stdvec(&(body, &self.labels))
+            .map_err(|error| ModelError::Body(error.to_string()))?;
         let mut bytes = Vec::with_capacity(HEADER + body.len());
         bytes.extend(MAGIC);
         bytes.extend(FORMAT_VERSION.to_le_bytes());
@@ -110,8 +117,9 @@ impl Recogniser {
             return Err(ModelError::NotAModel("it does not start with `farnearA`"));
         }
         let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
+        let unlabelled = word(8) == UNLABELLED_VERSION;
         for (what, at, expected) in [("format", 8, FORMAT_VERSION), ("descriptor", 12, DESCRIPTOR_VERSION)] {
-            if word(at) != expected {
+            if word(at) != expected && !(at == 8 && unlabelled) {
                 return Err(ModelError::Version { what, found: word(at), expected });
             }
         }
@@ -122,7 +130,10 @@ impl Recogniser {
         if checksum(body) != word(24) {
             return Err(ModelError::Checksum { found: checksum(body), expected: word(24) });
         }
-        let body: Body = postcard::from_bytes(body).map_err(|error| ModelError::Body(error.to_string()))?;
+        let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
+        let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
+        let labels =
+            if unlabelled { Vec::new() } else { postcard::from_bytes::<Vec<usize>>(rest).map_err(wrong)? };
         let map = match body.map {
             SavedMap::Rbf { centres, weights, gamma, ridge, condition } => {
                 Map::Rbf(Rbf::assemble(centres, weights, gamma, ridge, condition))
@@ -133,6 +144,7 @@ impl Recogniser {
             SavedPattern::Thesis(grid) => Pattern::Thesis(grid),
             SavedPattern::Codebook(book) => Pattern::Codebook(book),
             SavedPattern::Network(network) => Pattern::Network(network),
+            SavedPattern::Features(features) => Pattern::Features(features),
         };
         let space = Space {
             settings: body.settings.space.clone(),
@@ -140,6 +152,12 @@ impl Recogniser {
             spread: body.spread,
             pattern,
             neighbours: body.neighbours,
+            brought: None,
+        };
+        let labels = if unlabelled {
+            typical_labels(&body.patterns, &space.pattern, body.activities.len())
+        } else {
+            labels
         };
         let recogniser = Self {
             settings: body.settings,
@@ -149,10 +167,17 @@ impl Recogniser {
             classifier: body.classifier,
             limits: body.limits,
             patterns: body.patterns,
+            labels,
             typical_frames: body.typical_frames as usize,
         };
         recogniser.checked()
     }
+}
+
+/// Whose typical patterns those of a network are, in models that do not say it: so many of each activity, in order.
+fn typical_labels(patterns: &Array2<f32>, pattern: &Pattern, activities: usize) -> Vec<usize> {
+    let regular = matches!(pattern, Pattern::Network(_)) && patterns.nrows() == TYPICAL * activities;
+    if regular { (0..patterns.nrows()).map(|row| row / TYPICAL).collect() } else { Vec::new() }
 }
 
 /// CRC-32 as in zip files.
@@ -196,6 +221,11 @@ impl Recogniser {
                 fits(of_frame(found) && network.fits(found), "the network's layers")?;
                 Some(network.width())
             }
+            Pattern::Features(features) => {
+                let found = features.network.mean.len();
+                fits(of_frame(found) && features.fits(found), "the network's layers and its features")?;
+                Some(features.network.width())
+            }
             Pattern::Codebook(book) => {
                 let found = book.centres.ncols();
                 fits(of_frame(found), "the codebook's width")?;
@@ -208,6 +238,9 @@ impl Recogniser {
         };
         let width = of_view.and_then(|width| width.checked_mul(self.views)).unwrap_or(usize::MAX);
         fits(self.patterns.ncols() == width, "the training patterns' width")?;
+        let labelled = self.labels.len() == self.patterns.nrows()
+            && self.labels.iter().all(|label| *label < self.activities.len());
+        fits(self.labels.is_empty() || labelled, "the training patterns' activities")?;
         fits(self.limits.squared_distances.len() == self.activities.len(), "the limits of what is known")?;
         fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
         Ok(self)

@@ -5,6 +5,7 @@
 //! frames' own motion ([`super::frames`]). A clip's pattern is what the third layer gives. Unlike a codebook it is learned with the
 //! activities' names, and needs many more clips: thousands, which synthetic people can give. O(frames x (F x 64 + 64 x 128)) a clip.
 
+pub mod features;
 pub mod recogniser;
 pub mod training;
 

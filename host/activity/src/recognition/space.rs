@@ -1,9 +1,11 @@
 //! The learned part before the classifier: how frames are embedded and clips become patterns.
 
+use super::alignment::Brought;
 use super::clip::{Clip, Track};
 use super::codebook::{Codebook, stacked};
 use super::frames::{self, Mode, Weights};
 use super::network::Network;
+use super::network::features::{Features, values};
 use super::occupancy::OccupancyGrid;
 use crate::embedding::EmbeddingError;
 use crate::embedding::isomap::isomap;
@@ -113,6 +115,8 @@ pub enum Pattern {
     Codebook(Codebook),
     /// A network over frame vectors.
     Network(Box<Network>),
+    /// What a network gives, as features for another classifier.
+    Features(Box<Features>),
 }
 
 /// The learned space of frames and patterns.
@@ -128,6 +132,8 @@ pub struct Space {
     pub pattern: Pattern,
     /// Neighbours that the Isomap graph needed, 0 for PCA.
     pub neighbours: usize,
+    /// What brings frame vectors to those of the training clips, where clips come from elsewhere; not saved.
+    pub brought: Option<Brought>,
 }
 
 impl Space {
@@ -157,12 +163,37 @@ impl Space {
     /// Descriptors of another length.
     pub fn vectors(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
         let points = self.points(track)?;
-        Ok(match self.settings.pattern {
-            PatternKind::Thesis(_) => points,
+        Ok(self.vectors_of(points.view(), track.boxes.as_ref().map(|boxes| boxes.view())))
+    }
+
+    /// The same from frames that are embedded already, and their boxes.
+    pub fn vectors_of(&self, points: ArrayView2<f32>, boxes: Option<ArrayView2<f32>>) -> Array2<f32> {
+        let vectors = match self.settings.pattern {
+            PatternKind::Thesis(_) => points.to_owned(),
             PatternKind::Codebook(_) | PatternKind::Network => {
-                frames::vectors(points.view(), track, self.settings.mode, self.settings.weights)
+                frames::vectors(points, boxes, self.settings.mode, self.settings.weights)
             }
-        })
+        };
+        match &self.brought {
+            Some(brought) => brought.apply(&vectors),
+            None => vectors,
+        }
+    }
+
+    /// The same space with its network's values as features, by their statistics over clips; other spaces as they are.
+    ///
+    /// # Errors
+    /// Descriptors of another length.
+    pub fn with_features(&self, clips: &[&Clip]) -> Result<Self, EmbeddingError> {
+        let network = match &self.pattern {
+            Pattern::Network(network) => network,
+            Pattern::Features(features) => &features.network,
+            Pattern::Thesis(_) | Pattern::Codebook(_) => return Ok(self.clone()),
+        };
+        let vectors: Result<Vec<Array2<f32>>, EmbeddingError> =
+            clips.par_iter().flat_map_iter(|clip| &clip.views).map(|view| self.vectors(view)).collect();
+        let features = Features::fitted(network.clone(), values(network, &vectors?).view());
+        Ok(Self { pattern: Pattern::Features(Box::new(features)), ..self.clone() })
     }
 
     /// The pattern of frame vectors.
@@ -171,6 +202,7 @@ impl Space {
             Pattern::Thesis(grid) => grid.pattern(vectors),
             Pattern::Codebook(book) => book.pattern(vectors, self.settings.mode, sharpness),
             Pattern::Network(network) => network.pattern(vectors),
+            Pattern::Features(features) => features.pattern(vectors),
         }
     }
 }
@@ -231,6 +263,7 @@ impl Galleries {
             spread,
             pattern: Pattern::Thesis(OccupancyGrid { low: Vec::new(), range: Vec::new(), bins: Vec::new() }),
             neighbours: gallery.neighbours,
+            brought: None,
         };
         space.pattern = match &settings.pattern {
             // Learned afterwards, with the activities' names.

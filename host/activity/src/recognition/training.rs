@@ -1,5 +1,6 @@
 //! Training a recogniser: settings chosen or given, the classifier trained, and what counts as unknown.
 
+use super::alignment::Alignment;
 use super::choice::{Chosen, Views, choose, names};
 use super::classifier::Classifier;
 use super::clip::Clip;
@@ -25,6 +26,9 @@ impl Recogniser {
             classifiers: vec![settings.classifier],
             mirror: settings.mirror,
             inner_folds: 2,
+            align: Alignment::None,
+            self_training: 0,
+            features: None,
         };
         Self::train_searched(clips, &experiment, settings.scaling, &Unwatched)
             .map(|(recogniser, _)| recogniser)
@@ -83,6 +87,7 @@ impl Recogniser {
             views,
             space,
             patterns,
+            labels,
         };
         Ok((recogniser, inner_accuracy))
     }
@@ -118,7 +123,7 @@ fn limits(
                 |j: usize| if alone { j % originals != i } else { clips[j].subject != clips[i].subject };
             let others =
                 patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
-            (labels[i], nearest(others, &patterns.row(i).to_owned()))
+            (labels[i], nearest(others, patterns.row(i)))
         })
         .collect();
     Limits::conformal(&scored, classes, Limits::FALSE_ALARMS)

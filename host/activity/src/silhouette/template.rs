@@ -102,11 +102,14 @@ impl Template {
         Ok(template)
     }
 
-    /// Checks that a recording's markers fit: at least half of the template's must be there by name (a suit may lack a few).
-    ///
-    /// # Errors
-    /// [`TemplateError::UnknownMarkers`].
-    pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
+    /// How many of the template's markers a recording has, and how many there are.
+    pub fn coverage(&self, names: &[String]) -> (usize, usize) {
+        let (missing, of) = self.missing(names);
+        (of - missing.len(), of)
+    }
+
+    /// Markers that a recording lacks, and how many the template has.
+    fn missing(&self, names: &[String]) -> (Vec<String>, usize) {
         let has = |marker: &str| {
             names
                 .iter()
@@ -115,11 +118,19 @@ impl Template {
         let mut all: Vec<&String> = self.parts.iter().flat_map(|part| &part.markers).collect();
         all.sort();
         all.dedup();
-        let missing: Vec<String> = all.iter().filter(|marker| !has(marker)).map(|m| (*m).clone()).collect();
-        if 2 * missing.len() > all.len() {
+        (all.iter().filter(|marker| !has(marker)).map(|m| (*m).clone()).collect(), all.len())
+    }
+
+    /// Checks that a recording's markers fit: at least half of the template's must be there by name (a suit may lack a few).
+    ///
+    /// # Errors
+    /// [`TemplateError::UnknownMarkers`].
+    pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
+        let (missing, of) = self.missing(names);
+        if 2 * missing.len() > of {
             return Err(TemplateError::UnknownMarkers {
                 missing,
-                of: all.len(),
+                of,
                 template: self.name.clone(),
                 present: names.iter().take(12).cloned().collect(),
             });
@@ -139,14 +150,15 @@ impl Template {
     }
 
     /// The built-in templates, by name, as TOML: Plug-in Gait (and CMU 41), Vicon's 53 markers, OpenCap's laboratory markers, the
-    /// suit and props of Li 2014, and the joints of BVH skeletons. Their files lie in the crate's `templates` folder, to be copied and
+    /// suit and props of Li 2014, the joints of BVH skeletons and of a Kinect. Their files lie in the crate's `templates` folder, to be copied and
     /// changed.
-    pub const BUILT_IN: [(&str, &str); 5] = [
+    pub const BUILT_IN: [(&str, &str); 6] = [
         ("plug-in-gait", include_str!("../../templates/plug-in-gait.toml")),
         ("vicon-53", include_str!("../../templates/vicon-53.toml")),
         ("opencap", include_str!("../../templates/opencap.toml")),
         ("thesis", include_str!("../../templates/thesis.toml")),
         ("bvh", include_str!("../../templates/bvh.toml")),
+        ("kinect", include_str!("../../templates/kinect.toml")),
     ];
 
     /// The names of the built-in templates.

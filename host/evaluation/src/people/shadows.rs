@@ -55,8 +55,10 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     ));
     let mut rows = Vec::new();
     for (name, kind) in KINDS.into_iter().take(1) {
-        let scores =
-            Method::ALL.par_iter().map(|&method| detected(kind, method)).collect::<Result<Vec<_>>>()?;
+        let scores = Method::ALL
+            .par_iter()
+            .map(|&method| detected(kind, method, 0..MADE_SCENES))
+            .collect::<Result<Vec<_>>>()?;
         for (method, score) in Method::ALL.iter().zip(&scores) {
             rows.push(row(name, &format!("`{}`", method.name()), score));
         }
@@ -107,11 +109,25 @@ fn pooled(kind: Kind, cutter: Cutter, seeds: std::ops::Range<u64>) -> Result<Sha
     }))
 }
 
+/// Every detector and cutter on the first scenes one by one, by name.
+pub fn per_scene(scenes: u64) -> Result<Vec<(String, Vec<ShadowScore>)>> {
+    let mut found = Vec::new();
+    for method in Method::ALL {
+        let scores = (0..scenes).map(|seed| detected(Kind::Standard, method, seed..seed + 1));
+        found.push((method.name().to_owned(), scores.collect::<Result<Vec<_>>>()?));
+    }
+    for (name, cutter) in [("thesis", Cutter::Thesis), ("hybrid", Cutter::Hybrid)] {
+        let scores = (0..scenes).map(|seed| pooled(Kind::Standard, cutter, seed..seed + 1));
+        found.push((name.to_owned(), scores.collect::<Result<Vec<_>>>()?));
+    }
+    Ok(found)
+}
+
 /// The score of one detector over coloured scenes; the foreground given to it is body and shadow.
-fn detected(kind: Kind, method: Method) -> Result<ShadowScore> {
+fn detected(kind: Kind, method: Method, seeds: std::ops::Range<u64>) -> Result<ShadowScore> {
     let mut total = ShadowScore::default();
     let mut detector = Detector::new(method);
-    for seed in 0..MADE_SCENES {
+    for seed in seeds {
         let scene = scene(kind, seed);
         let truth = scene.truth();
         let pictures = colour_in(truth.view(), seed);

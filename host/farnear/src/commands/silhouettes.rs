@@ -2,6 +2,7 @@
 
 mod bodies;
 mod markers;
+mod passages;
 mod video;
 
 use anyhow::Result;
@@ -21,6 +22,7 @@ enum Source {
     Synthetic(bodies::Synthetic),
     Markers(markers::Arguments),
     Video(video::Arguments),
+    Passages(passages::Arguments),
 }
 
 /// Runs the command.
@@ -30,5 +32,6 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Source::Synthetic(arguments) => bodies::synthetic(arguments),
         Source::Markers(arguments) => markers::run(arguments),
         Source::Video(arguments) => video::run(arguments),
+        Source::Passages(arguments) => passages::run(arguments),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use image::GrayImage;
+use image::{GrayImage, Luma};
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
@@ -269,4 +269,35 @@ fn real_recordings_fit_built_in_templates() {
     let cut = folder.file("cut.c3d", &fs::read(data.join("cmu_02_05.c3d")).expect("readable")[..100_000]);
     let truncated = ["silhouettes", "markers", &cut, "--template", "plug-in-gait", "--out", &out];
     fails(&mut farnear(&truncated), 1, &["cut.c3d", "ends within the frames", "100000"]);
+}
+
+#[test]
+fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
+    let folder = Folder::new();
+    let masks = folder.text("masks");
+    fs::create_dir(&masks).expect("a folder");
+    // 8 to 12, nobody at 13, 14 to 17, then 40 to 41.
+    for frame in (8..18_u32).chain(40..42) {
+        let seen = frame != 13;
+        GrayImage::from_fn(60, 40, |x, y| {
+            Luma([if seen && x / 10 == frame % 6 && y > 5 { 255_u8 } else { 0 }])
+        })
+        .save(folder.path(&format!("masks/silho_{frame}.png")))
+        .expect("a picture");
+    }
+    let cut = |least: &str, out: &str| {
+        let mut command =
+            farnear(&["silhouettes", "passages", &masks, "--activity", "walk \"fast\"", "--subject", "p1"]);
+        command.args(["--least-frames", least, "--out", &folder.text(out), "--json"]);
+        command
+    };
+    let found = figures(&mut cut("3", "passages"));
+    let counts = ["masks", "passages", "frames", "too_short"].map(|name| number(&found, name));
+    assert_eq!(counts, [12.0, 2.0, 9.0, 1.0], "{found}");
+    assert!(folder.path("passages/passage2/silho_17.png").exists());
+    let samples = fs::read_to_string(folder.path("passages/samples.toml")).expect("samples");
+    let samples: toml::Table = samples.parse().expect("TOML");
+    assert_eq!(samples["sample"][1]["activity"].as_str(), Some("walk \"fast\""));
+    fails(&mut cut("6", "none"), 1, &["masks", "6 frames in a row"]);
+    assert!(!folder.path("none").exists());
 }

@@ -15,6 +15,7 @@ use farnear_activity::{
     recognition::{
         choice::{Views, names},
         clip::{Clip, Track},
+        experiment::Experiment,
         model::Recogniser,
         unknown::Limits,
         watch::Unwatched,
@@ -25,7 +26,7 @@ use serde::Serialize;
 
 use super::{
     confusion_picture,
-    method::Method,
+    method::{Adaptation, Method},
     samples::{SCALING, Samples, SamplesError, are_full_frames},
     watched,
 };
@@ -47,6 +48,8 @@ pub struct EvaluationSettings {
     pub learn_from: LearnFrom,
     /// How activities are told apart.
     pub method: Method,
+    /// What is done for clips from elsewhere.
+    pub adaptation: Adaptation,
     /// Which views are recognised together; without it fused, or each by itself where clips differ in their views.
     pub views: Option<Views>,
     /// A new folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold).
@@ -132,7 +135,8 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     let learned = train.as_deref().unwrap_or(&test);
     check_subjects(settings, &subjects, learned)?;
     check_activities(settings, &test, learned)?;
-    let experiment = settings.method.experiment();
+    let Adaptation { align, self_training } = settings.adaptation;
+    let experiment = Experiment { align, self_training, ..settings.method.experiment(full_frames)? };
     let outcome = train_on_others(learned, &test, &experiment, &[views], &watched::Folds::new(context));
     let outcome = watched::outcome(outcome, context, "evaluating")?;
     let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
@@ -183,8 +187,9 @@ pub struct OpenSetFigures {
 /// # Errors
 /// Samples that cannot be read or used, too few subjects or activities.
 pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Result<OpenSetFigures> {
-    let clips = Samples::read(samples, context)?.fused()?;
-    let found = open_set::open_set(&clips, &method.experiment(), SCALING, &watched::Folds::new(context));
+    let samples = Samples::read(samples, context)?;
+    let experiment = method.experiment(samples.full_frames)?;
+    let found = open_set::open_set(&samples.fused()?, &experiment, SCALING, &watched::Folds::new(context));
     let mut rows = watched::outcome(found, context, "evaluating")?;
     for row in &mut rows {
         for value in [&mut row.unknown_of_known, &mut row.unknown_of_strangers, &mut row.auroc] {
@@ -277,7 +282,9 @@ fn seconds_per_frame(
     context: &Context<'_>,
 ) -> Result<f64> {
     let views = clips.first().map_or(0, |clip| clip.views.len());
-    let (model, _) = Recogniser::train_searched(clips, &method.experiment().fixed(), SCALING, &Unwatched)?;
+    let full_frames = clips.first().is_some_and(|clip| clip.views.iter().all(|view| view.boxes.is_some()));
+    let experiment = method.experiment(full_frames)?.fixed();
+    let (model, _) = Recogniser::train_searched(clips, &experiment, SCALING, &Unwatched)?;
     let sequences = folders
         .iter()
         .take(views)

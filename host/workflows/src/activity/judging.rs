@@ -30,6 +30,8 @@ pub struct JudgingSettings {
     pub samples: PathBuf,
     /// Names of activities in the samples and in the model where they differ.
     pub same: Vec<(String, String)>,
+    /// Rounds in which the model learns from its own surest answers for the samples first, without their labels; 0 for none.
+    pub self_training: usize,
     /// All views of a clip together, in place of each by itself.
     pub fused: bool,
     /// A new folder for confusion.png, confusion.md and wrong.csv.
@@ -88,6 +90,20 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
         settings.same.iter().find(|(own, _)| own == activity).map_or(activity, |(_, known)| known).to_owned()
     };
     let recogniser = model.recogniser(samples.full_frames);
+    let adapted = (settings.self_training > 0)
+        .then(|| {
+            let apart = |clip: &Clip| -> Vec<Vec<Track>> {
+                if recogniser.views > 1 {
+                    vec![clip.views.clone()]
+                } else {
+                    clip.views.iter().map(|v| vec![v.clone()]).collect()
+                }
+            };
+            let clips: Vec<Vec<Track>> = samples.clips.iter().flat_map(apart).collect();
+            recogniser.adapted(&clips, settings.self_training)
+        })
+        .transpose()?;
+    let recogniser = adapted.as_ref().unwrap_or(recogniser);
     let judged = answers(recogniser, &samples.clips, settings.fused, &name, context)?;
     let (known, strange): (Vec<Judged>, Vec<Judged>) =
         judged.into_iter().partition(|judged| activities.contains(&judged.truth));

@@ -1,8 +1,20 @@
 //! How activities are told apart: what training and evaluation share.
 
 use farnear_activity::recognition::{
-    classifier::Family, experiment::Experiment, frames::Mode, space::SpaceSettings,
+    alignment::Alignment, classifier::Family, experiment::Experiment, frames::Mode, space::SpaceSettings,
 };
+
+use super::shipped::Shipped;
+use crate::error::Result;
+
+/// What is done for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Adaptation {
+    /// What of their frames is brought to the training clips'.
+    pub align: Alignment,
+    /// Rounds of learning from one's own surest answers for them.
+    pub self_training: usize,
+}
 
 /// The method.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -23,14 +35,28 @@ pub enum Pattern {
         /// What tells patterns apart.
         classifier: Family,
     },
+    /// What the network of a model that comes with the program gives.
+    Features {
+        /// The model's name.
+        model: &'static Shipped,
+        /// What tells patterns apart.
+        classifier: Family,
+    },
     /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
     Thesis,
 }
 
 impl Method {
-    /// What is tried and chosen from.
-    pub fn experiment(&self) -> Experiment {
+    /// What is tried and chosen from, for full frames or cut-out silhouettes.
+    ///
+    /// # Errors
+    /// As [`Shipped::recognisers`].
+    pub fn experiment(&self, full_frames: bool) -> Result<Experiment> {
         let experiment = match (self.pattern, self.search) {
+            (Pattern::Features { model, classifier }, _) => {
+                let [full, cut_out] = model.recognisers()?;
+                Experiment::on_features(if full_frames { full } else { cut_out }.space, classifier)
+            }
             (Pattern::Thesis, _) => Experiment::thesis(),
             (Pattern::Codebook { mode, classifier }, true) => {
                 Experiment::searched(mode).with_classifier(classifier)
@@ -40,13 +66,14 @@ impl Method {
                     .with_classifier(classifier)
             }
         };
-        if self.search { experiment } else { experiment.fixed() }
+        Ok(if self.search { experiment } else { experiment.fixed() })
     }
 
     /// Its name among figures.
     pub fn name(&self) -> &'static str {
         match self.pattern {
             Pattern::Thesis => "thesis",
+            Pattern::Features { model, .. } => model.name,
             Pattern::Codebook { mode: Mode::OrderFree, .. } => "order-free",
             Pattern::Codebook { mode: Mode::Ordered, .. } => "ordered",
         }

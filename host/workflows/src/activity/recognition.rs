@@ -7,21 +7,27 @@ use std::{
 };
 
 use farnear_activity::{
-    mask::{centre::SIDE_PX, subject::Flag},
+    mask::{Mask, centre::SIDE_PX, subject::Flag},
     recognition::{
         clip::Track,
-        live::{Live, joined, segments, windows},
+        live::{Live, joined, windows},
         model::{Answer, Recogniser},
+        segmentation::{Worth, segmented},
+        self_training::ROUNDS,
     },
 };
+use farnear_files::masks;
 use serde::Serialize;
 
 use super::{
+    film::Film,
+    samples::{SCALING, are_full_frames},
     shipped::Shipped,
     views::{Frames, Seen, View},
 };
 use crate::{
     context::Context,
+    counter::Counter,
     error::{About, Result, WorkflowError},
     figures::rounded,
     parameters::at_least,
@@ -59,6 +65,37 @@ impl Model {
         Self::shipped(path).is_none().then_some(path)
     }
 
+    /// The same model for clips from elsewhere (another camera, sensor, laboratory): it learns on from its surest answers for unlabelled ones, folders
+    /// of masks of one clip in one view each.
+    ///
+    /// # Errors
+    /// Masks that cannot be read or do not fit the model, a model that fuses several views.
+    pub fn adapted_to(self, clips: &[PathBuf], context: &Context<'_>) -> Result<Self> {
+        let counter = Counter::new(context, "clips read");
+        let mut tracks = Vec::new();
+        let mut full_frames = true;
+        for folder in clips {
+            counter.check("reading clips")?;
+            let read: Vec<Mask> = masks::read_all(folder)?.into_iter().map(|named| named.mask).collect();
+            let full = are_full_frames(&read);
+            if !tracks.is_empty() && full != full_frames {
+                let expected = "clips that are all full frames or all cut out at 100x100";
+                return Err(WorkflowError::parameter("clip to adapt to", folder.display(), expected));
+            }
+            full_frames = full;
+            tracks.push(vec![Track::from_masks(&read, SCALING, full)]);
+            counter.one(Some(clips.len()));
+        }
+        let adapted =
+            |model: &Recogniser| model.adapted(&tracks, ROUNDS).about(|| self.path.display().to_string());
+        Ok(match (&self.cut_out, full_frames) {
+            (Some(cut_out), false) => {
+                Self { cut_out: Some(adapted(cut_out)?), recogniser: self.recogniser, path: self.path }
+            }
+            _ => Self { recogniser: adapted(&self.recogniser)?, cut_out: self.cut_out, path: self.path },
+        })
+    }
+
     /// What recognises masks of that kind.
     pub fn recogniser(&self, full_frames: bool) -> &Recogniser {
         self.cut_out.as_ref().filter(|_| !full_frames).unwrap_or(&self.recogniser)
@@ -91,6 +128,8 @@ pub struct RecognitionSettings {
     pub among: Vec<String>,
     /// Frames of the running answer and of windows over a long recording; without it as many as a training clip had.
     pub window: Option<usize>,
+    /// A new folder for the first view's frames with the running answer drawn on them.
+    pub film: Option<PathBuf>,
 }
 
 /// More or other views than the model's.
@@ -147,7 +186,7 @@ pub struct RecognitionFigures {
     pub window: usize,
     /// Answers for windows that overlap by half.
     pub windows: Vec<Part>,
-    /// The recording cut where the answer changes.
+    /// The recording cut into stretches of one activity each, by a hidden semi-Markov model; not by the windows.
     pub segments: Vec<Part>,
     /// From a file to its part of a running answer.
     pub seconds_per_frame: f64,
@@ -182,6 +221,7 @@ pub struct Recognition<'m> {
     window: usize,
     live: Live<'m>,
     among: Vec<String>,
+    film: Option<Film>,
     /// Everything seen so far: `[view][frame]`.
     tracks: Vec<Vec<Track>>,
     frames: usize,
@@ -211,6 +251,7 @@ impl<'m> Recognition<'m> {
         Ok(Self {
             live: Live::new(model, window, true),
             among: settings.among.clone(),
+            film: settings.film.as_deref().map(Film::begin).transpose()?,
             tracks: vec![Vec::new(); views.len()],
             model,
             views,
@@ -245,6 +286,9 @@ impl<'m> Recognition<'m> {
         let answer = self.live.push_described(described).about(|| name.clone())?;
         let answer = restricted(answer, &self.among);
         self.seconds += start.elapsed().as_secs_f64();
+        if let (Some(film), Some(first)) = (&mut self.film, moment.first()) {
+            film.draw(first.picture.as_ref(), &first.mask, &answer)?;
+        }
         let flags: Vec<String> =
             moment.iter().flat_map(|seen| seen.flags.iter().map(Flag::to_string)).collect();
         self.flagged_frames += usize::from(!flags.is_empty());
@@ -267,9 +311,20 @@ impl<'m> Recognition<'m> {
         let answer = restricted(self.model.recognise(&whole)?, &self.among);
         let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
         stretches.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), &self.among));
-        let part = |from: usize, to, activity: &Option<String>, confidence| Part {
-            from: from + 1,
-            to,
+        if let Some(film) = self.film {
+            film.finish()?;
+        }
+        let found = segmented(self.model, &whole, &self.among, Worth::default())?;
+        // Frames without anybody are not in the tracks.
+        let seen = self.tracks.iter().find(|frames| frames.iter().any(|track| track.frames() > 0));
+        let numbers: Vec<usize> = seen
+            .into_iter()
+            .flat_map(|frames| (0..).zip(frames).filter(|(_, track)| track.frames() > 0))
+            .map(|(number, _)| number)
+            .collect();
+        let part = |from: usize, to: usize, activity: &Option<String>, confidence| Part {
+            from: numbers.get(from).copied().unwrap_or(0) + 1,
+            to: to.checked_sub(1).and_then(|last| numbers.get(last)).map_or(self.frames, |last| last + 1),
             activity: activity.clone(),
             confidence: rounded_share(confidence),
         };
@@ -291,10 +346,7 @@ impl<'m> Recognition<'m> {
                 .iter()
                 .map(|s| part(s.from, s.to, &s.answer.activity, s.answer.confidence))
                 .collect(),
-            segments: segments(&stretches)
-                .iter()
-                .map(|s| part(s.from, s.to, &s.activity, s.confidence))
-                .collect(),
+            segments: found.iter().map(|s| part(s.from, s.to, &s.activity, s.confidence)).collect(),
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
         })
     }

@@ -15,6 +15,7 @@ use super::{samples::SCALING, watched};
 use crate::{context::Context, error::Result, figures::rounded, parameters::within};
 
 /// A recogniser that comes with the program.
+#[derive(PartialEq)]
 pub struct Shipped {
     /// What it is called in place of a file.
     pub name: &'static str,
@@ -44,6 +45,12 @@ pub const MODELS: &[Shipped] = &[
 
 /// What they were trained on and tested on, and where they fail.
 pub const SHEET: &str = include_str!("../../../activity/models/README.md");
+
+impl std::fmt::Debug for Shipped {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
 
 impl Shipped {
     /// The one of a name.

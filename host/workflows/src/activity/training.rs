@@ -4,7 +4,7 @@ use std::{path::PathBuf, time::Instant};
 
 use farnear_activity::recognition::{
     choice::names,
-    clip::Clip,
+    clip::{Clip, Track},
     model::Recogniser,
     space::{Map, PatternKind},
 };
@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::{
     method::Method,
+    motion::{self, MotionSettings},
     samples::{SCALING, Samples},
     watched,
 };
@@ -30,7 +31,9 @@ const WINDOW_MIN: usize = 5;
 #[derive(Clone, PartialEq, Debug)]
 pub struct TrainingSettings {
     /// The samples, TOML.
-    pub samples: PathBuf,
+    pub samples: Option<PathBuf>,
+    /// Motion files to learn from, too or instead; every view is a clip of its own then.
+    pub motion: Option<MotionSettings>,
     /// The model.
     pub out: PathBuf,
     /// How activities are told apart.
@@ -83,17 +86,15 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
         at_least("window", window, WINDOW_MIN, "frames")?;
     }
     let start = Instant::now();
-    let samples = Samples::read(&settings.samples, context)?;
-    let (frames, empty_frames, full_frames) = (samples.frames, samples.empty_frames, samples.full_frames);
-    let clips: Vec<Clip> = if settings.any_view { samples.split() } else { samples.fused()? };
+    let learned = Learned::read(settings, context)?;
+    let Learned { clips, frames, empty_frames, full_frames, what } = learned;
     let clips: Vec<Clip> = match settings.window {
         Some(length) => clips.iter().flat_map(|clip| clip.windows(length)).collect(),
         None => clips,
     };
-    let experiment = settings.method.experiment();
+    let experiment = settings.method.experiment(full_frames)?;
     let trained = Recogniser::train_searched(&clips, &experiment, SCALING, &watched::Training::new(context));
-    let (model, inner_accuracy) =
-        watched::outcome(trained, context, "training").about(|| settings.samples.display().to_string())?;
+    let (model, inner_accuracy) = watched::outcome(trained, context, "training").about(|| what)?;
     staging::write_file(&settings.out, &model.to_bytes()?)?;
     context.say(&format!("wrote {}", settings.out.display()));
     let (gamma, condition_number) = match &model.space.map {
@@ -116,6 +117,46 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
         inner_accuracy: inner_accuracy.map(|value| rounded(value, 4)),
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
     })
+}
+
+/// What is learned from.
+struct Learned {
+    clips: Vec<Clip>,
+    frames: usize,
+    empty_frames: usize,
+    full_frames: bool,
+    /// For messages.
+    what: String,
+}
+
+impl Learned {
+    fn read(settings: &TrainingSettings, context: &Context<'_>) -> Result<Self> {
+        let mut learned = Self {
+            clips: Vec::new(),
+            frames: 0,
+            empty_frames: 0,
+            full_frames: true,
+            what: "motion files".into(),
+        };
+        if let Some(path) = &settings.samples {
+            let samples = Samples::read(path, context)?;
+            learned.frames = samples.frames;
+            learned.empty_frames = samples.empty_frames;
+            learned.full_frames = samples.full_frames;
+            learned.what = path.display().to_string();
+            let apart = settings.any_view || settings.motion.is_some();
+            learned.clips = if apart { samples.split() } else { samples.fused()? };
+        }
+        if let Some(motion) = &settings.motion {
+            let mut clips = motion::clips(motion, context)?;
+            learned.frames += clips.iter().flat_map(|clip| &clip.views).map(Track::frames).sum::<usize>();
+            if !learned.full_frames {
+                clips.iter_mut().flat_map(|clip| &mut clip.views).for_each(|view| view.boxes = None);
+            }
+            learned.clips.extend(clips);
+        }
+        Ok(learned)
+    }
 }
 
 fn layout(model: &Recogniser) -> String {

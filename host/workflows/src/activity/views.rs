@@ -84,6 +84,8 @@ pub(super) struct Seen {
     pub name: String,
     pub mask: Mask,
     pub flags: Vec<Flag>,
+    /// The video's frame; `None` for masks.
+    pub picture: Option<Pixels>,
 }
 
 /// The frames of a view, one by one.
@@ -133,7 +135,7 @@ fn seen_in_mask(file: &Path, first: &mut Option<First>) -> Result<Seen> {
     let mut flags = chooser.choose(mask.view()).flags;
     // Cut-out silhouettes fill their picture, so touching its edge says nothing.
     flags.retain(|flag| found != (SIDE_PX, SIDE_PX) || *flag != Flag::CutByEdge);
-    Ok(Seen { name, mask, flags })
+    Ok(Seen { name, mask, flags, picture: None })
 }
 
 fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> Result<Seen> {
@@ -144,5 +146,5 @@ fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> R
         None => extractor.insert(Box::new(Extractor::like(frame, ExtractorSettings::for_frame(frame))?)),
     };
     let found = extractor.extract(frame)?.subject;
-    Ok(Seen { name, mask: found.mask, flags: found.flags })
+    Ok(Seen { name, mask: found.mask, flags: found.flags, picture: Some(pixels) })
 }

@@ -28,7 +28,7 @@ use farnear_files::staging::Staging;
 use serde::Serialize;
 
 use self::{drawing::Job, missing::MissingParts};
-use super::{MM_PER_PX, SilhouettesError, VIEWS};
+use super::{MM_PER_PX, SilhouettesError, VIEWS, performances::samples_entry};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -43,8 +43,8 @@ pub struct MarkersSettings {
     pub file: PathBuf,
     /// The file's unit and upward axis, where they are known better than the file says or suggests.
     pub choices: Choices,
-    /// A built-in template's name, or a TOML file.
-    pub template: String,
+    /// A built-in template's name, or a TOML file; without it the built-in one that fits best.
+    pub template: Option<String>,
     /// The new folder.
     pub out: PathBuf,
     /// Views at equal steps round the subject, 1 to 72.
@@ -66,6 +66,17 @@ pub struct MarkersSettings {
     pub centred: bool,
     /// Keep only so many silhouettes of all views, the least alike (Li 2014, eq. 7.3), at 100x100 pixels.
     pub keep: Option<usize>,
+    /// Write `samples.toml` too, for training and evaluation: who does what.
+    pub samples: Option<Performer>,
+}
+
+/// Who does what in a recording.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Performer {
+    /// The person.
+    pub subject: String,
+    /// The activity.
+    pub activity: String,
 }
 
 impl MarkersSettings {
@@ -77,6 +88,10 @@ impl MarkersSettings {
             within("closed gap", close_mm, &(0.0..=1000.0), "mm")?;
         }
         at_least("kept silhouettes", self.keep.unwrap_or(1), 1, "pictures")?;
+        if let (Some(keep), Some(_)) = (self.keep, &self.samples) {
+            let expected = "no gallery where samples are asked for: its frames are not in order";
+            return Err(WorkflowError::parameter("kept silhouettes", keep, expected));
+        }
         at_least("step between frames", self.every, 1, "frames")
     }
 
@@ -144,16 +159,18 @@ struct Flagged<'a> {
 pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<MarkersFigures> {
     settings.check()?;
     let start = Instant::now();
-    let template = template(&settings.template)?;
     let recording = recording(&settings.file, settings.choices)?;
     let shown = settings.file.display();
+    let template = match &settings.template {
+        Some(name) => template(name)?,
+        None => best_template(&recording, &settings.file)?,
+    };
     check_fit(&template, &recording, &settings.file)?;
-    let warnings: Vec<String> = recording
-        .remarks()
-        .into_iter()
-        .chain(lying(&recording))
-        .map(|remark| format!("{shown}: {remark}"))
-        .collect();
+    if settings.template.is_none() {
+        context.say(&format!("{shown}: the template `{}` fits best", template.name));
+    }
+    let warnings: Vec<String> =
+        remarks(&recording).into_iter().map(|remark| format!("{shown}: {remark}")).collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
     let out = Staging::new_folder(&settings.out)?;
     let numbers = || (0..recording.frames.len()).step_by(settings.every);
@@ -183,6 +200,12 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         flagged: missing.flagged(&names),
     };
     out.write("silhouettes.toml", toml::to_string(&index)?.as_bytes())?;
+    if let Some(performer) = &settings.samples {
+        let clip = settings.file.file_stem().unwrap_or_default().to_string_lossy();
+        let rows =
+            (1..=views.len()).map(|view| samples_entry(&format!("view{view}"), performer, view, &clip));
+        out.write("samples.toml", rows.collect::<String>().as_bytes())?;
+    }
     out.finish()?;
     context.say(&format!("wrote {}", settings.out.display()));
     Ok(MarkersFigures {
@@ -196,6 +219,11 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
         warnings: warnings.clone(),
     })
+}
+
+/// What was guessed about a recording, and what is strange about it.
+pub(crate) fn remarks(recording: &Recording) -> Vec<String> {
+    recording.remarks().into_iter().chain(lying(recording)).collect()
 }
 
 /// A person who is longer than high in most frames lies down, or another axis points up.
@@ -228,7 +256,7 @@ fn hidden_percent(recording: &Recording) -> f64 {
 }
 
 /// A built-in template, else one from a file.
-fn template(name: &str) -> Result<Template> {
+pub(crate) fn template(name: &str) -> Result<Template> {
     let path = Path::new(name);
     let wrong = |source| SilhouettesError::Template { name: name.into(), source };
     if Template::names().any(|known| known == name) || !path.is_file() {
@@ -238,7 +266,7 @@ fn template(name: &str) -> Result<Template> {
     Ok(Template::parse(&text).map_err(wrong)?)
 }
 
-fn recording(path: &Path, choices: Choices) -> Result<Recording> {
+pub(crate) fn recording(path: &Path, choices: Choices) -> Result<Recording> {
     let bytes = fs::read(path).map_err(WorkflowError::read("the recording", path))?;
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let read = readers::read(&bytes, &ending, choices);
@@ -249,12 +277,33 @@ fn recording(path: &Path, choices: Choices) -> Result<Recording> {
     Ok(recording)
 }
 
-/// Refuses a template with other names than the recording's, and says which built-in one fits.
-fn check_fit(template: &Template, recording: &Recording, path: &Path) -> Result<()> {
-    let fits = |name: &&'static str| {
-        Template::named(name).is_ok_and(|template| template.check(&recording.names).is_ok())
+/// The built-in template of which the recording has the largest share of markers; of equals the one that uses more of them.
+///
+/// # Errors
+/// [`SilhouettesError::Unfit`] where no template has half of its markers in the recording.
+pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Template> {
+    let mut ranked: Vec<(f64, usize, Template)> = Template::names()
+        .filter_map(|name| Template::named(name).ok())
+        .map(|template| {
+            let (present, of) = template.coverage(&recording.names);
+            (present as f64 / of.max(1) as f64, present, template)
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+    let Some((_, _, best)) = ranked.into_iter().next() else {
+        return Err(SilhouettesError::NoFrames { path: path.into() }.into());
     };
+    best.check(&recording.names).map_err(|source| {
+        WorkflowError::from(SilhouettesError::Unfit { path: path.into(), source, fits: None })
+    })?;
+    Ok(best)
+}
+
+/// Refuses a template with other names than the recording's, and says which built-in one fits best.
+pub(crate) fn check_fit(template: &Template, recording: &Recording, path: &Path) -> Result<()> {
     template.check(&recording.names).map_err(|source| {
-        SilhouettesError::Unfit { path: path.into(), source, fits: Template::names().find(fits) }.into()
+        let best = best_template(recording, path).ok();
+        let fits = best.and_then(|best| Template::names().find(|name| *name == best.name));
+        SilhouettesError::Unfit { path: path.into(), source, fits }.into()
     })
 }

@@ -14,7 +14,7 @@ use farnear_files::{masks, staging::Staging};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{MM_PER_PX, SilhouettesError, VIEWS};
+use super::{MM_PER_PX, SilhouettesError, VIEWS, markers::Performer};
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::within};
 
 /// What is under way where the work is cancelled.
@@ -150,12 +150,22 @@ fn draw_view(
 fn samples(performances: &[Performance], names: &[String], views: usize) -> String {
     let mut samples = String::new();
     for (Performance { subject, activity, .. }, name) in performances.iter().zip(names) {
+        let performer = Performer { subject: subject.clone(), activity: activity.clone() };
         for view in 1..=views {
-            samples += &format!(
-                "[[sample]]\nmasks = \"{name}/view{view}\"\nsubject = \"{subject}\"\nactivity = \"{activity}\"\n\
-                 view = {view}\nclip = \"{name}\"\n\n"
-            );
+            samples += &samples_entry(&format!("{name}/view{view}"), &performer, view, name);
         }
     }
     samples
+}
+
+/// One sample of `samples.toml`.
+pub(super) fn samples_entry(masks: &str, performer: &Performer, view: usize, clip: &str) -> String {
+    let quoted = |text: &str| toml::Value::String(text.into()).to_string();
+    format!(
+        "[[sample]]\nmasks = {}\nsubject = {}\nactivity = {}\nview = {view}\nclip = {}\n\n",
+        quoted(masks),
+        quoted(&performer.subject),
+        quoted(&performer.activity),
+        quoted(clip)
+    )
 }

@@ -11,7 +11,7 @@ use farnear_workflows::{
     Cancel, Context, Nobody, Progress, Result, WorkflowError,
     activity::{
         evaluation::{self, EvaluationSettings, LearnFrom},
-        method::{Method, Pattern},
+        method::{Adaptation, Method, Pattern},
         training::{self, TrainingSettings},
     },
     silhouettes::{
@@ -72,7 +72,8 @@ fn people(out: PathBuf) -> SyntheticSettings {
 
 fn training(samples: PathBuf, out: PathBuf) -> TrainingSettings {
     let pattern = Pattern::Codebook { mode: Mode::OrderFree, classifier: Family::Svc };
-    TrainingSettings { samples, out, method: Method { pattern, search: true }, window: None, any_view: false }
+    let method = Method { pattern, search: true };
+    TrainingSettings { samples: Some(samples), motion: None, out, method, window: None, any_view: false }
 }
 
 #[track_caller]
@@ -124,6 +125,7 @@ fn training_and_evaluation_are_counted_and_stop_in_the_middle() {
         samples,
         learn_from: LearnFrom::OtherSubjects,
         method: Method { search: false, ..settings.method },
+        adaptation: Adaptation::default(),
         views: None,
         out: Some(stopped.path().join("evaluation")),
     };

@@ -16,7 +16,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use rayon::prelude::*;
 
 /// Typical patterns of an activity that outliers are measured from.
-const TYPICAL: usize = 24;
+pub(in crate::recognition) const TYPICAL: usize = 24;
 
 impl Recogniser {
     /// Trains a network on clips in one view each, and on their mirrors; how sure its answers are and what counts as unknown is found
@@ -54,6 +54,7 @@ impl Recogniser {
         space.pattern = Pattern::Network(Box::new(network));
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
+        let (patterns, labels) = typical(&patterns, &labels, activities.len());
         let mut recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
             limits: Limits::none(activities.len()),
@@ -68,7 +69,8 @@ impl Recogniser {
                 weights: last.weights.t().to_owned(),
                 offsets: last.offsets,
             }),
-            patterns: typical(&patterns, &labels, activities.len()),
+            patterns,
+            labels,
             activities,
             views: 1,
             space,
@@ -99,7 +101,7 @@ impl Recogniser {
         }
         let scored: Vec<(usize, f32)> = patterns
             .iter()
-            .map(|pattern| (self.classifier.best(pattern.view()).0, self.distance(pattern)))
+            .map(|pattern| (self.classifier.best(pattern.view()).0, self.distance(pattern.view())))
             .collect();
         self.limits = Limits::conformal(&scored, self.activities.len(), Limits::FALSE_ALARMS);
         Ok(())
@@ -138,8 +140,8 @@ fn best_slope(decisions: &[Vec<f32>], labels: &[usize]) -> f32 {
     (0.5 * (low + high)).exp()
 }
 
-/// Centres of every activity's patterns (k-means).
-fn typical(patterns: &[Array1<f32>], labels: &[usize], classes: usize) -> Array2<f32> {
+/// Centres of every activity's patterns (k-means), and whose they are.
+fn typical(patterns: &[Array1<f32>], labels: &[usize], classes: usize) -> (Array2<f32>, Vec<usize>) {
     let centres: Vec<Array2<f32>> = (0..classes)
         .into_par_iter()
         .map(|class| {
@@ -154,5 +156,6 @@ fn typical(patterns: &[Array1<f32>], labels: &[usize], classes: usize) -> Array2
         })
         .collect();
     let views: Vec<ArrayView2<f32>> = centres.iter().map(|part| part.view()).collect();
-    concatenate(Axis(0), &views).unwrap_or_default()
+    let whose = centres.iter().enumerate().flat_map(|(class, part)| vec![class; part.nrows()]).collect();
+    (concatenate(Axis(0), &views).unwrap_or_default(), whose)
 }

@@ -4,12 +4,15 @@ use crate::embedding::descriptor::Scaling;
 use crate::mask::{BoundingBox, Mask};
 use crate::recognition::clip::Track;
 use crate::silhouette::capsule::{Capsule, Point3};
+use crate::silhouette::parts::{self, Fill};
 use crate::silhouette::raster::Point;
+use crate::silhouette::template::Template;
 use crate::silhouette::view::{Canvas, View, draw, extent};
 use crate::synthetic::damage::{Damage, damaged};
 use ndarray::s;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use std::collections::HashMap;
 
 /// A camera that looks at the middle of where somebody is.
 #[derive(Clone, Copy, Debug)]
@@ -69,20 +72,28 @@ impl Camera {
         }
     }
 
+    /// The same camera walked round to that side.
+    #[must_use]
+    pub fn from_side(self, gamma_deg: f64) -> Self {
+        Self { view: View { gamma_deg, ..self.view }, ..self }
+    }
+
+    /// A point's image in the plane through the target, and how much larger than there things are where it is.
+    fn seen(&self, matrix: &[[f64; 3]; 3], p: Point3) -> (Point3, f64) {
+        let p = [p[0], p[1], p[2] - self.target_mm];
+        let [x, depth, z] =
+            std::array::from_fn(|i| matrix[i][0] * p[0] + matrix[i][1] * p[1] + matrix[i][2] * p[2]);
+        // Nobody comes nearer than a third of the way.
+        let scale = self.distance_mm / (self.distance_mm + depth).max(0.33 * self.distance_mm);
+        ([scale * x, 0.0, scale * z], scale)
+    }
+
     /// A body's image: capsules in the plane through the target, larger the nearer they are.
     fn image(&self, body: &[Capsule]) -> Vec<Capsule> {
         let matrix = self.view.matrix();
-        let seen = |p: Point3| -> (Point3, f64) {
-            let p = [p[0], p[1], p[2] - self.target_mm];
-            let [x, depth, z] =
-                std::array::from_fn(|i| matrix[i][0] * p[0] + matrix[i][1] * p[1] + matrix[i][2] * p[2]);
-            // Nobody comes nearer than a third of the way.
-            let scale = self.distance_mm / (self.distance_mm + depth).max(0.33 * self.distance_mm);
-            ([scale * x, 0.0, scale * z], scale)
-        };
         body.iter()
             .map(|capsule| {
-                let ((from, a), (to, b)) = (seen(capsule.from), seen(capsule.to));
+                let ((from, a), (to, b)) = (self.seen(&matrix, capsule.from), self.seen(&matrix, capsule.to));
                 Capsule::new(from, to, 0.5 * (a + b) * capsule.radius_mm)
             })
             .collect()
@@ -99,15 +110,53 @@ impl Camera {
         let images: Vec<Vec<Capsule>> = bodies.iter().map(|body| self.image(body)).collect();
         let level = View::default();
         let reach: Vec<Point> = images.iter().flat_map(|image| extent(image, &level)).collect();
-        let Some(canvas) = Canvas::fitting(&reach, stature_mm / self.person_px, 2) else {
+        let drawn = |canvas: &Canvas| images.iter().map(|image| draw(image, &level, canvas)).collect();
+        self.filmed(&reach, stature_mm, drawn, scaling, rng)
+    }
+
+    /// The same of somebody in a suit whose points a template makes a body of; gaps between parts up to `gap_mm` are closed.
+    pub fn track_of_parts(
+        &self,
+        frames: &[HashMap<&str, Point3>],
+        (template, gap_mm): (&Template, f64),
+        stature_mm: f64,
+        scaling: Scaling,
+        rng: &mut ChaCha8Rng,
+    ) -> Track {
+        let (matrix, level) = (self.view.matrix(), View::default());
+        let image = |frame: &HashMap<&'_ str, Point3>| -> HashMap<String, Point3> {
+            frame.iter().map(|(name, p)| ((*name).to_owned(), self.seen(&matrix, *p).0)).collect()
+        };
+        let owned: Vec<HashMap<String, Point3>> = frames.iter().map(image).collect();
+        let images: Vec<HashMap<&str, Point3>> =
+            owned.iter().map(|frame| frame.iter().map(|(name, p)| (name.as_str(), *p)).collect()).collect();
+        let reach = parts::extent(&images, template, &level);
+        let drawn = |canvas: &Canvas| {
+            let gap_px = (gap_mm / canvas.mm_per_px).round() as usize;
+            let one =
+                |image| parts::close(&parts::draw(image, template, &level, canvas, Fill::Hull).mask, gap_px);
+            images.iter().map(one).collect()
+        };
+        self.filmed(&reach, stature_mm, drawn, scaling, rng)
+    }
+
+    /// What is drawn on a canvas that holds `reach`, cut by the picture's border and segmented.
+    fn filmed(
+        &self,
+        reach: &[Point],
+        stature_mm: f64,
+        drawn: impl FnOnce(&Canvas) -> Vec<Mask>,
+        scaling: Scaling,
+        rng: &mut ChaCha8Rng,
+    ) -> Track {
+        let Some(canvas) = Canvas::fitting(reach, stature_mm / self.person_px, 2) else {
             return Track::from_masks(&[], scaling, true);
         };
-        let below = canvas.height_px - (self.cut[0] * self.person_px) as usize;
+        let below = canvas.height_px.saturating_sub((self.cut[0] * self.person_px) as usize);
         let beside = (self.cut[1] * canvas.width_px as f64) as usize;
-        let masks: Vec<Mask> = images
-            .iter()
-            .map(|image| {
-                let whole = draw(image, &level, &canvas);
+        let masks: Vec<Mask> = drawn(&canvas)
+            .into_iter()
+            .map(|whole| {
                 let framed = whole.slice(s![..below.max(8).min(canvas.height_px), beside..]).to_owned();
                 self.segmented(framed, rng)
             })

@@ -4,11 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use farnear_activity::{evaluation::confusion::Confusion, recognition::choice::Views};
+use farnear_activity::{
+    evaluation::confusion::Confusion,
+    recognition::{alignment::Alignment, choice::Views, self_training::ROUNDS},
+};
 use farnear_workflows::activity::{
     evaluation::{self, EvaluationSettings, LearnFrom},
     judging::{self, JudgingSettings},
-    method::Method,
+    method::{Adaptation, Method},
     recognition::Model,
 };
 
@@ -43,7 +46,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SAMPLES")]
     train: Option<PathBuf>,
     /// Judge this model: a file, or the name of one that comes with the program.
-    #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["leave_one_subject_out", "train", "mode", "epl", "classifier", "no_search"])]
+    #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["leave_one_subject_out", "train", "mode", "epl", "classifier", "no_search", "features"])]
     model: Option<PathBuf>,
     /// An activity's name in the samples and in the model, where they differ; may be repeated.
     #[arg(long, value_name = "SAMPLES=MODEL", requires = "model", value_parser = same)]
@@ -51,6 +54,14 @@ pub struct Arguments {
     /// Leave every activity out of the training in turn, and say how well it is told to be unknown.
     #[arg(long, conflicts_with_all = ["leave_one_subject_out", "train", "model", "views", "out"])]
     open_set: bool,
+    /// Learn on from one's own surest answers for the clips that are recognised, without their labels: for clips from another camera,
+    /// sensor or laboratory than those learned from.
+    #[arg(long, conflicts_with = "open_set")]
+    adapt: bool,
+    /// Bring the frames of the clips that are recognised to those learned from, without labels: their mean, their mean and spread, or their
+    /// covariance too (coral).
+    #[arg(long, value_name = "none|mean|spread|coral", default_value = "none", conflicts_with_all = ["open_set", "model"])]
+    align: Alignment,
     #[command(flatten)]
     method: MethodArguments,
     /// each: every view by itself, answers counted together; fused: all views of a clip at once [default: fused, or each where clips
@@ -80,6 +91,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             samples: arguments.samples,
             same: arguments.same,
             fused: arguments.views == Some(Views::Fused),
+            self_training: if arguments.adapt { ROUNDS } else { 0 },
             out: arguments.out,
         };
         let figures = judging::judge(&Model::read(model)?, &settings, &terminal::counting(arguments.json)?)?;
@@ -105,6 +117,10 @@ pub fn run(arguments: Arguments) -> Result<()> {
         samples: arguments.samples,
         learn_from,
         method: arguments.method.method(),
+        adaptation: Adaptation {
+            align: arguments.align,
+            self_training: if arguments.adapt { ROUNDS } else { 0 },
+        },
         views: arguments.views,
         out: arguments.out,
     };

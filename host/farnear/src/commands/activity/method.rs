@@ -7,7 +7,10 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use farnear_activity::recognition::{classifier::Family, frames::Mode};
-use farnear_workflows::activity::method::{Method, Pattern};
+use farnear_workflows::activity::{
+    method::{Method, Pattern},
+    shipped::{MODELS, Shipped},
+};
 
 /// The method.
 #[derive(Args)]
@@ -21,6 +24,10 @@ pub struct MethodArguments {
     /// svc (linear support vectors), softmax (logistic regression) or knn (nearest neighbours).
     #[arg(long, default_value = "svc", value_parser = classifiers())]
     classifier: Family,
+    /// Tell activities apart by what the network of a model that comes with the program makes of clips: where samples are few, or come from
+    /// another camera than what is recognised. The model says whether the order of frames counts.
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["mode", "epl"], value_parser = shipped())]
+    features: Option<&'static Shipped>,
     /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
     #[arg(long)]
     no_search: bool,
@@ -42,10 +49,19 @@ impl MethodArguments {
         }
         let pattern = match self.epl {
             Some(Epl::Thesis) => Pattern::Thesis,
-            None => Pattern::Codebook { mode: self.mode, classifier: self.classifier },
+            None => match self.features {
+                Some(model) => Pattern::Features { model, classifier: self.classifier },
+                None => Pattern::Codebook { mode: self.mode, classifier: self.classifier },
+            },
         };
         Method { pattern, search }
     }
+}
+
+/// The names of all models that come with the program.
+fn shipped() -> impl TypedValueParser<Value = &'static Shipped> {
+    PossibleValuesParser::new(MODELS.iter().map(|model| model.name))
+        .try_map(|name| Shipped::named(&name).ok_or("no model of that name"))
 }
 
 /// The names of all classifiers, so that help and completions list them.

@@ -15,7 +15,8 @@ use crate::{report, terminal};
 ///
 /// For every frame one JSON line: the answer for the frames so far (at most `--window` of them), its confidence from 0 to 1, and its
 /// strangeness, the distance from all training data over what is known (above 1 the activity is null: unknown). The last line
-/// answers for the whole and, window by window, for a recording that nobody cut. With `--json` only that object is printed.
+/// answers for the whole, window by window, and for a recording that nobody cut in `segments`: where one activity ends and the next begins.
+/// With `--json` only that object is printed.
 #[derive(Args)]
 #[command(after_help = "Example: farnear activity recognise masks/ --model everyday\n\
                   \x20        farnear activity recognise masks/ --model everyday --among walk,jog,'sit down','stand up'\n\
@@ -34,6 +35,14 @@ pub struct Arguments {
     /// Frames of the running answer and of windows over a long recording [default: as many as a training clip had].
     #[arg(long, value_name = "FRAMES")]
     window: Option<usize>,
+    /// Folders of masks of other clips from where these come from, a clip in one view each, which nobody has to name: the model learns on from its
+    /// surest answers for them first. Some dozens, of most of the activities.
+    #[arg(long, value_name = "MASKS", num_args = 1..)]
+    adapt_to: Vec<PathBuf>,
+    /// A new folder for the first view's frames as pictures with the running answer drawn on them (a video: `ffmpeg -i
+    /// frame_%06d.png answer.mp4`).
+    #[arg(long, value_name = "DIR")]
+    video_out: Option<PathBuf>,
     /// What the folders hold; by default pictures of black and white alone are masks, others video.
     #[arg(long = "as", value_name = "KIND")]
     kind: Option<Kind>,
@@ -53,10 +62,18 @@ enum Kind {
 /// # Errors
 /// Models and frames that cannot be read or do not belong together.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let model = Model::read(&arguments.model)?;
+    let mut model = Model::read(&arguments.model)?;
+    if !arguments.adapt_to.is_empty() {
+        model = model.adapted_to(&arguments.adapt_to, &terminal::counting(arguments.json)?)?;
+    }
     let view = |path: PathBuf| -> Result<View> { Ok(View { kind: kind(&path, arguments.kind)?, path }) };
     let views = arguments.views.into_iter().map(view).collect::<Result<Vec<View>>>()?;
-    let settings = RecognitionSettings { views, among: arguments.among, window: arguments.window };
+    let settings = RecognitionSettings {
+        views,
+        among: arguments.among,
+        window: arguments.window,
+        film: arguments.video_out,
+    };
     let context = terminal::context()?;
     let mut work = Recognition::begin(&model, &settings)?;
     while let Some(answer) = work.next(&context)? {

@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
+use farnear_activity::readers::recording::{Choices, Unit, Up};
 use farnear_workflows::activity::{
+    motion::{MotionFile, MotionSettings},
     shipped::{self, SyntheticTraining},
     training::{self, TrainingSettings},
 };
@@ -19,17 +21,24 @@ use crate::{report, terminal};
 /// views are fused; give them a common `clip = "name"` where a subject does an activity more than once and the order does not tell.
 /// With two or more subjects the settings are chosen by cross-validation over them.
 ///
+/// --motion learns from motion files, alone or beside samples: recordings of markers or joints (.c3d, .trc, .bvh, .csv, .skeleton, .txt), or
+/// UTKinect's and Florence's MATLAB files. Each recording is seen by cameras all round, at any height and distance, in clothes of any
+/// thickness, cut and segmented as recordings are.
+///
 /// --synthetic makes models of everyday activities from seeded people alone, as those that come with the program were made: networks
 /// that recognise from any one view, ordered and order-free, for full frames and for 100x100; --out is a new folder then.
 #[derive(Args)]
 #[command(after_help = "Example: farnear activity train samples.toml --out model.fnm --mode ordered\n\
+                  \x20        farnear activity train --motion walk=02_01.bvh anna:'sit down'=sit.c3d --out model.fnm\n\
                   \x20        farnear activity train --synthetic everyday --out models/")]
 pub struct Arguments {
     /// The samples, TOML.
-    #[arg(required_unless_present = "synthetic")]
+    #[arg(required_unless_present_any = ["synthetic", "motion"])]
     samples: Option<PathBuf>,
+    #[command(flatten)]
+    motion: MotionArguments,
     /// Learn from synthetic people in place of samples.
-    #[arg(long, value_name = "WHICH", conflicts_with_all = ["samples", "window", "any_view", "mode", "epl", "classifier", "no_search"])]
+    #[arg(long, value_name = "WHICH", conflicts_with_all = ["samples", "motion", "window", "any_view", "mode", "epl", "classifier", "no_search", "features"])]
     synthetic: Option<Synthetic>,
     /// Synthetic people to learn from.
     #[arg(long, value_name = "COUNT", default_value_t = shipped::PEOPLE, requires = "synthetic")]
@@ -53,6 +62,36 @@ pub struct Arguments {
     json: bool,
 }
 
+/// What is learned from motion files.
+#[derive(Args)]
+struct MotionArguments {
+    /// Motion files to learn from: FILE that says itself what is done in it (UTKinect, Florence, NTU), or with the activity and, where it
+    /// is not the file's name, the person before it.
+    #[arg(long, value_name = "[[SUBJECT:]ACTIVITY=]FILE", num_args = 1..)]
+    motion: Vec<MotionFile>,
+    /// What makes bodies of the points: a built-in template's name or a TOML file [default: the built-in one that fits best].
+    #[arg(long, value_name = "NAME|FILE", requires = "motion")]
+    template: Option<String>,
+    /// Which axis of the motion files points up: x, y or z [default: as they say or suggest].
+    #[arg(long, requires = "motion")]
+    up: Option<Up>,
+    /// Their unit of length: mm, cm, m, in, cmu or a number of millimetres [default: as they say or suggest].
+    #[arg(long, value_name = "UNIT", requires = "motion")]
+    units: Option<Unit>,
+    /// Cameras that see every recording.
+    #[arg(long, value_name = "COUNT", default_value_t = 24, requires = "motion")]
+    cameras: usize,
+}
+
+impl MotionArguments {
+    fn settings(self) -> Option<MotionSettings> {
+        let choices = Choices { unit: self.units, up: self.up };
+        let settings =
+            MotionSettings { files: self.motion, template: self.template, choices, cameras: self.cameras };
+        (!settings.files.is_empty()).then_some(settings)
+    }
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum Synthetic {
     /// Walking, sitting down, waving, drinking, digging and so on (farnear activity models lists them).
@@ -70,11 +109,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
             SyntheticTraining { people: arguments.people, passes: arguments.passes, out: arguments.out };
         return report::print(&shipped::train(&settings, &terminal::counting(json)?)?, json);
     }
-    let Some(samples) = arguments.samples else {
-        bail!(report::Usage("give samples, or --synthetic".into()))
-    };
     let settings = TrainingSettings {
-        samples,
+        samples: arguments.samples,
+        motion: arguments.motion.settings(),
         out: arguments.out,
         method: arguments.method.method(),
         window: arguments.window,

@@ -8,11 +8,11 @@ use farnear_activity::{
     readers::recording::{Choices, Unit, Up},
     silhouette::parts::Fill,
 };
-use farnear_workflows::silhouettes::markers::{self, MarkersSettings};
+use farnear_workflows::silhouettes::markers::{self, MarkersSettings, Performer};
 
 use crate::{report, terminal};
 
-/// Silhouettes of a motion-capture recording (C3D, TRC, CSV or BVH) from views at equal steps round the subject.
+/// Silhouettes of a motion-capture recording (C3D, TRC, CSV, BVH, NTU or Kinect joints) from views at equal steps round the subject.
 ///
 /// A template says which markers make which part of the body; parts are filled and the gaps between them closed. Every view
 /// gets a folder `view1`, `view2`, ... of masks, one PNG per frame, all on one canvas so that the subject moves in it as in a
@@ -22,11 +22,13 @@ use crate::{report, terminal};
     after_help = "Example: farnear silhouettes markers walk.c3d --template plug-in-gait --views 8 --out masks/"
 )]
 pub struct Arguments {
-    /// The recording: .c3d, .trc, .bvh, or .csv with columns NAME_x, NAME_y, NAME_z in mm.
+    /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), or .csv with columns NAME_x,
+    /// NAME_y, NAME_z in mm.
     file: PathBuf,
-    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, or a TOML file of `[[part]] name, markers, thickness_mm`.
+    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, or a TOML file of `[[part]] name, markers,
+    /// thickness_mm` [default: the one of these that fits best, which is said].
     #[arg(long, value_name = "NAME|FILE")]
-    template: String,
+    template: Option<String>,
     /// Folder for the masks; must not exist or be empty.
     #[arg(long)]
     out: PathBuf,
@@ -66,6 +68,12 @@ pub struct Arguments {
     /// masks are 100x100 then.
     #[arg(long, value_name = "COUNT")]
     keep: Option<usize>,
+    /// Write samples.toml for `farnear activity` too: this activity is done in the recording.
+    #[arg(long, value_name = "ACTIVITY", conflicts_with = "keep")]
+    samples: Option<String>,
+    /// Who does it [default: the file's name].
+    #[arg(long, value_name = "NAME", requires = "samples")]
+    subject: Option<String>,
     /// Print figures as JSON.
     #[arg(long)]
     json: bool,
@@ -95,7 +103,12 @@ pub fn run(arguments: Arguments) -> Result<()> {
         UpAxis::Y => Up::Y,
         UpAxis::Z => Up::Z,
     });
+    let stem = || arguments.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let samples = arguments
+        .samples
+        .map(|activity| Performer { activity, subject: arguments.subject.unwrap_or_else(stem) });
     let settings = MarkersSettings {
+        samples,
         file: arguments.file,
         choices: Choices { unit: arguments.units, up },
         template: arguments.template,

@@ -62,7 +62,7 @@ pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Work>> {
     let settings = MarkersSettings {
         file: fields.path("file")?,
         choices: Choices { unit: fields.optional("units")?, up: up(fields)? },
-        template: template.display().to_string(),
+        template: Some(template.display().to_string()),
         out: fields.path("out")?,
         views: fields.or("views", 8)?,
         first_view_deg: fields.or("first_view_deg", 0.0)?,
@@ -77,6 +77,7 @@ pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Work>> {
         every: fields.or("every", 1)?,
         centred: fields.flag("centred")?,
         keep: fields.optional("keep")?,
+        samples: None,
     };
     let mut inputs = vec![settings.file.clone()];
     inputs.extend(template.is_file().then_some(template));
@@ -161,7 +162,8 @@ fn recognised(settings: &Recognising, out: &Path, shared: &Shared, context: &Con
         Ok(View { path: path.clone(), kind })
     };
     let views = settings.views.iter().map(view).collect::<Result<Vec<View>>>()?;
-    let settings = RecognitionSettings { views, among: settings.among.clone(), window: settings.window };
+    let settings =
+        RecognitionSettings { views, among: settings.among.clone(), window: settings.window, film: None };
     let mut work = Recognition::begin(&model, &settings)?;
     let mut answers = String::new();
     while let Some(answer) = work.next(context)? {

@@ -1,0 +1,145 @@
+//! Joints of a Kinect as text, a frame a line: 20 joints of a first or 25 of a second one, each x, y, z in metres (x across, y up, z away
+//! from the sensor), with or without a number before them that counts frames (as UTKinect's `joints_s01_e01.txt`).
+
+use super::reader::Reader;
+use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
+
+/// The entry of [`super::READERS`].
+pub const READER: Reader = Reader {
+    name: "Kinect joints",
+    extensions: &["txt"],
+    about: "20 or 25 joints a line, metres, y up; a frame's number may stand before them",
+    read,
+};
+
+/// The 25 joints of a second Kinect, the first 20 of them in the order of a first one's; a template knows both by these names.
+pub const JOINTS_25: [&str; 25] = [
+    "hip centre",
+    "spine",
+    "neck",
+    "head",
+    "left shoulder",
+    "left elbow",
+    "left wrist",
+    "left hand",
+    "right shoulder",
+    "right elbow",
+    "right wrist",
+    "right hand",
+    "left hip",
+    "left knee",
+    "left ankle",
+    "left foot",
+    "right hip",
+    "right knee",
+    "right ankle",
+    "right foot",
+    "shoulder centre",
+    "left hand tip",
+    "left thumb",
+    "right hand tip",
+    "right thumb",
+];
+
+/// Frames per second of the sensor.
+const RATE_HZ: f64 = 30.0;
+
+/// Reads a file of joints.
+///
+/// # Errors
+/// [`RecordingError::Line`]: what stands there and what was expected.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    let mut frames = Vec::new();
+    let mut joints = None;
+    for (line, content) in (1..).zip(text(bytes)?.lines()) {
+        let wrong = |reason: String| RecordingError::Line { line, reason };
+        let words = content.split([' ', '\t', ',', ';']).filter(|word| !word.trim().is_empty());
+        let numbers: Vec<f64> = words
+            .map(|word| {
+                let number = word.trim().parse::<f64>();
+                number.map_err(|_| {
+                    wrong(format!("`{}` is no number", word.chars().take(20).collect::<String>()))
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        if numbers.is_empty() {
+            continue;
+        }
+        let found = match numbers.len() {
+            60 | 61 => 20,
+            75 | 76 => 25,
+            other => {
+                return Err(wrong(format!(
+                    "{other} numbers, expected 20 or 25 joints of 3, and the frame's number or not"
+                )));
+            }
+        };
+        if *joints.get_or_insert(found) != found {
+            return Err(wrong(format!("{found} joints, the lines before have others")));
+        }
+        let points = &numbers[numbers.len() % 3..];
+        // What the sensor did not find it puts at its own place.
+        frames.push(
+            points.chunks_exact(3).map(|p| p.iter().any(|v| *v != 0.0).then(|| [p[0], p[1], p[2]])).collect(),
+        );
+    }
+    let Some(joints) = joints else {
+        return Err(RecordingError::Line {
+            line: 1,
+            reason: "no numbers, expected joints of a Kinect".into(),
+        });
+    };
+    let mut names: Vec<String> = JOINTS_25.iter().take(joints).map(|name| (*name).to_owned()).collect();
+    if joints == 20 {
+        // A first Kinect has no neck but a point between the shoulders.
+        names[2] = JOINTS_25[20].into();
+    }
+    Ok(Found {
+        names,
+        rate_hz: RATE_HZ,
+        frames,
+        unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
+        up: Known { value: Up::Y, source: Source::Format },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(joints: usize) -> String {
+        (0..3 * joints).map(|k| format!("{} ", 0.1 * (k + 1) as f64)).collect()
+    }
+
+    #[test]
+    fn first_and_second_sensors_are_told_by_their_joints() {
+        let first = read(format!("1 {}\n2 {}\n", line(20), line(20)).as_bytes()).expect("joints");
+        assert_eq!(
+            (first.frames.len(), first.names.len(), first.names[2].as_str()),
+            (2, 20, "shoulder centre")
+        );
+        let p = first.frames[1][0].expect("seen");
+        assert!((p[0] - 0.1).abs() < 1e-12 && (p[2] - 0.3).abs() < 1e-12);
+        let second = read(line(25).replace(' ', ",").as_bytes()).expect("joints");
+        assert_eq!((second.names[2].as_str(), second.names[24].as_str()), ("neck", "right thumb"));
+        let hidden = format!("0 0 0 {}", line(19));
+        assert_eq!(read(hidden.as_bytes()).expect("joints").frames[0][0], None);
+    }
+
+    #[test]
+    fn other_text_is_refused_with_its_line() {
+        for (text, line_number, part) in [
+            ("".to_owned(), 1, "no numbers"),
+            ("1 2 3\n".into(), 1, "3 numbers"),
+            (format!("{}\n{}\n", line(20), line(25)), 2, "25 joints"),
+            (format!("{}\nx\n", line(20)), 2, "`x`"),
+        ] {
+            match read(text.as_bytes()) {
+                Err(RecordingError::Line { line, reason }) => {
+                    assert!(line == line_number && reason.contains(part), "{line}: {reason}");
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! NTU RGB+D skeleton files (Shahroudy et al., CVPR 2016): 25 joints of a second Kinect, as text.
+//!
+//! The number of frames; per frame the number of bodies; per body a line about it (its id first), the number of joints and a line per
+//! joint: x, y, z in metres (x across, y up, z away from the sensor), eight further numbers, and last whether the joint was tracked (0: it
+//! was not). Where a file holds several people the one who is there longest is taken, the one who moves more of equals.
+
+use super::kinect::JOINTS_25;
+use super::reader::Reader;
+use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
+use crate::silhouette::capsule::Point3;
+use std::collections::BTreeMap;
+
+/// The entry of [`super::READERS`].
+pub const READER: Reader = Reader {
+    name: "NTU RGB+D",
+    extensions: &["skeleton"],
+    about: "25 joints of a Kinect, metres, y up; the person who is there longest",
+    read,
+};
+
+/// Frames per second of the sensor.
+const RATE_HZ: f64 = 30.0;
+
+type Body = Vec<Option<Point3>>;
+
+/// Reads a skeleton file.
+///
+/// # Errors
+/// [`RecordingError::Line`]: what stands there and what was expected.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    let mut lines = Lines { lines: text(bytes)?.lines(), at: 0 };
+    let count = lines.count("the number of frames")?;
+    let mut bodies: BTreeMap<String, Vec<(usize, Body)>> = BTreeMap::new();
+    for frame in 0..count {
+        for _ in 0..lines.count("the number of bodies")? {
+            let about = lines.next("a line about a body")?;
+            let id = about.split_whitespace().next().unwrap_or_default().to_owned();
+            let joints = lines.count("the number of joints")?;
+            if joints != JOINTS_25.len() {
+                return Err(lines.wrong(&format!("{joints} joints, expected {}", JOINTS_25.len())));
+            }
+            let body = (0..joints).map(|_| lines.joint()).collect::<Result<Body, RecordingError>>()?;
+            bodies.entry(id).or_default().push((frame, body));
+        }
+    }
+    let chosen =
+        bodies.into_values().max_by(|a, b| a.len().cmp(&b.len()).then_with(|| moved(a).total_cmp(&moved(b))));
+    let mut frames = vec![vec![None; JOINTS_25.len()]; count];
+    for (frame, body) in chosen.unwrap_or_default() {
+        frames[frame] = body;
+    }
+    Ok(Found {
+        names: JOINTS_25.iter().map(|name| (*name).to_owned()).collect(),
+        rate_hz: RATE_HZ,
+        frames,
+        unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
+        up: Known { value: Up::Y, source: Source::Format },
+    })
+}
+
+/// How far the joints of a body have gone, file units.
+fn moved(body: &[(usize, Body)]) -> f64 {
+    body.windows(2)
+        .flat_map(|pair| pair[0].1.iter().zip(&pair[1].1))
+        .filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)))
+        .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt())
+        .sum()
+}
+
+struct Lines<'a> {
+    lines: std::str::Lines<'a>,
+    at: usize,
+}
+
+impl<'a> Lines<'a> {
+    /// The next line that is not empty.
+    fn next(&mut self, what: &str) -> Result<&'a str, RecordingError> {
+        loop {
+            self.at += 1;
+            match self.lines.next() {
+                Some(line) if line.trim().is_empty() => {}
+                Some(line) => return Ok(line.trim()),
+                None => return Err(self.wrong(&format!("the file ends, expected {what}"))),
+            }
+        }
+    }
+
+    fn wrong(&self, reason: &str) -> RecordingError {
+        RecordingError::Line { line: self.at, reason: reason.into() }
+    }
+
+    fn count(&mut self, what: &str) -> Result<usize, RecordingError> {
+        /// More frames, bodies or joints are no skeleton file; nothing is made room for before its lines are there but frames.
+        const MOST: usize = 1_000_000;
+        let line = self.next(what)?;
+        let found = line.parse::<usize>().ok().filter(|count| *count <= MOST);
+        found.ok_or_else(|| self.wrong(&format!("`{}`, expected {what}", shortened(line))))
+    }
+
+    /// A joint; `None` where it was not tracked.
+    fn joint(&mut self) -> Result<Option<Point3>, RecordingError> {
+        let line = self.next("a joint")?;
+        let wrong = || self.wrong(&format!("`{}`, expected the numbers of a joint", shortened(line)));
+        let numbers: Vec<f64> = line
+            .split_whitespace()
+            .map(|word| word.parse().map_err(|_| wrong()))
+            .collect::<Result<_, _>>()?;
+        match numbers.as_slice() {
+            [x, y, z, .., tracked] => Ok((*tracked != 0.0).then_some([*x, *y, *z])),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+fn shortened(line: &str) -> String {
+    line.chars().take(40).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file of two frames: a passer-by in the first, somebody in both, whose left hand was not tracked.
+    fn file() -> String {
+        let body = |id: &str, x: f64| {
+            let joints: String = (0..25)
+                .map(|joint| {
+                    format!(
+                        "{x} {} 3 0 0 0 0 0 0 0 0 {}\n",
+                        joint as f64 / 25.0,
+                        if joint == 7 { 0 } else { 2 }
+                    )
+                })
+                .collect();
+            format!("{id} 0 1 1 1 1 0 0 0 2\n25\n{joints}")
+        };
+        format!("2\n2\n{}{}1\n{}", body("71", 5.0), body("72", 0.5), body("72", 0.6))
+    }
+
+    #[test]
+    fn the_person_who_stays_is_taken_in_metres_with_y_up() {
+        let found = read(file().as_bytes()).expect("a skeleton");
+        let settled = found.settled(super::super::recording::Choices::default());
+        assert_eq!((settled.frames.len(), settled.rate_hz), (2, 30.0));
+        let head = settled.by_name(1)["head"];
+        assert!(head.iter().zip([600.0, -3000.0, 120.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
+        assert!(!settled.by_name(0).contains_key("left hand"));
+        assert!(settled.remarks().is_empty());
+    }
+
+    #[test]
+    fn what_is_no_skeleton_is_refused_with_its_line() {
+        for (text, line) in [
+            (String::new(), 1),
+            ("2\n1\n71 0\n24\n".into(), 4),
+            (file().replacen("0.5 0.04 3", "0.5 x 3", 1), 33),
+            (file().lines().take(40).collect::<Vec<_>>().join("\n"), 41),
+            ("99999999999\n".into(), 1),
+        ] {
+            match read(text.as_bytes()) {
+                Err(RecordingError::Line { line: found, .. }) => assert_eq!(found, line, "{text:.40}"),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}

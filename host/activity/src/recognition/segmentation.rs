@@ -1,0 +1,214 @@
+//! Recordings that nobody cut: where one activity ends and the next begins.
+//!
+//! A recording is a row of segments, each with one activity: a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010) whose states
+//! last as long as clips do. A segment from frame a to b is worth
+//! `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - (ln((b - a) / typical))^2 / (2 spread^2)`: the probability of its most probable
+//! activity and how far it is from all that was learned, as the recogniser says of a whole clip, what a change costs, and how unusual
+//! its length is. The row that is worth most is found by dynamic programming over a grid of borders, which then move frame by frame to where
+//! both neighbours are worth most. O(frames / step x lengths) answers; frames are embedded once.
+
+use super::clip::Track;
+use super::live::Segment;
+use super::model::{Answer, ModelError, Recogniser};
+use super::nearest::Nearest;
+use super::patterns::joined;
+use ndarray::{Array1, Array2, s};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// What a row of segments is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worth {
+    /// What a change costs, nats.
+    pub change: f32,
+    /// What being an outlier costs a frame, nats per unit of the outlier score.
+    pub strange: f32,
+    /// Spread of the logarithm of lengths.
+    pub spread: f32,
+    /// Shortest and longest segment, in typical clips.
+    pub lengths: [f32; 2],
+}
+
+impl Default for Worth {
+    fn default() -> Self {
+        Self { change: 2.0, strange: 0.5, spread: 0.6, lengths: [0.3, 2.5] }
+    }
+}
+
+/// Borders are looked for at so many places in a typical clip first.
+const PLACES: usize = 12;
+/// In long recordings at no more places than this in all.
+const MOST_PLACES: usize = 1500;
+/// From one length to the next.
+const LONGER: f32 = 1.15;
+/// Fewest frames of a segment.
+const LEAST: usize = 4;
+
+/// A view embedded once.
+struct Embedded {
+    points: Array2<f32>,
+    boxes: Option<Array2<f32>>,
+}
+
+/// A recording whose stretches can be asked for.
+struct Recording<'a> {
+    recogniser: &'a Recogniser,
+    nearest: Nearest<'a>,
+    /// As [`Recogniser::groups`].
+    groups: Vec<Vec<Embedded>>,
+    among: &'a [String],
+    typical: f32,
+    /// Between places where borders are looked for first, frames.
+    step: usize,
+    worth: Worth,
+}
+
+/// A stretch's answer and what it is worth.
+#[derive(Clone)]
+struct Valued {
+    worth: f32,
+    answer: Answer,
+}
+
+impl Recording<'_> {
+    fn valued(&self, from: usize, to: usize) -> Valued {
+        let answers: Vec<Answer> = self.groups.iter().map(|group| self.answer(group, from, to)).collect();
+        let answer = Answer::joint(&answers);
+        let answer = if self.among.is_empty() { answer } else { answer.among(self.among) };
+        let frames = (to - from) as f32;
+        let unusual = (frames / self.typical).ln() / self.worth.spread;
+        let strange = answer.outlier_score.min(5.0);
+        let each = answer.confidence.max(1e-6).ln() - self.worth.strange * strange;
+        Valued { worth: frames * each - self.worth.change - 0.5 * unusual * unusual, answer }
+    }
+
+    fn answer(&self, group: &[Embedded], from: usize, to: usize) -> Answer {
+        let (space, sharpness) = (&self.recogniser.space, self.recogniser.settings.sharpness);
+        let patterns: Vec<Array1<f32>> = group
+            .iter()
+            .map(|view| {
+                let boxes = view.boxes.as_ref().map(|boxes| boxes.slice(s![from..to, ..]));
+                let vectors = space.vectors_of(view.points.slice(s![from..to, ..]), boxes);
+                space.pattern_of(vectors.view(), sharpness)
+            })
+            .collect();
+        let all: Vec<usize> = (0..patterns.len()).collect();
+        let pattern = joined(&patterns, &all);
+        self.recogniser.answer_by(pattern.view(), self.nearest.squared_distance(pattern.view()))
+    }
+}
+
+/// Cuts a recording into segments of one activity each, of all that the model knows or `among` some; neighbours with the same activity
+/// become one. Frames are counted as in the tracks.
+///
+/// # Errors
+/// Views that do not fit the model.
+pub fn segmented(
+    recogniser: &Recogniser,
+    views: &[Track],
+    among: &[String],
+    worth: Worth,
+) -> Result<Vec<Segment>, ModelError> {
+    // A frame of everybody tells whether the views fit.
+    let first: Vec<Track> = views.iter().map(|view| view.select(&[0][..view.frames().min(1)])).collect();
+    recogniser.recognise(&first)?;
+    let frames = views.iter().map(Track::frames).filter(|frames| *frames > 0).min().unwrap_or(0);
+    if frames == 0 {
+        return Ok(Vec::new());
+    }
+    let boxed = recogniser.uses_boxes();
+    let embedded = |track: &Track| -> Result<Embedded, ModelError> {
+        Ok(Embedded { points: recogniser.space.points(track)?, boxes: track.boxes.clone().filter(|_| boxed) })
+    };
+    let groups = recogniser.groups(views);
+    let groups: Result<Vec<Vec<Embedded>>, ModelError> =
+        groups.iter().map(|group| group.iter().map(embedded).collect()).collect();
+    let typical = recogniser.typical_frames.max(LEAST) as f32;
+    let step = (typical as usize / PLACES).max(frames / MOST_PLACES).max(1);
+    let nearest = Nearest::new(recogniser.patterns.view());
+    let recording = Recording { recogniser, nearest, groups: groups?, among, typical, step, worth };
+    let borders = refined(&recording, best_borders(&recording, frames));
+    Ok(merged(&recording, &borders))
+}
+
+/// The borders of the row that is worth most, over a grid; first 0, last the number of frames.
+fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
+    let step = recording.step;
+    let places: Vec<usize> = (0..frames).step_by(step).chain([frames]).collect();
+    let [shortest, longest] = recording.worth.lengths.map(|times| times * recording.typical);
+    let lengths: Vec<usize> = std::iter::successors(Some(shortest.max(LEAST as f32)), |l| Some(l * LONGER))
+        .take_while(|l| *l <= longest)
+        .map(|l| (l / step as f32).round().max(1.0) as usize)
+        .collect();
+    // The stretches that end at each place: where they begin, and what they are worth.
+    let ending: Vec<Vec<(usize, f32)>> = (0..places.len())
+        .into_par_iter()
+        .map(|end| {
+            let mut begins: Vec<usize> = lengths.iter().filter_map(|l| end.checked_sub(*l)).collect();
+            // What is shorter than a segment may stand where the recording begins, for all of it may be that short.
+            if end > 0 && (begins.is_empty() || lengths.iter().all(|l| *l >= end)) {
+                begins.push(0);
+            }
+            begins.dedup();
+            begins.iter().map(|&begin| (begin, recording.valued(places[begin], places[end]).worth)).collect()
+        })
+        .collect();
+    let mut best: Vec<(f32, usize)> = vec![(f32::NEG_INFINITY, 0); places.len()];
+    best[0] = (0.0, 0);
+    for end in 1..places.len() {
+        for &(begin, worth) in &ending[end] {
+            let all = best[begin].0 + worth;
+            if all > best[end].0 {
+                best[end] = (all, begin);
+            }
+        }
+    }
+    let mut at = places.len() - 1;
+    let mut borders = vec![places[at]];
+    while at > 0 {
+        at = if best[at].0.is_finite() { best[at].1 } else { at - 1 };
+        borders.push(places[at]);
+    }
+    borders.reverse();
+    borders
+}
+
+/// Moves every border to the frame within a step at which both neighbours are worth most.
+fn refined(recording: &Recording, mut borders: Vec<usize>) -> Vec<usize> {
+    let step = recording.step;
+    let mut known: HashMap<(usize, usize), f32> = HashMap::new();
+    for place in 1..borders.len().saturating_sub(1) {
+        let (before, at, after) = (borders[place - 1], borders[place], borders[place + 1]);
+        let low = at.saturating_sub(step).max(before + 1);
+        let high = (at + step).min(after - 1);
+        let mut value =
+            |from, to| *known.entry((from, to)).or_insert_with(|| recording.valued(from, to).worth);
+        let mut best = (value(before, at) + value(at, after), at);
+        for border in low..=high {
+            let found = value(before, border) + value(border, after);
+            if found > best.0 {
+                best = (found, border);
+            }
+        }
+        borders[place] = best.1;
+    }
+    borders
+}
+
+/// Segments between borders, neighbours with one activity together.
+fn merged(recording: &Recording, borders: &[usize]) -> Vec<Segment> {
+    let mut found: Vec<Segment> = Vec::new();
+    for pair in borders.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let Answer { activity, confidence, .. } = recording.valued(from, to).answer;
+        match found.last_mut().filter(|last| last.activity == activity) {
+            Some(last) => {
+                let (own, all) = ((to - from) as f32, (to - last.from) as f32);
+                last.confidence += (confidence - last.confidence) * own / all;
+                last.to = to;
+            }
+            None => found.push(Segment { from, to, activity, confidence }),
+        }
+    }
+    found
+}

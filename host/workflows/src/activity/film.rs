@@ -1,0 +1,91 @@
+//! A recording with the running answer drawn on it: a folder of pictures, which is a video to this program and to others.
+
+use std::{io::Cursor, path::Path};
+
+use farnear_activity::{
+    mask::{Mask, bits::BitMask},
+    recognition::model::Answer,
+};
+use farnear_files::{EncodeError, staging::Staging, text::Writer, video::Pixels};
+use image::{ImageFormat, Rgb, RgbImage, imageops};
+
+use crate::error::Result;
+
+const INK: Rgb<u8> = Rgb([255, 255, 255]);
+const DARK: Rgb<u8> = Rgb([24, 24, 24]);
+const OUTLINE: Rgb<u8> = Rgb([255, 160, 0]);
+const KNOWN: Rgb<u8> = Rgb([60, 160, 90]);
+const UNKNOWN: Rgb<u8> = Rgb([150, 60, 60]);
+const TEXT_PX: f32 = 20.0;
+const GAP_PX: u32 = 6;
+/// Smaller frames are enlarged by whole numbers until they are this high.
+const LEAST_HEIGHT_PX: u32 = 240;
+/// The most probable activities that are shown.
+const SHOWN: usize = 3;
+
+/// Pictures under way; dropped before the end they leave nothing behind.
+pub(super) struct Film {
+    out: Staging,
+    writer: Writer,
+    frames: usize,
+}
+
+impl Film {
+    /// Begins a new folder.
+    pub fn begin(folder: &Path) -> Result<Self> {
+        Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)?, frames: 0 })
+    }
+
+    /// Draws a frame: the picture (the mask where there is none), the person's outline, and the answer so far with the next
+    /// most probable ones.
+    pub fn draw(&mut self, picture: Option<&Pixels>, mask: &Mask, answer: &Answer) -> Result<()> {
+        let seen = with_outline(picture, mask);
+        let line = self.writer.height();
+        let strip = SHOWN as u32 * (line + GAP_PX) + GAP_PX;
+        let (width, height) = (seen.width().max(320), seen.height());
+        let mut page = RgbImage::from_pixel(width, height + strip, DARK);
+        imageops::overlay(&mut page, &seen, i64::from((width - seen.width()) / 2), 0);
+        let mut ranked: Vec<&(String, f32)> = answer.probabilities.iter().collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (row, (name, share)) in (0_u32..).zip(ranked.into_iter().take(SHOWN)) {
+            let top = height + GAP_PX + row * (line + GAP_PX);
+            let bar = ((width - 2 * GAP_PX) as f32 * share.clamp(0.0, 1.0)) as u32;
+            let colour = if answer.activity.is_some() { KNOWN } else { UNKNOWN };
+            for (x, y) in (0..bar).flat_map(|x| (0..line).map(move |y| (x, y))) {
+                page.put_pixel(GAP_PX + x, top + y, colour);
+            }
+            let unknown = if row == 0 && answer.activity.is_none() { " (unknown)" } else { "" };
+            let text = format!("{name} {:.0} %{unknown}", 100.0 * share);
+            self.writer.write(&mut page, 2 * GAP_PX, top, &text, INK);
+        }
+        self.frames += 1;
+        let mut png = Cursor::new(Vec::new());
+        page.write_to(&mut png, ImageFormat::Png).map_err(EncodeError::of("a frame with its answer"))?;
+        Ok(self.out.write(&format!("frame_{:06}.png", self.frames), &png.into_inner())?)
+    }
+
+    /// Puts the folder in place.
+    pub fn finish(self) -> Result<()> {
+        Ok(self.out.finish()?)
+    }
+}
+
+/// The picture, enlarged where it is small, with the mask's outline.
+fn with_outline(picture: Option<&Pixels>, mask: &Mask) -> RgbImage {
+    let (height, width) = mask.dim();
+    let level = |y: usize, x: usize| match picture {
+        Some(Pixels::Grey(grey)) => grey.get((y, x)).map_or([0; 3], |v| [*v; 3]),
+        Some(Pixels::Rgb(rgb)) => [0, 1, 2].map(|k| rgb.get((y, x, k)).copied().unwrap_or_default()),
+        None => [if mask[[y, x]] { 200 } else { 0 }; 3],
+    };
+    let inner = BitMask::pack(mask.view()).eroded(1).unpack();
+    let seen = RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let (y, x) = (y as usize, x as usize);
+        if mask[[y, x]] && !inner[[y, x]] { OUTLINE } else { Rgb(level(y, x)) }
+    });
+    let times = LEAST_HEIGHT_PX.div_ceil(seen.height().max(1)).clamp(1, 8);
+    if times == 1 || seen.height() >= LEAST_HEIGHT_PX {
+        return seen;
+    }
+    imageops::resize(&seen, seen.width() * times, seen.height() * times, imageops::FilterType::Nearest)
+}

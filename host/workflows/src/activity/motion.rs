@@ -1,0 +1,267 @@
+//! Motion files as training clips: recordings of markers or joints, and public sets of joints, seen by cameras all round.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use farnear_activity::{
+    readers::{
+        recording::{Choices, Recording},
+        skeletons::{
+            FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, UTKINECT_ACTIVITIES, dress,
+            read_cells,
+        },
+    },
+    recognition::clip::{Clip, Track},
+    silhouette::template::Template,
+    synthetic::recorded::{self, Bodies},
+};
+
+use super::samples::SCALING;
+use crate::{
+    context::Context,
+    counter::Counter,
+    error::{Result, WorkflowError},
+    parameters::within,
+    silhouettes::{SilhouettesError, markers},
+};
+
+/// What is under way where the work is cancelled.
+const DURING: &str = "drawing motion files";
+/// Ending of MATLAB files, which hold sets of joints.
+const MATLAB: &str = "mat";
+
+/// A motion file, and what is done in it by whom.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MotionFile {
+    /// What is done; `None` for files that say it: a set's MATLAB file, or NTU's in their names.
+    pub activity: Option<String>,
+    /// Who does it; `None` for the file's name, or what a set says.
+    pub subject: Option<String>,
+    /// The file.
+    pub path: PathBuf,
+}
+
+impl FromStr for MotionFile {
+    type Err = String;
+
+    /// `ACTIVITY=FILE`, `SUBJECT:ACTIVITY=FILE` or `FILE`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = |name: &str| Some(name.trim().to_owned()).filter(|name| !name.is_empty());
+        let (names, path) = text.split_once('=').map_or((None, text), |(names, path)| (Some(names), path));
+        let (subject, activity) = match names.map(|names| names.split_once(':').ok_or(names)) {
+            Some(Ok((subject, activity))) => (named(subject), named(activity)),
+            Some(Err(activity)) => (None, named(activity)),
+            None => (None, None),
+        };
+        if path.trim().is_empty() || (names.is_some() && activity.is_none()) {
+            return Err(
+                "expected ACTIVITY=FILE, SUBJECT:ACTIVITY=FILE, or FILE where it says what is done".into()
+            );
+        }
+        Ok(Self { activity, subject, path: path.trim().into() })
+    }
+}
+
+/// Which motion files are learned from, and how they are seen.
+#[derive(Clone, PartialEq, Debug)]
+pub struct MotionSettings {
+    /// The files.
+    pub files: Vec<MotionFile>,
+    /// What makes bodies of points: a built-in template's name, or a TOML file; without it the built-in one that fits best.
+    pub template: Option<String>,
+    /// Unit and upward axis, where they are known better than the files say or suggest.
+    pub choices: Choices,
+    /// Sides that every recording is seen from, 1 to 500.
+    pub cameras: usize,
+}
+
+/// Why a motion file teaches nothing.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum MotionError {
+    /// Nothing says what is done in it.
+    #[error("{}: nothing says what is done in it; name it ACTIVITY=FILE", path.display())]
+    Activity {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A set has its own names.
+    #[error("{}: a set of joints says itself who does what; give the file alone", path.display())]
+    Named {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No camera sees anybody.
+    #[error("{}: nobody is seen; the unit or the upward axis may be wrong", path.display())]
+    NobodySeen {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// One recorded performance.
+struct Recorded {
+    subject: String,
+    activity: String,
+    rate_hz: f64,
+    joints: Joints,
+}
+
+enum Joints {
+    Set(SkeletonClip, Layout),
+    Points(Recording, Template),
+}
+
+/// The clips of motion files, each in one view.
+///
+/// # Errors
+/// Files that cannot be read, fit no template, do not say what is done in them, or in which nobody is seen.
+pub fn clips(settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Clip>> {
+    within("cameras", settings.cameras, &(1..=500), "")?;
+    let mut all = Vec::new();
+    let counter = Counter::new(context, "motion files");
+    for file in &settings.files {
+        counter.check(DURING)?;
+        let mut found = Vec::new();
+        for recorded in recorded(file, settings, context)? {
+            counter.check(DURING)?;
+            let seed = seed_of(&file.path, found.len());
+            found.extend(seen(&recorded, settings.cameras, seed));
+        }
+        if found.is_empty() {
+            return Err(MotionError::NobodySeen { path: file.path.clone() }.into());
+        }
+        all.extend(found);
+        counter.one(Some(settings.files.len()));
+    }
+    Ok(all)
+}
+
+/// A recording as every camera sees it, a clip each.
+fn seen(recorded: &Recorded, cameras: usize, seed: u64) -> Vec<Clip> {
+    let tracks: Vec<Track> = match &recorded.joints {
+        Joints::Set(clip, layout) => {
+            let bodies = clip.frames.iter().map(|joints| dress(joints, layout)).collect();
+            recorded::tracks(&Bodies::Capsules(bodies), recorded.rate_hz, cameras, seed, SCALING)
+        }
+        Joints::Points(recording, template) => {
+            let frames = (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
+            let bodies = Bodies::Parts(frames, template.clone());
+            recorded::tracks(&bodies, recorded.rate_hz, cameras, seed, SCALING)
+        }
+    };
+    let clip = |view| Clip {
+        subject: recorded.subject.clone(),
+        activity: recorded.activity.clone(),
+        views: vec![view],
+    };
+    tracks.into_iter().map(clip).collect()
+}
+
+/// What a file holds.
+fn recorded(file: &MotionFile, settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Recorded>> {
+    let path = &file.path;
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if ending == MATLAB {
+        return if file.activity.is_some() {
+            Err(MotionError::Named { path: path.clone() }.into())
+        } else {
+            set(path)
+        };
+    }
+    let (said_subject, said_activity) = ntu_names(path).map_or((None, None), |(s, a)| (Some(s), Some(a)));
+    let Some(activity) = file.activity.clone().or(said_activity) else {
+        return Err(MotionError::Activity { path: path.clone() }.into());
+    };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let recording = markers::recording(path, settings.choices)?;
+    for remark in markers::remarks(&recording) {
+        context.progress.warn(&format!("{}: {remark}", path.display()));
+    }
+    let template = match &settings.template {
+        Some(name) => markers::template(name)?,
+        None => markers::best_template(&recording, path)?,
+    };
+    markers::check_fit(&template, &recording, path)?;
+    Ok(vec![Recorded {
+        subject: file.subject.clone().or(said_subject).unwrap_or(stem),
+        activity,
+        rate_hz: recording.rate_hz,
+        joints: Joints::Points(recording, template),
+    }])
+}
+
+/// The performances of UTKinect or Florence, told by their joints.
+fn set(path: &Path) -> Result<Vec<Recorded>> {
+    /// Frames per second that both sets come to after their own cutting.
+    const RATE_HZ: f64 = 15.0;
+    let bytes = fs::read(path).map_err(WorkflowError::read("the skeletons", path))?;
+    let sets: [(Layout, &[&str]); 2] =
+        [(KINECT_20, &UTKINECT_ACTIVITIES), (FLORENCE_15, &FLORENCE_ACTIVITIES)];
+    let mut last = None;
+    for (layout, activities) in sets {
+        match read_cells(&bytes, &layout) {
+            Ok(clips) => {
+                let performance = |clip: SkeletonClip| Recorded {
+                    subject: format!("s{:02}", clip.subject + 1),
+                    activity: activities
+                        .get(clip.activity)
+                        .map_or_else(|| clip.activity.to_string(), ToString::to_string),
+                    rate_hz: RATE_HZ,
+                    joints: Joints::Set(clip, layout),
+                };
+                return Ok(clips.into_iter().map(performance).collect());
+            }
+            Err(source) => last = Some(SilhouettesError::Skeletons { path: path.into(), source }),
+        }
+    }
+    Err(last.map_or_else(|| MotionError::NobodySeen { path: path.into() }.into(), Into::into))
+}
+
+/// Person and activity in a name as NTU gives it: `S001C001P003R002A008.skeleton`.
+fn ntu_names(path: &Path) -> Option<(String, String)> {
+    let stem = path.file_stem()?.to_str()?;
+    let part = |letter: char| {
+        let from = stem.find(letter)?;
+        let digits = stem.get(from + 1..from + 4)?;
+        digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| format!("{letter}{digits}"))
+    };
+    (stem.len() == 20).then_some(())?;
+    Some((part('P')?, part('A')?))
+}
+
+/// The same for a file's name and performance on every computer.
+fn seed_of(path: &Path, number: usize) -> u64 {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    // FNV-1a.
+    let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    hash.wrapping_add(number as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_named_with_what_is_done_by_whom() {
+        let found: MotionFile = "anna: sit down =a=b.c3d".parse().expect("a file");
+        assert_eq!((found.subject.as_deref(), found.activity.as_deref()), (Some("anna"), Some("sit down")));
+        assert_eq!(found.path, Path::new("a=b.c3d"));
+        let found: MotionFile = "walk=x.bvh".parse().expect("a file");
+        assert_eq!((found.subject, found.activity.as_deref()), (None, Some("walk")));
+        assert_eq!("x.mat".parse::<MotionFile>().expect("a file").activity, None);
+        assert!("=x.bvh".parse::<MotionFile>().is_err() && "walk=".parse::<MotionFile>().is_err());
+    }
+
+    #[test]
+    fn ntu_says_person_and_activity_in_names() {
+        let found = ntu_names(Path::new("d/S001C002P003R002A008.skeleton"));
+        assert_eq!(found, Some(("P003".into(), "A008".into())));
+        assert_eq!(ntu_names(Path::new("APPLES.skeleton")), None);
+        assert_ne!(seed_of(Path::new("a.bvh"), 0), seed_of(Path::new("b.bvh"), 0));
+    }
+}
