@@ -16,15 +16,19 @@ mod sharpness;
 
 use std::ops::Range;
 
-use ndarray::{Array2, ArrayView2, s};
+use ndarray::{Array2, ArrayView2, Axis, Zip, s};
 use rayon::prelude::*;
 
+use crate::prepare::band::box_mean;
 pub use sharpness::{Sharpness, UnknownSharpness};
+use sharpness::{blur_reach_px, blurred};
 
 /// Images that make a stack.
 pub const LEAST_IMAGES: usize = 3;
 /// Rows that are worked on at a time.
 const BAND: usize = 48;
+/// Most that images are blurred by first, px.
+pub const MOST_SMOOTHING_PX: f32 = 10.0;
 /// Reliability below which a place has no depth, where nothing else is asked for.
 pub const USUAL_RELIABILITY: f32 = 0.1;
 
@@ -33,21 +37,29 @@ pub const USUAL_RELIABILITY: f32 = 0.1;
 pub struct StackSettings {
     /// The focus measure.
     pub measure: Sharpness,
+    /// Standard deviation of the Gaussian by which the images are blurred first, px; 0 = not at all. What is finer is mostly
+    /// noise and rounding, which weak texture drowns in.
+    pub smoothing_px: f32,
     /// Side of the window it is taken over, odd.
     pub window_px: usize,
     /// Points of the curve that the tip is fitted to, at most; odd.
     pub fit_points: usize,
+    /// Side of the median over the places found, odd; 1 = none.
+    pub median_px: usize,
     /// Places below this reliability have no value.
     pub min_reliability: f32,
 }
 
 impl Default for StackSettings {
-    /// The modified Laplacian, which the survey finds best on the whole, over 9 pixels; 11 points.
+    /// The modified Laplacian, which the survey finds best on the whole, over 9 pixels of images blurred by 1; 11 points; a median
+    /// of 9x9.
     fn default() -> Self {
         Self {
             measure: Sharpness::ModifiedLaplacian,
+            smoothing_px: 1.0,
             window_px: 9,
             fit_points: 11,
+            median_px: 9,
             min_reliability: USUAL_RELIABILITY,
         }
     }
@@ -98,6 +110,9 @@ pub enum StackError {
         /// Largest.
         most: usize,
     },
+    /// A blur that is none.
+    #[error("the images are to be blurred by {0} px: 0 to {MOST_SMOOTHING_PX} is possible")]
+    Smoothing(f32),
     /// A pixel without a value.
     #[error("image {number}: the pixel in column {column}, row {row} is not finite")]
     NotFinite {
@@ -133,15 +148,46 @@ pub fn depth_from_stack(
     check(images, settings)?;
     let (height, width) = images[0].dim();
     let tops: Vec<usize> = (0..height).step_by(BAND).collect();
-    let bands: Vec<Vec<[f32; 3]>> =
+    let bands: Vec<Vec<[f32; 2]>> =
         tops.into_par_iter().map(|top| band(images, settings, top..(top + BAND).min(height))).collect();
-    let map = |of: fn(&[f32; 3]) -> f32| {
+    let map = |of: fn(&[f32; 2]) -> f32| {
         let values = bands.iter().flatten().map(of).collect();
         Array2::from_shape_vec((height, width), values)
             .unwrap_or_else(|_| unreachable!("every row is in a band"))
     };
-    let place = map(|[place, _, _]| *place);
-    Ok(StackMap { place, reliability: map(|[_, reliability, _]| *reliability), all_in_focus: map(|v| v[2]) })
+    let (place, reliability) = (map(|[place, _]| *place), map(|[_, reliability]| *reliability));
+    let mut place = median(&place, settings.median_px);
+    let mut all_in_focus = Array2::zeros((height, width));
+    Zip::indexed(&mut all_in_focus).and(&mut place).and(&reliability).for_each(
+        |at, sharp, place, reliability| {
+            *sharp = between(images, *place, at);
+            if *reliability < settings.min_reliability {
+                *place = f32::NAN;
+            }
+        },
+    );
+    Ok(StackMap { place, reliability, all_in_focus })
+}
+
+/// Median over a window of `side` pixels, smaller at the borders.
+fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
+    if side == 1 {
+        return map.clone();
+    }
+    let (reach, (height, width)) = (side / 2, map.dim());
+    let mut result = Array2::zeros((height, width));
+    result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
+        let mut window = Vec::with_capacity(side * side);
+        for (x, value) in row.iter_mut().enumerate() {
+            let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
+            let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
+            window.clear();
+            window.extend(map.slice(s![rows, columns]).iter().copied());
+            let middle = window.len() / 2;
+            *value = *window.select_nth_unstable_by(middle, f32::total_cmp).1;
+        }
+    });
+    result
 }
 
 fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), StackError> {
@@ -151,6 +197,10 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
     };
     odd("the window", settings.window_px, 3, 101)?;
     odd("the number of points", settings.fit_points, 3, 31)?;
+    odd("the median's window", settings.median_px, 1, 31)?;
+    if !(0.0..=MOST_SMOOTHING_PX).contains(&settings.smoothing_px) {
+        return Err(StackError::Smoothing(settings.smoothing_px));
+    }
     if images.len() < LEAST_IMAGES {
         return Err(StackError::TooFew { count: images.len() });
     }
@@ -170,16 +220,19 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
     Ok(())
 }
 
-/// Place, reliability and sharp value of each pixel of some rows.
-fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>) -> Vec<[f32; 3]> {
+/// Place and reliability of each pixel of some rows.
+fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>) -> Vec<[f32; 2]> {
     let (height, width) = images[0].dim();
     // Rows beyond the band that its values depend on; at the picture's own border there are none.
-    let reach = settings.window_px / 2 + Sharpness::REACH_PX;
+    let reach = 2 * (settings.window_px / 2) + Sharpness::REACH_PX + blur_reach_px(settings.smoothing_px);
     let from = rows.start.saturating_sub(reach);
     let seen = from..(rows.end + reach).min(height);
     let measured: Vec<Array2<f32>> = images
         .iter()
-        .map(|image| settings.measure.of(image.slice(s![seen.clone(), ..]), settings.window_px))
+        .map(|image| {
+            let rows = image.slice(s![seen.clone(), ..]);
+            measured_over_windows(rows, settings)
+        })
         .collect();
     let mut curve = vec![0.0; images.len()];
     let pixels = rows.flat_map(|y| (0..width).map(move |x| (y, x)));
@@ -187,10 +240,21 @@ fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>
         .map(|(y, x)| {
             curve.iter_mut().zip(&measured).for_each(|(value, map)| *value = map[(y - from, x)]);
             let Tip { place, reliability } = tip(&curve, settings.fit_points);
-            let known = reliability >= settings.min_reliability;
-            [if known { place } else { f32::NAN }, reliability, between(images, place, (y, x))]
+            [place, reliability]
         })
         .collect()
+}
+
+/// The focus measure over windows that fade towards their rim: the mean over the window is taken twice, for a window with a hard
+/// rim puts a sharp detail's place on everything within its reach.
+fn measured_over_windows(image: ArrayView2<f32>, settings: &StackSettings) -> Array2<f32> {
+    let side = settings.window_px;
+    let measured = if settings.smoothing_px > 0.0 {
+        settings.measure.of(blurred(image, settings.smoothing_px).view(), side)
+    } else {
+        settings.measure.of(image, side)
+    };
+    box_mean(measured.view(), side)
 }
 
 /// A pixel between two images of the stack.
@@ -315,15 +379,45 @@ mod tests {
         for measure in
             [Sharpness::ModifiedLaplacian, Sharpness::GaussianDerivative, Sharpness::VarianceOfVariance]
         {
-            let settings = StackSettings { measure, min_reliability: 0.0, ..StackSettings::default() };
+            let settings =
+                StackSettings { measure, min_reliability: 0.0, median_px: 1, ..StackSettings::default() };
             let all = depth_from_stack(&views, &settings).unwrap();
-            let whole: Vec<_> = images.iter().map(|i| measure.of(i.view(), settings.window_px)).collect();
+            let whole: Vec<_> =
+                images.iter().map(|image| measured_over_windows(image.view(), &settings)).collect();
             for at in [(BAND - 1, 20), (BAND, 20), (2 * BAND, 3), (3 * BAND + 4, 39)] {
                 let curve: Vec<f32> = whole.iter().map(|map| map[at]).collect();
                 let expected = tip(&curve, settings.fit_points).place;
                 assert!((all.place[at] - expected).abs() < 1e-2, "{measure} at {at:?}");
             }
         }
+    }
+
+    #[test]
+    fn weak_texture_under_noise_is_found_by_blurring_first_and_a_median_after() {
+        // Coarse texture that fades away from image 4, under noise of single pixels.
+        let (size, mut state) = ((60, 80), 11_u32);
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0 - 0.5
+        };
+        let images: Vec<Array2<f32>> = (0..9)
+            .map(|number: i32| {
+                let fade = (-0.15 * (number - 4).pow(2) as f32).exp();
+                Array2::from_shape_fn(size, |(y, x)| {
+                    let texture = (0.9 * x as f32).sin() * (0.8 * y as f32).cos();
+                    0.5 + 0.02 * fade * texture + 0.03 * noise()
+                })
+            })
+            .collect();
+        let views: Vec<_> = images.iter().map(|image| image.view()).collect();
+        let error = |smoothing_px, median_px| {
+            let settings =
+                StackSettings { smoothing_px, median_px, min_reliability: 0.0, ..StackSettings::default() };
+            let place = depth_from_stack(&views, &settings).unwrap().place;
+            place.iter().map(|p| (p - 4.0).abs()).sum::<f32>() / place.len() as f32
+        };
+        let [plain, blurred, both] = [error(0.0, 1), error(1.0, 1), error(1.0, 9)];
+        assert!(blurred < 0.6 * plain && both < 0.8 * blurred, "{plain} {blurred} {both}");
     }
 
     #[test]
@@ -344,6 +438,8 @@ mod tests {
         assert!(of(&[&image, &broken, &image], &usual).contains("image 2: the pixel in column 4, row 3"));
         let even = StackSettings { window_px: 8, ..usual };
         assert!(of(&[&image, &image, &image], &even).contains("the window is 8: an odd number from 3"));
+        let blurred = StackSettings { smoothing_px: f32::NAN, ..usual };
+        assert!(of(&[&image, &image, &image], &blurred).contains("blurred by NaN px: 0 to 10"));
         let wide = StackSettings { window_px: 33, ..usual };
         assert!(of(&[&image, &image, &image], &wide).contains("smaller than the window of 33"));
     }

@@ -98,17 +98,22 @@ pub fn judge(
             }
         });
     explain_holes(&mut reasons, map);
-    let total = reasons.len() as f64;
-    let lost: Vec<Lost> = Reason::ALL
-        .into_iter()
-        .map(|reason| (reason, reasons.iter().filter(|code| **code == reason.code()).count()))
-        .filter(|(_, count)| *count > 0)
-        .map(|(reason, count)| Lost { reason, code: reason.code(), fraction: count as f64 / total })
-        .collect();
+    let lost = lost_pixels(&reasons);
     let valid = map.depth_mm.iter().filter(|depth| depth.is_finite()).count();
     map.low_texture_fraction =
         lost.iter().filter(|l| l.reason == Reason::NoTexture).map(|l| l.fraction).sum();
     Judgement { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
+}
+
+/// How many pixels have no depth, by reason, from the map of reasons.
+pub fn lost_pixels(reasons: &Array2<u8>) -> Vec<Lost> {
+    let total = reasons.len() as f64;
+    Reason::ALL
+        .into_iter()
+        .map(|reason| (reason, reasons.iter().filter(|code| **code == reason.code()).count()))
+        .filter(|(_, count)| *count > 0)
+        .map(|(reason, count)| Lost { reason, code: reason.code(), fraction: count as f64 / total })
+        .collect()
 }
 
 /// The range in which depths are believed.

@@ -1,6 +1,7 @@
 //! The parts of the accuracy pages, in their order.
 
 mod calibration;
+mod coded;
 mod corrections;
 mod designs;
 mod fill;
@@ -21,7 +22,7 @@ use crate::page::Page;
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
 /// The parts that need nothing but the renderer.
-pub const RENDERED: [Part; 10] = [
+pub const RENDERED: [Part; 11] = [
     ("planes", planes::measure),
     ("shapes", shapes::measure),
     ("mismatch", mismatch::measure),
@@ -31,6 +32,7 @@ pub const RENDERED: [Part; 10] = [
     ("fill", fill::measure),
     ("uncertainty", uncertainty::measure),
     ("calibration", calibration::measure),
+    ("coded", coded::measure),
     ("corrections", corrections::measure),
 ];
 

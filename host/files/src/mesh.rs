@@ -2,7 +2,7 @@
 //!
 //! The aperture stands in the front focal plane, so the chief ray of an object point at distance z from the lens goes
 //! through the front focus: a pixel of pitch p sees p (z - F) / F of the object, wherever the sensor stands. x to the
-//! right, y up, z towards the viewer; all in mm, the optical axis in the image's middle.
+//! right, y up, z towards the viewer; all in mm.
 
 use std::io::{self, Write};
 
@@ -18,6 +18,15 @@ pub struct Projection {
     pub focal_length_mm: f64,
     /// Pitch of the pixels.
     pub pixel_um: f64,
+    /// Column and row at which the optical axis meets the map; without it its middle.
+    pub axis_px: Option<[f64; 2]>,
+}
+
+impl Projection {
+    /// Column and row at which the optical axis meets a map of (height, width).
+    pub fn axis_in(&self, (height, width): (usize, usize)) -> [f64; 2] {
+        self.axis_px.unwrap_or([width, height].map(|n| 0.5 * (n as f64 - 1.0)))
+    }
 }
 
 /// Number of a place without a vertex.
@@ -40,6 +49,7 @@ pub fn write(
     let step = (high - low) * STEP;
     let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
 
+    let axis = projection.axis_in((height, width));
     let vertices = finite().count();
     let mut faces = 0_usize;
     for row in 1..height {
@@ -57,8 +67,8 @@ pub fn write(
     )?;
     for ((row, column), &z) in depth_mm.indexed_iter().filter(|(_, z)| z.is_finite()) {
         let scale = projection.pixel_um * 1e-3 * (f64::from(z) / projection.focal_length_mm - 1.0);
-        let x = (column as f64 - 0.5 * (width - 1) as f64) * scale;
-        let y = (0.5 * (height - 1) as f64 - row as f64) * scale;
+        let x = (column as f64 - axis[0]) * scale;
+        let y = (axis[1] - row as f64) * scale;
         let shade = (255.0 * (grey[[row, column]] / brightest).clamp(0.0, 1.0)).round() as u8;
         let mut vertex = [shade; 15];
         for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
@@ -126,7 +136,7 @@ mod tests {
     #[test]
     fn holes_have_no_vertices_and_steps_no_faces() {
         let depth = array![[900.0f32, 900.1, f32::NAN], [900.2, 900.1, 890.0]];
-        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4 };
+        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
         let bytes = ply(depth.view(), depth.view(), projection);
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("element vertex 5\n"), "{text}");

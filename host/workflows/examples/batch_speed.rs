@@ -100,6 +100,7 @@ fn by_loop(
             window: None,
             align: Default::default(),
             balance: Default::default(),
+            region: None,
             camera: None,
             min_confidence: 0.0,
             correction: None,

@@ -4,6 +4,7 @@ pub mod method;
 pub mod noise;
 pub mod output;
 mod pair;
+pub mod part;
 mod record;
 mod shared;
 
@@ -11,7 +12,7 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use farnear_depth::{
     corrections::Correction,
-    judge::{Judgement, Lost},
+    judge::{Judgement, Lost, lost_pixels},
     optics::Optics,
     pipeline::{DepthMap, Settings},
     prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
@@ -26,6 +27,7 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
+    measure::Rectangle,
     optics,
     psf::PsfSource,
 };
@@ -34,6 +36,7 @@ use method::{Method, Prepared};
 use noise::{CameraNoise, Source, Uncertainty};
 use output::{Outputs, Results};
 use pair::Pair;
+use part::Cut;
 
 pub use shared::Shared;
 
@@ -61,6 +64,8 @@ pub struct DepthSettings {
     pub align: Align,
     /// How both are brought to one brightness.
     pub balance: Balance,
+    /// The part of the images whose depth is wanted; without it all of them.
+    pub region: Option<Rectangle>,
     /// Folder with the camera's dark and flat frames.
     pub camera: Option<PathBuf>,
     /// Confidence, 0 to 1, below which a depth is taken away.
@@ -153,6 +158,10 @@ impl DepthSettings {
         if let (Method::Whitened, Some(asked)) = (self.method, &self.operators) {
             return Err(WorkflowError::parameter("operators", asked.display(), "method whitened uses none"));
         }
+        if let (Some(_), Some(file)) = (self.region, &self.correction) {
+            let expected = "a correction knows the lens by the place in the whole image: correct the whole map, or give no region";
+            return Err(WorkflowError::parameter("correction", file.display(), expected));
+        }
         let Method::Baseline(method) = self.method else { return Ok(()) };
         if let Some(window @ (Window::Adaptive | Window::Safe)) = self.window {
             return Err(WorkflowError::parameter(
@@ -184,6 +193,8 @@ struct Inputs {
     method: Prepared,
     correction: Option<Arc<Correction>>,
     camera: Option<Arc<CameraFrames>>,
+    /// What of the images is looked at, where it is not all.
+    cut: Option<Cut>,
     /// What there is to say of the optics.
     doubts: Vec<String>,
 }
@@ -214,14 +225,19 @@ impl Inputs {
             }
             None => (optics, doubts),
         };
-        let pair = Pair::read(&settings.far, &settings.near)?;
+        let mut pair = Pair::read(&settings.far, &settings.near)?;
+        let cut = settings.region.map(|region| Cut::out_of(&mut pair, region)).transpose()?;
         let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, shared)?;
         let correction = settings.correction.as_deref().map(|file| shared.correction(file)).transpose()?;
         if let Some(correction) = &correction {
             correction.check_range(&optics.working_range())?;
         }
         let camera = settings.camera.as_deref().map(|folder| shared.camera(folder)).transpose()?;
-        Ok(Self { optics, pair, method, correction, camera, doubts })
+        let camera = match (camera, &cut) {
+            (Some(frames), Some(cut)) => Some(Arc::new(cut.frames(&frames)?)),
+            (camera, _) => camera,
+        };
+        Ok(Self { optics, pair, method, correction, camera, cut, doubts })
     }
 
     /// Takes the images, which nothing needs afterwards.
@@ -255,8 +271,18 @@ impl Inputs {
             })
             .transpose()?;
         cancel("computing its deviation")?;
-        let image = if settings.write.show_image() { found.prepared.far } else { Array2::default((0, 0)) };
-        let Judgement { mut reasons, lost, .. } = judgement;
+        let mut image =
+            if settings.write.show_image() { found.prepared.far } else { Array2::default((0, 0)) };
+        let Judgement { mut reasons, mut lost, .. } = judgement;
+        let mut deviation = deviation;
+        if let Some(cut) = &self.cut {
+            [&mut map.depth_mm, &mut map.confidence, &mut image].into_iter().for_each(|map| cut.wanted(map));
+            cut.wanted(&mut reasons);
+            if let Some((deviation, _)) = &mut deviation {
+                cut.wanted(deviation);
+            }
+            lost = lost_pixels(&reasons);
+        }
         if let Some(correction) = &self.correction {
             correct(&mut map, &mut reasons, correction)?;
         }
@@ -361,6 +387,7 @@ mod tests {
             window: None,
             align: Align::default(),
             balance: Balance::default(),
+            region: None,
             camera: None,
             min_confidence: 0.0,
             correction: None,

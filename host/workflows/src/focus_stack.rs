@@ -64,6 +64,8 @@ struct Record<'a> {
     made_by: &'static str,
     unit: &'static str,
     measure: &'static str,
+    smoothing_px: f32,
+    median_px: usize,
     window_px: usize,
     fit_points: usize,
     min_reliability: f32,
@@ -104,11 +106,14 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
         .iter()
         .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
         .collect();
-    let StackSettings { measure, window_px, fit_points, min_reliability } = settings.computation;
+    let StackSettings { measure, smoothing_px, window_px, fit_points, median_px, min_reliability } =
+        settings.computation;
     let record = Record {
         made_by: MADE_BY,
         unit: figures.unit,
         measure: measure.name(),
+        smoothing_px,
+        median_px,
         window_px,
         fit_points,
         min_reliability,

@@ -23,6 +23,7 @@ pub use profile::{ProfileFigures, ProfilePoint, profile};
 pub use region::{RegionFigures, region};
 
 use crate::{
+    depth::part::Part,
     error::{Result, WorkflowError},
     optics,
 };
@@ -42,18 +43,19 @@ pub struct Measured {
 #[derive(Deserialize)]
 struct Record {
     optics: Optics,
+    part: Option<Part>,
 }
 
-/// The optics that made the map of a folder: its record's, else the pair's.
-fn optics_of(folder: &Path) -> Result<Optics> {
+/// The optics that made the map of a folder: its record's, else the pair's; and which part of the images it is of.
+fn optics_of(folder: &Path) -> Result<(Optics, Option<Part>)> {
     let record = folder.join("depth.toml");
     if !record.exists() {
-        return Ok(optics::of_pair(None, &folder.join("far.png"))?.0);
+        return Ok((optics::of_pair(None, &folder.join("far.png"))?.0, None));
     }
     let text = fs::read_to_string(&record).map_err(WorkflowError::read("the map's record", &record))?;
-    let Record { optics } =
+    let Record { optics, part } =
         toml::from_str(&text).map_err(WorkflowError::file(&record, "a record of a depth map"))?;
-    Ok(optics)
+    Ok((optics, part))
 }
 
 /// A rectangle of pixels.
@@ -68,6 +70,22 @@ pub struct Rectangle {
     pub width: usize,
     /// Rows.
     pub height: usize,
+}
+
+/// A text that names no rectangle.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("expected column, row, width and height in pixels, such as 100,80,320,240")]
+pub struct NoRectangle;
+
+impl std::str::FromStr for Rectangle {
+    type Err = NoRectangle;
+
+    fn from_str(text: &str) -> std::result::Result<Self, NoRectangle> {
+        let numbers = text.split(',').map(|part| part.trim().parse().map_err(|_| NoRectangle));
+        let numbers = numbers.collect::<std::result::Result<Vec<usize>, _>>()?;
+        let [x, y, width, height] = numbers[..] else { return Err(NoRectangle) };
+        Ok(Self { x, y, width, height })
+    }
 }
 
 impl Measured {
@@ -87,23 +105,34 @@ impl Measured {
                 format!("{:?} rows and columns, depth.npy has {:?}", deviation.dim(), depth_mm.dim());
             return Err(WorkflowError::file(&path, "a map of the depth's size")(reason));
         }
-        let optics = optics_of(folder)?;
-        let projection =
-            Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um() };
+        let (optics, part) = optics_of(folder)?;
+        let projection = Projection {
+            focal_length_mm: optics.focal_length_mm(),
+            pixel_um: optics.pixel_um(),
+            axis_px: part.map(|part| part.axis_px()),
+        };
         Ok(Self { depth_mm, deviation_mm, projection })
     }
 
     /// Where the pixel sees the object, mm: to the right, up, away from the lens. `None` where there is no depth.
     pub fn point_mm(&self, column: usize, row: usize) -> Option<[f64; 3]> {
         let z = f64::from(*self.depth_mm.get((row, column))?);
-        let (height, width) = self.depth_mm.dim();
+        let [axis_x, axis_y] = self.projection.axis_in(self.depth_mm.dim());
         let scale = self.projection.pixel_um * 1e-3 * (z / self.projection.focal_length_mm - 1.0);
-        let beside = |at: usize, size: usize| (at as f64 - 0.5 * (size as f64 - 1.0)) * scale;
-        z.is_finite().then(|| [beside(column, width), -beside(row, height), z])
+        let beside = |at: usize, axis: f64| (at as f64 - axis) * scale;
+        z.is_finite().then(|| [beside(column, axis_x), -beside(row, axis_y), z])
     }
 
     fn check(&self, at: &Rectangle) -> Result<()> {
-        let (height, width) = self.depth_mm.dim();
+        at.check_within(self.depth_mm.dim())
+    }
+}
+
+impl Rectangle {
+    /// # Errors
+    /// [`WorkflowError::Parameter`] unless it is a part of an image of (height, width).
+    pub fn check_within(&self, (height, width): (usize, usize)) -> Result<()> {
+        let at = self;
         let fits = |begin: usize, size: usize, all: usize| {
             size > 0 && begin.checked_add(size).is_some_and(|end| end <= all)
         };

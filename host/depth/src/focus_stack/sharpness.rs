@@ -247,6 +247,20 @@ fn derivatives(image: ArrayView2<f32>) -> [Array2<f32>; 2] {
     [(&slope, &smooth), (&smooth, &slope)].map(|(across, down)| separable(image, across, down))
 }
 
+/// The image blurred by a Gaussian of this standard deviation, which reaches [`blur_reach_px`] far.
+pub(super) fn blurred(image: ArrayView2<f32>, sd_px: f32) -> Array2<f32> {
+    let radius = blur_reach_px(sd_px) as isize;
+    let gauss = |t: isize| (-0.5 * (t as f32 / sd_px).powi(2)).exp();
+    let total: f32 = (-radius..=radius).map(gauss).sum();
+    let taps: Vec<f32> = (-radius..=radius).map(|t| gauss(t) / total).collect();
+    separable(image, &taps, &taps)
+}
+
+/// How far [`blurred`] looks.
+pub(super) fn blur_reach_px(sd_px: f32) -> usize {
+    (3.0 * sd_px).ceil() as usize
+}
+
 fn separable(image: ArrayView2<f32>, across: &[f32], down: &[f32]) -> Array2<f32> {
     let pass = |image: ArrayView2<f32>, taps: &[f32]| {
         let (height, width) = image.dim();

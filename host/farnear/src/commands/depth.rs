@@ -11,6 +11,7 @@ use farnear_depth::{
 };
 use farnear_workflows::{
     depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs},
+    measure::Rectangle,
     psf::PsfSource,
 };
 
@@ -56,6 +57,10 @@ pub struct Arguments {
     /// none, gain or local.
     #[arg(long, value_name = "HOW", default_value_t)]
     balance: Balance,
+    /// Depth of a part of the images only: its column, row, width and height in pixels. Maps have its size, and depth.toml says
+    /// where it lies.
+    #[arg(long, value_name = "X,Y,W,H")]
+    region: Option<Rectangle>,
     /// Folder of the camera's dark and flat frames, from `farnear calibrate camera`.
     #[arg(long, value_name = "DIR")]
     camera: Option<PathBuf>,
@@ -124,6 +129,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         window: arguments.window,
         align: arguments.align,
         balance: arguments.balance,
+        region: arguments.region,
         camera: arguments.camera,
         min_confidence: arguments.min_confidence,
         correction: arguments.correction,

@@ -35,6 +35,13 @@ pub struct Arguments {
     /// Focus measure (a wrong name lists all).
     #[arg(long, value_name = "NAME", default_value_t = Sharpness::ModifiedLaplacian)]
     measure: Sharpness,
+    /// Blur the images by a Gaussian of this standard deviation before their sharpness is measured, in pixels, 0 to 10: what is
+    /// finer is mostly noise.
+    #[arg(long, value_name = "PX", default_value_t = 1.0)]
+    smooth: f32,
+    /// Side of the median over the depths found, in pixels: odd, 1 (none) to 31.
+    #[arg(long, value_name = "PX", default_value_t = 9)]
+    median: usize,
     /// Side of the window over which sharpness is measured, in pixels: odd, 3 to 101.
     #[arg(long, value_name = "PX", default_value_t = 9)]
     window: usize,
@@ -75,6 +82,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
         sensor,
         optics,
         measure,
+        smooth,
+        median,
         window,
         points,
         align,
@@ -85,7 +94,14 @@ pub fn run(arguments: Arguments) -> Result<()> {
         stack,
         places: distances.map(Places::ObjectMm).or(sensor.map(Places::SensorMm)),
         optics,
-        computation: StackSettings { measure, window_px: window, fit_points: points, min_reliability },
+        computation: StackSettings {
+            measure,
+            smoothing_px: smooth,
+            window_px: window,
+            fit_points: points,
+            median_px: median,
+            min_reliability,
+        },
         align: align.0,
         out,
     };

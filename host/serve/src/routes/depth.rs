@@ -165,6 +165,7 @@ async fn compute(
         window: None,
         align: Align::default(),
         balance: Balance::default(),
+        region: None,
         camera: None,
         min_confidence: 0.0,
         correction: None,

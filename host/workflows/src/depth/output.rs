@@ -193,8 +193,11 @@ impl<'a> Results<'a> {
 
     fn mesh(&self, to: &mut Sink) -> io::Result<()> {
         let optics = &self.inputs.optics;
-        let projection =
-            Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um() };
+        let projection = Projection {
+            focal_length_mm: optics.focal_length_mm(),
+            pixel_um: optics.pixel_um(),
+            axis_px: self.inputs.cut.map(|cut| cut.part().axis_px()),
+        };
         mesh::write(self.depth(), self.computed.image.view(), projection, to)
     }
 

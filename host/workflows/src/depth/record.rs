@@ -4,7 +4,9 @@ use farnear_depth::{judge::Lost, operators::Operators, optics::Optics, pipeline:
 use farnear_files::map::Scale;
 use serde::Serialize;
 
-use super::{Computed, DepthSettings, Inputs, noise::Uncertainty, output::Outputs, pair::name_of};
+use super::{
+    Computed, DepthSettings, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part,
+};
 use crate::{MADE_BY, error::Result};
 
 /// Version of the record.
@@ -35,6 +37,9 @@ struct Record<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
     min_confidence: f32,
+    /// Where the map lies in the images, where it is of a part of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    part: Option<Part>,
     settings: Settings,
     /// What was found and done before depth.
     prepared: Report,
@@ -72,6 +77,7 @@ pub fn record(
         balance: settings.balance.to_string(),
         camera: settings.camera.as_deref().map(name_of),
         min_confidence: settings.min_confidence,
+        part: inputs.cut.map(|cut| cut.part()),
         prepared: computed.report,
         no_depth: &computed.lost,
         // The number of threads changes nothing in the result.

@@ -9,7 +9,7 @@ use farnear_files::{
 use ndarray::s;
 
 use super::Measured;
-use crate::error::Result;
+use crate::error::{Result, WorkflowError};
 
 /// A PLY of at most `points` points: every second, third, ... row and column of the map, coloured by the far image.
 ///
@@ -18,8 +18,16 @@ use crate::error::Result;
 pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
     let Measured { depth_mm, projection, .. } = Measured::read(folder)?;
     let grey = read_grey(&folder.join("far.png"))?.pixels;
+    if grey.dim() != depth_mm.dim() {
+        let value = format!("{:?} rows and columns", depth_mm.dim());
+        return Err(WorkflowError::parameter("depth.npy", value, "a map of the whole of far.png"));
+    }
     let step = step(depth_mm.len(), points);
-    let pitch = Projection { pixel_um: projection.pixel_um * step as f64, ..projection };
+    let pitch = Projection {
+        pixel_um: projection.pixel_um * step as f64,
+        axis_px: projection.axis_px.map(|axis| axis.map(|place| place / step as f64)),
+        ..projection
+    };
     let window = s![..;step, ..;step];
     Ok(ply(depth_mm.slice(window), grey.slice(window), pitch))
 }

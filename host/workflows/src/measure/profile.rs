@@ -69,7 +69,7 @@ mod tests {
     fn the_line_is_followed() {
         let mut depth_mm = Array2::from_shape_fn((10, 20), |(y, x)| (100 * y + x) as f32);
         depth_mm[[2, 4]] = f32::NAN;
-        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4 };
+        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
         let map = Measured { depth_mm, deviation_mm: None, projection };
         let found = profile(&map, [0, 0], [8, 4]).unwrap().points;
         assert_eq!(found.len(), 9);

@@ -126,8 +126,11 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
         maps.push(map.depth_mm);
         context.progress.advance("pairs", index + 1, Some(settings.pairs));
     }
-    let projection =
-        Projection { focal_length_mm: optics.optics.focal_length_mm(), pixel_um: optics.optics.pixel_um() };
+    let projection = Projection {
+        focal_length_mm: optics.optics.focal_length_mm(),
+        pixel_um: optics.optics.pixel_um(),
+        axis_px: None,
+    };
     let found = figures(&maps, predicted.as_ref(), projection, settings.true_mm)?;
     let found = QualityFigures { time: (!emulated).then(clock::now_rfc3339).flatten(), ..found };
     record.measurements.push(found.clone());
@@ -211,7 +214,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    const PROJECTION: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4 };
+    const PROJECTION: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
 
     /// Maps of a plane at 900 mm that tremble by `noise` from pair to pair.
     fn maps(noise: f32) -> Vec<Array2<f32>> {

@@ -30,6 +30,7 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
         window: fields.optional("window")?,
         align: fields.or("align", Default::default())?,
         balance: fields.or("balance", Default::default())?,
+        region: fields.optional("region")?,
         camera: fields.optional_path("camera")?,
         min_confidence: fields.or("min_confidence", 0.0)?,
         correction: fields.optional_path("correction")?,

@@ -1,0 +1,100 @@
+//! Depth of a part of the images only.
+
+use farnear_depth::prepare::CameraFrames;
+use ndarray::{Array2, s};
+use serde::{Deserialize, Serialize};
+
+use super::pair::Pair;
+use crate::{
+    error::{Result, WorkflowError},
+    measure::Rectangle,
+};
+
+/// What is looked at beside the part, px: windows of 21 and operators in a row reach less far.
+const AROUND_PX: usize = 40;
+
+/// Where a map lies in the images it was made of; stands in `depth.toml`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Part {
+    /// Leftmost column of the map in the images.
+    pub x: usize,
+    /// Topmost row.
+    pub y: usize,
+    /// Columns of the images.
+    pub image_width: usize,
+    /// Rows of the images.
+    pub image_height: usize,
+}
+
+impl Part {
+    /// Column and row of the images' middle, where the optical axis is, in the map.
+    pub fn axis_px(&self) -> [f64; 2] {
+        let of = |size: usize, begin: usize| 0.5 * (size as f64 - 1.0) - begin as f64;
+        [of(self.image_width, self.x), of(self.image_height, self.y)]
+    }
+}
+
+/// What is cut out of the images, and what of it is wanted.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Cut {
+    wanted: Rectangle,
+    seen: Rectangle,
+    image: (usize, usize),
+}
+
+impl Cut {
+    /// Cuts a part with its surroundings out of a pair.
+    pub fn out_of(pair: &mut Pair, wanted: Rectangle) -> Result<Self> {
+        let image @ (height, width) = pair.far.dim();
+        wanted.check_within(image)?;
+        let along = |begin: usize, size: usize, all: usize| {
+            let from = begin.saturating_sub(AROUND_PX);
+            (from, (begin + size + AROUND_PX).min(all) - from)
+        };
+        let (x, seen_width) = along(wanted.x, wanted.width, width);
+        let (y, seen_height) = along(wanted.y, wanted.height, height);
+        let cut = Self { wanted, seen: Rectangle { x, y, width: seen_width, height: seen_height }, image };
+        if pair.near.dim() == image {
+            for image in [&mut pair.far, &mut pair.near] {
+                *image = of(image, cut.seen);
+            }
+        }
+        Ok(cut)
+    }
+
+    /// A camera's frames of the same place.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`] for frames of another size than the images.
+    pub fn frames(&self, frames: &CameraFrames) -> Result<CameraFrames> {
+        let (height, width) = frames.dark().dim();
+        if (height, width) != self.image {
+            let of = format!("{width}x{height} px, the images have {}x{}", self.image.1, self.image.0);
+            return Err(WorkflowError::parameter("camera", of, "frames of the images' size"));
+        }
+        let Rectangle { x, y, width, height } = self.seen;
+        let place = s![y..y + height, x..x + width];
+        let (dark, response) =
+            (frames.dark().slice(place).to_owned(), frames.response().slice(place).to_owned());
+        let parts = CameraFrames::new(dark, response, frames.bad_pixels().slice(place).to_owned());
+        parts.map_err(|error| WorkflowError::parameter("camera", "frames", error.to_string()))
+    }
+
+    /// What was asked for of a map of what was seen.
+    pub fn wanted<T: Clone>(&self, map: &mut Array2<T>) {
+        if !map.is_empty() {
+            let Rectangle { x, y, width, height } = self.wanted;
+            *map = of(map, Rectangle { x: x - self.seen.x, y: y - self.seen.y, width, height });
+        }
+    }
+
+    /// For the record.
+    pub fn part(&self) -> Part {
+        let Rectangle { x, y, .. } = self.wanted;
+        Part { x, y, image_width: self.image.1, image_height: self.image.0 }
+    }
+}
+
+fn of<T: Clone>(map: &Array2<T>, Rectangle { x, y, width, height }: Rectangle) -> Array2<T> {
+    map.slice(s![y..y + height, x..x + width]).to_owned()
+}
