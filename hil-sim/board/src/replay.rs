@@ -230,6 +230,9 @@ mod tests {
         let (config, script) = parse(&text).expect("a good trace");
         assert_eq!((config.seed, script.firmware, script.end_ns), (3, 255, 9));
         let order = Entry::Ordered(CameraOrder::Expose { exposure_us: 20, id: 3 });
-        assert_eq!(script.entries, [(7, Entry::Sent(vec![0, 255])), (9, order), (8, Entry::Looked { asked_ns: 8 })]);
+        assert_eq!(
+            script.entries,
+            [(7, Entry::Sent(vec![0, 255])), (9, order), (8, Entry::Looked { asked_ns: 8 })]
+        );
     }
 }
