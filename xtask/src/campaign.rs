@@ -1,4 +1,7 @@
-//! The long tests on the emulated board: those of `hil-sim/board/tests/it` with more of everything, once per seed.
+//! Campaigns on the emulated board: random scenarios by their seeds, judged and made small; and the long tests, those of
+//! `hil-sim/board/tests/it` with more of everything.
+
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
@@ -10,9 +13,24 @@ use crate::{
 /// What `cargo xtask campaign` can be told.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// How many rigs, each with its own mechanics: seeds 1, 2, 3 ...
-    #[arg(long, default_value_t = 3)]
+    /// How many random scenarios, each a rig, a host and what happens to them: seeds 1, 2, 3 ...
+    #[arg(long, default_value_t = 100)]
     seeds: u64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1)]
+    first: u64,
+    /// Only a part of the seeds, e.g. 2/8, the second of eight: for several machines. No other tests run then.
+    #[arg(long)]
+    shard: Option<String>,
+    /// Where the small scenarios are written that break a property.
+    #[arg(long, default_value = "out/campaign")]
+    out: PathBuf,
+    /// No long tests, only scenarios.
+    #[arg(long)]
+    scenarios_only: bool,
+    /// How many rigs the long tests run on, each with its own mechanics.
+    #[arg(long, default_value_t = 3)]
+    rigs: u64,
     /// Random moves of each axis on each rig.
     #[arg(long, default_value_t = 1_000)]
     moves: u32,
@@ -25,17 +43,45 @@ pub struct Arguments {
     /// Hostile frames (replays, bursts, noise, other hosts) for the rig's behaviour without the emulator, once for all seeds.
     #[arg(long, default_value_t = 1_000_000)]
     hostile_frames: u64,
+    /// Power cuts at random bytes that are written to the memory, without the emulator.
+    #[arg(long, default_value_t = 10_000)]
+    power_cuts: u64,
 }
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = firmware::build()?;
-    for seed in 1..=arguments.seeds {
-        step(&format!("campaign, seed {seed}"));
+    // Where both go wrong the scenarios' table is seen all the same.
+    let scenarios = scenarios(arguments, &elf);
+    if arguments.shard.is_some() || arguments.scenarios_only {
+        return scenarios;
+    }
+    long_tests(arguments, &elf)?;
+    scenarios
+}
+
+/// Plays the scenarios of the seeds.
+fn scenarios(arguments: &Arguments, elf: &Path) -> Result<()> {
+    step(&format!("campaign, {} scenarios", arguments.seeds));
+    let mut command = cargo(["run", "--locked", "--package", "farnear-sim", "--", "campaign"]);
+    command
+        .args(["--seeds", &arguments.seeds.to_string(), "--first", &arguments.first.to_string()])
+        .args(["--shard", arguments.shard.as_deref().unwrap_or("1/1")])
+        .arg("--firmware")
+        .arg(elf)
+        .arg("--out")
+        .arg(&arguments.out);
+    finish(&mut command)
+}
+
+/// The long tests, once per rig, and those without the emulator.
+fn long_tests(arguments: &Arguments, elf: &Path) -> Result<()> {
+    for seed in 1..=arguments.rigs {
+        step(&format!("campaign, rig {seed}"));
         let mut command = cargo(["test", "--locked", "--package", "farnear-sim", "--test", "it"]);
         command
             .args(["--", "steps::", "accuracy::", "memory::", "fuzz::", "--nocapture", "--test-threads", "2"])
-            .env("FARNEAR_FIRMWARE", &elf)
+            .env("FARNEAR_FIRMWARE", elf)
             .env("FARNEAR_CAMPAIGN", "1")
             .env("FARNEAR_SEED", seed.to_string())
             .env("FARNEAR_MOVES", arguments.moves.to_string())
@@ -43,10 +89,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .env("FARNEAR_FUZZ_FRAMES", arguments.fuzz_frames.to_string());
         finish(&mut command)?;
     }
-    step("campaign, hostile frames");
+    step("campaign, hostile frames and power cuts");
     let mut command = cargo(["test", "--locked", "--package", "farnear-rig", "--test", "it"]);
     command
-        .args(["--", "hostile::", "--nocapture"])
+        .args(["--", "hostile::", "power_cuts::", "--nocapture"])
+        .env("FARNEAR_POWER_CUTS", arguments.power_cuts.to_string())
         .env("FARNEAR_HOSTILE_FRAMES", arguments.hostile_frames.to_string());
     finish(&mut command)
 }

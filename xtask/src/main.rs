@@ -48,7 +48,8 @@ enum Job {
         #[arg(long)]
         write: bool,
     },
-    /// The long tests on the emulated board, seed after seed: a million steps, thousands of moves, a fuzzed link.
+    /// Random scenarios on the emulated board, judged and made small; then its long tests, rig after rig: a million steps,
+    /// thousands of moves, a fuzzed link.
     Campaign(campaign::Arguments),
     /// Run the property tests with many more cases, seed after seed.
     Fuzz {

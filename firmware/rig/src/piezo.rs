@@ -26,6 +26,10 @@ use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_HZ, TICK_US};
 use crate::settings::FineSettings;
 use crate::shaper::Shaper;
 
+/// A piezo this near its target is at rest: what swings less stays within the stated error.
+const AT_REST: Nanometres = Nanometres(100);
+/// For so long: one that swings through is on its way. A fifth of the resonance's period.
+const NEAR_TICKS: u16 = 5;
 /// Ticks of the way down at the start, and the codes (3 um) below which it is none.
 const RELAX: u32 = TICK_HZ / 10;
 const RELAXED: u16 = 1_000;
@@ -80,6 +84,8 @@ pub(crate) struct Piezo {
     failed: bool,
     /// A sweep drives it without the loop, and reads the gauge.
     driven: bool,
+    /// Ticks for which it has been near its target.
+    near_ticks: u16,
 }
 
 impl Piezo {
@@ -99,6 +105,7 @@ impl Piezo {
             gauge_missing_ticks: 0,
             failed: false,
             driven: false,
+            near_ticks: 0,
         }
     }
 
@@ -144,6 +151,11 @@ impl Piezo {
     pub(crate) fn arrived(&self) -> bool {
         let shaper = &self.settings.gains.shaper;
         !self.closing && self.control.as_ref().is_none_or(|control| control.shaper.arrived(shaper))
+    }
+
+    /// Whether it moves: its set-point does, or the loop has not brought it there yet.
+    pub(crate) fn is_moving(&self) -> bool {
+        !self.arrived() || self.control.is_some() && self.near_ticks < NEAR_TICKS
     }
 
     /// Goes to `target`, closing the loop where it is open.
@@ -204,6 +216,8 @@ impl Piezo {
         };
         self.gauge_missing_ticks = 0;
         self.measured = self.gauge.position(code as i32 - GAUGE_CODE_ZERO as i32);
+        let off = self.target.0.saturating_sub(self.measured.0).saturating_abs();
+        self.near_ticks = if off > AT_REST.0 { 0 } else { self.near_ticks.saturating_add(1) };
         if self.start == Start::Unknown {
             self.begin_to_relax();
         }

@@ -252,7 +252,8 @@ impl RigAccess<'_, '_> {
 
     /// Cuts the wire of the strobe, or mends it.
     pub fn cut_strobe(&mut self, cut: bool) {
-        self.wiring.cut_strobe(cut);
+        let at = self.stop.at;
+        self.wiring.cut_strobe(&mut self.session.board_mut().chip, at, cut);
     }
 
     /// The camera's host triggers it by software, for an image of this name.

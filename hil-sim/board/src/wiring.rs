@@ -310,14 +310,7 @@ impl Wiring {
                 }
             }
         }
-        if self.strobe_cut {
-            return;
-        }
-        let level = Level::from(edge != Edge::End);
-        chip.drive_pin(at, STROBE, level);
-        if chip.function(STROBE) == Some(TIM2_FUNCTION) {
-            chip.drive_timer(at, TIM2, channel(4), level);
-        }
+        self.put_strobe(chip, at);
     }
 
     /// When the camera or a switch needs attention next.
@@ -375,9 +368,19 @@ impl Wiring {
         self.exposures_begun
     }
 
-    /// Cuts the wire of the strobe, or mends it.
-    pub fn cut_strobe(&mut self, cut: bool) {
+    /// Cuts the wire of the strobe, which its resistor then holds low, or mends it.
+    pub fn cut_strobe(&mut self, chip: &mut Chip, at: VirtualNanos, cut: bool) {
         self.strobe_cut = cut;
+        self.put_strobe(chip, at);
+    }
+
+    /// Brings the strobe to the board.
+    fn put_strobe(&mut self, chip: &mut Chip, at: VirtualNanos) {
+        let level = Level::from(self.begun.is_some() && !self.strobe_cut);
+        chip.drive_pin(at, STROBE, level);
+        if chip.function(STROBE) == Some(TIM2_FUNCTION) {
+            chip.drive_timer(at, TIM2, channel(4), level);
+        }
     }
 
     fn stage_mut(&mut self, name: StageName) -> &mut StageWires {

@@ -117,7 +117,7 @@ impl Stage {
     pub(crate) fn status(&self, axis: Axis, request: Option<u32>) -> AxisStatus {
         let (asked, moving) = match self.stepper(axis) {
             Some(stepper) => (stepper.target(), !stepper.is_still()),
-            None => (self.fine.target(), !self.fine.arrived()),
+            None => (self.fine.target(), self.fine.is_moving()),
         };
         AxisStatus { state: self.state(axis), asked, measured: self.measured(axis), moving, request }
     }

@@ -56,6 +56,28 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
 }
 
 #[test]
+fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
+    // Found by the campaign: the set-point had arrived, and the piezo was still on its way by a micrometre a millisecond.
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, 1);
+    let mut rests = 0;
+    for target in [20_000, 176_270, 90_000, 33_569, 105_101] {
+        piezo.go(Nanometres(target));
+        for _ in 0..500 {
+            piezo.sense(plant.gauge());
+            plant.tick(piezo.act());
+            if !piezo.is_moving() {
+                rests += 1;
+                let off = plant.position - f64::from(piezo.measured().0);
+                // Five standard deviations of the gauge, and what it swings in a tick within 100 nm of its target.
+                assert!(off.abs() < 120.0, "{off} nm beside what is told, to {target}");
+            }
+        }
+    }
+    assert!(rests > 1_500, "it rests most of the time: {rests}");
+}
+
+#[test]
 fn holding_turns_3_nm_of_gauge_noise_into_less_than_10_nm_of_motion() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 1);

@@ -1,0 +1,61 @@
+//! The scenarios that broke something once, and some that show what a file can say: every property holds in each of them.
+
+use std::{fs, path::PathBuf, process::Command, sync::Mutex};
+
+use farnear_sim::{Scenario, campaign::play_alone};
+
+fn files() -> Vec<PathBuf> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/scenarios");
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn every_property_holds_in_every_scenario_that_broke_one() {
+    let files = files();
+    assert!(files.len() >= 5, "{files:?}");
+    let (next, told) = (Mutex::new(files.iter()), Mutex::new(Vec::new()));
+    // Two at a time: other tests run beside this one.
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                loop {
+                    let Some(file) = next.lock().expect("nobody panics").next() else { return };
+                    let scenario = Scenario::read(file).unwrap_or_else(|error| panic!("{error}"));
+                    let outcome = play_alone(&scenario, None).unwrap_or_else(|error| panic!("{error}"));
+                    assert!(outcome.answered > 10, "{} plays nothing: {outcome:?}", file.display());
+                    told.lock().expect("nobody panics").extend(
+                        outcome.broken.iter().map(|broken| format!("{}: {broken:?}", file.display())),
+                    );
+                }
+            });
+        }
+    });
+    let told = told.into_inner().expect("nobody panics");
+    assert!(told.is_empty(), "{told:#?}");
+}
+
+#[test]
+fn the_program_plays_a_scenario_and_refuses_a_wrong_one_by_line_and_field() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |text: &str| {
+        let file = folder.path().join("scenario.toml");
+        fs::write(&file, text).expect("writable");
+        let program = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+            .args(["run", "--scenario"])
+            .arg(&file)
+            .output()
+            .expect("farnear-sim starts");
+        let text = String::from_utf8_lossy(&program.stdout) + String::from_utf8_lossy(&program.stderr);
+        (program.status.success(), text.into_owned())
+    };
+    let good = "[[host]]\ndoes = \"move\"\naxis = \"fine\"\nto_um = 50.0\n\
+                [[happens]]\non = \"move-done\"\nwhat = \"reset-button\"";
+    let (well, said) = run(&format!("start_um = [100.0, 200.0]\n{good}"));
+    assert!(well && said.contains("1 resets") && said.contains("every property holds"), "{said}");
+    let (well, said) = run("[[happens]]\nafter_ms = 3\nwhat = \"motor-weak\"\namount = 7");
+    let named = ["line 1", "amount = 7", "0 to 1"].iter().all(|part| said.contains(part));
+    assert!(!well && named && said.contains("scenario.toml"), "{said}");
+}
