@@ -1,4 +1,4 @@
-//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`], using it ([`recognition`]), evaluating
+//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`], using it ([`recognition`], [`running`] with the pictures), evaluating
 //! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
 mod confusion_picture;
@@ -6,6 +6,7 @@ pub mod evaluation;
 pub mod judging;
 pub mod method;
 pub mod recognition;
+pub mod running;
 pub mod samples;
 pub mod shipped;
 pub mod training;
