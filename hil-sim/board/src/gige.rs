@@ -150,13 +150,21 @@ fn obey(
 ) {
     let mut bytes = [0; control::PACKET_MAX];
     loop {
-        match control.recv_from(&mut bytes) {
+        let received = control.recv_from(&mut bytes);
+        // Each time, not in silence only: others may be talking all the while.
+        lock(device)
+            .look_for_controller(Instant::now(), received.as_ref().ok().map(|(_, from)| *from))
+            .into_iter()
+            .for_each(ask);
+        match received {
             Ok((length, from)) => {
                 // The time is asked for before the device is held: the rig may be waiting for a picture to be taken.
                 let starts = control::starts_acquisition(&bytes[..length]);
                 let now_ns = if starts { now() } else { 0 };
                 let done = lock(device).obey(&bytes[..length], from, Instant::now(), now_ns);
-                done.asks.into_iter().for_each(ask);
+                for asked in done.asks {
+                    carry_out(asked, ask, now);
+                }
                 if let Some(answer) = done.answer {
                     let _ = control.send_to(&answer, from); // who asked may have gone
                 }
@@ -164,11 +172,25 @@ fn obey(
                     send(stream, to, &packets);
                 }
             }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                lock(device).look_for_controller(Instant::now()).into_iter().for_each(ask);
-            }
-            Err(_) => {} // an answer that nobody took comes back as an error of the next receive
+            // Nothing came; or an answer that nobody took comes back as an error.
+            Err(_) => {}
         }
+    }
+}
+
+/// Asks the rig; a camera that runs freely no more has ended its last exposure when this returns, so that it hears the next trigger.
+fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
+    let ends = match asked {
+        Control::FreeRun { period, exposure } if period.0 == 0 => Some(exposure),
+        _ => None,
+    };
+    ask(asked);
+    let Some(exposure) = ends else { return };
+    let micros = u64::from(exposure.0) + u64::from(device::BETWEEN_EXPOSURES_US);
+    let (until_ns, begin) = (now() + 1000 * micros, Instant::now());
+    ask(Control::AdvanceMicros(micros));
+    while now() < until_ns && begin.elapsed() < PATIENCE {
+        thread::sleep(Duration::from_millis(1));
     }
 }
 

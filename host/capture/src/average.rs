@@ -35,13 +35,22 @@ impl Average {
         let ((far_height, far_width), (near_height, near_width)) = (self.sum.dim(), image.pixels.dim());
         let (far_bits, near_bits) = (self.first.bits, image.bits);
         if (far_width, far_height, far_bits) != (near_width, near_height, near_bits) {
-            return Err(CaptureError::Unlike { far_width, far_height, far_bits, near_width, near_height, near_bits });
+            return Err(CaptureError::Unlike {
+                far_width,
+                far_height,
+                far_bits,
+                near_width,
+                near_height,
+                near_bits,
+            });
         }
         let white = white(image.bits.into());
-        Zip::from(&mut self.sum).and(&mut self.saturated).and(&image.pixels).for_each(|sum, saturated, code| {
-            *sum += u32::from(*code);
-            *saturated |= u32::from(*code) >= white;
-        });
+        Zip::from(&mut self.sum).and(&mut self.saturated).and(&image.pixels).for_each(
+            |sum, saturated, code| {
+                *sum += u32::from(*code);
+                *saturated |= u32::from(*code) >= white;
+            },
+        );
         self.count += 1;
         Ok(())
     }

@@ -30,7 +30,8 @@ pub fn person(moment: &Moment<'_>) -> Bytes {
     let mask = moment.mask.slice(s![..;step, ..;step]);
     let (height, width) = picture.dim();
     let header = json!({ "type": "person", "width": width, "height": height, "answer": moment.answer });
-    let pixels: Vec<u8> = picture.iter().copied().chain(mask.iter().map(|person| u8::from(*person))).collect();
+    let pixels: Vec<u8> =
+        picture.iter().copied().chain(mask.iter().map(|person| u8::from(*person))).collect();
     message(&header, &pixels)
 }
 

@@ -8,6 +8,7 @@ pub mod general;
 pub mod lens;
 pub mod people;
 pub mod quality;
+pub mod recordings;
 pub mod rig;
 
 use std::sync::Arc;
@@ -50,6 +51,7 @@ pub fn api() -> (Router<Arc<App>>, serde_json::Value) {
     let api = quality::routes(api);
     let api = calibrate::routes(api);
     let api = people::routes(api);
+    let api = recordings::routes(api);
     api.finish()
 }
 

@@ -89,12 +89,15 @@ impl Command {
                 Ok(Ask::Write(all.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect()))
             }
             READ_MEMORY => match all[..] {
-                [address, length, ..] if (length as usize) <= READ_MAX => Ok(Ask::Memory(address, length as usize)),
+                [address, length, ..] if (length as usize) <= READ_MAX => {
+                    Ok(Ask::Memory(address, length as usize))
+                }
                 _ => Err(bad),
             },
             // What this camera lets be written are registers.
             WRITE_MEMORY if all.len() >= 2 => {
-                let writes = (0..).zip(&all[1..]).map(|(index, value)| (all[0].wrapping_add(4 * index), *value));
+                let writes =
+                    (0..).zip(&all[1..]).map(|(index, value)| (all[0].wrapping_add(4 * index), *value));
                 Ok(Ask::Write(writes.collect()))
             }
             READ_REGISTERS | WRITE_REGISTERS | WRITE_MEMORY => Err(bad),
@@ -165,10 +168,14 @@ mod tests {
     fn commands_are_read_and_answered() {
         let command = Command::read(&packet(READ_REGISTERS, &[0, 0, 0x0a, 0])).expect("a command");
         assert_eq!(command.ask, Ok(Ask::Registers(vec![0x0a00])));
-        assert_eq!(command.answer(Ok(&[1, 2, 3, 4])), Some(vec![0, 0, 0, 0x81, 0, 4, 0x12, 0x34, 1, 2, 3, 4]));
+        assert_eq!(
+            command.answer(Ok(&[1, 2, 3, 4])),
+            Some(vec![0, 0, 0, 0x81, 0, 4, 0x12, 0x34, 1, 2, 3, 4])
+        );
         let denied = command.answer(Err(Refusal::AccessDenied));
         assert_eq!(denied, Some(vec![0x80, 0x06, 0, 0x81, 0, 0, 0x12, 0x34]));
-        let memory = Command::read(&packet(WRITE_MEMORY, &[0, 0, 0, 8, 0, 0, 0, 1, 0, 0, 0, 2])).expect("a command");
+        let memory =
+            Command::read(&packet(WRITE_MEMORY, &[0, 0, 0, 8, 0, 0, 0, 1, 0, 0, 0, 2])).expect("a command");
         assert_eq!(memory.ask, Ok(Ask::Write(vec![(8, 1), (12, 2)])));
         let unknown = Command::read(&packet(0x0100, &[])).expect("a command");
         assert_eq!(unknown.ask, Err(Refusal::NotImplemented));

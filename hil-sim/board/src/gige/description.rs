@@ -31,7 +31,8 @@ pub fn description(features: &[Feature]) -> String {
     let all = categories.iter().copied().chain(["ChunkDataControl"]);
     text += &format!("<Category Name=\"Root\">{}</Category>\n", list(&mut { all }));
     for category in &categories {
-        let mut names = features.iter().filter(|feature| feature.category == *category).map(|feature| feature.name);
+        let mut names =
+            features.iter().filter(|feature| feature.category == *category).map(|feature| feature.name);
         text += &format!("<Category Name=\"{category}\">{}</Category>\n", list(&mut names));
     }
     let mut registers = Vec::new();
@@ -60,7 +61,9 @@ fn node(feature: &Feature) -> String {
     match &feature.value {
         Value::Constant => format!("<Integer Name=\"{name}\">{value}</Integer>\n"),
         Value::Integer { min, max } => {
-            format!("<Integer Name=\"{name}\">{value}<Min>{min}</Min><Max>{max}</Max><Inc>1</Inc></Integer>\n")
+            format!(
+                "<Integer Name=\"{name}\">{value}<Min>{min}</Min><Max>{max}</Max><Inc>1</Inc></Integer>\n"
+            )
         }
         Value::Number { min, max, parts, unit } => {
             let of = |number: u32| f64::from(number) / f64::from(*parts);
@@ -75,7 +78,9 @@ fn node(feature: &Feature) -> String {
         Value::Choice(choices) => {
             let entries: String = choices
                 .iter()
-                .map(|(entry, value)| format!("<EnumEntry Name=\"{entry}\"><Value>{value}</Value></EnumEntry>"))
+                .map(|(entry, value)| {
+                    format!("<EnumEntry Name=\"{entry}\"><Value>{value}</Value></EnumEntry>")
+                })
                 .collect();
             format!("<Enumeration Name=\"{name}\">{entries}{value}</Enumeration>\n")
         }

@@ -16,12 +16,10 @@ use super::{
     control::{Ask, Command},
     description::CHUNKS,
     features::{
-        ACQUISITION, BLACK_LEVEL, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, MONO_8, OFFSET_X, OFFSET_Y,
-        PIXEL_FORMAT, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
+        ACQUISITION, BLACK_LEVEL, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, MONO_8, OFFSET_X,
+        OFFSET_Y, PIXEL_FORMAT, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
     },
-    registers::{
-        FIRE_TEST, HEARTBEAT_MS, PACKET_SIZE, PRIVILEGE, PRIVILEGE_CONTROL, Refusal, Registers,
-    },
+    registers::{FIRE_TEST, HEARTBEAT_MS, PACKET_SIZE, PRIVILEGE, PRIVILEGE_CONTROL, Refusal, Registers},
     stream::{Frame, HEADERS_BYTES, UDP_HEADERS_BYTES},
 };
 use crate::{imager::Picture, plant::Noise};
@@ -33,7 +31,7 @@ const PACKET_BYTES_MAX: usize = 65_507;
 /// Where the size of packets stands in its register.
 const PACKET_BYTES: u32 = 0xFFFF;
 /// What a camera that runs freely needs beside its exposures: its read-out, and some time to spare.
-const BETWEEN_EXPOSURES_US: u32 = 15_000;
+pub(super) const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// Names of software-triggered pictures: far from the board's own numbers.
 const SOFTWARE_SHOTS: u32 = 0x4000_0000;
 
@@ -106,9 +104,12 @@ impl Device {
         let mut done = Done::default();
         let result = match &command.ask {
             Err(refusal) => Err(*refusal),
-            Ok(Ask::Discovery) => self.registers.read(0, super::registers::DISCOVERY_BYTES).map(<[u8]>::to_vec),
+            Ok(Ask::Discovery) => {
+                self.registers.read(0, super::registers::DISCOVERY_BYTES).map(<[u8]>::to_vec)
+            }
             Ok(Ask::Registers(all)) => {
-                let values: Result<Vec<&[u8]>, _> = all.iter().map(|at| self.registers.read(*at, 4)).collect();
+                let values: Result<Vec<&[u8]>, _> =
+                    all.iter().map(|at| self.registers.read(*at, 4)).collect();
                 values.map(|values| values.concat())
             }
             Ok(Ask::Memory(address, length)) => {
@@ -166,7 +167,8 @@ impl Device {
                 self.triggers += 1;
                 done.asks.push(Control::Expose { shot_id, exposure });
                 // A rig at which nothing happens stands still in time; this much passes.
-                done.asks.push(Control::AdvanceMicros(u64::from(exposure.0.saturating_add(BETWEEN_EXPOSURES_US))));
+                done.asks
+                    .push(Control::AdvanceMicros(u64::from(exposure.0.saturating_add(BETWEEN_EXPOSURES_US))));
             }
             _ => {}
         }
@@ -207,11 +209,11 @@ impl Device {
         self.change_free_run()
     }
 
-    /// Takes the camera from a controller that has said nothing for too long.
-    pub fn look_for_controller(&mut self, now: Instant) -> Option<Control> {
+    /// Takes the camera from a controller that has said nothing for too long; `from` has just said something.
+    pub fn look_for_controller(&mut self, now: Instant, from: Option<SocketAddr>) -> Option<Control> {
         let allowed = Duration::from_millis(u64::from(self.registers.get(HEARTBEAT_MS)));
-        let (_, heard) = self.controller?;
-        if now.saturating_duration_since(heard) <= allowed {
+        let (controller, heard) = self.controller?;
+        if Some(controller) == from || now.saturating_duration_since(heard) <= allowed {
             return None;
         }
         self.release()
@@ -262,7 +264,8 @@ impl Device {
     /// The region, with gain and black level, in the pixel format.
     fn picture(&self, picture: &Picture) -> Option<Frame> {
         let get = |register| self.registers.get(register) as usize;
-        let (sensor_width, sensor_height) = (usize::from(picture.header.width), usize::from(picture.header.height));
+        let (sensor_width, sensor_height) =
+            (usize::from(picture.header.width), usize::from(picture.header.height));
         let (left, top) = (get(OFFSET_X).min(sensor_width), get(OFFSET_Y).min(sensor_height));
         // A region that reaches over the edge ends there; the offset may have been set after the size.
         let (width, height) = (get(WIDTH).min(sensor_width - left), get(HEIGHT).min(sensor_height - top));

@@ -122,7 +122,8 @@ pub fn table((width, height): (u16, u16), bits: u8) -> Vec<Feature> {
     let only = |name| Value::Choice(vec![(name, 0)]);
     let image = "ImageFormatControl";
     let acquisition = "AcquisitionControl";
-    let feature = |name, category, register, value, initial| Feature { name, category, register, value, initial };
+    let feature =
+        |name, category, register, value, initial| Feature { name, category, register, value, initial };
     vec![
         feature("SensorWidth", image, SENSOR_WIDTH, Value::Constant, width),
         feature("SensorHeight", image, SENSOR_HEIGHT, Value::Constant, height),

@@ -6,8 +6,8 @@ use super::{
     GigeConfig,
     description::{CHUNKS, FILE, MODEL, TICKS_PER_SECOND, VENDOR, description},
     features::{
-        CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, HEIGHT, MONO_8, PAYLOAD_SIZE, PIXEL_FORMAT, Value, WIDTH,
-        table,
+        CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, HEIGHT, MONO_8, PAYLOAD_SIZE, PIXEL_FORMAT, Value,
+        WIDTH, table,
     },
     stream,
 };
@@ -98,16 +98,16 @@ impl Registers {
         // A locally administered address of its own for each seed.
         let mac = config.seed as u32;
         for (register, value) in [
-            (0x00, 0x0001_0002),          // version 1.2
-            (0x04, 1 << 31 | 1),          // big endian, UTF-8
-            (0x08, 0x0200),               // MAC
+            (0x00, 0x0001_0002), // version 1.2
+            (0x04, 1 << 31 | 1), // big endian, UTF-8
+            (0x08, 0x0200),      // MAC
             (0x0C, mac),
-            (0x10, 0b101),                // link-local and persistent addresses
+            (0x10, 0b101), // link-local and persistent addresses
             (0x14, 0b100),
             (0x24, config.address.to_bits()),
             (0x34, 0xFF00_0000),
-            (0x600, 1),                   // network interfaces
-            (0x904, 1),                   // streams
+            (0x600, 1), // network interfaces
+            (0x904, 1), // streams
             (0x934, CAPABILITIES),
             (HEARTBEAT_MS, USUAL_HEARTBEAT_MS),
             (0x940, TICKS_PER_SECOND),
@@ -191,7 +191,9 @@ impl Registers {
         for feature in known {
             let allowed = match &feature.value {
                 Value::Constant => continue,
-                Value::Integer { min, max } | Value::Number { min, max, .. } => (*min..=*max).contains(&value),
+                Value::Integer { min, max } | Value::Number { min, max, .. } => {
+                    (*min..=*max).contains(&value)
+                }
                 Value::Choice(choices) => choices.iter().any(|(_, choice)| *choice == value),
                 Value::Command(written) => *written == value,
             };

@@ -8,16 +8,16 @@ use std::{
 
 use farnear_sim::gige::{
     features::{
-        ACQUISITION, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, GAIN, HEIGHT, OFFSET_X, OFFSET_Y, PAYLOAD_SIZE, SOFTWARE, START,
-        STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
+        ACQUISITION, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, GAIN, HEIGHT, OFFSET_X, OFFSET_Y, PAYLOAD_SIZE,
+        SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
     },
     registers::{HEARTBEAT_MS, PRIVILEGE, STREAM_ADDRESS, STREAM_PORT},
 };
 
 use crate::pty::{Program, capture};
 
-/// Far longer than anything here takes.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Far longer than anything here takes: the stages home while a frame is awaited, as slowly as a busy computer emulates it.
+const PATIENCE: Duration = Duration::from_secs(600);
 /// A packet that has not come by then is asked for again.
 const GAP: Duration = Duration::from_millis(300);
 const ACCESS_DENIED: u16 = 0x8006;
@@ -53,6 +53,8 @@ impl Client {
         let Ok(SocketAddr::V4(to)) = client.stream.local_addr() else { panic!("no address of its own") };
         for (register, value) in [
             (PRIVILEGE, 2),
+            // This client sends none, and a busy computer takes its time.
+            (HEARTBEAT_MS, 600_000),
             (STREAM_ADDRESS, to.ip().to_bits()),
             (STREAM_PORT, u32::from(to.port())),
         ] {
@@ -121,9 +123,12 @@ impl Client {
                 Err(_) => {
                     let Some(id) = number else { continue };
                     // The end is not known where the trailer was lost, too.
-                    let end = last.unwrap_or_else(|| packets.keys().next_back().map_or(0, |last| last + 1000));
-                    let missing = (0..=end).find(|packet| !packets.contains_key(packet)).expect("something is");
-                    let until = (missing..=end).find(|packet| packets.contains_key(packet)).map_or(end, |p| p - 1);
+                    let end =
+                        last.unwrap_or_else(|| packets.keys().next_back().map_or(0, |last| last + 1000));
+                    let missing =
+                        (0..=end).find(|packet| !packets.contains_key(packet)).expect("something is");
+                    let until =
+                        (missing..=end).find(|packet| packets.contains_key(packet)).map_or(end, |p| p - 1);
                     let again = [u32::from(id), missing, until].map(u32::to_be_bytes).concat();
                     self.number += 1;
                     let head = [0x42, 0, 0, 0x40, 0, 12, 0, self.number as u8];
@@ -154,7 +159,8 @@ fn frames_over_lossy_gige_are_those_of_the_endpoint_to_the_bit() {
     let program = Program::start(&["--seed", "3", "--gige", &text, "--gige-lost", "30"]);
     assert_eq!(program.gige.as_deref(), Some("farnear-emulated-S3"));
     let mut client = Client::controlling(camera);
-    for (register, value) in [(TRIGGER_MODE, 1), (CHUNK_MODE, 1), (CHUNK_ENABLE + 4, 1), (ACQUISITION, START)] {
+    for (register, value) in [(TRIGGER_MODE, 1), (CHUNK_MODE, 1), (CHUNK_ENABLE + 4, 1), (ACQUISITION, START)]
+    {
         assert_eq!(client.write(register, value), 0);
     }
     assert_eq!(client.read(PAYLOAD_SIZE), 640 * 480 + 8 + 16);
@@ -221,7 +227,8 @@ fn it_runs_freely_and_by_software_with_region_gain_and_format() {
     let (camera, text) = address(3);
     let program = Program::start(&["--scene", "plane:900", "--noise", "12bit", "--gige", &text]);
     let mut client = Client::controlling(camera);
-    for (register, value) in [(OFFSET_X, 16), (OFFSET_Y, 8), (WIDTH, 64), (HEIGHT, 32), (ACQUISITION, START)] {
+    for (register, value) in [(OFFSET_X, 16), (OFFSET_Y, 8), (WIDTH, 64), (HEIGHT, 32), (ACQUISITION, START)]
+    {
         assert_eq!(client.write(register, value), 0);
     }
     let (first, second) = (client.frame(), client.frame());
@@ -234,7 +241,13 @@ fn it_runs_freely_and_by_software_with_region_gain_and_format() {
         codes.sum::<f64>() / (frame.payload.len() / 2) as f64
     };
     // By software: once for each, and brighter by the factor.
-    let settings = [(TRIGGER_MODE, 1), (TRIGGER_SOURCE, SOFTWARE), (EXPOSURE_US, 5_000), (GAIN, 150), (ACQUISITION, START)];
+    let settings = [
+        (TRIGGER_MODE, 1),
+        (TRIGGER_SOURCE, SOFTWARE),
+        (EXPOSURE_US, 5_000),
+        (GAIN, 150),
+        (ACQUISITION, START),
+    ];
     for (register, value) in settings {
         assert_eq!(client.write(register, value), 0);
     }

@@ -9,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::genicam_camera::ALONE;
 use farnear_capture::{
     Client,
     camera::{Camera, CameraError, GenicamCamera, Setting, SimCamera},
@@ -37,9 +38,7 @@ struct Rig {
 }
 
 impl Rig {
-    /// One at a time: there is one port for cameras on the loopback interface.
     fn start(seed: u64, arguments: &[&str]) -> Self {
-        static ALONE: Mutex<()> = Mutex::new(());
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let mut child = Command::new(simulator())
             .args(["run", "--gige", "lo", "--seed", &seed.to_string()])
@@ -51,7 +50,8 @@ impl Rig {
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let value = |key: &str| {
-            let (_, rest) = line.split_once(&format!("\"{key}\": \"")).unwrap_or_else(|| panic!("{key}: {line}"));
+            let (_, rest) =
+                line.split_once(&format!("\"{key}\": \"")).unwrap_or_else(|| panic!("{key}: {line}"));
             rest.split('"').next().unwrap().to_string()
         };
         let (port, camera, gige) = (value("port"), value("camera"), value("gige"));
@@ -117,7 +117,9 @@ fn a_rig_killed_in_mid_capture_is_said_and_the_next_one_works() {
     let told = Arc::clone(&exposing);
     let capture = std::thread::spawn(move || {
         let say = &mut |text: &str| *told.lock().unwrap() |= text.starts_with("exposing");
-        let pairs = std::iter::repeat_with(|| capture_pair(&client, &mut camera, &SENSOR, &Exposures::default(), say));
+        let pairs = std::iter::repeat_with(|| {
+            capture_pair(&client, &mut camera, &SENSOR, &Exposures::default(), say)
+        });
         pairs.filter_map(Result::err).next().unwrap().to_string()
     });
     let until = Instant::now() + WAIT;
@@ -140,7 +142,10 @@ fn software_triggers_give_their_frames_and_a_camera_that_is_held_says_so() {
     let rig = Rig::start(7, &[]);
     let mut camera = rig.gige();
     let held = GenicamCamera::open(&rig.gige).err().unwrap();
-    assert!(matches!(&held, CameraError::Unusable { .. }) && held.to_string().contains("another program"), "{held}");
+    assert!(
+        matches!(&held, CameraError::Unusable { .. }) && held.to_string().contains("another program"),
+        "{held}"
+    );
     camera.watch().unwrap();
     let mut newest = || camera.newest(WAIT).unwrap().expect("a frame within the wait");
     let (first, second) = (newest(), newest());

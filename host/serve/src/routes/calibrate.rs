@@ -22,6 +22,7 @@ use farnear_workflows::{
         targets::{self, TargetSettings},
     },
     sessions,
+    simulator::Scenery,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -191,7 +192,10 @@ async fn series(
     let open = connected(&app)?;
     // Nobody can put a target before the emulated rig that is seen: one is started before each target instead.
     let (rig, ask) = match &app.address {
-        Some(address) if address.is_emulated() => (address.clone(), false),
+        // Nobody watches its stages, so time need not be a person's.
+        Some(RigAddress::Emulated(scenery)) => {
+            (RigAddress::Emulated(Scenery { paced: false, ..scenery.clone() }), false)
+        }
         _ => (RigAddress::Open(open), true),
     };
     let settings = TargetSettings {

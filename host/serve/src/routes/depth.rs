@@ -57,7 +57,15 @@ pub struct DepthWish {
 impl Default for DepthWish {
     fn default() -> Self {
         let Settings { smoothing_px, median_px, fill, .. } = Settings::default();
-        Self { method: "ro".into(), operators: None, smooth_px: smoothing_px, median_px, fill, corrected: false, variant: None }
+        Self {
+            method: "ro".into(),
+            operators: None,
+            smooth_px: smoothing_px,
+            median_px,
+            fill,
+            corrected: false,
+            variant: None,
+        }
     }
 }
 

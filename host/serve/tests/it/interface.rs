@@ -70,10 +70,14 @@ fn body_of(method: &str, path: &str) -> &'static str {
         ("post", "/api/calibrate/psf") => r#"{"targets":[{"capture":"absent"}],"model":"gaussian"}"#,
         ("post", "/api/calibrate/correction") => r#"{"method":"planar"}"#,
         ("post", "/api/people/recognise") => r#"{"video":"absent.y4m"}"#,
-        ("post", "/api/people/sun") => r#"{"latitude_deg":52,"longitude_deg":-1,"time":"2026-06-21T12:00:00Z"}"#,
+        ("post", "/api/people/sun") => {
+            r#"{"latitude_deg":52,"longitude_deg":-1,"time":"2026-06-21T12:00:00Z"}"#
+        }
         ("post", "/api/people/shadow") => {
             r#"{"video":"absent.y4m","sun":{"latitude_deg":52,"longitude_deg":-1,"time":"2026-06-21T12:00:00Z"},"camera":{"height_m":1,"azimuth_deg":0,"pitch_deg":0,"focal_length_mm":4,"pixel_um":6}}"#
         }
+        ("post", "/api/recordings") => r#"{"on":true}"#,
+        ("post", "/api/recordings/play") => r#"{"recording":"absent.pairs"}"#,
         ("post", "/api/quality") => r#"{"pairs":2}"#,
         _ => "{}",
     }
@@ -103,7 +107,10 @@ fn every_route_answers_in_its_own_words() {
                 _ => false,
             };
             assert!(fits, "{method} {path}: {answer:?}");
-            assert!(answer.status != 404 || place.contains("absent") || answer.error().contains("absent"), "{method} {path}: {answer:?}");
+            assert!(
+                answer.status != 404 || place.contains("absent") || answer.error().contains("absent"),
+                "{method} {path}: {answer:?}"
+            );
             assert!(answer.status != 422, "{method} {path}: the body of this test does not fit: {answer:?}");
             served.post("/api/stop", "", "{}");
             served.state_when(|state| state["job"].is_null() || state["job"]["phase"] != "running");

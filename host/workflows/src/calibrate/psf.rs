@@ -91,8 +91,7 @@ pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> 
         Psf::Gaussian { k } => (None, k),
         Psf::Generalised { p, k } => (Some(p), k),
     };
-    let targets_mm: Vec<f64> =
-        found.alphas.iter().map(|alpha| rounded(optics.depth_mm(*alpha), 3)).collect();
+    let targets_mm: Vec<f64> = found.alphas.iter().map(|alpha| rounded(optics.depth_mm(*alpha), 3)).collect();
     Ok(PsfFigures {
         psf: psf.to_string(),
         p,

@@ -163,8 +163,10 @@ impl CameraSettings {
             let expected = format!("{OF_THE_EMULATED_RIG}; {rig} needs one of {ADDRESSES} but sim");
             return Err(WorkflowError::parameter("camera", "sim", expected));
         }
-        if let Some(exposure) = self.settings.iter().find(|setting| matches!(setting, Setting::ExposureUs(_))) {
-            let expected = "the board's pulse is the exposure: set it where the other exposures are set".to_string();
+        if let Some(exposure) = self.settings.iter().find(|setting| matches!(setting, Setting::ExposureUs(_)))
+        {
+            let expected =
+                "the board's pulse is the exposure: set it where the other exposures are set".to_string();
             return Err(WorkflowError::parameter("exposure_us", exposure.value(), expected));
         }
         let camera = self.address.open()?.map(|camera| self.set_up(camera)).transpose()?;

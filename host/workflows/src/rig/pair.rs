@@ -84,7 +84,8 @@ pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFig
     let frames = settings.frames.as_deref().map(camera_frames::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
-    let (mut pair, mut record) = take_averaged(&mut rig, &optics, &settings.camera, settings.averaged, context)?;
+    let (mut pair, mut record) =
+        take_averaged(&mut rig, &optics, &settings.camera, settings.averaged, context)?;
     if let Some(frames) = &frames {
         for taken in [&mut pair.far, &mut pair.near] {
             taken.image = corrected(&taken.image, frames)?;
@@ -134,8 +135,12 @@ fn take_averaged(
 ) -> Result<(Pair, CaptureRecord)> {
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-    let exposures =
-        Exposures { exposure: settings.exposure, image_wait: settings.image_wait, averaged, ..Exposures::default() };
+    let exposures = Exposures {
+        exposure: settings.exposure,
+        image_wait: settings.image_wait,
+        averaged,
+        ..Exposures::default()
+    };
     let EquippedRig { camera, rig } = equipped;
     let say = &mut |what: &str| context.say(what);
     let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;

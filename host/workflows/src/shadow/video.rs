@@ -63,7 +63,10 @@ const SAMPLES: usize = 6;
 ///
 /// # Errors
 /// The video, the camera's numbers, a sun too low for shadows, folders that cannot be written. What was complete stays.
-pub fn remove_from_video(settings: &VideoShadowSettings, context: &Context<'_>) -> Result<VideoShadowFigures> {
+pub fn remove_from_video(
+    settings: &VideoShadowSettings,
+    context: &Context<'_>,
+) -> Result<VideoShadowFigures> {
     let none = || VideoError::NoFrames { path: settings.video.clone() };
     let first = Video::open(&settings.video)?.next().ok_or_else(none)??;
     let (height, width) = frame_of(&first.pixels).size();

@@ -48,7 +48,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let count = images.len() / 2;
     if !depth.is_empty() && depth.len() != count {
         let given = depth.len();
-        bail!(Usage(format!("--depth is given {given} times for {count} pairs: give it for each, or not at all")));
+        bail!(Usage(format!(
+            "--depth is given {given} times for {count} pairs: give it for each, or not at all"
+        )));
     }
     let pairs = images
         .chunks_exact(2)
