@@ -10,10 +10,40 @@ use std::{
     thread::JoinHandle,
 };
 
-use farnear_protocol::{BoardMicros, camera::FrameHeader};
+use farnear_protocol::{
+    BoardMicros,
+    camera::{FRAME_HEADER, FrameHeader},
+};
 use farnear_scene::{Camera, Lens, Psf, Renderer, Scene};
 
 use crate::{error::SimError, wiring::Shot};
+
+/// A picture with when it was taken, for a camera that stamps its frames by a clock of its own.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Picture {
+    /// Start of the exposure, virtual nanoseconds.
+    pub begin_ns: u64,
+    /// What it is.
+    pub header: FrameHeader,
+    /// As the endpoint sends it.
+    frame: Vec<u8>,
+}
+
+impl Picture {
+    /// A picture of these pixels.
+    pub fn new(begin_ns: u64, header: FrameHeader, pixels: &[u16]) -> Self {
+        let mut frame = Vec::with_capacity(4 + header.length() as usize);
+        frame.extend(header.length().to_le_bytes());
+        frame.extend(header.to_bytes());
+        frame.extend(pixels.iter().flat_map(|pixel| pixel.to_le_bytes()));
+        Self { begin_ns, header, frame }
+    }
+
+    /// Its pixels row by row, 16 bits each, the lower byte first.
+    pub fn pixels(&self) -> &[u8] {
+        self.frame.get(4 + FRAME_HEADER..).unwrap_or_default()
+    }
+}
 
 /// Renders exposures.
 pub struct Imager {
@@ -44,6 +74,10 @@ impl Imager {
     /// # Errors
     /// [`SimError::Scene`].
     pub fn frame(&mut self, shot: &Shot) -> Result<Vec<u8>, SimError> {
+        Ok(self.picture(shot)?.frame)
+    }
+
+    fn picture(&mut self, shot: &Shot) -> Result<Picture, SimError> {
         let number = self.exposures;
         self.exposures += 1;
         let image = self
@@ -57,14 +91,11 @@ impl Imager {
             height: self.camera.height_px as u16,
             bits: self.camera.noise.bits(),
         };
-        let mut bytes = Vec::with_capacity(4 + header.length() as usize);
-        bytes.extend(header.length().to_le_bytes());
-        bytes.extend(header.to_bytes());
-        bytes.extend(image.iter().flat_map(|pixel| pixel.to_le_bytes()));
-        Ok(bytes)
+        let pixels: Vec<u16> = image.iter().copied().collect();
+        Ok(Picture::new(shot.begin_ns, header, &pixels))
     }
 
-    /// Renders what comes until nothing can come any more; counts `waiting` down with each.
+    /// Renders what comes until nothing can come any more; counts `waiting` down with each. `second` gets all of it, too.
     ///
     /// # Errors
     /// [`SimError::Io`] where no thread can be started.
@@ -72,15 +103,18 @@ impl Imager {
         mut self,
         shots: Receiver<Shot>,
         frames: SyncSender<Vec<u8>>,
+        mut second: Option<SyncSender<Picture>>,
         waiting: Arc<AtomicUsize>,
     ) -> Result<JoinHandle<()>, SimError> {
         std::thread::Builder::new()
             .name("camera".into())
             .spawn(move || {
                 for shot in shots {
-                    match self.frame(&shot) {
-                        Ok(frame) => {
-                            if frames.send(frame).is_err() {
+                    match self.picture(&shot) {
+                        Ok(picture) => {
+                            // A second camera that has ended is missed by nobody.
+                            second = second.take().filter(|second| second.send(picture.clone()).is_ok());
+                            if frames.send(picture.frame).is_err() {
                                 return;
                             }
                         }

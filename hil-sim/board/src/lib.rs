@@ -7,7 +7,7 @@
 //! - [`parts`]: what the parts are like, the numbers of `parts.toml`; [`processor`]: what its instructions cost.
 //! - [`rig`]: the emulated rig in this process, for tests; [`config`], [`command`], [`report`]: what it is made of, what
 //!   it can be asked and what it answers.
-//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client.
+//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client; the same camera as one of [`gige`] Vision.
 //! - [`board`], [`chips`], [`memory`], [`kept_memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
 //! - [`camera`], [`imager`]: when the camera exposes, and its images.
 //! - [`driver`]: what happens whenever the emulator stops; [`pacing`], [`lockstep`]: when virtual time passes.
@@ -32,6 +32,7 @@ pub mod endpoint;
 pub mod error;
 pub mod faults;
 pub mod firmware;
+pub mod gige;
 pub mod imager;
 pub mod judge;
 pub mod kept_memory;

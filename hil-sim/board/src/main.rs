@@ -14,6 +14,7 @@ use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, standard};
 use farnear_sim::{
     Pace, Parts, RigConfig, Scenario,
     campaign::{self, Campaign, Shard, cpu_time},
+    gige::{self, GigeConfig},
     imager::Imager,
     player,
     run::ServedRig,
@@ -124,6 +125,13 @@ struct Run {
     /// make again.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
+    /// Be a GigE Vision camera, too, on this network interface: lo, or an IPv4 address of this computer. Its identification stands in
+    /// the line of JSON; `farnear camera list` finds it.
+    #[arg(long, value_name = "INTERFACE", value_parser = gige::interface)]
+    gige: Option<std::net::Ipv4Addr>,
+    /// So many of 1000 packets of the GigE Vision camera are lost.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "gige", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    gige_lost: u32,
 }
 
 fn main() -> ExitCode {
@@ -270,7 +278,14 @@ fn serve(run: &Run) -> Result<()> {
     let lens = Lens::from_optics(&optics)?;
     let camera = Camera::new(standard::SIZE_PX.0, standard::SIZE_PX.1, run.noise);
     let imager = Imager::new(&run.scene, &lens, &run.psf, camera, config.seed)?;
-    let rig = ServedRig::start(&config, imager)?;
+    let gige = run.gige.map(|address| GigeConfig {
+        address,
+        seed: config.seed,
+        lost_per_thousand: run.gige_lost,
+        sensor_px: (standard::SIZE_PX.0 as u16, standard::SIZE_PX.1 as u16),
+        bits: run.noise.bits(),
+    });
+    let rig = ServedRig::start(&config, imager, gige.as_ref())?;
     let link = run.link.as_deref().map(|path| Link::new(path, &rig.port)).transpose()?;
     let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());
     ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
@@ -283,7 +298,8 @@ fn serve(run: &Run) -> Result<()> {
         });
     }
     let mut stdout = std::io::stdout();
-    writeln!(stdout, "{{\"port\": \"{port}\", \"camera\": \"{}\"}}", rig.camera)?;
+    let gige = rig.gige.as_ref().map_or_else(String::new, |id| format!(", \"gige\": \"{id}\""));
+    writeln!(stdout, "{{\"port\": \"{port}\", \"camera\": \"{}\"{gige}}}", rig.camera)?;
     stdout.flush()?;
     rig.wait()?;
     Ok(())

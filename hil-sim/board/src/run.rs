@@ -1,4 +1,4 @@
-//! The program: an emulated rig behind a pty and a camera endpoint.
+//! The program: an emulated rig behind a pty and a camera endpoint, or two.
 
 use std::{
     net::SocketAddr,
@@ -8,6 +8,7 @@ use std::{
         mpsc::{self, Sender},
     },
     thread::JoinHandle,
+    time::Duration,
 };
 
 use farnear_protocol::camera::Control;
@@ -17,10 +18,14 @@ use crate::{
     config::RigConfig,
     endpoint,
     error::SimError,
+    gige::{self, GigeConfig},
     imager::Imager,
     port,
     rig::launch,
 };
+
+/// The board is asked for its time; one that does not answer by then has ended.
+const ANSWER: Duration = Duration::from_secs(2);
 
 /// A rig that clients can open.
 pub struct ServedRig {
@@ -28,16 +33,18 @@ pub struct ServedRig {
     pub port: String,
     /// Address of the camera endpoint.
     pub camera: SocketAddr,
+    /// Identification of its GigE Vision camera, where it has one.
+    pub gige: Option<String>,
     commands: Sender<Command>,
     thread: JoinHandle<Result<(), SimError>>,
 }
 
 impl ServedRig {
-    /// Starts the rig and opens its two doors.
+    /// Starts the rig and opens its two doors; with `gige` a third one, by which the same pictures come.
     ///
     /// # Errors
     /// [`SimError`].
-    pub fn start(config: &RigConfig, imager: Imager) -> Result<Self, SimError> {
+    pub fn start(config: &RigConfig, imager: Imager, gige: Option<&GigeConfig>) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
         let pictures = Arc::new(AtomicUsize::new(0));
@@ -46,27 +53,19 @@ impl ServedRig {
         let (commands, thread) = launch(config, outlets, None)?;
         // One picture at a time is handed on: what is not fetched holds the imager up, and the imager the board.
         let (frames_out, frames) = mpsc::sync_channel(1);
-        imager.watch(shots, frames_out, pictures)?;
-        let control = commands.clone();
-        let camera = endpoint::open(frames, move |asked| {
-            let command = match asked {
-                // Nobody waits for the end: what comes from the host meanwhile is held until the time has passed.
-                Control::AdvanceMicros(micros) => {
-                    Command::Advance { nanos: micros.saturating_mul(1000), done: mpsc::channel().0 }
-                }
-                Control::Expose { shot_id, exposure } => {
-                    Command::Camera(CameraOrder::Expose { exposure_us: u64::from(exposure.0), id: shot_id })
-                }
-                Control::FreeRun { period, exposure } => Command::Camera(CameraOrder::FreeRun {
-                    period_us: u64::from(period.0),
-                    exposure_us: u64::from(exposure.0),
-                }),
-            };
-            let _ = control.send(command); // the rig may have ended
-        })?;
+        let ask = asker(&commands);
+        let (gige, second) = match gige {
+            Some(gige) => {
+                let (second, pictures) = mpsc::sync_channel(1);
+                (Some(gige::open(gige, pictures, ask.clone(), clock(&commands))?), Some(second))
+            }
+            None => (None, None),
+        };
+        imager.watch(shots, frames_out, second, pictures)?;
+        let camera = endpoint::open(frames, ask)?;
         let to_board = commands.clone();
         let port = port::open(bytes, move |frame| to_board.send(Command::Bytes(frame)).is_ok())?;
-        Ok(Self { port, camera, commands, thread })
+        Ok(Self { port, camera, gige, commands, thread })
     }
 
     /// A way to end the rig from elsewhere.
@@ -83,5 +82,39 @@ impl ServedRig {
     /// What ended it, if it was not asked to.
     pub fn wait(self) -> Result<(), SimError> {
         self.thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))
+    }
+}
+
+/// Hands on what the camera's host asks of it.
+fn asker(commands: &Sender<Command>) -> impl Fn(Control) + Send + Clone + 'static {
+    let commands = commands.clone();
+    move |asked| {
+        let command = match asked {
+            // Nobody waits for the end: what comes from the host meanwhile is held until the time has passed.
+            Control::AdvanceMicros(micros) => {
+                Command::Advance { nanos: micros.saturating_mul(1000), done: mpsc::channel().0 }
+            }
+            Control::Expose { shot_id, exposure } => {
+                Command::Camera(CameraOrder::Expose { exposure_us: u64::from(exposure.0), id: shot_id })
+            }
+            Control::FreeRun { period, exposure } => Command::Camera(CameraOrder::FreeRun {
+                period_us: u64::from(period.0),
+                exposure_us: u64::from(exposure.0),
+            }),
+        };
+        let _ = commands.send(command); // the rig may have ended
+    }
+}
+
+/// Tells the rig's time in ns.
+fn clock(commands: &Sender<Command>) -> impl Fn() -> u64 + Send + 'static {
+    let commands = commands.clone();
+    move || {
+        let (tell, told) = mpsc::channel();
+        let look = Box::new(move |rig: &mut crate::RigAccess<'_, '_>| {
+            let _ = tell.send(rig.now_ns()); // whoever asked may have given up
+        });
+        let _ = commands.send(Command::Access(look)); // the rig may have ended
+        told.recv_timeout(ANSWER).unwrap_or(0)
     }
 }

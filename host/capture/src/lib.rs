@@ -34,6 +34,7 @@
 //! # Ok::<(), ClientError>(())
 //! ```
 
+pub mod average;
 pub mod board_correction;
 pub mod camera;
 pub mod client;

@@ -9,6 +9,7 @@ use farnear_protocol::{
 };
 
 use crate::{
+    average::Average,
     camera::{Camera, Image},
     client::Client,
     describe::um,
@@ -29,6 +30,8 @@ pub struct Exposures {
     pub settle: Settle,
     /// Longest wait for an image once the board has told of its exposure.
     pub image_wait: Duration,
+    /// Exposures of each image of a pair, which are averaged; 1 or more.
+    pub averaged: u16,
 }
 
 impl Default for Exposures {
@@ -37,6 +40,7 @@ impl Default for Exposures {
             exposure: Micros(5_000),
             settle: Settle::of_move(Axis::SensorFine),
             image_wait: Duration::from_secs(30),
+            averaged: 1,
         }
     }
 }
@@ -115,7 +119,7 @@ pub fn reach(
     Ok(Reach { coarse, shots: [shot(sensor.far_mm)?, shot(sensor.near_mm)?] })
 }
 
-/// Takes a pair. `say` is told in words what is being done.
+/// Takes a pair. `say` is told in words what is being done. Of exposures that are averaged the first stands in the record.
 pub fn capture_pair(
     client: &Client,
     camera: &mut dyn Camera,
@@ -126,21 +130,23 @@ pub fn capture_pair(
     let reach = reach(client, sensor, exposures, say)?;
     let [far, near] = reach.shots.map(|shot| um(shot.target));
     say(&format!("exposing far (piezo at {far:.3} um) and near ({near:.3} um)"));
-    let mut taken = Vec::new();
-    expose(
-        client,
-        camera,
-        &reach.shots,
-        exposures.image_wait,
-        |record, image| -> Result<(), CaptureError> {
-            taken.push((record, image));
-            Ok(())
-        },
-    )?;
-    let told = taken.len();
-    let Ok(both) = <[(ShotRecord, Image); 2]>::try_from(taken) else {
-        return Err(CaptureError::Count { told, asked: 2 });
+    let repeat = exposures.averaged.max(1);
+    let shots = reach.shots.map(|shot| Shot { repeat, ..shot });
+    let mut taken: [Option<(ShotRecord, Average)>; 2] = [None, None];
+    let mut told = 0;
+    expose(client, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
+        told += 1;
+        match taken.get_mut(usize::from(record.index)) {
+            Some(Some((_, average))) => average.add(&image)?,
+            Some(none) => *none = Some((record, Average::of(image))),
+            None => return Err(CaptureError::Count { told, asked: 2 * usize::from(repeat) }),
+        }
+        Ok(())
+    })?;
+    let [Some(far), Some(near)] = taken else {
+        return Err(CaptureError::Count { told, asked: 2 * usize::from(repeat) });
     };
+    let both = [far, near].map(|(record, average)| (record, average.finish()));
     pair_of(both, sensor, reach.coarse, &client.hello().limits)
 }
 

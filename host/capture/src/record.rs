@@ -3,7 +3,7 @@
 //! The folder appears whole or not at all. From an emulated rig it holds no clock time, port or random number:
 //! the same scene and seed give the same bytes.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use farnear_files::{
     EncodeError,
@@ -125,6 +125,15 @@ pub struct CameraRecord {
     pub height: usize,
     /// Bits of the camera; 9 to 15 are shifted up to 16 in the files.
     pub bits: u8,
+    /// Exposures that each image is the mean of, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub averaged: Option<u16>,
+    /// Whether the camera's dark and flat frames were taken off.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub corrected: bool,
+    /// What was set on the camera for this.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub settings: BTreeMap<String, String>,
 }
 
 /// The board.
@@ -250,7 +259,15 @@ fn record(
         time: circumstances.time,
         stage,
         exposure,
-        camera: CameraRecord { kind: circumstances.camera.into(), width, height, bits: image.bits },
+        camera: CameraRecord {
+            kind: circumstances.camera.into(),
+            width,
+            height,
+            bits: image.bits,
+            averaged: None,
+            corrected: false,
+            settings: BTreeMap::new(),
+        },
         board: BoardRecord {
             name: hello.board.as_str().into(),
             firmware: hello.firmware.as_str().into(),

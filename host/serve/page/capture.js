@@ -22,12 +22,13 @@ export function warn(found) {
 /** The panel. */
 export function make() {
   const depth = h("input", { type: "checkbox", checked: true });
+  const averaged = h("input", { type: "number", value: 1, min: 1, max: 256, "aria-label": "Exposures of each image, averaged" });
   const amount = h("input", { type: "number", value: 10, min: 1, max: 500, "aria-label": "Pairs of the series" });
   const axis = choice([["fine", "Piezo"], ["coarse", "Coarse"], ["lens", "Lens"]], "fine", () => {}, { "aria-label": "Axis of the stack" });
   const [from, to, steps] = [["From", 20], ["To", 180], ["Images", 17]].map(([text, value]) => field(text, h("input", { type: "number", value, step: "any" }), text === "Images" ? "" : "µm"));
   const value = (place) => Number(place.querySelector("input").value);
   warnings = h("ul", { class: "warnings", hidden: true, "aria-label": "Before you capture" });
-  const pair = button("Capture pair", () => take({ kind: "pair" }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
+  const pair = button("Capture pair", () => take({ kind: "pair", averaged: Math.round(Number(averaged.value)) }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
   const all = [
     pair,
     button("Series", () => take({ kind: "series", pairs: Math.round(Number(amount.value)) }, false), { "data-capture": "" }),
@@ -40,7 +41,8 @@ export function make() {
   });
   key("c", "Capture a pair", () => !pair.disabled && pair.click());
   return panel("Capture", warnings, h("div", { class: "capture" }, pair, h("label", { class: "check" }, depth, "compute depth")),
-    h("details", {}, h("summary", {}, "Series, still, stack"),
+    h("details", {}, h("summary", {}, "Average, series, still, stack"),
+      h("div", { class: "row" }, h("span", {}, "Average"), averaged, h("span", { class: "unit" }, "exposures")),
       h("div", { class: "row" }, all[1], amount, h("span", { class: "unit" }, "pairs")),
       h("div", { class: "row" }, all[2], h("span", { class: "dim" }, "at the present focus")),
       h("div", { class: "row" }, all[3], axis), h("div", { class: "three" }, from, to, steps)));

@@ -198,16 +198,18 @@ function compute(name, done) {
   const smooth = h("input", { type: "number", value: 7, min: 1, max: 63, step: 2 });
   const median = choice([["1", "none"], ["3", "3 × 3"], ["5", "5 × 5"], ["7", "7 × 7"]], "3", () => {});
   const filled = h("input", { type: "checkbox" });
+  const corrected = h("input", { type: "checkbox" });
   const keep = h("input", { type: "checkbox" });
   const start = async () => {
     if (!name()) return;
-    const wish = { method: method.value, smooth_px: Number(smooth.value), median_px: Number(median.value), fill: filled.checked };
-    if (keep.checked) wish.variant = `${method.value}-${smooth.value}-${median.value}${filled.checked ? "-filled" : ""}`;
+    const wish = { method: method.value, smooth_px: Number(smooth.value), median_px: Number(median.value), fill: filled.checked, corrected: corrected.checked };
+    if (keep.checked) wish.variant = `${method.value}-${smooth.value}-${median.value}${filled.checked ? "-filled" : ""}${corrected.checked ? "-corrected" : ""}`;
     const begun = await act(`/api/captures/${name()}/depth`, wish);
     if (begun && (await ended("computation", begun.job)).phase === "done") done();
   };
   return panel("Compute", field("Method", method), field("Smoothing", smooth, "px"), field("Median", median),
-    h("label", { class: "check" }, filled, "fill low texture"), h("label", { class: "check" }, keep, "keep beside, to compare"),
+    h("label", { class: "check" }, filled, "fill low texture"), h("label", { class: "check" }, corrected, "correction of this session"),
+    h("label", { class: "check" }, keep, "keep beside, to compare"),
     button("Compute depth", start));
 }
 

@@ -1,5 +1,5 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
-import { act, drives, on, store } from "./link.js";
+import { act, drives, ended, get, on, store } from "./link.js";
 import { h, button, choice, field, number, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
@@ -28,6 +28,23 @@ export function make(host) {
   let best = 0;
   const off = button("Live image", () => mode("image"), { "aria-pressed": "false", title: "L" });
   const deep = button("Live depth", () => mode("depth"), { "aria-pressed": "false", title: "Pair after pair by the piezo" });
+  const record = button("Record", () => act("/api/recordings", { on: !store.state?.live.recording }), { "aria-pressed": "false", title: "Keeps the pairs of live depth" });
+  const recordings = h("select", { "aria-label": "Recording" });
+  const fast = h("input", { type: "checkbox" });
+  const played = h("p", { class: "dim", "aria-live": "polite" });
+  const play = button("Play", async () => {
+    const begun = await act("/api/recordings/play", { recording: recordings.value, fast: fast.checked });
+    if (!begun) return;
+    depth.element.hidden = false;
+    const job = await ended("computation", begun.job);
+    if (job.phase === "done") played.textContent = `${job.result.pairs} pairs, ${number(job.result.maps_per_second, 1)} maps/s, ${number(job.result.latency_ms, 1)} ms a map (median)`;
+  });
+  const listed = async () => {
+    const { recordings: found } = await get("/api/recordings").catch(() => ({ recordings: [] }));
+    const present = recordings.value;
+    recordings.replaceChildren(...found.map(({ name, megabytes }) => h("option", { value: name, selected: name === present }, `${name}, ${number(megabytes, 0)} MB`)));
+    play.disabled = !found.length;
+  };
   const exposure = h("input", { type: "number", min: 1, max: 1000000, step: 100, inputmode: "numeric" });
   exposure.addEventListener("change", () => act("/api/live", { exposure_us: Math.round(Number(exposure.value)) }));
   const measure = choice(MEASURES, MEASURES[0][0], (name) => { values.length = 0; best = 0; act("/api/live", { measure: name }); });
@@ -35,26 +52,32 @@ export function make(host) {
 
   host.append(h("div", { class: "split" },
     h("div", { class: "stage" },
-      h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), saturation.label, peaking.label,
+      h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), record, saturation.label, peaking.label,
         h("span", { class: "grow" }), status),
       h("div", { class: "viewers" }, image.element, depth.element)),
     h("div", { class: "side" },
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
+      panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
       panel("Exposure", field("Exposure", exposure, "µs"), histogram, figures, warnings))));
   depth.element.hidden = true;
   key("l", "Live image on or off", () => mode("image"));
 
   const mode = (wanted) => act("/api/live", { mode: store.state?.live.mode === wanted ? "off" : wanted });
 
-  on("state", (state) => {
+  on("state", (state, before) => {
     const { live, rig } = state;
     off.setAttribute("aria-pressed", live.mode === "image");
     deep.setAttribute("aria-pressed", live.mode === "depth");
     for (const control of [off, deep, exposure, measure]) control.disabled = !drives() || rig.phase !== "ready";
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
     measure.value = live.measure;
-    depth.element.hidden = live.mode !== "depth";
+    const playing = state.computation?.kind === "play" && state.computation.phase === "running";
+    depth.element.hidden = live.mode !== "depth" && !playing;
+    record.disabled = !drives() || live.mode !== "depth";
+    record.setAttribute("aria-pressed", Boolean(live.recording));
+    record.textContent = live.recording ? "Stop recording" : "Record";
+    if (before?.live.recording !== live.recording) listed();
     const moving = state.job?.phase === "running";
     if (rig.phase !== "ready") status.textContent = "";
     else if (live.error) status.textContent = live.error;

@@ -8,6 +8,7 @@ import * as depth from "./depth.js";
 import * as lens from "./lens.js";
 import * as sessions from "./sessions.js";
 import * as quality from "./quality.js";
+import * as guides from "./guides.js";
 import * as log from "./log.js";
 import { whenCaptured } from "./capture.js";
 
@@ -148,6 +149,7 @@ function begin() {
   addView("optics", "Optics", lens.make);
   addView("captures", "Captures", (host) => sessions.make(host, (name) => go("depth", name)));
   addView("quality", "Quality", quality.make);
+  addView("guides", "Guides", guides.make);
   addView("log", "Log", log.make);
   $("tabs").addEventListener("keydown", tabKeys);
   $("stop").addEventListener("click", stop);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use axum::{
     Router,
+    extract::DefaultBodyLimit,
     handler::Handler,
     routing::{MethodRouter, get, post, put},
 };
@@ -91,6 +92,24 @@ impl Api {
         self.changing::<B, R>(path, "put", who, about, put(handler))
     }
 
+    /// A route that takes bytes as they are, at most so many.
+    pub fn put_bytes<R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
+        mut self,
+        path: &str,
+        about: &str,
+        bytes_max: usize,
+        handler: H,
+    ) -> Self {
+        let answer = self.json_of::<R>();
+        let operation = json!({
+            "summary": about,
+            "requestBody": { "required": true, "content": { "application/octet-stream": {} } },
+            "responses": responses(answer),
+            "parameters": [seat("Secret of a seat, from the first message on the socket.")],
+        });
+        self.add(path, "put", put(handler).layer(DefaultBodyLimit::max(bytes_max)), operation)
+    }
+
     fn changing<B: JsonSchema, R: JsonSchema>(
         mut self,
         path: &str,
@@ -106,16 +125,10 @@ impl Api {
             "responses": responses(answer),
         });
         if who != For::All {
-            operation["parameters"] = json!([{
-                "name": SEAT_HEADER,
-                "in": "header",
-                "required": true,
-                "description": match who {
-                    For::Driver => "Secret of the seat that drives.",
-                    _ => "Secret of a seat, from the first message on the socket.",
-                },
-                "schema": { "type": "string" },
-            }]);
+            operation["parameters"] = json!([seat(match who {
+                For::Driver => "Secret of the seat that drives.",
+                _ => "Secret of a seat, from the first message on the socket.",
+            })]);
         }
         self.add(path, method, route, operation)
     }
@@ -173,6 +186,17 @@ impl Api {
         });
         (self.router, document)
     }
+}
+
+/// The header that says who asks.
+fn seat(about: &str) -> Value {
+    json!({
+        "name": SEAT_HEADER,
+        "in": "header",
+        "required": true,
+        "description": about,
+        "schema": { "type": "string" },
+    })
 }
 
 /// What a route answers, and how it fails.

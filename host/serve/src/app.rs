@@ -17,7 +17,7 @@ use farnear_protocol::Micros;
 use farnear_workflows::{
     Cancel, WorkflowError,
     optics::GivenOptics,
-    rig::{RigAddress, camera::CameraSettings, open::OpenRig},
+    rig::{RigAddress, camera::CameraSettings, open::OpenRig, recording::Recorder},
 };
 use tokio::sync::watch;
 
@@ -56,6 +56,8 @@ pub struct App {
     pub pictures: watch::Sender<Bytes>,
     live: Mutex<Live>,
     log: Mutex<VecDeque<String>>,
+    /// The recording of live depth that is under way.
+    pub recorder: Mutex<Option<Recorder>>,
     /// The answer to a question, until the job has taken it.
     pub answer: Mutex<Option<String>>,
     ending: watch::Sender<bool>,
@@ -121,6 +123,7 @@ impl App {
             live: Mutex::new(live),
             log: Mutex::default(),
             answer: Mutex::default(),
+            recorder: Mutex::default(),
             ending: watch::Sender::new(false),
         }))
     }
@@ -168,7 +171,10 @@ impl App {
         live.cancel = Cancel::default();
         let Live { mode, exposure, measure, .. } = live.clone();
         drop(live);
-        self.change(|state| state.live = LiveState { mode, exposure_us: exposure.0, measure, error: None });
+        self.change(|state| {
+            let recording = state.live.recording.take();
+            state.live = LiveState { mode, exposure_us: exposure.0, measure, error: None, recording };
+        });
     }
 
     /// Ends what is seen now, so that a job begins; it goes on after the job.
@@ -235,6 +241,17 @@ impl App {
     /// The log, the oldest line first.
     pub fn log(&self) -> Vec<String> {
         lock(&self.log).iter().cloned().collect()
+    }
+
+    /// Ends the recording that is under way, if one is.
+    pub fn finish_recording(&self) {
+        let Some(recorder) = lock(&self.recorder).take() else { return };
+        let name = self.state().live.recording.unwrap_or_default();
+        match recorder.finish() {
+            Ok(found) => self.note(format!("recorded {name}: {} pairs, {} s", found.pairs, found.seconds)),
+            Err(error) => self.note(format!("recording {name}: {error}")),
+        }
+        self.change(|state| state.live.recording = None);
     }
 
     /// Ends jobs and live depth, and stops the rig; does not wait for any of them.
@@ -316,7 +333,13 @@ fn beginning(address: Option<&RigAddress>, live: &Live) -> State {
         },
         job: None,
         computation: None,
-        live: LiveState { mode: live.mode, exposure_us: live.exposure.0, measure: live.measure, error: None },
+        live: LiveState {
+            mode: live.mode,
+            exposure_us: live.exposure.0,
+            measure: live.measure,
+            error: None,
+            recording: None,
+        },
         seats: SeatsState { driver: None, asking: None, count: 0 },
         question: None,
         captures: 0,

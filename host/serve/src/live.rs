@@ -1,9 +1,9 @@
 //! Images and depth as they come, between jobs.
 
-use std::{cell::RefCell, time::Instant};
+use std::{cell::RefCell, path::Path, time::Instant};
 
 use farnear_capture::camera::Image;
-use farnear_depth::pipeline::Settings;
+use farnear_depth::{optics::Optics, pipeline::Settings};
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
     Context, Nobody, Result, WorkflowError, optics, picture,
@@ -11,12 +11,13 @@ use farnear_workflows::{
         RigAddress,
         live::{self, LiveSettings},
         live_depth::{self, LiveDepth, LiveDepthSettings},
+        recording::{self, PlayFigures},
     },
 };
 use serde_json::json;
 
 use crate::{
-    app::{App, Live},
+    app::{App, Live, lock},
     picture_message::{depth_codes, eight_bits, message},
     view::LiveMode,
 };
@@ -74,34 +75,68 @@ fn image_message(record: &ShotRecord, image: &Image, live: &Live, rate_hz: f64) 
 }
 
 fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate) -> Result<()> {
-    let range = optics::read(&app.optics_file())?.working_range();
+    let ends = ends(&optics::read(&app.optics_file())?);
     let settings = LiveDepthSettings {
         rig,
         camera: app.camera(),
         optics: app.optics_file(),
         computation: Settings::default(),
     };
-    // A little beyond the range on both sides: what lies just outside is still told apart.
-    let margin = 0.25 * (range.far_mm - range.near_mm);
-    let ends = [(range.near_mm - margin) as f32, (range.far_mm + margin) as f32];
-    live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
-        let (height, width) = depth.map.depth_mm.dim();
-        let header = json!({
-            "type": "depth",
-            "width": width,
-            "height": height,
-            "low_mm": ends[0],
-            "high_mm": ends[1],
-            "rate_hz": rate.next(),
-            "pair_ms": depth.pair_ms,
-            "latency_ms": depth.latency_ms,
-            "low_texture_fraction": depth.map.low_texture_fraction,
-        });
-        let mut pixels = depth_codes(&depth.map.depth_mm, ends);
-        pixels.extend(depth.map.confidence.iter().map(|value| (value * 255.0) as u8));
-        pixels.extend(eight_bits(depth.far));
-        app.pictures.send_replace(message(&header, &pixels));
+    let ended = live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
+        record(app, &depth);
+        app.pictures.send_replace(depth_message(&depth, ends, rate.next()));
         enough(app)
+    });
+    app.finish_recording();
+    ended
+}
+
+/// Adds the pair to the recording, if one is under way; a full one ends.
+fn record(app: &App, depth: &LiveDepth<'_>) {
+    let added = lock(&app.recorder).as_mut().map(|recorder| recorder.add(depth.far, depth.near));
+    match added {
+        None | Some(Ok(true)) => {}
+        Some(Ok(false)) => app.finish_recording(),
+        Some(Err(error)) => {
+            app.note(format!("recording: {error}"));
+            app.finish_recording();
+        }
+    }
+}
+
+/// Depth, confidence and the far image, with what the page shows beside them.
+fn depth_message(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> axum::body::Bytes {
+    let (height, width) = depth.map.depth_mm.dim();
+    let header = json!({
+        "type": "depth",
+        "width": width,
+        "height": height,
+        "low_mm": ends[0],
+        "high_mm": ends[1],
+        "rate_hz": rate_hz,
+        "pair_ms": depth.pair_ms,
+        "latency_ms": depth.latency_ms,
+        "low_texture_fraction": depth.map.low_texture_fraction,
+    });
+    let mut pixels = depth_codes(&depth.map.depth_mm, ends);
+    pixels.extend(depth.map.confidence.iter().map(|value| (value * 255.0) as u8));
+    pixels.extend(eight_bits(depth.far));
+    message(&header, &pixels)
+}
+
+/// A little beyond the range on both sides: what lies just outside is still told apart.
+fn ends(optics: &Optics) -> [f32; 2] {
+    let range = optics.working_range();
+    let margin = 0.25 * (range.far_mm - range.near_mm);
+    [(range.near_mm - margin) as f32, (range.far_mm + margin) as f32]
+}
+
+/// Shows a recording as it was recorded, or as fast as depth is computed.
+pub fn play(app: &App, path: &Path, fast: bool, context: &Context<'_>) -> Result<PlayFigures> {
+    let rate = Rate::default();
+    recording::play(path, &Settings::default(), fast, context, |depth, optics| {
+        app.pictures.send_replace(depth_message(&depth, ends(optics), rate.next()));
+        Ok(())
     })
 }
 

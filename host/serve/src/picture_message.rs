@@ -2,8 +2,10 @@
 
 use axum::body::Bytes;
 use farnear_capture::camera::Image;
-use ndarray::Array2;
+use farnear_workflows::activity::running::Moment;
+use ndarray::{Array2, s};
 use serde::Serialize;
+use serde_json::json;
 
 /// Codes of depth that are left when 0 means that there is none.
 const CODES: f32 = 65_534.0;
@@ -16,6 +18,21 @@ pub fn message(header: &impl Serialize, pixels: &[u8]) -> Bytes {
     bytes.extend(&header);
     bytes.extend(pixels);
     bytes.into()
+}
+
+/// Widest picture of a person that is sent, px: it is looked at, not measured.
+const PERSON_WIDTH: usize = 320;
+
+/// A moment of a recognition: grey values, then the mask (1 = person), and the answer in the header.
+pub fn person(moment: &Moment<'_>) -> Bytes {
+    let step = moment.picture.ncols().div_ceil(PERSON_WIDTH).max(1);
+    let picture = moment.picture.slice(s![..;step, ..;step]);
+    let mask = moment.mask.slice(s![..;step, ..;step]);
+    let (height, width) = picture.dim();
+    let header = json!({ "type": "person", "width": width, "height": height, "answer": moment.answer });
+    let pixels: Vec<u8> =
+        picture.iter().copied().chain(mask.iter().map(|person| u8::from(*person))).collect();
+    message(&header, &pixels)
 }
 
 /// The upper eight bits of each pixel, row by row.

@@ -1,11 +1,14 @@
 //! All routes, one file per subject.
 
+pub mod calibrate;
 pub mod captures;
 pub mod depth;
 pub mod files;
 pub mod general;
 pub mod lens;
+pub mod people;
 pub mod quality;
+pub mod recordings;
 pub mod rig;
 
 use std::sync::Arc;
@@ -46,6 +49,9 @@ pub fn api() -> (Router<Arc<App>>, serde_json::Value) {
     let api = files::routes(api);
     let api = depth::routes(api);
     let api = quality::routes(api);
+    let api = calibrate::routes(api);
+    let api = people::routes(api);
+    let api = recordings::routes(api);
     api.finish()
 }
 
@@ -116,6 +122,17 @@ pub fn driver(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     }
     Err(Failure::new(StatusCode::FORBIDDEN, "another browser drives the rig")
         .with_hint("Ask for the controls first."))
+}
+
+/// Refuses who has no seat.
+///
+/// # Errors
+/// A failure that says where seats come from.
+pub fn seated(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
+    match app.with_seats(|seats| seats.number_of(secret(headers))) {
+        Some(_) => Ok(()),
+        None => Err(Failure::new(StatusCode::FORBIDDEN, "no such seat; a seat comes with a socket")),
+    }
 }
 
 /// The secret of a seat; empty where there is none.

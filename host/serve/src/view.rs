@@ -120,6 +120,8 @@ pub struct LiveState {
     pub measure: FocusMeasure,
     /// Why there is none though it is wanted.
     pub error: Option<String>,
+    /// Name of the recording that live depth goes into.
+    pub recording: Option<String>,
 }
 
 /// What is looked at live.

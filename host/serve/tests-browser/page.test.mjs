@@ -1,7 +1,7 @@
 // The page in a real browser, on the emulated rig: `npm ci && npm test`, or `cargo xtask test`.
 // SCREENSHOTS=folder keeps pictures of every view; docs/images has two of them.
 import assert from "node:assert/strict";
-import { mkdirSync, readFileSync } from "node:fs";
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
@@ -9,7 +9,8 @@ import { Validator } from "@seriousme/openapi-schema-validator";
 import { browser as launch, open, serve } from "./server.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const VIEWS = ["live", "depth", "optics", "captures", "quality", "log"];
+const VIEWS = ["live", "depth", "optics", "captures", "quality", "guides", "log"];
+const GUIDES = ["power", "psf", "series", "shadow", "activity"];
 const SIZES = [[1440, 900], [820, 1180], [390, 844]];
 let server;
 let browser;
@@ -158,6 +159,92 @@ test("live depth comes, and stop ends it", async () => {
   await page.context().close();
 });
 
+test("live depth is recorded and played back", async () => {
+  const page = await open(browser, server.address);
+  const record = page.getByRole("button", { name: "Record", exact: true });
+  assert.ok(await record.isDisabled(), "there is nothing to record");
+  await page.getByRole("button", { name: "Live depth" }).click();
+  await page.locator(".status", { hasText: "ms from image to map" }).waitFor();
+  await record.click();
+  await until((now) => now.live.recording, "it records");
+  await page.waitForTimeout(4000);
+  await page.getByRole("button", { name: "Stop recording" }).click();
+  await until((now) => !now.live.recording, "the recording ends");
+  await page.keyboard.press("Escape");
+  await until((now) => now.live.mode === "off", "live depth ends");
+  await page.getByLabel("Recording", { exact: true }).locator("option", { hasText: "live-001" }).waitFor({ state: "attached" });
+  await page.getByLabel("as fast as it goes").check();
+  await page.getByRole("button", { name: "Play" }).click();
+  const { computation } = await until((now) => now.computation?.kind === "play" && now.computation.phase !== "running", "it is played");
+  assert.equal(computation.phase, "done", computation.error);
+  assert.ok(computation.result.pairs >= 1 && computation.result.maps_per_second > 0, JSON.stringify(computation.result));
+  console.log(`recording: ${computation.result.pairs} pairs, ${computation.result.maps_per_second} maps/s, ${computation.result.latency_ms} ms a map`);
+  await page.locator("p", { hasText: "maps/s" }).last().waitFor();
+  assert.deepEqual(page.complaints, []);
+});
+
+test("the guide of the flat series captures targets, learns a correction and finds the point spread function", async () => {
+  const page = await open(browser, `${server.address}#guides/series`);
+  await page.getByLabel("Distances", { exact: true }).or(page.getByLabel("Distances in mm")).fill("890, 910, 930");
+  await page.getByRole("button", { name: "Capture the series" }).click();
+  await page.locator(".status", { hasText: "3 targets: 890.0, 910.0, 930.0 mm" }).waitFor();
+  await page.getByLabel("Method", { exact: true }).selectOption("planar");
+  await page.getByRole("button", { name: "Learn", exact: true }).click();
+  await page.locator("dt", { hasText: "RMS after" }).waitFor();
+  const mm = async (name) => Number.parseFloat(await page.locator("dt", { hasText: name }).locator("+ dd").textContent());
+  assert.ok((await mm("RMS after")) <= (await mm("RMS before")), "a correction makes it no worse");
+  await page.locator("[data-guide=psf]").click();
+  await page.getByLabel("the flat series: 3 targets at known distances").check();
+  await page.getByRole("button", { name: "Find", exact: true }).click();
+  const found = page.locator("dt", { hasText: "point spread function" }).locator("+ dd");
+  await found.waitFor();
+  // The emulated lens is that of the session's optics: a Gaussian with k = 0.4578.
+  const k = Number.parseFloat((await found.textContent()).match(/k=([0-9.]+)/)[1]);
+  assert.ok(Math.abs(k - 0.4578) < 0.03, `k = ${k}`);
+  assert.deepEqual(page.complaints, []);
+});
+
+/** Somebody, a bright ellipse, who goes through a picture that stands still; from `Y4M` frames. */
+function walk(frames = 40, width = 160, height = 120) {
+  const parts = [Buffer.from(`YUV4MPEG2 W${width} H${height} F25:1 Cmono\n`)];
+  for (let at = 0; at < frames; at++) {
+    const picture = Buffer.alloc(width * height, 60);
+    for (let row = 0; row < height; row++) {
+      for (let column = 0; column < width; column++) {
+        picture[row * width + column] += (row * 7 + column * 13) % 9;
+        const [x, y] = [(column - 30 - 2 * Math.max(0, at - 12)) / 11, (row - 62) / 34];
+        if (at >= 12 && x * x + y * y < 1) picture[row * width + column] = 200;
+      }
+    }
+    parts.push(Buffer.from("FRAME\n"), picture);
+  }
+  return Buffer.concat(parts);
+}
+
+test("a video that is sent is recognised frame by frame, and its shadow taken off", async () => {
+  const page = await open(browser, `${server.address}#guides/activity`);
+  const video = join(server.session, "..", `walk-${process.pid}.y4m`);
+  writeFileSync(video, walk());
+  await page.getByLabel("Video file to send").or(page.getByLabel("Send one")).setInputFiles(video);
+  await page.locator("p", { hasText: "is there" }).waitFor();
+  await page.getByRole("button", { name: "Recognise the video" }).click();
+  const { computation } = await until((now) => now.computation?.kind === "recognise" && now.computation.phase !== "running", "it is recognised");
+  assert.equal(computation.phase, "done", computation.error);
+  assert.equal(computation.result.frames, 40);
+  assert.ok(computation.result.empty_frames < 40, "somebody is seen");
+  await page.locator(".person-answer output", { hasText: "of all 40 frames" }).waitFor();
+  assert.ok((await page.locator("canvas.person").evaluate((canvas) => canvas.width)) > 0, "the picture is shown");
+  await page.locator("[data-guide=shadow]").click();
+  await page.getByLabel("Time").fill("2026-06-21T12:00");
+  await page.locator("dt", { hasText: "shadow's length" }).waitFor();
+  await page.getByRole("button", { name: "Take the shadow off" }).click();
+  const { computation: cut } = await until((now) => now.computation?.kind === "shadow" && now.computation.phase !== "running", "the shadow is off");
+  assert.equal(cut.phase, "done", cut.error);
+  await page.locator(".masks img").first().waitFor();
+  assert.ok(await page.locator(".masks img").first().evaluate((image) => image.decode().then(() => image.naturalWidth === 160)));
+  assert.deepEqual(page.complaints, []);
+});
+
 for (const [width, height] of SIZES) {
   for (const colorScheme of ["light", "dark"]) {
     test(`every view at ${width}x${height}, ${colorScheme}: readable by all, nothing beside the screen`, async () => {
@@ -176,6 +263,18 @@ for (const [width, height] of SIZES) {
         const beside = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
         assert.ok(beside <= 0, `${view} is ${beside} px too wide`);
         assert.ok(await page.locator("#stop").isVisible());
+      }
+      for (const guide of GUIDES) {
+        await page.locator("#tab-guides").click();
+        await page.locator(`[data-guide=${guide}]`).click();
+        await page.waitForTimeout(400);
+        if (process.env.SCREENSHOTS) await page.screenshot({ path: join(process.env.SCREENSHOTS, `guide-${guide}-${width}-${colorScheme}.png`) });
+        await page.evaluate(AXE);
+        const { violations } = await page.evaluate(() => globalThis.axe.run());
+        const grave = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+        assert.deepEqual(grave.map(({ id, nodes }) => `${guide}: ${id} ${nodes[0].target}`), []);
+        const beside = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+        assert.ok(beside <= 0, `${guide} is ${beside} px too wide`);
       }
       assert.deepEqual(page.complaints, []);
       await page.context().close();

@@ -1,4 +1,5 @@
-//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`]), evaluating
+//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`], [`running`] with the
+//! pictures), evaluating
 //! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
 mod confusion_picture;
@@ -8,6 +9,7 @@ pub mod judging;
 pub mod method;
 pub mod motion;
 pub mod recognition;
+pub mod running;
 pub mod samples;
 pub mod shipped;
 pub mod training;

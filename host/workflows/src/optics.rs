@@ -31,8 +31,16 @@ impl GivenOptics {
     /// [`WorkflowError::Read`], or which value makes no optics.
     pub fn read(path: &Path) -> Result<Self> {
         let text = fs::read_to_string(path).map_err(WorkflowError::read("the optics file", path))?;
+        Self::parse(&text, path)
+    }
+
+    /// Checks optics that stand in another file, at `path`.
+    ///
+    /// # Errors
+    /// Which value makes no optics.
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let table = text.parse().about(|| about(path))?;
-        Ok(Self { path: path.into(), optics: check(&text, path)?, table })
+        Ok(Self { path: path.into(), optics: check(text, path)?, table })
     }
 
     /// The optics, and what there is to say of them.

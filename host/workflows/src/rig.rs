@@ -26,6 +26,7 @@ pub mod motion;
 pub mod open;
 pub mod pair;
 pub mod quality;
+pub mod recording;
 pub mod sequence;
 pub mod series;
 pub mod settings;

@@ -18,6 +18,22 @@ pub struct Moment {
     pub time: DateTime<Utc>,
 }
 
+impl Moment {
+    /// A place in degrees and a time as RFC 3339 writes it, `2026-06-21T12:00:00+02:00`.
+    ///
+    /// # Errors
+    /// [`crate::WorkflowError::Sun`] for a place that is none, [`crate::WorkflowError::Parameter`] for a time that is none.
+    pub fn new(latitude_deg: f64, longitude_deg: f64, time: &str) -> Result<Self> {
+        let place = Place::new(latitude_deg, longitude_deg)?;
+        let wrong = |_| {
+            let expected = "expected a date and a time with its zone, as 2026-06-21T12:00:00+02:00";
+            crate::WorkflowError::parameter("time", time, expected)
+        };
+        let time = DateTime::parse_from_rfc3339(time).map_err(wrong)?.with_timezone(&Utc);
+        Ok(Self { place, time })
+    }
+}
+
 /// Who computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Formula {

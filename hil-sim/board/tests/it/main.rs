@@ -7,6 +7,7 @@ mod bench;
 mod calibration;
 mod continuous;
 mod fuzz;
+mod gige;
 mod maths;
 mod memory;
 mod outstanding;

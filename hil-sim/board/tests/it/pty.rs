@@ -25,6 +25,7 @@ pub struct Program {
     child: Child,
     pub port: String,
     camera: String,
+    pub gige: Option<String>,
 }
 
 impl Program {
@@ -44,11 +45,12 @@ impl Program {
             rest.split('"').next().expect("a value").to_string()
         };
         let (port, camera) = (value("port"), value("camera"));
-        Self { child, port, camera }
+        let gige = line.contains("\"gige\"").then(|| value("gige"));
+        Self { child, port, camera, gige }
     }
 
     /// Closes its standard input and waits for its end.
-    fn end(mut self) -> std::process::ExitStatus {
+    pub fn end(mut self) -> std::process::ExitStatus {
         drop(self.child.stdin.take());
         let deadline = Instant::now() + PATIENCE;
         loop {
@@ -148,7 +150,7 @@ fn receive_frame(camera: &mut TcpStream) -> (FrameHeader, Vec<u8>) {
 }
 
 /// Homes, goes to the far focus, exposes far and near; gives both frames.
-fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
+pub fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
     let mut client = Client::open(&program.port);
     for axis in [Axis::SensorCoarse, Axis::Lens] {
         let homed = client.carry_out(&Request::Home { axis, silence: SILENCE });

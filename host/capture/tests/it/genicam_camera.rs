@@ -28,7 +28,10 @@ const NUMBERS: u64 = 255;
 /// Any delay of this computer's; the fake camera's time stamps are taken by a process of its own.
 const SCHEDULING: Duration = Duration::from_secs(15);
 
-/// The fake camera. There is one port for cameras on one address, so there is one at a time.
+/// There is one port for cameras on one address, so there is one at a time.
+pub static ALONE: Mutex<()> = Mutex::new(());
+
+/// The fake camera.
 struct Fake {
     child: Child,
     _alone: MutexGuard<'static, ()>,
@@ -36,7 +39,6 @@ struct Fake {
 
 impl Fake {
     fn start(lost_per_thousand: u32) -> Self {
-        static ALONE: Mutex<()> = Mutex::new(());
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let child = Command::new("arv-fake-gv-camera-0.8")
             .args(["-i", "lo", "-s", "GV01", "-r", &lost_per_thousand.to_string()])

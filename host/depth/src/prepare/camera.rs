@@ -6,7 +6,8 @@
 
 use ndarray::{Array2, ArrayView2, Zip};
 
-use super::band::box_mean;
+use super::{band::box_mean, defects};
+use crate::reason::Reason;
 
 /// Side of the window that a pixel's response is relative to.
 const SURROUNDINGS_PX: usize = 31;
@@ -135,6 +136,26 @@ impl CameraFrames {
         self.bad.iter().filter(|bad| **bad).count()
     }
 
+    /// The image (values from 0 to 1) as a camera without these faults would have taken it, single bad pixels mended from their
+    /// neighbours. A patch of them stays as it is: nothing is known of it.
+    ///
+    /// # Errors
+    /// [`CameraError::Size`] for an image of another size.
+    pub fn correct(&self, image: ArrayView2<f32>) -> Result<Array2<f32>, CameraError> {
+        self.check(image.dim())?;
+        let seen = self.apply(image);
+        let Some(bad) = self.bad() else { return Ok(seen) };
+        let marks = bad.mapv(|bad| if bad { Reason::BadPixel.code() } else { 0 });
+        let mut mended = seen.clone();
+        defects::mend(&mut mended, &marks);
+        Zip::from(&mut mended).and(&seen).for_each(|mended, seen| {
+            if mended.is_nan() {
+                *mended = *seen;
+            }
+        });
+        Ok(mended)
+    }
+
     pub(super) fn check(&self, (image_height, image_width): (usize, usize)) -> Result<(), CameraError> {
         let (height, width) = self.dark.dim();
         if (height, width) == (image_height, image_width) {
@@ -191,6 +212,19 @@ mod tests {
         for ((y, x), value) in seen.indexed_iter().filter(|(at, _)| *at != (20, 30)) {
             assert!((value - 0.5).abs() < 0.01, "({x}, {y}): {value}");
         }
+    }
+
+    #[test]
+    fn a_corrected_image_has_no_pattern_and_no_bad_pixel() {
+        let dark = Array2::from_elem((60, 80), 0.02);
+        let mut flat = Array2::from_shape_fn((60, 80), |(y, x)| 0.5 * response(y, x)) + &dark;
+        flat[(20, 30)] = 0.02;
+        let frames = CameraFrames::learn(std::slice::from_ref(&dark), std::slice::from_ref(&flat)).unwrap();
+        let seen = frames.correct(flat.view()).unwrap();
+        for ((y, x), value) in seen.indexed_iter() {
+            assert!((value - 0.5).abs() < 0.01, "({x}, {y}): {value}");
+        }
+        assert!(matches!(frames.correct(Array2::zeros((3, 4)).view()), Err(CameraError::Size { .. })));
     }
 
     #[test]

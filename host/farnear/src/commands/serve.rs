@@ -24,9 +24,12 @@ pub struct Arguments {
     /// Serial port of the board; or sim, to start the emulated rig. Without it the page shows captures.
     #[arg(long, value_name = "PORT|sim")]
     rig: Option<String>,
-    /// Camera: sim (with --rig sim), HOST:PORT of a farnear-sim, or folder:DIR where images appear.
+    /// Camera: sim (with --rig sim), HOST:PORT of a farnear-sim, folder:DIR where images appear, or another kind of docs/cameras.md.
     #[arg(long, value_name = "CAMERA", default_value = "sim")]
     camera: String,
+    /// Set this on the camera first, as far as its kind has it: gain, black_level, pixel_format, region, trigger_source.
+    #[arg(long, value_name = "NAME=VALUE")]
+    set: Vec<farnear_capture::camera::Setting>,
     /// Scene before the emulated camera: plane:MM, staircase, slant, cone or sphere [default: staircase].
     #[arg(long, value_parser = scene)]
     scene: Option<String>,
@@ -80,6 +83,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             address: arguments.camera.parse()?,
             exposure: Micros(5_000),
             image_wait: Duration::from_secs(30),
+            settings: arguments.set,
         },
         session: arguments.session,
         optics: arguments.optics,

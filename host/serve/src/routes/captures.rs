@@ -20,7 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, driver};
+use super::{Body, Shared, aside, driver, seated};
 use crate::{
     api::{Api, For},
     app::App,
@@ -42,6 +42,9 @@ pub enum Wish {
         /// The new capture's name; the next free number without one.
         #[serde(default)]
         name: Option<String>,
+        /// Exposures that each image is the mean of, 1 to 256.
+        #[serde(default = "once")]
+        averaged: u16,
     },
     /// Pair after pair.
     Series {
@@ -61,6 +64,10 @@ pub enum Wish {
         /// Images.
         steps: usize,
     },
+}
+
+fn once() -> u16 {
+    1
 }
 
 /// That a capture was begun.
@@ -146,9 +153,7 @@ async fn note(
     headers: HeaderMap,
     Body(NoteBody { rating, text }): Body<NoteBody>,
 ) -> Result<Json<Done>, Failure> {
-    if app.with_seats(|seats| seats.number_of(super::secret(&headers))).is_none() {
-        return Err(Failure::new(StatusCode::FORBIDDEN, "no such seat; a seat comes with a socket"));
-    }
+    seated(&app, &headers)?;
     let folder = sessions::folder_of(&app.session, &name)?;
     sessions::write_note(&folder, &Note { rating, text })?;
     app.change(|state| state.captures += 1);
@@ -165,12 +170,12 @@ async fn capture(
     let (camera, optics) = (app.camera(), app.optics_file());
     let free = |kind, count| sessions::free_names(&app.session, kind, count);
     let (task, out) = match wish {
-        Wish::Pair { name } => {
+        Wish::Pair { name, averaged } => {
             let out = match name {
                 Some(name) => sessions::folder_of(&app.session, &name)?,
                 None => free("pair", 1)?.remove(0),
             };
-            let settings = PairSettings { rig, camera, optics, out: out.clone() };
+            let settings = PairSettings { rig, camera, optics, averaged, frames: None, out: out.clone() };
             let work = move |app: &App, context: &Context<'_>| {
                 kept(app, figures(pair::capture(&settings, context)?))
             };

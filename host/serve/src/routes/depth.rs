@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, secret};
+use super::{Body, Shared, aside, calibrate, seated};
 use crate::{
     api::{Api, For},
     app::App,
@@ -48,6 +48,8 @@ pub struct DepthWish {
     pub median_px: usize,
     /// Whether regions of low texture are filled.
     pub fill: bool,
+    /// Whether the correction that the session has learned is applied.
+    pub corrected: bool,
     /// Name of the capture's folder within which another map is kept; without it the capture's own.
     pub variant: Option<String>,
 }
@@ -55,7 +57,15 @@ pub struct DepthWish {
 impl Default for DepthWish {
     fn default() -> Self {
         let Settings { smoothing_px, median_px, fill, .. } = Settings::default();
-        Self { method: "ro".into(), operators: None, smooth_px: smoothing_px, median_px, fill, variant: None }
+        Self {
+            method: "ro".into(),
+            operators: None,
+            smooth_px: smoothing_px,
+            median_px,
+            fill,
+            corrected: false,
+            variant: None,
+        }
     }
 }
 
@@ -130,9 +140,7 @@ async fn compute(
     headers: HeaderMap,
     Body(wish): Body<DepthWish>,
 ) -> Result<Json<Begun>, Failure> {
-    if app.with_seats(|seats| seats.number_of(secret(&headers))).is_none() {
-        return Err(Failure::new(StatusCode::FORBIDDEN, "no such seat; a seat comes with a socket"));
-    }
+    seated(&app, &headers)?;
     let folder = sessions::folder_of(&app.session, &name)?;
     let method: Method = wish.method.parse().map_err(|error: depth::method::UnknownMethod| {
         Failure::new(StatusCode::BAD_REQUEST, format!("method {:?}: {error}", wish.method))
@@ -168,7 +176,7 @@ async fn compute(
         region: None,
         camera: None,
         min_confidence: 0.0,
-        correction: None,
+        correction: wish.corrected.then(|| app.session.join(calibrate::CORRECTION)),
         uncertainty: (method == Method::RationalOperators).then_some(CameraNoise::Estimated),
         write: Outputs::default(),
         out: Some(out),

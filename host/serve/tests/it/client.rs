@@ -61,6 +61,7 @@ impl Served {
             address: CameraAddress::Folder(shots),
             exposure: Micros(5_000),
             image_wait: Duration::from_secs(5),
+            settings: Vec::new(),
         };
         let listen = listen(folder.path());
         let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen };

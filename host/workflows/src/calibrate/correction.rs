@@ -92,14 +92,22 @@ struct Entry {
 /// # Errors
 /// [`WorkflowError::Read`]; [`WorkflowError::File`] for a list of another form or an empty one; [`WorkflowError::Map`].
 pub fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    self::list(list)?.into_iter().map(|(depth, mm)| Ok((map::read(&folder.join(depth))?, mm))).collect()
+}
+
+/// The files (relative to the list) and true depths in mm of a list of patterns.
+///
+/// # Errors
+/// As [`read`], without the maps.
+pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
     const EXPECTED: &str = "a list of [[pattern]] with depth = FILE and true_mm = MM";
     let text = fs::read_to_string(list).map_err(WorkflowError::read("the list of patterns", list))?;
     let List { pattern } = toml::from_str(&text).map_err(WorkflowError::file(list, EXPECTED))?;
     if pattern.is_empty() {
         return Err(WorkflowError::file(list, EXPECTED)("it lists no [[pattern]]"));
     }
-    let folder = list.parent().unwrap_or(Path::new(""));
-    pattern.iter().map(|entry| Ok((map::read(&folder.join(&entry.depth))?, entry.true_mm))).collect()
+    Ok(pattern.into_iter().map(|entry| (entry.depth, entry.true_mm)).collect())
 }
 
 fn rmse_mm(maps: &[(Array2<f32>, f64)], correction: Option<&Correction>) -> Result<f64> {

@@ -1,4 +1,4 @@
-//! The point spread function from a pair of a flat, textured target: k of a Gaussian, or p and k of a generalised one.
+//! The point spread function from pairs of a flat, textured target: k of a Gaussian, or p and k of a generalised one.
 
 use std::path::PathBuf;
 
@@ -20,19 +20,26 @@ use crate::{
 /// Decimals of p and of k: no pair tells them better.
 const DECIMALS: [i32; 2] = [4, 5];
 
-/// What is looked at, and for what.
+/// A pair of a flat target.
 #[derive(Clone, PartialEq, Debug)]
-pub struct PsfSettings {
+pub struct TargetPair {
     /// The far-focused image.
     pub far: PathBuf,
     /// The near-focused image.
     pub near: PathBuf,
+    /// Where the target stands; without it it is taken to stand at the focus of the sharper image.
+    pub depth_mm: Option<f64>,
+}
+
+/// What is looked at, and for what.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PsfSettings {
+    /// One pair or several, which are fitted together.
+    pub pairs: Vec<TargetPair>,
     /// The optics file; its own point spread function does not matter.
     pub optics: PathBuf,
     /// What to find.
     pub model: Model,
-    /// Where the target stands; without it it is taken to stand at the focus of the sharper image.
-    pub depth_mm: Option<f64>,
     /// Where the optics with what was found are written to.
     pub out: Option<PathBuf>,
 }
@@ -49,8 +56,11 @@ pub struct PsfFigures {
     pub k: f64,
     /// What is left of the images' energy when one is made from the other, 0 to 1.
     pub residual: f64,
-    /// Where the target was taken to stand.
+    /// Where the target was taken to stand; the first of several.
     pub target_mm: f64,
+    /// Where each of several was.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub targets_mm: Vec<f64>,
 }
 
 /// Finds the point spread function.
@@ -59,12 +69,17 @@ pub struct PsfFigures {
 /// Optics, images, [`WorkflowError::Calibration`]; [`WorkflowError::Parameter`] for a target inside the focal length.
 pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> {
     let optics = optics::read(&settings.optics)?;
-    let far = read_grey(&settings.far)?.pixels;
-    let near = read_grey(&settings.near)?.pixels;
-    let alpha = settings.depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
-    context.cancel.check("reading the pair")?;
-    let pair = CapturedPair { far: far.view(), near: near.view(), alpha };
-    let found = fit_psf(&[pair], &optics, settings.model)?;
+    let mut images = Vec::new();
+    for pair in &settings.pairs {
+        let alpha = pair.depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
+        images.push((read_grey(&pair.far)?.pixels, read_grey(&pair.near)?.pixels, alpha));
+        context.cancel.check("reading the pairs")?;
+    }
+    let pairs: Vec<CapturedPair<'_>> = images
+        .iter()
+        .map(|(far, near, alpha)| CapturedPair { far: far.view(), near: near.view(), alpha: *alpha })
+        .collect();
+    let found = fit_psf(&pairs, &optics, settings.model)?;
     context.cancel.check("fitting the point spread function")?;
     let psf = rounded_psf(found.psf);
     if let Some(out) = &settings.out {
@@ -77,13 +92,14 @@ pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> 
         // No model of a calibration.
         Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => (None, 1.0),
     };
-    let target_mm = found.alphas.first().map_or(f64::NAN, |alpha| optics.depth_mm(*alpha));
+    let targets_mm: Vec<f64> = found.alphas.iter().map(|alpha| rounded(optics.depth_mm(*alpha), 3)).collect();
     Ok(PsfFigures {
         psf: psf.to_string(),
         p,
         k,
         residual: rounded(found.residual, 6),
-        target_mm: rounded(target_mm, 3),
+        target_mm: targets_mm.first().copied().unwrap_or(f64::NAN),
+        targets_mm: if targets_mm.len() > 1 { targets_mm } else { Vec::new() },
     })
 }
 

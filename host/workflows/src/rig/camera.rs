@@ -7,7 +7,7 @@ use std::{
 };
 
 use farnear_capture::{
-    camera::{Camera, CommandCamera, FolderCamera, SimCamera, command::CommandLine},
+    camera::{Camera, CommandCamera, FolderCamera, Setting, SimCamera, command::CommandLine},
     record::Circumstances,
 };
 use farnear_depth::psf::Psf;
@@ -110,7 +110,7 @@ fn not_built(kind: &str, address: impl std::fmt::Display, feature: &str) -> Work
 }
 
 /// A camera and how it exposes.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct CameraSettings {
     /// Which.
     pub address: CameraAddress,
@@ -118,11 +118,16 @@ pub struct CameraSettings {
     pub exposure: Micros,
     /// Longest wait for an image.
     pub image_wait: Duration,
+    /// What is set on it before anything moves, in this order; never the exposure.
+    pub settings: Vec<Setting>,
 }
 
 /// A camera that does not hang on the emulated rig, opened before the rig: one that is not there is known before anything
 /// moves.
-pub struct EarlyCamera(Option<Box<dyn Camera>>);
+pub struct EarlyCamera {
+    camera: Option<Box<dyn Camera>>,
+    settings: CameraSettings,
+}
 
 /// What is wrong with this camera at another rig.
 const OF_THE_EMULATED_RIG: &str = "it belongs to the emulated rig";
@@ -158,7 +163,19 @@ impl CameraSettings {
             let expected = format!("{OF_THE_EMULATED_RIG}; {rig} needs one of {ADDRESSES} but sim");
             return Err(WorkflowError::parameter("camera", "sim", expected));
         }
-        Ok(EarlyCamera(self.address.open()?))
+        if let Some(exposure) = self.settings.iter().find(|setting| matches!(setting, Setting::ExposureUs(_)))
+        {
+            let expected =
+                "the board's pulse is the exposure: set it where the other exposures are set".to_string();
+            return Err(WorkflowError::parameter("exposure_us", exposure.value(), expected));
+        }
+        let camera = self.address.open()?.map(|camera| self.set_up(camera)).transpose()?;
+        Ok(EarlyCamera { camera, settings: self.clone() })
+    }
+
+    fn set_up(&self, mut camera: Box<dyn Camera>) -> Result<Box<dyn Camera>> {
+        self.settings.iter().try_for_each(|setting| camera.set(setting))?;
+        Ok(camera)
     }
 }
 
@@ -174,9 +191,11 @@ impl EarlyCamera {
         context: &Context<'_>,
     ) -> Result<EquippedRig> {
         let rig = Rig::connect(address, optics, context)?;
-        let camera = match (self.0, &rig.emulation) {
+        let camera = match (self.camera, &rig.emulation) {
             (Some(camera), _) => camera,
-            (None, Some((simulator, _))) => Box::new(SimCamera::connect(simulator.camera())?),
+            (None, Some((simulator, _))) => {
+                self.settings.set_up(Box::new(SimCamera::connect(simulator.camera())?))?
+            }
             (None, None) => return Err(WorkflowError::parameter("camera", "sim", OF_THE_EMULATED_RIG)),
         };
         Ok(EquippedRig { camera, rig })

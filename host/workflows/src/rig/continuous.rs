@@ -224,6 +224,7 @@ mod tests {
                 address: CameraAddress::Emulated,
                 exposure: Micros(5_000),
                 image_wait: std::time::Duration::from_secs(1),
+                settings: Vec::new(),
             },
             cycle: Cycle::Program { path: "none".into() },
             rate_hz,

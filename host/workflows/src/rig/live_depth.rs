@@ -32,6 +32,8 @@ pub struct LiveDepthSettings {
 pub struct LiveDepth<'a> {
     /// The far-focused image.
     pub far: &'a Image,
+    /// The near-focused image.
+    pub near: &'a Image,
     /// Its depth, confidence and warnings.
     pub map: &'a DepthMap,
     /// Board time from the start of the far exposure to the end of the near one, in ms.
@@ -82,7 +84,13 @@ pub fn watch(
         let map = processor.run(grey(&far.image).view(), grey(&near.image).view())?;
         let pair_us = near.record.strobe_end.0.saturating_sub(far.record.strobe_start.0);
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
-        on_depth(LiveDepth { far: &far.image, map, pair_ms: pair_us as f64 / 1e3, latency_ms })?;
+        on_depth(LiveDepth {
+            far: &far.image,
+            near: &near.image,
+            map,
+            pair_ms: pair_us as f64 / 1e3,
+            latency_ms,
+        })?;
     }
     Ok(())
 }

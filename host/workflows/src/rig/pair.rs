@@ -3,17 +3,20 @@
 use std::path::PathBuf;
 
 use farnear_capture::{
+    camera::Image,
     pair::{Exposures, Pair, capture_pair},
     plan::SensorPair,
     record::{CaptureRecord, begin_folder, finish_folder, record_of},
 };
+use farnear_depth::prepare::CameraFrames;
+use ndarray::Zip;
 use serde::Serialize;
 
 use super::{
     RigAddress,
     camera::{CameraSettings, EquippedRig},
 };
-use crate::{context::Context, error::Result, optics::GivenOptics};
+use crate::{camera_frames, context::Context, error::Result, optics::GivenOptics, parameters::within};
 
 /// What is captured with, and where to.
 #[derive(Clone, Debug)]
@@ -24,9 +27,16 @@ pub struct PairSettings {
     pub camera: CameraSettings,
     /// The optics file.
     pub optics: PathBuf,
+    /// Exposures of each image, which are averaged: 1 to [`AVERAGED_MAX`].
+    pub averaged: u16,
+    /// The folder of the camera's dark and flat frames ([`crate::camera_frames`]), which are taken off the images.
+    pub frames: Option<PathBuf>,
     /// The new capture folder.
     pub out: PathBuf,
 }
+
+/// Most exposures that are averaged: beyond, drift counts more than noise.
+pub const AVERAGED_MAX: u16 = 256;
 
 /// What there is to say of a pair.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -70,12 +80,36 @@ impl From<&Pair> for PairFigures {
 /// Optics, folder, camera, rig: in this order, so that nothing moves where the result could not be kept.
 pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
+    within("average", settings.averaged, &(1..=AVERAGED_MAX), "exposures")?;
+    let frames = settings.frames.as_deref().map(camera_frames::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
-    let (pair, record) = take(&mut rig, &optics, &settings.camera, context)?;
+    let (mut pair, mut record) =
+        take_averaged(&mut rig, &optics, &settings.camera, settings.averaged, context)?;
+    if let Some(frames) = &frames {
+        for taken in [&mut pair.far, &mut pair.near] {
+            taken.image = corrected(&taken.image, frames)?;
+        }
+        record.camera.bits = pair.far.image.bits;
+        record.camera.corrected = true;
+    }
     finish_folder(folder, &pair, &record)?;
     context.say(&format!("wrote {}", settings.out.display()));
     Ok(PairFigures::from(&pair))
+}
+
+/// The image without the camera's faults, in 16 bits: what is not saturated stays below white, and what is darker than the dark frame
+/// is black.
+fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
+    const WHITE: f32 = 65_535.0;
+    let white = ((1_u32 << image.bits.min(16)) - 1) as u16;
+    let grey = image.pixels.mapv(|code| f32::from(code) / f32::from(white));
+    let seen = frames.correct(grey.view())?;
+    let pixels = Zip::from(&image.pixels).and(&seen).map_collect(|raw, seen| match *raw >= white {
+        true => u16::MAX,
+        false => (seen * WHITE).round().clamp(0.0, WHITE - 1.0) as u16,
+    });
+    Ok(Image { pixels, bits: 16 })
 }
 
 /// Captures a pair with what is open already.
@@ -88,14 +122,32 @@ pub fn take(
     settings: &CameraSettings,
     context: &Context<'_>,
 ) -> Result<(Pair, CaptureRecord)> {
+    take_averaged(equipped, optics, settings, 1, context)
+}
+
+/// As [`take`], with each image the mean of so many exposures.
+fn take_averaged(
+    equipped: &mut EquippedRig,
+    optics: &GivenOptics,
+    settings: &CameraSettings,
+    averaged: u16,
+    context: &Context<'_>,
+) -> Result<(Pair, CaptureRecord)> {
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-    let exposures =
-        Exposures { exposure: settings.exposure, image_wait: settings.image_wait, ..Exposures::default() };
+    let exposures = Exposures {
+        exposure: settings.exposure,
+        image_wait: settings.image_wait,
+        averaged,
+        ..Exposures::default()
+    };
     let EquippedRig { camera, rig } = equipped;
     let say = &mut |what: &str| context.say(what);
     let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;
     let circumstances = equipped.circumstances(optics.optics.psf(), optics.table.clone());
-    let record = record_of(&pair, &equipped.rig.client, circumstances);
+    let mut record = record_of(&pair, &equipped.rig.client, circumstances);
+    record.camera.averaged = (averaged > 1).then_some(averaged);
+    record.camera.settings =
+        settings.settings.iter().map(|setting| (setting.name().to_owned(), setting.value())).collect();
     Ok((pair, record))
 }

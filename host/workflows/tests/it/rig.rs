@@ -47,6 +47,7 @@ fn camera(folder: &Path) -> CameraSettings {
         address: CameraAddress::Folder(folder.into()),
         exposure: Micros(5_000),
         image_wait: Duration::from_secs(30),
+        settings: Vec::new(),
     }
 }
 

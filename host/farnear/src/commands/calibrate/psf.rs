@@ -1,33 +1,36 @@
-//! `farnear calibrate psf`: k of a Gaussian, or p and k of a generalised Gaussian, from a captured pair.
+//! `farnear calibrate psf`: k of a Gaussian, or p and k of a generalised Gaussian, from captured pairs.
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use farnear_depth::calibrate::Model;
-use farnear_workflows::calibrate::psf::{self, PsfSettings};
+use farnear_workflows::calibrate::psf::{self, PsfSettings, TargetPair};
 
-use crate::{report, terminal};
+use crate::{
+    report::{self, Usage},
+    terminal,
+};
 
-/// Find the point spread function from a pair of a flat, textured target at the far or near focus.
+/// Find the point spread function from one pair or several of a flat, textured target; without --depth at the far or near focus.
 #[derive(Args)]
 #[command(
-    after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian --out calibrated.toml"
+    after_help = "Examples:\n  farnear calibrate psf far.png near.png --optics optics.toml --model gaussian --out calibrated.toml\n  \
+        farnear calibrate psf a/far.png a/near.png b/far.png b/near.png --depth 900 --depth 920 --optics optics.toml --model generalised"
 )]
 pub struct Arguments {
-    /// The image focused on the far plane.
-    far: PathBuf,
-    /// The image focused on the near plane.
-    near: PathBuf,
+    /// The images of each pair: the one focused on the far plane, the one focused on the near plane; then the next pair's.
+    #[arg(num_args = 2.., required = true, value_names = ["FAR", "NEAR"])]
+    images: Vec<PathBuf>,
     /// The optics file; its own point spread function does not matter.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
     /// What to find: gaussian (k) or generalised (p and k).
     #[arg(long)]
     model: Model,
-    /// Depth at which the target stands; without it the target is taken to stand at the focus of the sharper image.
+    /// Depth at which the target stands, once for each pair; without it it is taken to stand at the focus of the sharper image.
     #[arg(long, value_name = "MM")]
-    depth: Option<f64>,
+    depth: Vec<f64>,
     /// Where to write the optics with the point spread function that was found.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -38,7 +41,26 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { far, near, optics, model, depth, out, json } = arguments;
-    let settings = PsfSettings { far, near, optics, model, depth_mm: depth, out };
+    let Arguments { images, optics, model, depth, out, json } = arguments;
+    if images.len() % 2 != 0 {
+        bail!(Usage(format!("{} images: expected a far and a near one of each pair", images.len())));
+    }
+    let count = images.len() / 2;
+    if !depth.is_empty() && depth.len() != count {
+        let given = depth.len();
+        bail!(Usage(format!(
+            "--depth is given {given} times for {count} pairs: give it for each, or not at all"
+        )));
+    }
+    let pairs = images
+        .chunks_exact(2)
+        .enumerate()
+        .map(|(at, pair)| TargetPair {
+            far: pair[0].clone(),
+            near: pair[1].clone(),
+            depth_mm: depth.get(at).copied(),
+        })
+        .collect();
+    let settings = PsfSettings { pairs, optics, model, out };
     report::print(&psf::fit(&settings, &terminal::context()?)?, json)
 }

@@ -14,7 +14,8 @@ use crate::{report, terminal};
 /// The folder appears when everything is in it: far.png, near.png and capture.toml.
 #[derive(Args)]
 #[command(
-    after_help = "Example: farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --optics optics.toml --out pair1/"
+    after_help = "Examples:\n  farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --optics optics.toml --out pair1/\n  \
+        farnear rig capture --port /dev/ttyACM0 --camera genicam: --set gain=2 --average 8 --optics optics.toml --out pair2/"
 )]
 pub struct Arguments {
     #[command(flatten)]
@@ -24,6 +25,13 @@ pub struct Arguments {
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
+    /// Take each image as the mean of so many exposures (1 to 256): noise falls with the root of their number.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    average: u16,
+    /// Take the camera's own dark and flat frames off both images: a folder of `farnear calibrate camera`. Do not give it to
+    /// `farnear depth` again.
+    #[arg(long, value_name = "DIR")]
+    camera_frames: Option<PathBuf>,
     /// The new capture folder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -38,6 +46,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
         rig: arguments.target.address()?,
         camera: arguments.camera.settings()?,
         optics: arguments.optics,
+        averaged: arguments.average,
+        frames: arguments.camera_frames,
         out: arguments.out,
     };
     report::print(&pair::capture(&settings, &terminal::context()?)?, arguments.json)

@@ -4,6 +4,7 @@ use std::{path::PathBuf, time::Duration};
 
 use anyhow::{Result, bail};
 use clap::Args;
+use farnear_capture::camera::Setting;
 use farnear_depth::psf::Psf;
 use farnear_protocol::Micros;
 use farnear_scene::{Noise, Scene};
@@ -118,6 +119,10 @@ pub struct CameraArguments {
     /// Longest wait for an image in seconds.
     #[arg(long, value_name = "S", default_value_t = 30)]
     image_wait_s: u64,
+    /// Set this on the camera first, as far as its kind has it: gain, black_level, pixel_format, region (column,row,width,height),
+    /// trigger_source; may be given several times. `farnear camera show` has the ranges.
+    #[arg(long, value_name = "NAME=VALUE")]
+    set: Vec<Setting>,
 }
 
 impl CameraArguments {
@@ -127,6 +132,7 @@ impl CameraArguments {
             address: self.camera.parse()?,
             exposure: Micros(self.exposure_us),
             image_wait: Duration::from_secs(self.image_wait_s),
+            settings: self.set.clone(),
         })
     }
 }

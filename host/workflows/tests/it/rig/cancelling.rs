@@ -77,7 +77,14 @@ fn every_workflow_that_moves_stops_the_rig() {
         (
             "pair",
             Box::new(|rig, context| {
-                let settings = PairSettings { rig, camera: camera(path), optics: optics(), out: out() };
+                let settings = PairSettings {
+                    rig,
+                    camera: camera(path),
+                    optics: optics(),
+                    averaged: 1,
+                    frames: None,
+                    out: out(),
+                };
                 pair::capture(&settings, context).map(drop)
             }),
         ),
@@ -136,7 +143,8 @@ fn a_camera_that_gives_nothing_is_waited_for_no_longer() {
         |board| board.board().triggers > 0,
         |rig, context| {
             let out = path.join("out");
-            let settings = PairSettings { rig, camera: camera(path), optics: optics(), out };
+            let settings =
+                PairSettings { rig, camera: camera(path), optics: optics(), averaged: 1, frames: None, out };
             pair::capture(&settings, context).map(drop)
         },
     );

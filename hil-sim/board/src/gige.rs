@@ -1,0 +1,247 @@
+//! The emulated camera as a GigE Vision camera: the same pictures as those of the TCP [`crate::endpoint`], over the transport of cameras that
+//! can be bought, so that a client's whole way from trigger to depth can be tried without one.
+//!
+//! Written from the protocol's public descriptions (packet layouts and register addresses as Aravis' headers give them), because Aravis' own
+//! fake camera has no line that triggers it, stamps its frames by the wall clock, and takes pictures from a C callback only. Here:
+//!
+//! - the hardware trigger is the emulated board's trigger line; software triggers and free running work, too;
+//! - frames are stamped in the emulated rig's time, in the leader and as chunks, and counted from the start of the acquisition;
+//! - lost packets are sent again when asked for, and can be lost on purpose;
+//! - gain (a factor), black level, region and pixel format are applied to the finished picture, as digital cameras do behind the converter.
+//!
+//! [`control`]: the control channel (GVCP, UDP port 3956); [`registers`]: what can be read and written; [`features`]: the camera's features, one
+//! table from which registers and the GenICam [`description`] are made; [`stream`]: frames as packets (GVSP); [`device`]: what the camera does.
+
+pub mod control;
+pub mod description;
+pub mod device;
+pub mod features;
+pub mod registers;
+pub mod stream;
+
+use std::{
+    io::ErrorKind,
+    net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc::Receiver},
+    thread,
+    time::{Duration, Instant},
+};
+
+use farnear_protocol::camera::Control;
+
+use crate::{error::SimError, imager::Picture};
+use device::Device;
+
+/// Where cameras listen, by the standard.
+const CONTROL_PORT: u16 = 3956;
+/// From one look at the heartbeat to the next.
+const LOOK: Duration = Duration::from_millis(100);
+/// A camera that runs freely waits so long for a picture of its own to be rendered.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Packets that leave at once; a pause after each such burst keeps to about a gigabit a second, which a receiver's buffer stands.
+const BURST: usize = 16;
+/// See [`BURST`].
+const PAUSE: Duration = Duration::from_micros(150);
+
+/// What a GigE Vision camera is made of.
+#[derive(Clone, Debug)]
+pub struct GigeConfig {
+    /// Address of the network interface on which it answers.
+    pub address: Ipv4Addr,
+    /// Its serial number is made of it, and which packets are lost.
+    pub seed: u64,
+    /// So many of 1000 packets are lost.
+    pub lost_per_thousand: u32,
+    /// Size of the sensor: width, height.
+    pub sensor_px: (u16, u16),
+    /// Bits of its converter.
+    pub bits: u8,
+}
+
+/// The address that a user names: `lo`, or an IPv4 address of this computer.
+///
+/// # Errors
+/// Anything else, in words.
+pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
+    match text {
+        "lo" => Ok(Ipv4Addr::LOCALHOST),
+        _ => text.parse().map_err(|_| {
+            format!("expected lo or an IPv4 address of this computer, e.g. 192.168.7.1; it is {text:?}")
+        }),
+    }
+}
+
+type Shared = Arc<Mutex<Device>>;
+
+fn lock(device: &Shared) -> MutexGuard<'_, Device> {
+    device.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Opens the camera: `pictures` go to whoever has it under control, and what its host asks of it to `ask`; `now` is the emulated rig's time in
+/// ns. Gives its identification, by which clients open it.
+///
+/// # Errors
+/// [`SimError::Io`] where the address is not this computer's, or another camera has the port.
+pub fn open(
+    config: &GigeConfig,
+    pictures: Receiver<Picture>,
+    ask: impl Fn(Control) + Send + Clone + 'static,
+    now: impl Fn() -> u64 + Send + 'static,
+) -> Result<String, SimError> {
+    let bind = |port: u16| {
+        let address = SocketAddrV4::new(config.address, port);
+        UdpSocket::bind(address).map_err(|source| {
+            let what = match source.kind() {
+                ErrorKind::AddrInUse => format!(
+                    "a GigE Vision camera answers at {} already (port {port} is taken): end that one, or use another interface",
+                    config.address
+                ),
+                ErrorKind::AddrNotAvailable => format!("no network interface here has the address {}", config.address),
+                _ => format!("cannot open the GigE Vision camera at {address}"),
+            };
+            SimError::Io { what, source }
+        })
+    };
+    let failed = |source| SimError::Io { what: "cannot open the GigE Vision camera".into(), source };
+    let (control, stream) = (bind(CONTROL_PORT)?, bind(0)?);
+    control.set_read_timeout(Some(LOOK)).map_err(failed)?;
+    let device = Device::new(config);
+    let id = device.id();
+    let device: Shared = Arc::new(Mutex::new(device));
+    let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
+        thread::Builder::new().name(name.into()).spawn(work).map_err(failed)
+    };
+    // Whoever looks for cameras shouts to all; what is sent to this computer's own address arrives by the other socket.
+    match UdpSocket::bind((Ipv4Addr::BROADCAST, CONTROL_PORT)) {
+        Ok(shouts) => {
+            let (device, answers) = (Arc::clone(&device), control.try_clone().map_err(failed)?);
+            spawn("GigE discovery", Box::new(move || discover(&shouts, &answers, &device)))?;
+        }
+        Err(error) => eprintln!(
+            "the GigE Vision camera does not hear broadcasts ({error}); clients find it by its address only"
+        ),
+    }
+    let (obeying, sending) = (Arc::clone(&device), stream.try_clone().map_err(failed)?);
+    let heard = ask.clone();
+    spawn("GigE control", Box::new(move || obey(&control, &sending, &obeying, &heard, &now)))?;
+    let showing = Arc::clone(&device);
+    spawn("GigE stream", Box::new(move || show(&pictures, &stream, &showing)))?;
+    spawn("GigE free run", Box::new(move || run_freely(&device, &ask)))?;
+    Ok(id)
+}
+
+/// Answers those who look for cameras.
+fn discover(shouts: &UdpSocket, answers: &UdpSocket, device: &Shared) {
+    let mut bytes = [0; control::PACKET_MAX];
+    while let Ok((length, from)) = shouts.recv_from(&mut bytes) {
+        if let Some(answer) = control::discovery(&bytes[..length], lock(device).registers()) {
+            let _ = answers.send_to(&answer, from); // who asked may have gone
+        }
+    }
+}
+
+/// Does what comes by the control channel.
+fn obey(
+    control: &UdpSocket,
+    stream: &UdpSocket,
+    device: &Shared,
+    ask: &impl Fn(Control),
+    now: &impl Fn() -> u64,
+) {
+    let mut bytes = [0; control::PACKET_MAX];
+    loop {
+        let received = control.recv_from(&mut bytes);
+        // Each time, not in silence only: others may be talking all the while.
+        lock(device)
+            .look_for_controller(Instant::now(), received.as_ref().ok().map(|(_, from)| *from))
+            .into_iter()
+            .for_each(ask);
+        match received {
+            Ok((length, from)) => {
+                // The time is asked for before the device is held: the rig may be waiting for a picture to be taken.
+                let starts = control::starts_acquisition(&bytes[..length]);
+                let now_ns = if starts { now() } else { 0 };
+                let done = lock(device).obey(&bytes[..length], from, Instant::now(), now_ns);
+                for asked in done.asks {
+                    carry_out(asked, ask, now);
+                }
+                if let Some(answer) = done.answer {
+                    let _ = control.send_to(&answer, from); // who asked may have gone
+                }
+                if let Some((to, packets)) = done.again {
+                    send(stream, to, &packets);
+                }
+            }
+            // Nothing came; or an answer that nobody took comes back as an error.
+            Err(_) => {}
+        }
+    }
+}
+
+/// Asks the rig; a camera that runs freely no more has ended its last exposure when this returns, so that it hears the next trigger.
+fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
+    let ends = match asked {
+        Control::FreeRun { period, exposure } if period.0 == 0 => Some(exposure),
+        _ => None,
+    };
+    ask(asked);
+    let Some(exposure) = ends else { return };
+    let micros = u64::from(exposure.0) + u64::from(device::BETWEEN_EXPOSURES_US);
+    let (until_ns, begin) = (now() + 1000 * micros, Instant::now());
+    ask(Control::AdvanceMicros(micros));
+    while now() < until_ns && begin.elapsed() < PATIENCE {
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Sends pictures as frames while there is an acquisition.
+fn show(pictures: &Receiver<Picture>, stream: &UdpSocket, device: &Shared) {
+    for picture in pictures {
+        let frame = lock(device).frame(&picture);
+        if let Some((to, packets)) = frame {
+            send(stream, to, &packets);
+        }
+    }
+}
+
+fn send(stream: &UdpSocket, to: SocketAddr, packets: &[Vec<u8>]) {
+    for burst in packets.chunks(BURST) {
+        for packet in burst {
+            let _ = stream.send_to(packet, to); // the line tells of nothing that is lost
+        }
+        thread::sleep(PAUSE);
+    }
+}
+
+/// A rig at which nothing happens stands still in time; a camera that runs freely lets it pass, a picture's worth at a time.
+fn run_freely(device: &Shared, ask: &impl Fn(Control)) {
+    loop {
+        let (period, frames) = {
+            let device = lock(device);
+            (device.free_period(), device.frames())
+        };
+        let Some(period) = period else {
+            thread::sleep(LOOK);
+            continue;
+        };
+        ask(Control::AdvanceMicros(u64::from(period.0)));
+        let begin = Instant::now();
+        thread::sleep(Duration::from_micros(u64::from(period.0)));
+        while lock(device).frames() == frames && begin.elapsed() < PATIENCE {
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interfaces_are_named_or_refused() {
+        assert_eq!(interface("lo"), Ok(Ipv4Addr::LOCALHOST));
+        assert_eq!(interface("127.0.0.7"), Ok(Ipv4Addr::new(127, 0, 0, 7)));
+        let error = interface("eth7").unwrap_err();
+        assert!(error.contains("eth7") && error.contains("IPv4"), "{error}");
+    }
+}

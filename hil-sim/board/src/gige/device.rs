@@ -1,0 +1,300 @@
+//! What the camera does: who has it under control, when it acquires, which picture goes out as which frame.
+
+use std::{
+    collections::VecDeque,
+    net::SocketAddr,
+    time::{Duration, Instant},
+};
+
+use farnear_protocol::{
+    camera::{Control, FREE_RUNNING},
+    units::Micros,
+};
+
+use super::{
+    GigeConfig,
+    control::{Ask, Command},
+    description::CHUNKS,
+    features::{
+        ACQUISITION, BLACK_LEVEL, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, MONO_8, OFFSET_X,
+        OFFSET_Y, PIXEL_FORMAT, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
+    },
+    registers::{FIRE_TEST, HEARTBEAT_MS, PACKET_SIZE, PRIVILEGE, PRIVILEGE_CONTROL, Refusal, Registers},
+    stream::{Frame, HEADERS_BYTES, UDP_HEADERS_BYTES},
+};
+use crate::{imager::Picture, plant::Noise};
+
+/// Frames that can be asked for again.
+const KEPT: usize = 8;
+/// Largest packet of UDP.
+const PACKET_BYTES_MAX: usize = 65_507;
+/// Where the size of packets stands in its register.
+const PACKET_BYTES: u32 = 0xFFFF;
+/// What a camera that runs freely needs beside its exposures: its read-out, and some time to spare.
+pub(super) const BETWEEN_EXPOSURES_US: u32 = 15_000;
+/// Names of software-triggered pictures: far from the board's own numbers.
+const SOFTWARE_SHOTS: u32 = 0x4000_0000;
+
+/// What a packet of the control channel led to.
+#[derive(Default)]
+pub struct Done {
+    /// What to answer.
+    pub answer: Option<Vec<u8>>,
+    /// What the rig is asked for.
+    pub asks: Vec<Control>,
+    /// Packets that are to be sent (again), and where.
+    pub again: Option<(SocketAddr, Vec<Vec<u8>>)>,
+}
+
+/// The camera.
+pub struct Device {
+    registers: Registers,
+    bits: u8,
+    lost: f64,
+    losses: Noise,
+    /// Who has it under control, and when that was heard of last.
+    controller: Option<(SocketAddr, Instant)>,
+    /// Rig time at which the acquisition began, in ns.
+    acquires_since_ns: Option<u64>,
+    frames: u64,
+    triggers: u32,
+    kept: VecDeque<(u16, Vec<Vec<u8>>)>,
+    free_run: bool,
+}
+
+impl Device {
+    /// At power-on.
+    pub fn new(config: &GigeConfig) -> Self {
+        Self {
+            registers: Registers::new(config),
+            bits: config.bits,
+            lost: f64::from(config.lost_per_thousand) / 1000.0,
+            losses: Noise::new(config.seed, "GigE packets"),
+            controller: None,
+            acquires_since_ns: None,
+            frames: 0,
+            triggers: 0,
+            kept: VecDeque::new(),
+            free_run: false,
+        }
+    }
+
+    /// By which clients open it.
+    pub fn id(&self) -> String {
+        self.registers.id()
+    }
+
+    /// What can be read of it.
+    pub fn registers(&self) -> &Registers {
+        &self.registers
+    }
+
+    /// Frames since the start of the acquisition.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Does what a packet asks for; `now_ns` is the rig's time, `now` the wall clock's.
+    pub fn obey(&mut self, bytes: &[u8], from: SocketAddr, now: Instant, now_ns: u64) -> Done {
+        let Some(command) = Command::read(bytes) else { return Done::default() };
+        let controls = self.controller.is_some_and(|(controller, _)| controller == from);
+        if controls {
+            self.controller = Some((from, now));
+        }
+        let mut done = Done::default();
+        let result = match &command.ask {
+            Err(refusal) => Err(*refusal),
+            Ok(Ask::Discovery) => {
+                self.registers.read(0, super::registers::DISCOVERY_BYTES).map(<[u8]>::to_vec)
+            }
+            Ok(Ask::Registers(all)) => {
+                let values: Result<Vec<&[u8]>, _> =
+                    all.iter().map(|at| self.registers.read(*at, 4)).collect();
+                values.map(|values| values.concat())
+            }
+            Ok(Ask::Memory(address, length)) => {
+                let read = self.registers.read(*address, *length);
+                read.map(|bytes| [&address.to_be_bytes(), bytes].concat())
+            }
+            Ok(Ask::Resend { frame, first, last }) => {
+                done.again = self.again(*frame, *first, *last).filter(|_| controls);
+                Ok(Vec::new())
+            }
+            Ok(Ask::Write(writes)) => {
+                let each = writes.iter().try_for_each(|(register, value)| {
+                    self.write(*register, *value, from, now, now_ns, &mut done)
+                });
+                each.map(|()| command.written(writes).to_vec())
+            }
+        };
+        done.answer = command.answer(result.as_deref().map_err(|refusal| *refusal));
+        done
+    }
+
+    fn write(
+        &mut self,
+        register: u32,
+        value: u32,
+        from: SocketAddr,
+        now: Instant,
+        now_ns: u64,
+        done: &mut Done,
+    ) -> Result<(), Refusal> {
+        if self.controller.is_some_and(|(controller, _)| controller != from) {
+            return Err(Refusal::AccessDenied);
+        }
+        if register != PRIVILEGE && self.controller.is_none() {
+            return Err(Refusal::AccessDenied);
+        }
+        self.registers.write(register, value)?;
+        match register {
+            PRIVILEGE if value & PRIVILEGE_CONTROL != 0 => self.controller = Some((from, now)),
+            PRIVILEGE => done.asks.extend(self.release()),
+            PACKET_SIZE if value & FIRE_TEST != 0 => {
+                self.registers.put(PACKET_SIZE, value & !FIRE_TEST);
+                let test = vec![0; self.packet_bytes() - UDP_HEADERS_BYTES];
+                done.again = self.registers.destination().map(|to| (to, vec![test]));
+            }
+            ACQUISITION if value == START => {
+                self.acquires_since_ns = Some(now_ns);
+                self.frames = 0;
+                self.kept.clear();
+            }
+            ACQUISITION => self.acquires_since_ns = None,
+            TRIGGER_SOFTWARE if self.is_triggered_by_software() => {
+                let exposure = Micros(self.registers.get(EXPOSURE_US));
+                let shot_id = SOFTWARE_SHOTS + self.triggers % SOFTWARE_SHOTS;
+                self.triggers += 1;
+                done.asks.push(Control::Expose { shot_id, exposure });
+                // A rig at which nothing happens stands still in time; this much passes.
+                done.asks
+                    .push(Control::AdvanceMicros(u64::from(exposure.0.saturating_add(BETWEEN_EXPOSURES_US))));
+            }
+            _ => {}
+        }
+        done.asks.extend(self.change_free_run());
+        Ok(())
+    }
+
+    fn is_triggered_by_software(&self) -> bool {
+        let on = self.registers.get(TRIGGER_MODE) == 1 && self.registers.get(TRIGGER_SOURCE) == SOFTWARE;
+        on && self.acquires_since_ns.is_some()
+    }
+
+    /// From one exposure to the next of a camera that runs freely now.
+    pub fn free_period(&self) -> Option<Micros> {
+        let free = self.acquires_since_ns.is_some() && self.registers.get(TRIGGER_MODE) == 0;
+        let exposure = self.registers.get(EXPOSURE_US);
+        let by_rate = (1e9 / f64::from(self.registers.get(FRAME_RATE).max(1))) as u32;
+        free.then(|| Micros(by_rate.max(exposure.saturating_add(BETWEEN_EXPOSURES_US))))
+    }
+
+    /// What the rig's camera is to be told, where it begins or ends to run freely.
+    fn change_free_run(&mut self) -> Option<Control> {
+        let period = self.free_period();
+        if period.is_some() == self.free_run {
+            return None;
+        }
+        self.free_run = period.is_some();
+        let exposure = Micros(self.registers.get(EXPOSURE_US));
+        Some(Control::FreeRun { period: period.unwrap_or(Micros(0)), exposure })
+    }
+
+    /// Whoever had it has it no more.
+    fn release(&mut self) -> Option<Control> {
+        self.controller = None;
+        self.acquires_since_ns = None;
+        self.registers.put(PRIVILEGE, 0);
+        self.registers.put(ACQUISITION, STOP);
+        self.change_free_run()
+    }
+
+    /// Takes the camera from a controller that has said nothing for too long; `from` has just said something.
+    pub fn look_for_controller(&mut self, now: Instant, from: Option<SocketAddr>) -> Option<Control> {
+        let allowed = Duration::from_millis(u64::from(self.registers.get(HEARTBEAT_MS)));
+        let (controller, heard) = self.controller?;
+        if Some(controller) == from || now.saturating_duration_since(heard) <= allowed {
+            return None;
+        }
+        self.release()
+    }
+
+    fn packet_bytes(&self) -> usize {
+        let asked = (self.registers.get(PACKET_SIZE) & PACKET_BYTES) as usize;
+        asked.clamp(HEADERS_BYTES + 64, PACKET_BYTES_MAX)
+    }
+
+    /// A picture as packets and where they go; `None` where it is nobody's: without an acquisition, exposed before it began, or not triggered
+    /// as the camera is now.
+    pub fn frame(&mut self, picture: &Picture) -> Option<(SocketAddr, Vec<Vec<u8>>)> {
+        let since_ns = self.acquires_since_ns?;
+        let free = picture.header.shot_id == FREE_RUNNING;
+        let software = picture.header.shot_id & SOFTWARE_SHOTS != 0 && !free;
+        let wanted = match (self.registers.get(TRIGGER_MODE), self.registers.get(TRIGGER_SOURCE)) {
+            (0, _) => free,
+            (_, SOFTWARE) => software,
+            _ => !free && !software,
+        };
+        if !wanted || picture.begin_ns < since_ns {
+            return None;
+        }
+        let to = self.registers.destination()?;
+        self.frames += 1;
+        let frame = self.picture(picture)?;
+        let packets = frame.packets(self.packet_bytes());
+        let sent = packets.iter().filter(|_| self.losses.uniform() >= self.lost).cloned().collect();
+        self.kept.push_back((frame.short_number(), packets));
+        if self.kept.len() > KEPT {
+            self.kept.pop_front();
+        }
+        Some((to, sent))
+    }
+
+    /// The packets of a frame that can be sent again; some of them are lost again.
+    fn again(&mut self, frame: u16, first: u32, last: u32) -> Option<(SocketAddr, Vec<Vec<u8>>)> {
+        let to = self.registers.destination()?;
+        let (_, packets) = self.kept.iter().find(|(number, _)| *number == frame)?;
+        let (first, last) = (first as usize, (last as usize).min(packets.len().saturating_sub(1)));
+        let asked = packets.get(first..=last)?;
+        let lost = self.lost;
+        let sent = asked.iter().filter(|_| self.losses.uniform() >= lost).cloned().collect();
+        Some((to, sent))
+    }
+
+    /// The region, with gain and black level, in the pixel format.
+    fn picture(&self, picture: &Picture) -> Option<Frame> {
+        let get = |register| self.registers.get(register) as usize;
+        let (sensor_width, sensor_height) =
+            (usize::from(picture.header.width), usize::from(picture.header.height));
+        let (left, top) = (get(OFFSET_X).min(sensor_width), get(OFFSET_Y).min(sensor_height));
+        // A region that reaches over the edge ends there; the offset may have been set after the size.
+        let (width, height) = (get(WIDTH).min(sensor_width - left), get(HEIGHT).min(sensor_height - top));
+        let format = self.registers.get(PIXEL_FORMAT);
+        let (gain, black) = (self.registers.get(GAIN), self.registers.get(BLACK_LEVEL));
+        let max = (1_u32 << self.bits) - 1;
+        // To the next code, half of one up.
+        let developed = |code: u16| ((u32::from(code) * gain + 50) / 100 + black).min(max);
+        let pixels = picture.pixels();
+        let mut bytes = Vec::with_capacity(2 * width * height);
+        for row in pixels.chunks_exact(2 * sensor_width).skip(top).take(height) {
+            for pixel in row[2 * left..2 * (left + width)].chunks_exact(2) {
+                let code = developed(u16::from_le_bytes([pixel[0], pixel[1]]));
+                match format {
+                    MONO_8 => bytes.push((code >> (self.bits - 8)) as u8),
+                    _ => bytes.extend((code as u16).to_le_bytes()),
+                }
+            }
+        }
+        let chunks: Option<[bool; CHUNKS.len()]> =
+            (self.registers.get(CHUNK_MODE) == 1).then(|| self.registers.chunk_flags());
+        Some(Frame {
+            number: self.frames,
+            time_ns: picture.begin_ns,
+            pixel_format: format,
+            size_px: (width as u32, height as u32),
+            offset_px: (left as u32, top as u32),
+            pixels: bytes,
+            chunks,
+        })
+    }
+}

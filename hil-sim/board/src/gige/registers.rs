@@ -1,0 +1,280 @@
+//! What can be read and written by the control channel: the bootstrap registers of GigE Vision 1.2, the camera's features, and its description.
+
+use std::net::Ipv4Addr;
+
+use super::{
+    GigeConfig,
+    description::{CHUNKS, FILE, MODEL, TICKS_PER_SECOND, VENDOR, description},
+    features::{
+        CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, HEIGHT, MONO_8, PAYLOAD_SIZE, PIXEL_FORMAT, Value,
+        WIDTH, table,
+    },
+    stream,
+};
+
+/// Who has the camera under control.
+pub const PRIVILEGE: u32 = 0x0A00;
+/// Both ways of having it: exclusively, and so that others may read.
+pub const PRIVILEGE_CONTROL: u32 = 0b11;
+/// How long its controller may say nothing, in ms.
+pub const HEARTBEAT_MS: u32 = 0x0938;
+/// Port to which frames go.
+pub const STREAM_PORT: u32 = 0x0D00;
+/// Size of the stream's packets with their headers of IP and UDP, and flags.
+pub const PACKET_SIZE: u32 = 0x0D04;
+/// Address to which frames go.
+pub const STREAM_ADDRESS: u32 = 0x0D18;
+/// Bytes that a discovery is answered with.
+pub const DISCOVERY_BYTES: usize = 0xF8;
+/// The flag that has one packet of this size sent, to see whether it arrives.
+pub const FIRE_TEST: u32 = 1 << 31;
+
+/// Where the description lies.
+const DESCRIPTION: u32 = 0x0001_0000;
+/// Packets at power-on: Ethernet's usual size.
+const USUAL_PACKET_BYTES: u32 = 1500;
+/// The standard's own heartbeat.
+const USUAL_HEARTBEAT_MS: u32 = 3000;
+/// Resends packets; has a register for a name; tells its serial number.
+const CAPABILITIES: u32 = 1 << 2 | 1 << 1 | 1 | 1 << 30;
+/// What the standard lets be written, with its range.
+const WRITABLE: [(u32, u32, u32); 9] = [
+    (PRIVILEGE, 0, u32::MAX),
+    (HEARTBEAT_MS, 500, 600_000),
+    (STREAM_PORT, 0, 65_535),
+    (PACKET_SIZE, 0, u32::MAX),
+    (0x0D08, 0, u32::MAX), // delay between packets, which here is its own
+    (STREAM_ADDRESS, 0, u32::MAX),
+    (CHUNK_MODE, 0, 1),
+    (CHUNK_SELECTOR, 0, CHUNKS.len() as u32 - 1),
+    (0x0D24, 0, u32::MAX), // configuration of the stream: nothing of it is here, and it reads as 0
+];
+
+/// Why something cannot be read or written, by the standard's numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u16)]
+pub enum Refusal {
+    /// No such command.
+    NotImplemented = 0x8001,
+    /// A value out of range, or a packet that is none.
+    InvalidParameter = 0x8002,
+    /// Nothing lies there.
+    InvalidAddress = 0x8003,
+    /// To be read only.
+    WriteProtect = 0x8004,
+    /// Not a multiple of 4.
+    BadAlignment = 0x8005,
+    /// Somebody else has the camera.
+    AccessDenied = 0x8006,
+}
+
+/// The camera's memory.
+pub struct Registers {
+    bytes: Vec<u8>,
+    features: Vec<Feature>,
+}
+
+impl Registers {
+    /// As they are at power-on.
+    pub fn new(config: &GigeConfig) -> Self {
+        let features = table(config.sensor_px, config.bits);
+        let text = description(&features);
+        let mut bytes = vec![0; DESCRIPTION as usize];
+        bytes.extend(text.as_bytes());
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        let mut registers = Self { bytes, features };
+        let serial = format!("S{}", config.seed % 1_000_000_000_000);
+        for (at, room, text) in [
+            (0x48, 32, VENDOR),
+            (0x68, 32, MODEL),
+            (0x88, 32, env!("CARGO_PKG_VERSION")),
+            (0xA8, 48, "emulated rig: no hardware is involved"),
+            (0xD8, 16, &serial),
+            (0x200, 512, &format!("Local:{FILE};{DESCRIPTION:X};{:X}", text.len())),
+        ] {
+            let text = &text.as_bytes()[..text.len().min(room - 1)];
+            registers.bytes[at..at + text.len()].copy_from_slice(text);
+        }
+        // A locally administered address of its own for each seed.
+        let mac = config.seed as u32;
+        for (register, value) in [
+            (0x00, 0x0001_0002), // version 1.2
+            (0x04, 1 << 31 | 1), // big endian, UTF-8
+            (0x08, 0x0200),      // MAC
+            (0x0C, mac),
+            (0x10, 0b101), // link-local and persistent addresses
+            (0x14, 0b100),
+            (0x24, config.address.to_bits()),
+            (0x34, 0xFF00_0000),
+            (0x600, 1), // network interfaces
+            (0x904, 1), // streams
+            (0x934, CAPABILITIES),
+            (HEARTBEAT_MS, USUAL_HEARTBEAT_MS),
+            (0x940, TICKS_PER_SECOND),
+            (PACKET_SIZE, USUAL_PACKET_BYTES),
+        ] {
+            registers.put(register, value);
+        }
+        for feature in registers.features.clone() {
+            registers.put(feature.register, feature.initial);
+        }
+        registers.settle();
+        registers
+    }
+
+    /// Maker, model and serial number, as clients put them together.
+    pub fn id(&self) -> String {
+        let text = |at: usize, room: usize| {
+            let bytes = &self.bytes[at..at + room];
+            let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(room);
+            String::from_utf8_lossy(&bytes[..end]).into_owned()
+        };
+        format!("{}-{}-{}", text(0x48, 32), text(0x68, 32), text(0xD8, 16))
+    }
+
+    /// Value of a register of the camera's own; 0 for what lies nowhere.
+    pub fn get(&self, register: u32) -> u32 {
+        let at = register as usize;
+        let bytes = self.bytes.get(at..at + 4).and_then(|bytes| bytes.try_into().ok());
+        bytes.map_or(0, u32::from_be_bytes)
+    }
+
+    /// Sets a register of the camera's own, whoever may write it.
+    pub fn put(&mut self, register: u32, value: u32) {
+        let at = register as usize;
+        if let Some(bytes) = self.bytes.get_mut(at..at + 4) {
+            bytes.copy_from_slice(&value.to_be_bytes());
+        }
+    }
+
+    /// Bytes from an address on.
+    ///
+    /// # Errors
+    /// [`Refusal`] where not all of them lie in the memory.
+    pub fn read(&self, address: u32, length: usize) -> Result<&[u8], Refusal> {
+        if address % 4 != 0 || length % 4 != 0 {
+            return Err(Refusal::BadAlignment);
+        }
+        let end = (address as usize).checked_add(length).ok_or(Refusal::InvalidAddress)?;
+        self.bytes.get(address as usize..end).ok_or(Refusal::InvalidAddress)
+    }
+
+    /// Writes what a client may write.
+    ///
+    /// # Errors
+    /// [`Refusal`]: nothing is brought into its range in silence.
+    pub fn write(&mut self, register: u32, value: u32) -> Result<(), Refusal> {
+        if register % 4 != 0 {
+            return Err(Refusal::BadAlignment);
+        }
+        let chunk = (CHUNK_ENABLE..CHUNK_ENABLE + 4 * CHUNKS.len() as u32).contains(&register);
+        let bootstrap = WRITABLE.iter().find(|(at, ..)| *at == register).map(|(_, min, max)| (*min, *max));
+        let allowed = match bootstrap.or(chunk.then_some((0, 1))) {
+            Some((min, max)) => (min..=max).contains(&value),
+            None => self.feature_allows(register, value)?,
+        };
+        if !allowed {
+            return Err(Refusal::InvalidParameter);
+        }
+        self.put(register, value);
+        self.settle();
+        Ok(())
+    }
+
+    fn feature_allows(&self, register: u32, value: u32) -> Result<bool, Refusal> {
+        let mut known = self.features.iter().filter(|feature| feature.register == register).peekable();
+        if known.peek().is_none() {
+            let inside = (register as usize) < self.bytes.len();
+            return Err(if inside { Refusal::WriteProtect } else { Refusal::InvalidAddress });
+        }
+        let mut may_write = false;
+        for feature in known {
+            let allowed = match &feature.value {
+                Value::Constant => continue,
+                Value::Integer { min, max } | Value::Number { min, max, .. } => {
+                    (*min..=*max).contains(&value)
+                }
+                Value::Choice(choices) => choices.iter().any(|(_, choice)| *choice == value),
+                Value::Command(written) => *written == value,
+            };
+            if allowed {
+                return Ok(true);
+            }
+            may_write = true;
+        }
+        if may_write { Ok(false) } else { Err(Refusal::WriteProtect) }
+    }
+
+    /// What follows from other registers.
+    fn settle(&mut self) {
+        let pixel = if self.get(PIXEL_FORMAT) == MONO_8 { 1 } else { 2 };
+        let image = self.get(WIDTH) * self.get(HEIGHT) * pixel;
+        let chunks = stream::chunk_bytes(self.get(CHUNK_MODE) == 1, self.chunk_flags());
+        self.put(PAYLOAD_SIZE, image + chunks);
+    }
+
+    /// Which chunks are turned on.
+    pub fn chunk_flags(&self) -> [bool; CHUNKS.len()] {
+        let mut index = 0;
+        [(); CHUNKS.len()].map(|()| {
+            let on = self.get(CHUNK_ENABLE + index) == 1;
+            index += 4;
+            on
+        })
+    }
+
+    /// Where frames go; `None` where nobody has said.
+    pub fn destination(&self) -> Option<std::net::SocketAddr> {
+        let port = u16::try_from(self.get(STREAM_PORT)).ok().filter(|port| *port > 0)?;
+        Some((Ipv4Addr::from_bits(self.get(STREAM_ADDRESS)), port).into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub fn config() -> GigeConfig {
+        GigeConfig {
+            address: Ipv4Addr::LOCALHOST,
+            seed: 7,
+            lost_per_thousand: 0,
+            sensor_px: (640, 480),
+            bits: 12,
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_in_its_range_or_refused() {
+        let mut registers = Registers::new(&config());
+        assert_eq!(registers.id(), "farnear-emulated-S7");
+        assert_eq!(registers.get(PAYLOAD_SIZE), 640 * 480 * 2);
+        assert_eq!(registers.write(WIDTH, 320), Ok(()));
+        assert_eq!(registers.write(PIXEL_FORMAT, MONO_8), Ok(()));
+        assert_eq!(registers.get(PAYLOAD_SIZE), 320 * 480);
+        for (register, value, refusal) in [
+            (WIDTH, 641, Refusal::InvalidParameter),
+            (WIDTH + 2, 10, Refusal::BadAlignment),
+            (PIXEL_FORMAT, 5, Refusal::InvalidParameter),
+            (PAYLOAD_SIZE, 5, Refusal::WriteProtect),
+            (0x48, 5, Refusal::WriteProtect),
+            (0xFFFF_FFF0, 5, Refusal::InvalidAddress),
+        ] {
+            assert_eq!(registers.write(register, value), Err(refusal), "{register:x}");
+        }
+        assert_eq!(registers.read(0xFFFF_FFFC, 8), Err(Refusal::InvalidAddress));
+        assert_eq!(registers.read(0, DISCOVERY_BYTES).map(<[u8]>::len), Ok(DISCOVERY_BYTES));
+    }
+
+    #[test]
+    fn chunks_are_part_of_the_payload() {
+        let mut registers = Registers::new(&config());
+        let bare = registers.get(PAYLOAD_SIZE);
+        for (register, value) in [(CHUNK_MODE, 1), (CHUNK_ENABLE, 1), (CHUNK_ENABLE + 4, 1)] {
+            registers.write(register, value).expect("may be written");
+        }
+        // The trailer of the image, and two numbers of 8 bytes with theirs.
+        assert_eq!(registers.get(PAYLOAD_SIZE), bare + 8 + 2 * 16);
+        assert!(registers.write(CHUNK_ENABLE + 8, 1).is_err());
+    }
+}

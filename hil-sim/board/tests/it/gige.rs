@@ -1,0 +1,261 @@
+//! The camera as one of GigE Vision, to a client that knows nothing but the protocol: no library is needed for these tests.
+
+use std::{
+    collections::BTreeMap,
+    net::{Ipv4Addr, SocketAddr, UdpSocket},
+    time::{Duration, Instant},
+};
+
+use farnear_sim::gige::{
+    features::{
+        ACQUISITION, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, GAIN, HEIGHT, OFFSET_X, OFFSET_Y, PAYLOAD_SIZE,
+        SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
+    },
+    registers::{HEARTBEAT_MS, PRIVILEGE, STREAM_ADDRESS, STREAM_PORT},
+};
+
+use crate::pty::{Program, capture};
+
+/// Far longer than anything here takes: the stages home while a frame is awaited, as slowly as a busy computer emulates it.
+const PATIENCE: Duration = Duration::from_secs(600);
+/// A packet that has not come by then is asked for again.
+const GAP: Duration = Duration::from_millis(300);
+const ACCESS_DENIED: u16 = 0x8006;
+
+/// A client of the protocol.
+struct Client {
+    control: UdpSocket,
+    stream: UdpSocket,
+    number: u16,
+}
+
+/// A frame that came.
+#[derive(Debug)]
+struct Frame {
+    number: u16,
+    time_ns: u64,
+    payload: Vec<u8>,
+}
+
+impl Client {
+    fn new(camera: Ipv4Addr) -> Self {
+        let control = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a socket");
+        control.connect((camera, 3956)).expect("an address");
+        control.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+        let stream = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a socket");
+        stream.set_read_timeout(Some(GAP)).expect("a timeout");
+        Self { control, stream, number: 0 }
+    }
+
+    /// A camera under control, whose frames come here.
+    fn controlling(camera: Ipv4Addr) -> Self {
+        let mut client = Self::new(camera);
+        let Ok(SocketAddr::V4(to)) = client.stream.local_addr() else { panic!("no address of its own") };
+        for (register, value) in [
+            (PRIVILEGE, 2),
+            // This client sends none, and a busy computer takes its time.
+            (HEARTBEAT_MS, 600_000),
+            (STREAM_ADDRESS, to.ip().to_bits()),
+            (STREAM_PORT, u32::from(to.port())),
+        ] {
+            assert_eq!(client.write(register, value), 0);
+        }
+        client
+    }
+
+    fn ask(&mut self, code: u16, payload: &[u8]) -> (u16, Vec<u8>) {
+        self.number += 1;
+        let mut bytes = vec![0x42, 1];
+        bytes.extend(code.to_be_bytes());
+        bytes.extend((payload.len() as u16).to_be_bytes());
+        bytes.extend(self.number.to_be_bytes());
+        bytes.extend(payload);
+        self.control.send(&bytes).expect("sent");
+        let mut answer = [0; 1024];
+        let length = self.control.recv(&mut answer).expect("an answer");
+        assert_eq!(answer[6..8], self.number.to_be_bytes());
+        (u16::from_be_bytes([answer[0], answer[1]]), answer[8..length].to_vec())
+    }
+
+    /// Status of a write.
+    fn write(&mut self, register: u32, value: u32) -> u16 {
+        self.ask(0x0082, &[register.to_be_bytes(), value.to_be_bytes()].concat()).0
+    }
+
+    fn read(&mut self, register: u32) -> u32 {
+        let (status, value) = self.ask(0x0080, &register.to_be_bytes());
+        assert_eq!(status, 0);
+        u32::from_be_bytes(value.try_into().expect("a word"))
+    }
+
+    fn description(&mut self) -> String {
+        let url = self.ask(0x0084, &[0x200_u32.to_be_bytes(), 512_u32.to_be_bytes()].concat()).1;
+        let url = String::from_utf8_lossy(&url[4..]).trim_end_matches('\0').to_string();
+        let parts: Vec<&str> = url.split(';').collect();
+        let [at, length] = [1, 2].map(|part| u32::from_str_radix(parts[part], 16).expect("a number"));
+        let mut text = Vec::new();
+        for from in (at..at + length).step_by(512) {
+            let part = (at + length - from).min(512).next_multiple_of(4);
+            text.extend(&self.ask(0x0084, &[from.to_be_bytes(), part.to_be_bytes()].concat()).1[4..]);
+        }
+        String::from_utf8(text[..length as usize].to_vec()).expect("text")
+    }
+
+    /// The next frame; what is missing is asked for again until all of it is there.
+    fn frame(&mut self) -> Frame {
+        let deadline = Instant::now() + PATIENCE;
+        let mut packets = BTreeMap::new();
+        let mut number = None;
+        let mut last = None;
+        let mut bytes = [0; 2048];
+        loop {
+            assert!(Instant::now() < deadline, "no frame; {} packets of {number:?} came", packets.len());
+            match self.stream.recv(&mut bytes) {
+                Ok(length) => {
+                    let id = u16::from_be_bytes([bytes[2], bytes[3]]);
+                    assert_eq!(*number.get_or_insert(id), id, "a frame before the one before it is whole");
+                    let packet = u32::from_be_bytes([0, bytes[5], bytes[6], bytes[7]]);
+                    if bytes[4] == 2 {
+                        last = Some(packet);
+                    }
+                    packets.insert(packet, bytes[8..length].to_vec());
+                }
+                Err(_) => {
+                    let Some(id) = number else { continue };
+                    // The end is not known where the trailer was lost, too.
+                    let end =
+                        last.unwrap_or_else(|| packets.keys().next_back().map_or(0, |last| last + 1000));
+                    let missing =
+                        (0..=end).find(|packet| !packets.contains_key(packet)).expect("something is");
+                    let until =
+                        (missing..=end).find(|packet| packets.contains_key(packet)).map_or(end, |p| p - 1);
+                    let again = [u32::from(id), missing, until].map(u32::to_be_bytes).concat();
+                    self.number += 1;
+                    let head = [0x42, 0, 0, 0x40, 0, 12, 0, self.number as u8];
+                    self.control.send(&[&head[..], &again].concat()).expect("sent");
+                }
+            }
+            if let Some(last) = last
+                && packets.len() as u32 == last + 1
+            {
+                let leader = &packets[&0];
+                let time_ns = u64::from_be_bytes(leader[4..12].try_into().expect("8 bytes"));
+                let payload = (1..last).flat_map(|packet| packets[&packet].clone()).collect();
+                return Frame { number: number.unwrap_or(0), time_ns, payload };
+            }
+        }
+    }
+}
+
+/// One that no other test has: there is one port for cameras on each.
+fn address(last: u8) -> (Ipv4Addr, String) {
+    let address = Ipv4Addr::new(127, 0, 77, last);
+    (address, address.to_string())
+}
+
+#[test]
+fn frames_over_lossy_gige_are_those_of_the_endpoint_to_the_bit() {
+    let (camera, text) = address(1);
+    let program = Program::start(&["--seed", "3", "--gige", &text, "--gige-lost", "30"]);
+    assert_eq!(program.gige.as_deref(), Some("farnear-emulated-S3"));
+    let mut client = Client::controlling(camera);
+    for (register, value) in [(TRIGGER_MODE, 1), (CHUNK_MODE, 1), (CHUNK_ENABLE + 4, 1), (ACQUISITION, START)]
+    {
+        assert_eq!(client.write(register, value), 0);
+    }
+    assert_eq!(client.read(PAYLOAD_SIZE), 640 * 480 + 8 + 16);
+    let receiver = std::thread::spawn(move || {
+        let frames = [client.frame(), client.frame()];
+        (client, frames)
+    });
+    let by_endpoint = capture(&program);
+    let (mut client, frames) = receiver.join().expect("both frames");
+    for ((frame, (header, pixels)), number) in frames.iter().zip(&by_endpoint).zip(1..) {
+        assert_eq!(frame.number, number);
+        let grey: Vec<u8> = pixels.chunks(2).map(|pixel| pixel[0]).collect();
+        assert!(frame.payload[..640 * 480] == grey, "frame {number} differs from the endpoint's");
+        // The frame's number as a chunk: 8 bytes before its own trailer.
+        assert_eq!(frame.payload[frame.payload.len() - 16..][..8], u64::from(number).to_be_bytes());
+        // The board counts its time from its reset, the camera from power-on; they run alike within the crystal's 50 ppm and a microsecond.
+        let apart = (frame.time_ns / 1000).abs_diff(header.exposure.0);
+        assert!(apart < 2_000_000, "{apart} us");
+    }
+    let apart_ns = frames[1].time_ns - frames[0].time_ns;
+    let apart_us = by_endpoint[1].0.exposure.0 - by_endpoint[0].0.exposure.0;
+    assert!((apart_ns / 1000).abs_diff(apart_us) <= 5, "{apart_ns} ns, {apart_us} us");
+    assert_eq!(client.write(ACQUISITION, STOP), 0);
+    assert!(program.end().success());
+}
+
+#[test]
+fn it_is_found_described_set_and_held_by_one_client_until_that_falls_silent() {
+    let (camera, text) = address(2);
+    let program = Program::start(&["--noise", "12bit", "--gige", &text]);
+    let mut client = Client::controlling(camera);
+    let (status, about) = client.ask(2, &[]);
+    assert_eq!((status, about.len()), (0, 0xF8));
+    assert_eq!(about[0x48..0x4F], *b"farnear");
+    let description = client.description();
+    for name in ["\"Width\"", "\"TriggerSource\"", "\"Mono12\"", "ChunkFrameID", "</RegisterDescription>"] {
+        assert!(description.contains(name), "{name} is not in the description");
+    }
+    assert_eq!(client.write(WIDTH, 4000), 0x8002);
+    assert_eq!(client.ask(0x0100, &[]).0, 0x8001);
+    let mut other = Client::new(camera);
+    assert_eq!((other.write(PRIVILEGE, 2), other.write(GAIN, 200)), (ACCESS_DENIED, ACCESS_DENIED));
+    assert_eq!(other.read(PRIVILEGE), 2, "who may not write may read");
+    assert_eq!(client.write(HEARTBEAT_MS, 500), 0);
+    let until = Instant::now() + PATIENCE;
+    while other.write(PRIVILEGE, 2) == ACCESS_DENIED {
+        assert!(Instant::now() < until, "a silent client has it for ever");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert_eq!(client.write(GAIN, 200), ACCESS_DENIED);
+    // The same address twice: the second camera says what is the matter.
+    let second = std::process::Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
+        .args(["run", "--gige", &text])
+        .stdin(std::process::Stdio::piped())
+        .output()
+        .expect("starts");
+    let said = String::from_utf8_lossy(&second.stderr);
+    assert!(!second.status.success() && said.contains("3956 is taken"), "{said}");
+    assert!(program.end().success());
+}
+
+#[test]
+fn it_runs_freely_and_by_software_with_region_gain_and_format() {
+    let (camera, text) = address(3);
+    let program = Program::start(&["--scene", "plane:900", "--noise", "12bit", "--gige", &text]);
+    let mut client = Client::controlling(camera);
+    for (register, value) in [(OFFSET_X, 16), (OFFSET_Y, 8), (WIDTH, 64), (HEIGHT, 32), (ACQUISITION, START)]
+    {
+        assert_eq!(client.write(register, value), 0);
+    }
+    let (first, second) = (client.frame(), client.frame());
+    assert_eq!((first.payload.len(), first.number, second.number), (64 * 32 * 2, 1, 2));
+    // 25 frames a second by the rig's own time, whatever the computer does meanwhile.
+    assert_eq!(second.time_ns - first.time_ns, 40_000_000);
+    assert_eq!(client.write(ACQUISITION, STOP), 0);
+    let mean = |frame: &Frame| {
+        let codes = frame.payload.chunks(2).map(|code| f64::from(u16::from_le_bytes([code[0], code[1]])));
+        codes.sum::<f64>() / (frame.payload.len() / 2) as f64
+    };
+    // By software: once for each, and brighter by the factor.
+    let settings = [
+        (TRIGGER_MODE, 1),
+        (TRIGGER_SOURCE, SOFTWARE),
+        (EXPOSURE_US, 5_000),
+        (GAIN, 150),
+        (ACQUISITION, START),
+    ];
+    for (register, value) in settings {
+        assert_eq!(client.write(register, value), 0);
+    }
+    assert_eq!(client.write(TRIGGER_SOFTWARE, 1), 0);
+    let bright = client.frame();
+    assert_eq!(bright.number, 1);
+    let factor = mean(&bright) / mean(&first);
+    // Noise of a few codes on 2048 pixels, and what saturates.
+    assert!((factor - 1.5).abs() < 0.03, "{factor}");
+    assert!(program.end().success());
+}

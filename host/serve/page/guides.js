@@ -1,0 +1,188 @@
+// Guides with pictures: first power-up, point spread function, flat series, and people before the camera.
+import { act, call, drives, ended, get, on, store } from "./link.js";
+import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
+import * as draw from "./guide-pictures.js";
+import * as people from "./people.js";
+
+/** Steps of the bring-up checklist as the program names them: what to do, and the picture beside it. */
+const STEPS = [
+  ["the link", "NUCLEO alone on USB, nothing wired.", "board"], ["who the board is", "The firmware says its name and version.", "board"],
+  ["alarms", "No alarm is latched.", "board"], ["memory", "A setting outlasts a reset.", "board"],
+  ["end switches by hand", "Motors not connected. Press each switch in turn.", "switch"], ["emergency stop", "Press it: an alarm comes and goes with it.", "stop"],
+  ["encoder direction", "Turn each shaft by hand, away from home.", "encoder"],
+  ["motors on", "24 V off, connect the motors, stages in mid-travel; a hand on the emergency stop; 24 V on.", "motor"],
+  ["first slow homing", "Slowly towards its home switch.", "home"], ["homing repeats", "The second time within 1 µm.", "home"],
+  ["a move at full speed", "To the middle of the travel.", "motor"], ["halt and its alarm", "It stops at once, and says so.", "stop"],
+  ["piezo sweep", "Gauge and amplifier follow.", "piezo"], ["far and near by piezo", "Settled within milliseconds.", "piezo"],
+  ["camera and strobe", "Trigger, strobe and image belong together.", "camera"],
+];
+const SIGNS = { passed: ["✓", "passed"], failed: ["✗", "failed"], "passed-over": ["–", "passed over"] };
+
+/** Makes the view. */
+export function make(host) {
+  const guides = [
+    ["power", "First power-up", draw.board(), powerUp()], ["psf", "Point spread function", draw.target(), psf()],
+    ["series", "Flat series and correction", draw.series(), series()], ["shadow", "Shadow by the sun", draw.sun(40, 200, 1.2), people.shadow()],
+    ["activity", "What somebody does", draw.person(), people.activity()],
+  ];
+  const place = h("div", { class: "guide scroll", tabindex: "-1" });
+  const list = h("div", { class: "guide-list", role: "group", "aria-label": "Guides" }, guides.map(([name, title, picture]) =>
+    h("button", { type: "button", class: "guide-card", "data-guide": name, onclick: () => pick(name) }, picture, h("span", {}, title))));
+  host.append(list, place);
+  const pick = (name) => {
+    const found = guides.find(([other]) => other === name) ?? guides[0];
+    for (const card of list.children) card.setAttribute("aria-pressed", card.dataset.guide === found[0]);
+    place.replaceChildren(found[3].element);
+    found[3].shown?.();
+    if (!host.hidden) history.replaceState(null, "", `#guides/${found[0]}`);
+  };
+  on("state", () => {
+    for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !drives() || store.state.rig.phase !== "ready" || store.state.job?.phase === "running";
+    for (const control of host.querySelectorAll("[data-needs=seat]")) control.disabled = !store.seat || store.state.computation?.phase === "running";
+  });
+  pick("power");
+  return { shown: (name) => pick(name ?? place.dataset.guide) };
+}
+
+/** A step of a guide: its picture, what to do, and controls. */
+function step(count, title, picture, ...content) {
+  return h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, picture), h("div", { class: "guide-words" }, h("h2", {}, `${count}. ${title}`), content));
+}
+
+function powerUp() {
+  const said = h("p", { class: "status", "aria-live": "polite" });
+  const verdicts = new Map();
+  const items = STEPS.map(([name, what, picture], at) => {
+    const sign = h("span", { class: "verdict", "aria-hidden": "true" }, String(at + 1));
+    const found = h("p", { class: "dim" }, what);
+    verdicts.set(name, { sign, found, what });
+    return h("li", { class: "check-step" }, draw[picture](), sign, h("div", {}, h("h3", {}, name), found));
+  });
+  const show = (result) => {
+    for (const { step: name, verdict, detail } of result.steps) {
+      const { sign, found, what } = verdicts.get(name) ?? {};
+      if (!sign) continue;
+      sign.textContent = SIGNS[verdict][0];
+      sign.dataset.verdict = verdict;
+      found.textContent = `${SIGNS[verdict][1]}: ${detail || what}`;
+    }
+    said.textContent = `${result.passed} passed, ${result.failed} failed, ${result.passed_over} passed over`;
+  };
+  const start = async () => {
+    for (const { sign } of verdicts.values()) delete sign.dataset.verdict;
+    const begun = await act("/api/rig/check");
+    const job = begun && (await ended("job", begun.job));
+    if (job?.phase === "done") show(job.result);
+    else if (job) said.textContent = job.error ?? "stopped";
+  };
+  on("state", ({ job }) => { if (job?.kind === "check" && job.phase === "running") said.textContent = job.said ?? "…"; });
+  const element = h("div", { class: "guide-body" },
+    h("section", { class: "panel" }, h("h2", {}, "First power-up"),
+      h("p", {}, "Take the next step only when the one before did what it should. What the board can tell is measured; where a pair of hands is needed, the page asks. The first seven steps are done with the motors disconnected."),
+      h("div", { class: "buttons" }, button("Start the checklist", start, { class: "primary", "data-needs": "rig" })), said),
+    h("ol", { class: "check-steps" }, items));
+  return { element };
+}
+
+function psf() {
+  const pairs = h("ul", { class: "choose" });
+  const taught = h("div", {});
+  const result = h("div", { "aria-live": "polite" });
+  const model = choice([["gaussian", "Gaussian: k"], ["generalised", "Generalised Gaussian: p and k"]], "gaussian", () => {});
+  let useSeries = null;
+  const capture = async () => {
+    const begun = await act("/api/captures", { kind: "pair" });
+    if (begun && (await ended("job", begun.job)).phase === "done") await shown();
+  };
+  const find = async () => {
+    const targets = [...pairs.querySelectorAll("li")].filter((row) => row.querySelector("[type=checkbox]").checked).map((row) => {
+      const mm = row.querySelector("[type=number]").value;
+      return mm === "" ? { capture: row.dataset.name } : { capture: row.dataset.name, depth_mm: Number(mm) };
+    });
+    const begun = await act("/api/calibrate/psf", { targets, series: Boolean(useSeries?.checked), model: model.value });
+    const job = begun && (await ended("computation", begun.job));
+    if (job?.phase === "done") show(job.result);
+  };
+  const show = (found) => {
+    const apply = async () => {
+      const { optics } = await get("/api/optics");
+      optics.psf = found.p == null ? { model: "gaussian", k: found.k } : { model: "generalised", p: found.p, k: found.k };
+      if (await act("/api/optics", { optics }, "PUT")) notice("In use for captures from now on.");
+    };
+    const targets = found.targets_mm ?? [found.target_mm];
+    result.replaceChildren(rows([["point spread function", found.psf], ["residual", number(found.residual, 5)], ["pairs", targets.length], ["targets", targets.map((mm) => number(mm, 1)).join(", ") + " mm"]]),
+      button("Use it", apply, { class: "primary", "data-needs": "rig" }));
+  };
+  async function shown() {
+    try {
+      const [{ captures }, found] = await Promise.all([get("/api/captures"), get("/api/calibrate")]);
+      pairs.replaceChildren(...captures.filter(({ kind, broken }) => kind === "pair" && !broken).map(({ name }) => h("li", { "data-name": name },
+        h("label", { class: "check" }, h("input", { type: "checkbox" }), name),
+        h("input", { type: "number", step: "any", placeholder: "at its focus", "aria-label": `Distance of the target of ${name}, mm` }), h("span", { class: "unit" }, "mm"))));
+      if (!pairs.children.length) pairs.append(h("li", { class: "dim" }, "No pair yet."));
+      useSeries = h("input", { type: "checkbox", disabled: !found.series_mm.length });
+      taught.replaceChildren(h("label", { class: "check" }, useSeries, `the flat series: ${found.series_mm.length} targets at known distances`));
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  }
+  const element = h("div", { class: "guide-body" },
+    step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target, square to the rig: at the far or the near focus, or at a distance that you know. With several distances p and k are told apart better.")),
+    step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), button("Capture pair", capture, { "data-needs": "rig" })),
+    step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "seat" })), result));
+  return { element, shown };
+}
+
+function series() {
+  const count = h("input", { type: "number", value: 6, min: 2, max: 60 });
+  const own = h("input", { type: "text", placeholder: "e.g. 890, 905, 930", "aria-label": "Distances in mm" });
+  const captured = h("p", { class: "status", "aria-live": "polite" });
+  const result = h("div", { "aria-live": "polite" });
+  const method = h("select", {});
+  const distances = async () => {
+    if (own.value.trim()) return own.value.split(/[\s,;]+/).filter(Boolean).map(Number);
+    const { optics } = await get("/api/optics");
+    const { range } = (await call("POST", "/api/optics/calculate", { optics })).figures;
+    const steps = Math.max(2, Math.round(Number(count.value)));
+    // To a tenth of a millimetre, which can be set on a rail.
+    return Array.from({ length: steps }, (_, at) => Number((range.near_mm + ((range.far_mm - range.near_mm) * at) / (steps - 1)).toFixed(1)));
+  };
+  const start = async () => {
+    try {
+      const distances_mm = await distances();
+      if (distances_mm.some((mm) => !Number.isFinite(mm))) return notice("Distances are numbers in mm, with commas between them.", "error");
+      const begun = await act("/api/calibrate/series", { distances_mm });
+      const job = begun && (await ended("job", begun.job));
+      if (job?.phase === "done") result.replaceChildren(rows([["targets", job.result.targets], ["error before correction, RMS", number(job.result.rmse_mm, 2, "mm")]]));
+      await shown();
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  };
+  const learn = async () => {
+    const begun = await act("/api/calibrate/correction", { method: method.value });
+    const job = begun && (await ended("computation", begun.job));
+    if (job?.phase !== "done") return;
+    const found = job.result;
+    result.replaceChildren(rows([["method", found.method], ["targets", found.patterns], ["range", `${number(found.near_mm, 1)} to ${number(found.far_mm, 1)} mm`],
+      ["RMS before", number(found.rmse_before_mm, 3, "mm")], ["RMS after", number(found.rmse_after_mm, 3, "mm")]]),
+      h("p", { class: "dim" }, "In Depth, under Compute, tick “correction of this session”."));
+    shown();
+  };
+  const forget = async () => { if (await act("/api/calibrate/series/forget")) setTimeout(shown, 400); };
+  async function shown() {
+    try {
+      const { series_mm, corrected, methods } = await get("/api/calibrate");
+      captured.textContent = series_mm.length ? `${series_mm.length} targets: ${series_mm.map((mm) => number(mm, 1)).join(", ")} mm${corrected ? " · a correction is learned" : ""}` : "No target yet.";
+      if (!method.children.length) method.append(...methods.map((name) => h("option", { value: name }, name)));
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  }
+  const element = h("div", { class: "guide-body" },
+    step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves by itself. A series that was broken off goes on where it stood."),
+      field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", forget, { "data-needs": "rig" })), captured),
+    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), button("Learn", learn, { class: "primary", "data-needs": "seat" })),
+    panel("Result", result));
+  return { element, shown };
+}

@@ -1,0 +1,157 @@
+// Guides about people: their shadow by the sun, and what they do.
+import { act, call, ended, get, on, store } from "./link.js";
+import { h, button, field, keep, notice, number, panel, rows } from "./ui.js";
+import * as draw from "./guide-pictures.js";
+
+const LAST = 240;
+
+/** A choice of the videos that were sent, with a way to send one. */
+function videos() {
+  const chosen = h("select", { "aria-label": "Video" });
+  const file = h("input", { type: "file", accept: "video/*,.y4m", "aria-label": "Video file to send" });
+  const said = h("p", { class: "dim", "aria-live": "polite" });
+  async function shown() {
+    try {
+      const { videos: names } = await get("/api/people");
+      const present = chosen.value;
+      chosen.replaceChildren(...names.map((name) => h("option", { value: name, selected: name === present }, name)));
+      if (!names.length) chosen.append(h("option", { value: "" }, "none sent yet"));
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  }
+  file.addEventListener("change", async () => {
+    const [video] = file.files;
+    if (!video) return;
+    said.textContent = `sending ${video.name} …`;
+    // Names on the rig's computer are plain.
+    const name = video.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^\.+/, "").slice(-80) || "video";
+    try {
+      const answer = await fetch(`/api/people/videos/${name}`, { method: "PUT", body: video, headers: { "x-farnear-seat": store.seat?.secret ?? "" } });
+      const given = await answer.json().catch(() => ({}));
+      if (!answer.ok) throw Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint });
+      said.textContent = `${name} is there`;
+      await shown();
+      chosen.value = name;
+    } catch (error) {
+      said.textContent = "";
+      notice(error.message, "error", error.hint);
+    }
+  });
+  return { parts: [field("Video", chosen), field("Send one", file), said], shown, name: () => chosen.value };
+}
+
+/** What somebody does: a running answer beside the picture it rests on. */
+export function activity() {
+  const video = videos();
+  const canvas = h("canvas", { class: "person", role: "img", "aria-label": "Picture with the person marked" });
+  const answer = h("output", { class: "big", "aria-live": "polite" }, "–");
+  const details = h("div", {});
+  const strip = h("canvas", { class: "strip", role: "img", "aria-label": "Answers over the last frames", width: LAST, height: 24 });
+  const known = h("p", { class: "dim" });
+  const past = [];
+  const start = async (wish, lane) => {
+    past.length = 0;
+    const begun = await act("/api/people/recognise", wish);
+    if (!begun) return;
+    const job = await ended(lane, begun.job);
+    if (job.phase === "done" && job.result) tell(job.result, `of all ${job.result.frames} frames`);
+  };
+  const tell = (found, of) => {
+    answer.replaceChildren(found.activity ?? "unknown", h("small", {}, ` ${number(100 * found.confidence, 0)} % ${of}`));
+    keep(details, [found.best, found.flags], () => [rows(found.best.map(({ activity: name, share }) => [name, h("meter", { min: 0, max: 1, value: share, "aria-label": name }, `${number(100 * share, 0)} %`)])),
+      found.flags?.length ? h("p", { class: "dim" }, found.flags.join(", ")) : ""]);
+  };
+  on("person", ({ width, height, answer: found }, bytes) => {
+    const pixels = new Uint8Array(bytes);
+    show(canvas, pixels, width, height);
+    tell(found, `at frame ${found.frame}`);
+    past.push(found.activity);
+    if (past.length > LAST) past.shift();
+    stripes(strip, past);
+  });
+  const element = h("div", { class: "guide-body" },
+    h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "What somebody does"),
+      h("p", {}, "A camera that stands still and one person who moves. The first frames teach the background. Stop ends it."), video.parts, known,
+      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "seat" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
+    panel("Answer", h("div", { class: "person-answer" }, canvas, h("div", {}, answer, strip, details))));
+  const shown = async () => {
+    await video.shown();
+    const { activities } = await get("/api/people").catch(() => ({ activities: [] }));
+    known.textContent = activities.length ? `Knows ${activities.length} activities: ${activities.join(", ")}.` : "";
+  };
+  return { element, shown };
+}
+
+/** The picture in grey, the person in the page's accent. */
+function show(canvas, pixels, width, height) {
+  canvas.width = width;
+  canvas.height = height;
+  const image = new ImageData(width, height);
+  const count = width * height;
+  for (let at = 0; at < count; at++) {
+    const [grey, person] = [pixels[at], pixels[count + at]];
+    image.data.set(person ? [grey * 0.4, 90 + grey * 0.6, 120 + grey * 0.5, 255] : [grey, grey, grey, 255], 4 * at);
+  }
+  canvas.getContext("2d").putImageData(image, 0, 0);
+}
+
+/** A stripe of colour for each answer. */
+function stripes(canvas, past) {
+  const context = canvas.getContext("2d");
+  context.clearRect(0, 0, canvas.width, canvas.height);
+  past.forEach((name, at) => {
+    let hash = 7;
+    for (const letter of name ?? "") hash = (hash * 31 + letter.charCodeAt(0)) % 360;
+    context.fillStyle = name ? `hsl(${hash} 55% 50%)` : "#8886";
+    context.fillRect(at, 0, 1, canvas.height);
+  });
+}
+
+/** The shadow of a person by where the sun stands. */
+export function shadow() {
+  const video = videos();
+  const input = (value, about) => h("input", { type: "number", step: "any", value, title: about });
+  const inputs = { latitude: input(52.95), longitude: input(-1.18), height: input(1.2), azimuth: input(0, "anticlockwise from north"), pitch: input(5, "downwards"), focal: input(8), pixel: input(6) };
+  const now = new Date(Date.now() - new Date().getTimezoneOffset() * 60_000).toISOString().slice(0, 16);
+  const time = h("input", { type: "datetime-local", value: now });
+  const picture = h("div", { class: "guide-picture wide" }, draw.sun(30, 0, 1.7));
+  const facts = h("div", { "aria-live": "polite" });
+  const results = h("div", { "aria-live": "polite" });
+  const value = (control) => Number(control.value);
+  const sunlight = () => ({ latitude_deg: value(inputs.latitude), longitude_deg: value(inputs.longitude), time: new Date(time.value).toISOString() });
+  async function shown() {
+    if (!time.value) return;
+    try {
+      const found = await call("POST", "/api/people/sun", sunlight());
+      const { elevation_deg, azimuth_deg } = found.figures;
+      picture.replaceChildren(draw.sun(elevation_deg, found.direction_deg, found.length_per_height ?? NaN));
+      facts.replaceChildren(rows([["sun above the horizon", `${number(elevation_deg, 2)}°`], ["sun from north", `${number(azimuth_deg, 2)}°`],
+        ["shadow falls to", `${number(found.direction_deg, 1)}°`], ["shadow's length", found.length_per_height == null ? "no shadow" : `${number(found.length_per_height, 2)} × height`]]));
+    } catch (error) {
+      facts.replaceChildren(h("p", { class: "bad" }, error.message));
+    }
+  }
+  let waiting = 0;
+  for (const control of [time, inputs.latitude, inputs.longitude]) control.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(shown, 150); });
+  const start = async () => {
+    const camera = { height_m: value(inputs.height), azimuth_deg: value(inputs.azimuth), pitch_deg: value(inputs.pitch), focal_length_mm: value(inputs.focal), pixel_um: value(inputs.pixel) };
+    const begun = await act("/api/people/shadow", { video: video.name(), sun: sunlight(), camera });
+    const job = begun && (await ended("computation", begun.job));
+    if (job?.phase !== "done") return;
+    const found = job.result;
+    const mask = (folder, file) => h("img", { src: `/api/people/shadows/${begun.shadow}/${folder}/${file}`, alt: `${file}, ${folder.replace("-", " ")}`, loading: "lazy" });
+    results.replaceChildren(rows([["frames", found.frames], ["cut", found.cut], ["doubtful", found.flagged], ["removed, mean", found.removed_percent == null ? "–" : `${number(found.removed_percent, 1)} %`]]),
+      h("div", { class: "masks" }, found.samples.map((file) => h("figure", {}, mask("with-shadow", file), mask("without-shadow", file), h("figcaption", { class: "dim" }, file)))));
+  };
+  const element = h("div", { class: "guide-body" },
+    h("section", { class: "panel guide-step" }, picture, h("div", { class: "guide-words" }, h("h2", {}, "1. Where and when"),
+      field("Latitude", inputs.latitude, "°"), field("Longitude", inputs.longitude, "°"), field("Time", time), facts)),
+    h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.camera()), h("div", { class: "guide-words" }, h("h2", {}, "2. How the camera stood"),
+      field("Height", inputs.height, "m"), field("Looks to", inputs.azimuth, "°"), field("Down by", inputs.pitch, "°"), field("Focal length", inputs.focal, "mm"), field("Pixel", inputs.pixel, "µm"),
+      h("p", { class: "dim" }, "Looks to: anticlockwise from north."))),
+    h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "3. The video"), video.parts,
+      h("div", { class: "buttons" }, button("Take the shadow off", start, { class: "primary", "data-needs": "seat" })))),
+    panel("Masks with and without shadow", results));
+  return { element, shown: () => { video.shown(); shown(); } };
+}

@@ -1,0 +1,249 @@
+//! What a rig is taught: its point spread function, and a correction from flat targets.
+
+use std::{fs, path::PathBuf};
+
+use axum::{
+    Json,
+    extract::State,
+    http::{HeaderMap, StatusCode},
+};
+use farnear_depth::{
+    calibrate::Model,
+    corrections::{CdcSettings, Method},
+};
+use farnear_workflows::{
+    Context, WorkflowError,
+    calibrate::{
+        correction::{self, CorrectionSettings},
+        psf::{self, PsfSettings, TargetPair},
+    },
+    rig::{
+        RigAddress,
+        targets::{self, TargetSettings},
+    },
+    sessions,
+    simulator::Scenery,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Body, Shared, aside, driver, seated};
+use crate::{
+    api::{Api, For},
+    app::App,
+    failure::Failure,
+    lane::Task,
+    routes::rig::{begin, connected, figures},
+    view::{Begun, Nothing},
+};
+
+/// The correction in the session's folder.
+pub const CORRECTION: &str = "correction.toml";
+/// The series of flat targets in it.
+const SERIES: &str = "flat-series";
+/// Its list.
+const LIST: &str = "PATTERNS.toml";
+
+/// A capture of a flat target.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// The capture's name.
+    pub capture: String,
+    /// How far the target stood, where that is known.
+    #[serde(default)]
+    pub depth_mm: Option<f64>,
+}
+
+/// What the point spread function is found from.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PsfWish {
+    /// Pairs of flat targets.
+    #[serde(default)]
+    pub targets: Vec<Target>,
+    /// Whether the pairs of the flat series count, too, with their distances.
+    #[serde(default)]
+    pub series: bool,
+    /// `gaussian` (k) or `generalised` (p and k).
+    pub model: String,
+}
+
+/// Where flat targets are captured.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SeriesWish {
+    /// Their distances from the lens; the working range in equal steps without any.
+    #[serde(default)]
+    pub distances_mm: Vec<f64>,
+}
+
+/// What a correction is learned by.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CorrectionWish {
+    /// As `farnear calibrate correction --method` names it.
+    pub method: String,
+}
+
+/// What the session has been taught.
+#[derive(Serialize, JsonSchema)]
+pub struct Taught {
+    /// Distances of the flat series' targets so far.
+    pub series_mm: Vec<f64>,
+    /// Whether there is a correction.
+    pub corrected: bool,
+    /// Names of the corrections that can be learned.
+    pub methods: Vec<String>,
+}
+
+/// Adds the routes.
+pub fn routes(api: Api) -> Api {
+    api.get::<Taught, _, _>("/api/calibrate", "What this session has been taught.", taught)
+        .post::<PsfWish, Begun, _, _>(
+            "/api/calibrate/psf",
+            For::Seated,
+            "Finds the point spread function from one pair or several of flat targets.",
+            find_psf,
+        )
+        .post::<SeriesWish, Begun, _, _>(
+            "/api/calibrate/series",
+            For::Driver,
+            "Captures flat targets at several distances; at a real rig somebody places them and answers.",
+            series,
+        )
+        .post::<Nothing, Begun, _, _>(
+            "/api/calibrate/series/forget",
+            For::Driver,
+            "Forgets the flat series and the correction, to begin anew.",
+            forget,
+        )
+        .post::<CorrectionWish, Begun, _, _>(
+            "/api/calibrate/correction",
+            For::Seated,
+            "Learns a correction from the flat series.",
+            learn,
+        )
+}
+
+/// The series' maps with their distances; empty before the first.
+fn patterns(app: &App) -> Result<Vec<(PathBuf, f64)>, WorkflowError> {
+    let list = app.session.join(SERIES).join(LIST);
+    if !list.is_file() {
+        return Ok(Vec::new());
+    }
+    let folder = app.session.join(SERIES);
+    let entries = correction::list(&list)?;
+    Ok(entries.into_iter().map(|(map, mm)| (folder.join(map), mm)).collect())
+}
+
+async fn taught(State(app): Shared) -> Result<Json<Taught>, Failure> {
+    aside(move || {
+        let series_mm = patterns(&app)?.into_iter().map(|(_, mm)| mm).collect();
+        let methods = Method::ALL.iter().map(ToString::to_string).collect();
+        Ok(Json(Taught { series_mm, corrected: app.session.join(CORRECTION).is_file(), methods }))
+    })
+    .await
+}
+
+async fn find_psf(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<PsfWish>,
+) -> Result<Json<Begun>, Failure> {
+    seated(&app, &headers)?;
+    let bad = |error: String| Failure::new(StatusCode::BAD_REQUEST, error);
+    let model: Model = wish.model.parse().map_err(|error| bad(format!("model {:?}: {error}", wish.model)))?;
+    let mut pairs = Vec::new();
+    for Target { capture, depth_mm } in wish.targets {
+        let folder = sessions::folder_of(&app.session, &capture)?;
+        pairs.push(TargetPair { far: folder.join("far.png"), near: folder.join("near.png"), depth_mm });
+    }
+    if wish.series {
+        for (map, mm) in patterns(&app)? {
+            let folder = map.parent().map(PathBuf::from).unwrap_or_default();
+            pairs.push(TargetPair {
+                far: folder.join("far.png"),
+                near: folder.join("near.png"),
+                depth_mm: Some(mm),
+            });
+        }
+    }
+    if pairs.is_empty() {
+        return Err(bad("no pair was chosen: capture a flat, textured target first".into()));
+    }
+    let settings = PsfSettings { pairs, optics: app.optics_file(), model, out: None };
+    let work = move |_: &App, context: &Context<'_>| figures(psf::fit(&settings, context)?);
+    compute(&app, Task { kind: "psf", title: "Find the point spread function".into(), work: Box::new(work) })
+}
+
+/// Begins a computation.
+fn compute(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
+    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Begun { job }))
+}
+
+async fn series(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(SeriesWish { distances_mm }): Body<SeriesWish>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let open = connected(&app)?;
+    // Nobody can put a target before the emulated rig that is seen: one is started before each target instead.
+    let (rig, ask) = match &app.address {
+        // Nobody watches its stages, so time need not be a person's.
+        Some(RigAddress::Emulated(scenery)) => {
+            (RigAddress::Emulated(Scenery { paced: false, ..scenery.clone() }), false)
+        }
+        _ => (RigAddress::Open(open), true),
+    };
+    let settings = TargetSettings {
+        rig,
+        camera: app.camera(),
+        optics: app.optics_file(),
+        distances_mm,
+        ask,
+        out: app.session.join(SERIES),
+    };
+    let work = move |_: &App, context: &Context<'_>| figures(targets::capture(&settings, context)?);
+    begin(&app, Task { kind: "flat-series", title: "Capture flat targets".into(), work: Box::new(work) })
+}
+
+async fn forget(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(Nothing {}): Body<Nothing>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let work = move |app: &App, _: &Context<'_>| {
+        let (series, file) = (app.session.join(SERIES), app.session.join(CORRECTION));
+        for (path, gone) in [(&series, fs::remove_dir_all(&series)), (&file, fs::remove_file(&file))] {
+            match gone {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(WorkflowError::Folder { folder: path.clone(), source: error });
+                }
+                _ => {}
+            }
+        }
+        Ok(serde_json::Value::Null)
+    };
+    compute(&app, Task { kind: "forget", title: "Forget the flat series".into(), work: Box::new(work) })
+}
+
+async fn learn(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(CorrectionWish { method }): Body<CorrectionWish>,
+) -> Result<Json<Begun>, Failure> {
+    seated(&app, &headers)?;
+    let wrong = |error| Failure::new(StatusCode::BAD_REQUEST, format!("method {method:?}: {error}"));
+    let settings = CorrectionSettings {
+        patterns: app.session.join(SERIES).join(LIST),
+        method: method.parse().map_err(wrong)?,
+        cdc: CdcSettings::default(),
+        out: app.session.join(CORRECTION),
+    };
+    let work = move |_: &App, context: &Context<'_>| figures(correction::learn(&settings, context)?);
+    compute(&app, Task { kind: "correction", title: "Learn the correction".into(), work: Box::new(work) })
+}

@@ -1,0 +1,290 @@
+//! People before the camera: what they do, and their shadow.
+
+use std::{fs, path::PathBuf};
+
+use axum::{
+    Json,
+    body::Bytes,
+    extract::{Path, State},
+    http::{HeaderMap, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use farnear_activity::{
+    shadow::{CameraFile, camera},
+    sun::Model as SunModel,
+};
+use farnear_files::staging::write_file;
+use farnear_workflows::{
+    Context, WorkflowError,
+    activity::{recognition::Model, running},
+    rig::{RigAddress, live::LiveSettings},
+    sessions,
+    shadow::video::{self, VideoShadowSettings},
+    sun::{self, Formula, Moment},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Body, Shared, aside, driver, seated};
+use crate::{
+    api::{Api, For},
+    app::App,
+    failure::Failure,
+    lane::Task,
+    picture_message::person,
+    routes::rig::{begin, connected, figures},
+    view::{Begun, DONE, Done},
+};
+
+/// The folder of videos and masks in the session's.
+const FOLDER: &str = "people";
+/// Longest video that a browser may send.
+const VIDEO_MAX_BYTES: usize = 256 << 20;
+/// The model that comes with the program.
+const USUAL_MODEL: &str = "everyday";
+
+/// What is recognised.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RecogniseWish {
+    /// A video that was sent; without it what the rig's camera sees, until somebody stops it.
+    #[serde(default)]
+    pub video: Option<String>,
+}
+
+/// A place and a time.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sunlight {
+    /// North positive, degrees.
+    pub latitude_deg: f64,
+    /// East positive, degrees.
+    pub longitude_deg: f64,
+    /// RFC 3339: `2026-06-21T12:00:00+02:00`.
+    pub time: String,
+}
+
+/// How a camera stands.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Standing {
+    /// Lens above the ground.
+    pub height_m: f64,
+    /// Viewing direction, anticlockwise from north, degrees.
+    pub azimuth_deg: f64,
+    /// Viewing direction below the horizontal, degrees.
+    pub pitch_deg: f64,
+    /// Focal length.
+    pub focal_length_mm: f64,
+    /// Distance of neighbouring pixels.
+    pub pixel_um: f64,
+}
+
+/// A video of somebody with a shadow.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ShadowWish {
+    /// A video that was sent.
+    pub video: String,
+    /// Where and when.
+    pub sun: Sunlight,
+    /// How the camera stood.
+    pub camera: Standing,
+}
+
+/// What there is.
+#[derive(Serialize, JsonSchema)]
+pub struct People {
+    /// Names of the videos that were sent.
+    pub videos: Vec<String>,
+    /// Activities that are known.
+    pub activities: Vec<String>,
+}
+
+/// Where the sun stands and what shadow it throws.
+#[derive(Serialize, JsonSchema)]
+pub struct Shadow {
+    /// As `farnear sun --json` prints it.
+    pub figures: Value,
+    /// Length of the shadow of somebody 1 m tall; absent where the sun is below the horizon.
+    pub length_per_height: Option<f64>,
+    /// Where it falls, clockwise from north, degrees.
+    pub direction_deg: f64,
+}
+
+/// That shadow is being taken off.
+#[derive(Serialize, JsonSchema)]
+pub struct Removing {
+    /// The job's number.
+    pub job: u64,
+    /// Name of the result.
+    pub shadow: String,
+}
+
+/// Adds the routes.
+pub fn routes(api: Api) -> Api {
+    api.get::<People, _, _>("/api/people", "Videos that were sent, activities that are known.", people)
+        .put_bytes::<Done, _, _>("/api/people/videos/{video}", "Sends a video.", VIDEO_MAX_BYTES, receive)
+        .post::<RecogniseWish, Begun, _, _>(
+            "/api/people/recognise",
+            For::Driver,
+            "Recognises what somebody does; the running answer comes by the socket.",
+            recognise,
+        )
+        .post::<Sunlight, Shadow, _, _>(
+            "/api/people/sun",
+            For::All,
+            "Where the sun stands and what shadow it throws; nothing is changed.",
+            sunlight,
+        )
+        .post::<ShadowWish, Removing, _, _>(
+            "/api/people/shadow",
+            For::Seated,
+            "Makes silhouettes of a video and takes the shadow off them.",
+            shadow,
+        )
+        .get_bytes("/api/people/shadows/{shadow}/{masks}/{file}", "A mask.", "image/png", mask)
+}
+
+fn folder(app: &App) -> PathBuf {
+    app.session.join(FOLDER)
+}
+
+/// The path of a video that was sent.
+fn video_of(app: &App, name: &str) -> Result<PathBuf, Failure> {
+    let path = sessions::folder_of(&folder(app), name)?;
+    match path.is_file() {
+        true => Ok(path),
+        false => Err(Failure::missing(&format!("video {name}"))),
+    }
+}
+
+async fn people(State(app): Shared) -> Result<Json<People>, Failure> {
+    aside(move || {
+        let entries = fs::read_dir(folder(&app)).into_iter().flatten().flatten();
+        let files = entries.filter(|entry| entry.path().is_file());
+        let mut videos: Vec<String> =
+            files.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        videos.sort();
+        let activities = Model::read(USUAL_MODEL.as_ref())?.activities().to_vec();
+        Ok(Json(People { videos, activities }))
+    })
+    .await
+}
+
+async fn receive(
+    State(app): Shared,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    bytes: Bytes,
+) -> Result<Json<Done>, Failure> {
+    seated(&app, &headers)?;
+    let path = sessions::folder_of(&folder(&app), &name)?;
+    aside(move || {
+        let folder = folder(&app);
+        fs::create_dir_all(&folder).map_err(|source| WorkflowError::Folder { folder, source })?;
+        write_file(&path, &bytes).map_err(WorkflowError::from)?;
+        Ok(Json(DONE))
+    })
+    .await
+}
+
+async fn recognise(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(RecogniseWish { video }): Body<RecogniseWish>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let title = |what: &str| format!("Recognise {what}");
+    let Some(name) = video else {
+        let settings = LiveSettings { rig: RigAddress::Open(connected(&app)?), camera: app.camera() };
+        let work = move |app: &App, context: &Context<'_>| {
+            let model = Model::read(USUAL_MODEL.as_ref())?;
+            running::camera(&settings, &model, context, |moment| {
+                app.pictures.send_replace(person(moment));
+                Ok(())
+            })?;
+            Ok(Value::Null)
+        };
+        let task = Task { kind: "recognise", title: title("what the camera sees"), work: Box::new(work) };
+        return begin(&app, task);
+    };
+    let path = video_of(&app, &name)?;
+    let work = move |app: &App, context: &Context<'_>| {
+        let model = Model::read(USUAL_MODEL.as_ref())?;
+        figures(running::video(&path, &model, context, |moment| {
+            app.pictures.send_replace(person(moment));
+            Ok(())
+        })?)
+    };
+    let task = Task { kind: "recognise", title: title(&name), work: Box::new(work) };
+    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Begun { job }))
+}
+
+fn moment(sun: &Sunlight) -> Result<Moment, WorkflowError> {
+    Moment::new(sun.latitude_deg, sun.longitude_deg, &sun.time)
+}
+
+async fn sunlight(Body(given): Body<Sunlight>) -> Result<Json<Shadow>, Failure> {
+    let found = sun::position(&moment(&given)?, Formula::Host(SunModel::Psa))?;
+    let up = found.elevation_deg > 0.0;
+    Ok(Json(Shadow {
+        length_per_height: up.then(|| 1.0 / found.elevation_deg.to_radians().tan()),
+        direction_deg: (found.azimuth_deg + 180.0) % 360.0,
+        figures: figures(found)?,
+    }))
+}
+
+async fn shadow(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<ShadowWish>,
+) -> Result<Json<Removing>, Failure> {
+    seated(&app, &headers)?;
+    let video = video_of(&app, &wish.video)?;
+    let out = sessions::free_names(&folder(&app), "shadow", 1)?.remove(0);
+    let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = wish.camera;
+    let camera = camera::Camera {
+        height_m,
+        azimuth_deg,
+        pitch_deg,
+        focal_length_mm,
+        pixel_um,
+        width_px: 0,
+        height_px: 0,
+        principal_point_px: None,
+    };
+    let settings = VideoShadowSettings {
+        video,
+        camera: CameraFile {
+            camera,
+            subject: camera::SubjectPrior::default(),
+            standard_deviations: camera::StandardDeviations::default(),
+        },
+        moment: moment(&wish.sun)?,
+        rate_hz: None,
+        out,
+    };
+    let work = move |_: &App, context: &Context<'_>| figures(video::remove_from_video(&settings, context)?);
+    let title = format!("Shadow of {}", wish.video);
+    let task = Task { kind: "shadow", title, work: Box::new(work) };
+    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Removing { job, shadow: name }))
+}
+
+async fn mask(
+    State(app): Shared,
+    Path((shadow, masks, file)): Path<(String, String, String)>,
+) -> Result<Response, Failure> {
+    let folder = sessions::folder_of(&sessions::folder_of(&folder(&app), &shadow)?, &masks)?;
+    let path = sessions::folder_of(&folder, &file)?;
+    if path.extension().is_none_or(|ending| ending != "png") {
+        return Err(Failure::new(StatusCode::BAD_REQUEST, format!("file {file}: expected a mask, NAME.png")));
+    }
+    let missing = move |_| Failure::missing(&format!("mask {file}"));
+    let bytes = aside(move || fs::read(&path).map_err(missing)).await?;
+    Ok(([(header::CONTENT_TYPE, "image/png")], bytes).into_response())
+}

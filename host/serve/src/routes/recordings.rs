@@ -1,0 +1,147 @@
+//! Live depth, recorded and played back.
+
+use std::{fs, path::PathBuf};
+
+use axum::{
+    Json,
+    extract::State,
+    http::{HeaderMap, StatusCode},
+};
+use farnear_workflows::{Context, WorkflowError, optics::GivenOptics, rig::recording::Recorder, sessions};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Body, Shared, aside, driver, seated};
+use crate::{
+    api::{Api, For},
+    app::{App, lock},
+    failure::Failure,
+    lane::Task,
+    live,
+    routes::rig::figures,
+    view::{Begun, DONE, Done, LiveMode},
+};
+
+/// The folder of recordings in the session's.
+const FOLDER: &str = "recordings";
+/// How their names end.
+const ENDING: &str = ".pairs";
+
+/// Whether live depth is recorded.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RecordWish {
+    /// From now on, or no more.
+    pub on: bool,
+}
+
+/// What is played, and how.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlayWish {
+    /// Name of the recording.
+    pub recording: String,
+    /// As fast as depth is computed, instead of as it was recorded.
+    #[serde(default)]
+    pub fast: bool,
+}
+
+/// A recording.
+#[derive(Serialize, JsonSchema)]
+pub struct OneRecording {
+    /// Its name.
+    pub name: String,
+    /// Its size.
+    pub megabytes: f64,
+}
+
+/// All of them.
+#[derive(Serialize, JsonSchema)]
+pub struct Recordings {
+    /// By name.
+    pub recordings: Vec<OneRecording>,
+}
+
+/// Adds the routes.
+pub fn routes(api: Api) -> Api {
+    api.get::<Recordings, _, _>("/api/recordings", "Recordings of live depth.", list)
+        .post::<RecordWish, Done, _, _>(
+            "/api/recordings",
+            For::Driver,
+            "Begins to record live depth, or ends it.",
+            record,
+        )
+        .post::<PlayWish, Begun, _, _>(
+            "/api/recordings/play",
+            For::Seated,
+            "Plays a recording: depth is computed anew and comes by the socket as when it is live.",
+            play,
+        )
+}
+
+fn folder(app: &App) -> PathBuf {
+    app.session.join(FOLDER)
+}
+
+async fn list(State(app): Shared) -> Result<Json<Recordings>, Failure> {
+    aside(move || {
+        let entries = fs::read_dir(folder(&app)).into_iter().flatten().flatten();
+        let mut recordings: Vec<OneRecording> = entries
+            .filter_map(|entry| {
+                let name = entry.file_name().to_string_lossy().into_owned();
+                let bytes = entry.metadata().ok()?.len();
+                let whole = name.ends_with(ENDING) && !name.starts_with('.');
+                whole.then(|| OneRecording { name, megabytes: (bytes as f64 / 1e5).round() / 10.0 })
+            })
+            .collect();
+        recordings.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(Json(Recordings { recordings }))
+    })
+    .await
+}
+
+async fn record(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(RecordWish { on }): Body<RecordWish>,
+) -> Result<Json<Done>, Failure> {
+    driver(&app, &headers)?;
+    if !on {
+        app.finish_recording();
+        return Ok(Json(DONE));
+    }
+    if app.live().mode != LiveMode::Depth {
+        return Err(Failure::new(StatusCode::CONFLICT, "live depth is off: there is nothing to record")
+            .with_hint("Begin live depth first."));
+    }
+    let mut recorder = lock(&app.recorder);
+    if recorder.is_some() {
+        return Err(Failure::busy("a recording"));
+    }
+    let folder = folder(&app);
+    let free =
+        (1..).map(|number| format!("live-{number:03}{ENDING}")).find(|name| !folder.join(name).exists());
+    let name = free.unwrap_or_default();
+    *recorder = Some(Recorder::begin(&folder.join(&name), &GivenOptics::read(&app.optics_file())?)?);
+    drop(recorder);
+    app.change(|state| state.live.recording = Some(name));
+    Ok(Json(DONE))
+}
+
+async fn play(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(PlayWish { recording, fast }): Body<PlayWish>,
+) -> Result<Json<Begun>, Failure> {
+    seated(&app, &headers)?;
+    let path = sessions::folder_of(&folder(&app), &recording)?;
+    if !path.is_file() {
+        return Err(Failure::missing(&format!("recording {recording}")));
+    }
+    let work = move |app: &App, context: &Context<'_>| -> Result<_, WorkflowError> {
+        figures(live::play(app, &path, fast, context)?)
+    };
+    let task = Task { kind: "play", title: format!("Play {recording}"), work: Box::new(work) };
+    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Begun { job }))
+}

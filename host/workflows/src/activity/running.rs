@@ -1,0 +1,210 @@
+//! A running answer with what it rests on, the picture and the person cut out of it: for a face that shows both while they come, from a
+//! video or from the rig's camera.
+
+use std::{path::Path, time::Instant};
+
+use farnear_activity::{
+    mask::{
+        Mask,
+        extractor::{Extractor, ExtractorSettings},
+        subject::Flag,
+    },
+    recognition::{
+        clip::Track,
+        live::{Live, joined},
+        model::{Answer, Recogniser},
+    },
+};
+use farnear_capture::camera::Image;
+use farnear_files::video::{Pixels, Video, VideoFrame};
+use ndarray::{Array2, Axis};
+use serde::Serialize;
+
+use super::recognition::{Model, Share};
+use crate::{
+    context::Context,
+    error::{About, Result},
+    figures::rounded,
+    rig::live::{self, LiveSettings},
+    silhouettes::frame_of,
+};
+
+/// Activities that are named with their shares.
+const BEST: usize = 3;
+
+/// The answer for the frames so far, at most a window of them.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RunningAnswer {
+    /// Number of the frame, from 1.
+    pub frame: usize,
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// What it is most likely, the likeliest first.
+    pub best: Vec<Share>,
+    /// What is doubtful about the frame's mask.
+    pub flags: Vec<String>,
+}
+
+/// A frame, its mask and the answer with it.
+pub struct Moment<'a> {
+    /// Grey values.
+    pub picture: &'a Array2<u8>,
+    /// The person.
+    pub mask: &'a Mask,
+    /// The answer.
+    pub answer: &'a RunningAnswer,
+}
+
+/// The answer for all frames.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RunningFigures {
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// What it is most likely, the likeliest first.
+    pub best: Vec<Share>,
+    /// Frames.
+    pub frames: usize,
+    /// Frames with nobody.
+    pub empty_frames: usize,
+    /// From a frame to its answer, mean, in s.
+    pub seconds_per_frame: f64,
+}
+
+/// Recognises frame by frame.
+pub struct Watcher<'m> {
+    model: &'m Recogniser,
+    live: Live<'m>,
+    extractor: Option<Extractor>,
+    tracks: Vec<Track>,
+    seconds: f64,
+}
+
+impl<'m> Watcher<'m> {
+    /// With nothing seen.
+    pub fn new(model: &'m Model) -> Self {
+        let model = model.recogniser(true);
+        let live = Live::new(model, model.typical_frames.max(1), true);
+        Self { model, live, extractor: None, tracks: Vec::new(), seconds: 0.0 }
+    }
+
+    /// Takes the next frame.
+    ///
+    /// # Errors
+    /// Frames of different size, a model of several views.
+    pub fn take(&mut self, pixels: &Pixels) -> Result<(Mask, RunningAnswer)> {
+        let start = Instant::now();
+        let frame = frame_of(pixels);
+        let extractor = match &mut self.extractor {
+            Some(extractor) => extractor,
+            none => none.insert(Extractor::like(frame, ExtractorSettings::for_frame(frame))?),
+        };
+        let found = extractor.extract(frame)?.subject;
+        let track = Track::from_masks(std::slice::from_ref(&found.mask), self.model.settings.scaling, true);
+        self.tracks.push(track.clone());
+        let answer = self.live.push_described(vec![track])?;
+        self.seconds += start.elapsed().as_secs_f64();
+        let told = RunningAnswer {
+            frame: self.tracks.len(),
+            confidence: share(answer.confidence),
+            best: best(&answer),
+            activity: answer.activity,
+            flags: found.flags.iter().map(Flag::to_string).collect(),
+        };
+        Ok((found.mask, told))
+    }
+
+    /// The answer for all of it.
+    ///
+    /// # Errors
+    /// A model of several views.
+    pub fn finish(&self) -> Result<RunningFigures> {
+        let whole = joined(self.tracks.iter());
+        let empty_frames = whole.empty_frames;
+        let answer = self.model.recognise(&[whole])?;
+        let frames = self.tracks.len();
+        Ok(RunningFigures {
+            confidence: share(answer.confidence),
+            best: best(&answer),
+            activity: answer.activity,
+            frames,
+            empty_frames,
+            seconds_per_frame: rounded(self.seconds / frames.max(1) as f64, 6),
+        })
+    }
+}
+
+/// Recognises a video and gives each frame with its answer to `on_moment`.
+///
+/// # Errors
+/// A video that cannot be read, a model that does not fit; [`crate::WorkflowError::Cancelled`]; what `on_moment` gives.
+pub fn video(
+    path: &Path,
+    model: &Model,
+    context: &Context<'_>,
+    mut on_moment: impl FnMut(&Moment<'_>) -> Result<()>,
+) -> Result<RunningFigures> {
+    let mut watcher = Watcher::new(model);
+    for frame in Video::open(path)? {
+        context.cancel.check("recognising")?;
+        let VideoFrame { name, pixels } = frame?;
+        let (mask, answer) = watcher.take(&pixels).about(|| name.clone())?;
+        context.progress.advance("frames", answer.frame, None);
+        on_moment(&Moment { picture: &grey(pixels), mask: &mask, answer: &answer })?;
+    }
+    watcher.finish()
+}
+
+/// Recognises what the rig's camera sees until the context or `on_moment` wants no more.
+///
+/// # Errors
+/// As [`live::watch`]; a model that does not fit; [`crate::WorkflowError::Cancelled`] at the wished end.
+pub fn camera(
+    settings: &LiveSettings,
+    model: &Model,
+    context: &Context<'_>,
+    mut on_moment: impl FnMut(&Moment<'_>) -> Result<()>,
+) -> Result<()> {
+    let mut watcher = Watcher::new(model);
+    live::watch(settings, context, |_, image| {
+        let pixels = Pixels::Grey(eight_bits(&image));
+        let (mask, answer) = watcher.take(&pixels)?;
+        // Nobody ends by himself what is watched live: memory must not grow with it.
+        watcher.tracks.clear();
+        on_moment(&Moment { picture: &grey(pixels), mask: &mask, answer: &answer })
+    })
+}
+
+fn grey(pixels: Pixels) -> Array2<u8> {
+    match pixels {
+        Pixels::Grey(grey) => grey,
+        Pixels::Rgb(rgb) => rgb.map_axis(Axis(2), |pixel| {
+            let sum: u16 = pixel.iter().map(|level| u16::from(*level)).sum();
+            ((sum + 1) / 3) as u8
+        }),
+    }
+}
+
+fn eight_bits(image: &Image) -> Array2<u8> {
+    let extra = image.bits.saturating_sub(8);
+    image.pixels.mapv(|code| (code >> extra).min(255) as u8)
+}
+
+fn best(answer: &Answer) -> Vec<Share> {
+    let mut shares: Vec<Share> = answer
+        .probabilities
+        .iter()
+        .map(|(activity, value)| Share { activity: activity.clone(), share: share(*value) })
+        .collect();
+    shares.sort_by(|a, b| b.share.total_cmp(&a.share));
+    shares.truncate(BEST);
+    shares
+}
+
+/// With four decimals, without the digits that f32 does not have.
+fn share(value: f32) -> f64 {
+    rounded(f64::from(value), 4)
+}

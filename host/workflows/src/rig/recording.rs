@@ -1,0 +1,327 @@
+//! Recorded live depth: the pairs as they came, with their times and the optics, in one file. Played back, depth is computed anew, at the
+//! pace of the record or as fast as this computer can.
+//!
+//! The file, all numbers little-endian:
+//! ```text
+//! "FNPAIRS1" | u32 length of the optics | optics (TOML) | pairs
+//! pair: u64 microseconds since the first | u16 width | u16 height | u8 bits | far: u16 per pixel | near: u16 per pixel
+//! ```
+
+use std::{
+    fs::{self, File},
+    io::{BufReader, BufWriter, ErrorKind, Read, Write},
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use farnear_capture::camera::Image;
+use farnear_depth::{
+    optics::Optics,
+    pipeline::{Processor, Settings},
+};
+use ndarray::Array2;
+use serde::Serialize;
+
+use super::live_depth::{LiveDepth, grey};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    operators,
+    optics::GivenOptics,
+};
+
+const MAGIC: &[u8; 8] = b"FNPAIRS1";
+/// What a file of this kind is called in messages.
+const EXPECTED: &str = "recorded pairs";
+/// Most pairs of a recording: 2.5 GB at 640x480.
+pub const PAIRS_MAX: usize = 2000;
+/// Longest optics.
+const OPTICS_MAX: u32 = 1 << 20;
+/// Most pixels of an image.
+const PIXELS_MAX: usize = 1 << 26;
+/// From one look at the wish to stop to the next.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What was recorded.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RecordingFigures {
+    /// Pairs.
+    pub pairs: usize,
+    /// From the first to the last.
+    pub seconds: f64,
+}
+
+/// What was played.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PlayFigures {
+    /// Pairs.
+    pub pairs: usize,
+    /// Over the time that it took.
+    pub maps_per_second: f64,
+    /// From a pair to its map, median, in ms of this computer's clock.
+    pub latency_ms: f64,
+    /// Recorded time, s.
+    pub seconds: f64,
+}
+
+/// A recording under way. The file has its name when it is finished; one that is not goes with this value.
+pub struct Recorder {
+    file: BufWriter<File>,
+    partial: PathBuf,
+    target: PathBuf,
+    begin: Option<Instant>,
+    last: Duration,
+    pairs: usize,
+    finished: bool,
+}
+
+impl Recorder {
+    /// Begins a recording.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, optics that cannot be.
+    pub fn begin(target: &Path, optics: &GivenOptics) -> Result<Self> {
+        let folder = target.parent().unwrap_or(Path::new("."));
+        let failed = |source| WorkflowError::Folder { folder: folder.into(), source };
+        fs::create_dir_all(folder).map_err(failed)?;
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        let partial = folder.join(format!(".{name}.partial"));
+        let mut file = BufWriter::new(File::create(&partial).map_err(failed)?);
+        let text = toml::to_string(&optics.table)?;
+        file.write_all(MAGIC)
+            .and_then(|()| file.write_all(&(text.len() as u32).to_le_bytes()))
+            .and_then(|()| file.write_all(text.as_bytes()))
+            .map_err(failed)?;
+        let target = target.into();
+        Ok(Self { file, partial, target, begin: None, last: Duration::ZERO, pairs: 0, finished: false })
+    }
+
+    /// Adds a pair; gives whether there is room for more.
+    ///
+    /// # Errors
+    /// A disk that is full, images of more than 65,535 pixels along a side.
+    pub fn add(&mut self, far: &Image, near: &Image) -> Result<bool> {
+        let (height, width) = far.pixels.dim();
+        let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
+            return Err(WorkflowError::parameter(
+                "image",
+                format!("{width}x{height}"),
+                "at most 65535 px along each side",
+            ));
+        };
+        if far.pixels.dim() != near.pixels.dim() || far.bits != near.bits {
+            return Err(WorkflowError::parameter(
+                "pair",
+                self.pairs,
+                "both images have one size and depth of bits",
+            ));
+        }
+        self.last = self.begin.get_or_insert_with(Instant::now).elapsed();
+        let mut bytes = Vec::with_capacity(13 + 4 * far.pixels.len());
+        bytes.extend((self.last.as_micros() as u64).to_le_bytes());
+        bytes.extend(width.to_le_bytes());
+        bytes.extend(height.to_le_bytes());
+        bytes.push(far.bits);
+        bytes.extend(far.pixels.iter().chain(&near.pixels).flat_map(|code| code.to_le_bytes()));
+        let folder = self.target.parent().unwrap_or(Path::new(".")).to_path_buf();
+        self.file.write_all(&bytes).map_err(|source| WorkflowError::Folder { folder, source })?;
+        self.pairs += 1;
+        Ok(self.pairs < PAIRS_MAX)
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// A disk that is full.
+    pub fn finish(mut self) -> Result<RecordingFigures> {
+        let folder = self.target.parent().unwrap_or(Path::new(".")).to_path_buf();
+        self.file
+            .flush()
+            .and_then(|()| fs::rename(&self.partial, &self.target))
+            .map_err(|source| WorkflowError::Folder { folder, source })?;
+        self.finished = true;
+        Ok(RecordingFigures { pairs: self.pairs, seconds: rounded(self.last.as_secs_f64(), 3) })
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if !self.finished {
+            let _ = fs::remove_file(&self.partial); // it may have gone
+        }
+    }
+}
+
+/// A pair of a recording.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RecordedPair {
+    /// Since the first.
+    pub at: Duration,
+    /// The far-focused image.
+    pub far: Image,
+    /// The near-focused image.
+    pub near: Image,
+}
+
+/// A recording that is read, pair after pair.
+pub struct Recording {
+    file: BufReader<File>,
+    path: PathBuf,
+    optics: Optics,
+    read: usize,
+}
+
+impl Recording {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// A file that is missing, or holds something else.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(WorkflowError::read("the recording", path))?;
+        let mut file = BufReader::new(file);
+        let wrong = WorkflowError::file(path, EXPECTED);
+        let mut head = [0; 12];
+        if file.read_exact(&mut head).is_err() || head[..8] != *MAGIC {
+            return Err(wrong("it does not begin with FNPAIRS1"));
+        }
+        let length = u32::from_le_bytes([head[8], head[9], head[10], head[11]]);
+        if length > OPTICS_MAX {
+            return Err(wrong("its optics are longer than any"));
+        }
+        let mut text = vec![0; length as usize];
+        file.read_exact(&mut text).map_err(WorkflowError::read("the recording", path))?;
+        let text = String::from_utf8_lossy(&text).into_owned();
+        let optics = GivenOptics::parse(&text, path)?.optics;
+        Ok(Self { file, path: path.into(), optics, read: 0 })
+    }
+
+    /// The next pair; `None` at the end.
+    ///
+    /// # Errors
+    /// A file that is cut short, or holds something else.
+    pub fn next(&mut self) -> Result<Option<RecordedPair>> {
+        let (path, number) = (self.path.clone(), self.read + 1);
+        let wrong = |what: &str| WorkflowError::file(&path, EXPECTED)(format!("pair {number} {what}"));
+        let mut head = [0; 13];
+        match self.file.read(&mut head[..1]) {
+            Ok(0) => return Ok(None),
+            Ok(_) => {}
+            Err(error) => return Err(WorkflowError::read("the recording", &path)(error)),
+        }
+        let cut = |error: std::io::Error| match error.kind() {
+            ErrorKind::UnexpectedEof => wrong("is cut short"),
+            _ => WorkflowError::read("the recording", &path)(error),
+        };
+        self.file.read_exact(&mut head[1..]).map_err(cut)?;
+        let [t0, t1, t2, t3, t4, t5, t6, t7, w0, w1, h0, h1, bits] = head;
+        let micros = u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]);
+        let (width, height) = (u16::from_le_bytes([w0, w1]), u16::from_le_bytes([h0, h1]));
+        let pixels = usize::from(width) * usize::from(height);
+        if pixels == 0 || pixels > PIXELS_MAX || !(8..=16).contains(&bits) {
+            return Err(wrong(&format!("has {width}x{height} pixels of {bits} bits")));
+        }
+        let mut image = || -> Result<Image> {
+            let mut bytes = vec![0; 2 * pixels];
+            self.file.read_exact(&mut bytes).map_err(cut)?;
+            let codes = bytes.chunks_exact(2).map(|code| u16::from_le_bytes([code[0], code[1]])).collect();
+            let size = (usize::from(height), usize::from(width));
+            let pixels = Array2::from_shape_vec(size, codes).map_err(|error| wrong(&error.to_string()))?;
+            Ok(Image { pixels, bits })
+        };
+        let (far, near) = (image()?, image()?);
+        self.read = number;
+        Ok(Some(RecordedPair { at: Duration::from_micros(micros), far, near }))
+    }
+}
+
+/// Plays a recording and gives each pair with its depth to `on_depth`.
+///
+/// # Errors
+/// The file, optics, operators, computation; [`WorkflowError::Cancelled`]; what `on_depth` gives.
+pub fn play(
+    path: &Path,
+    computation: &Settings,
+    fast: bool,
+    context: &Context<'_>,
+    mut on_depth: impl FnMut(LiveDepth<'_>, &Optics) -> Result<()>,
+) -> Result<PlayFigures> {
+    let mut recording = Recording::open(path)?;
+    let optics = recording.optics.clone();
+    let designed = operators::find(None, &optics)?;
+    let mut processor = Processor::new(&designed, &optics, computation)?;
+    let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
+    while let Some(RecordedPair { at, far, near }) = recording.next()? {
+        while !fast && begin.elapsed() < at {
+            context.cancel.check("playing a recording")?;
+            std::thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
+        }
+        context.cancel.check("playing a recording")?;
+        let arrived = Instant::now();
+        let map = processor.run(grey(&far).view(), grey(&near).view())?;
+        let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+        latencies_ms.push(latency_ms);
+        seconds = at.as_secs_f64();
+        context.progress.advance("pairs", latencies_ms.len(), None);
+        on_depth(LiveDepth { far: &far, near: &near, map, pair_ms: 0.0, latency_ms }, &optics)?;
+    }
+    latencies_ms.sort_by(f64::total_cmp);
+    let pairs = latencies_ms.len();
+    Ok(PlayFigures {
+        pairs,
+        maps_per_second: rounded(pairs as f64 / begin.elapsed().as_secs_f64().max(1e-9), 2),
+        latency_ms: rounded(latencies_ms.get(pairs / 2).copied().unwrap_or_default(), 2),
+        seconds: rounded(seconds, 3),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    fn image(code: u16) -> Image {
+        Image { pixels: Array2::from_shape_fn((3, 5), |(y, x)| code + (5 * y + x) as u16), bits: 12 }
+    }
+
+    fn optics() -> GivenOptics {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/rig.toml");
+        GivenOptics::read(&path).expect("the example's optics")
+    }
+
+    #[test]
+    fn pairs_come_back_as_they_were_and_a_cut_file_says_where() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.pairs");
+        let mut recorder = Recorder::begin(&path, &optics()).expect("begins");
+        for code in [10, 200] {
+            assert!(recorder.add(&image(code), &image(code + 1)).expect("room"));
+        }
+        assert!(!path.exists(), "the file has its name when it is whole");
+        assert_eq!(recorder.finish().expect("a file").pairs, 2);
+        let mut recording = Recording::open(&path).expect("pairs");
+        for code in [10, 200] {
+            let pair = recording.next().expect("whole").expect("there");
+            assert_eq!((pair.far, pair.near), (image(code), image(code + 1)));
+        }
+        assert_eq!(recording.next().expect("whole"), None);
+        let bytes = fs::read(&path).expect("a file");
+        fs::write(&path, &bytes[..bytes.len() - 3]).expect("writable");
+        let mut recording = Recording::open(&path).expect("pairs");
+        assert!(recording.next().is_ok());
+        let error = recording.next().expect_err("cut").to_string();
+        assert!(error.contains("pair 2 is cut short"), "{error}");
+        fs::write(&path, b"something else").expect("writable");
+        assert!(Recording::open(&path).err().expect("refused").to_string().contains("FNPAIRS1"));
+    }
+
+    #[test]
+    fn a_recording_that_is_not_finished_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut recorder = Recorder::begin(&folder.path().join("a.pairs"), &optics()).expect("begins");
+        recorder.add(&image(1), &image(2)).expect("room");
+        drop(recorder);
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
+    }
+}

@@ -1,0 +1,118 @@
+//! From a video of a person in the sun to silhouettes without their shadow, in one go: masks in which the shadow still is, the camera's file,
+//! and the masks without it, in one folder.
+
+use std::{fs, path::PathBuf};
+
+use farnear_activity::{
+    background,
+    shadow::{CameraFile, Method},
+};
+use farnear_files::{
+    staging,
+    video::{Video, VideoError},
+};
+use serde::Serialize;
+
+use super::removal::{self, RemovalFigures, RemovalSettings};
+use crate::{
+    context::Context,
+    error::{About, Result, WorkflowError},
+    silhouettes::{
+        frame_of,
+        video::{self, ShadowTreatment, VideoSettings},
+    },
+    sun::Moment,
+};
+
+/// The folder of masks in which the shadow still is.
+pub const WITH: &str = "with-shadow";
+/// The folder of masks without it.
+pub const WITHOUT: &str = "without-shadow";
+
+/// What is cut out and how.
+#[derive(Clone, PartialEq, Debug)]
+pub struct VideoShadowSettings {
+    /// The video.
+    pub video: PathBuf,
+    /// How the camera stands; the size of its pictures is the video's.
+    pub camera: CameraFile,
+    /// Where, and when the video begins.
+    pub moment: Moment,
+    /// Frames per second, where the time is to pass.
+    pub rate_hz: Option<f64>,
+    /// The new folder.
+    pub out: PathBuf,
+}
+
+/// What was cut.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct VideoShadowFigures {
+    /// Frames with a usable silhouette.
+    pub silhouettes: usize,
+    /// Names of some masks with a person, evenly through the video.
+    pub samples: Vec<String>,
+    /// What was taken off.
+    #[serde(flatten)]
+    pub removal: RemovalFigures,
+}
+
+/// Samples to look at.
+const SAMPLES: usize = 6;
+
+/// Makes both folders of masks.
+///
+/// # Errors
+/// The video, the camera's numbers, a sun too low for shadows, folders that cannot be written. What was complete stays.
+pub fn remove_from_video(
+    settings: &VideoShadowSettings,
+    context: &Context<'_>,
+) -> Result<VideoShadowFigures> {
+    let none = || VideoError::NoFrames { path: settings.video.clone() };
+    let first = Video::open(&settings.video)?.next().ok_or_else(none)??;
+    let (height, width) = frame_of(&first.pixels).size();
+    let mut camera = settings.camera.clone();
+    (camera.camera.width_px, camera.camera.height_px) = (width, height);
+    let text = toml::to_string(&camera)?;
+    CameraFile::parse(&text).about(|| "the camera".into())?;
+    fs::create_dir_all(&settings.out)
+        .map_err(|source| WorkflowError::Folder { folder: settings.out.clone(), source })?;
+    let file = settings.out.join("camera.toml");
+    staging::write_file(&file, text.as_bytes())?;
+    let (with, without) = (settings.out.join(WITH), settings.out.join(WITHOUT));
+    let masks = VideoSettings {
+        video: settings.video.clone(),
+        out: with.clone(),
+        learn_first: true,
+        learning_frames: 0,
+        history_frames: background::Settings::default().history_frames,
+        shadow: ShadowTreatment::Keep,
+        centred: false,
+        labels: None,
+        grey: false,
+    };
+    let made = video::extract(&masks, context)?;
+    let removal = removal::remove_from_masks(
+        &RemovalSettings {
+            masks: with.clone(),
+            camera: file,
+            moment: settings.moment,
+            rate_hz: settings.rate_hz,
+            method: Method::default(),
+            out: without,
+        },
+        context,
+    )?;
+    Ok(VideoShadowFigures { silhouettes: made.silhouettes, samples: samples(&with)?, removal })
+}
+
+/// Names of masks with something in them.
+fn samples(folder: &std::path::Path) -> Result<Vec<String>> {
+    let masks = farnear_files::masks::read_all(folder)?;
+    let seen: Vec<&String> = masks
+        .iter()
+        .filter(|named| named.mask.iter().any(|person| *person))
+        .map(|named| &named.name)
+        .collect();
+    let step = (seen.len() / SAMPLES).max(1);
+    Ok(seen.into_iter().step_by(step).take(SAMPLES).map(|name| format!("{name}.png")).collect())
+}
