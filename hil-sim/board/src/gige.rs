@@ -156,24 +156,21 @@ fn obey(
             .look_for_controller(Instant::now(), received.as_ref().ok().map(|(_, from)| *from))
             .into_iter()
             .for_each(ask);
-        match received {
-            Ok((length, from)) => {
-                // The time is asked for before the device is held: the rig may be waiting for a picture to be taken.
-                let starts = control::starts_acquisition(&bytes[..length]);
-                let now_ns = if starts { now() } else { 0 };
-                let done = lock(device).obey(&bytes[..length], from, Instant::now(), now_ns);
-                for asked in done.asks {
-                    carry_out(asked, ask, now);
-                }
-                if let Some(answer) = done.answer {
-                    let _ = control.send_to(&answer, from); // who asked may have gone
-                }
-                if let Some((to, packets)) = done.again {
-                    send(stream, to, &packets);
-                }
+        // Without: nothing came, or an answer that nobody took came back as an error.
+        if let Ok((length, from)) = received {
+            // The time is asked for before the device is held: the rig may be waiting for a picture to be taken.
+            let starts = control::starts_acquisition(&bytes[..length]);
+            let now_ns = if starts { now() } else { 0 };
+            let done = lock(device).obey(&bytes[..length], from, Instant::now(), now_ns);
+            for asked in done.asks {
+                carry_out(asked, ask, now);
             }
-            // Nothing came; or an answer that nobody took comes back as an error.
-            Err(_) => {}
+            if let Some(answer) = done.answer {
+                let _ = control.send_to(&answer, from); // who asked may have gone
+            }
+            if let Some((to, packets)) = done.again {
+                send(stream, to, &packets);
+            }
         }
     }
 }

@@ -34,10 +34,10 @@ pub enum Warning {
     },
     /// The operators were designed for another PSF than the optics have.
     PsfMismatch {
-        /// PSF of the operators.
-        operators: Psf,
+        /// PSF of the operators; boxed, for a measured one is long.
+        operators: Box<Psf>,
         /// PSF of the optics.
-        optics: Psf,
+        optics: Box<Psf>,
     },
     /// The far image seems to be the near one. Exchanging the images turns alpha into -alpha and nothing else, so only what
     /// is known of scenes can tell; a scene that says nothing, as a plane, draws no warning.

@@ -85,7 +85,7 @@ impl Command {
                 _ => Err(bad),
             },
             READ_REGISTERS if !all.is_empty() => Ok(Ask::Registers(all)),
-            WRITE_REGISTERS if !all.is_empty() && all.len() % 2 == 0 => {
+            WRITE_REGISTERS if !all.is_empty() && all.len().is_multiple_of(2) => {
                 Ok(Ask::Write(all.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect()))
             }
             READ_MEMORY => match all[..] {

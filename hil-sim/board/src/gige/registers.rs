@@ -152,7 +152,7 @@ impl Registers {
     /// # Errors
     /// [`Refusal`] where not all of them lie in the memory.
     pub fn read(&self, address: u32, length: usize) -> Result<&[u8], Refusal> {
-        if address % 4 != 0 || length % 4 != 0 {
+        if !address.is_multiple_of(4) || !length.is_multiple_of(4) {
             return Err(Refusal::BadAlignment);
         }
         let end = (address as usize).checked_add(length).ok_or(Refusal::InvalidAddress)?;
@@ -164,7 +164,7 @@ impl Registers {
     /// # Errors
     /// [`Refusal`]: nothing is brought into its range in silence.
     pub fn write(&mut self, register: u32, value: u32) -> Result<(), Refusal> {
-        if register % 4 != 0 {
+        if !register.is_multiple_of(4) {
             return Err(Refusal::BadAlignment);
         }
         let chunk = (CHUNK_ENABLE..CHUNK_ENABLE + 4 * CHUNKS.len() as u32).contains(&register);

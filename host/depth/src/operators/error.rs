@@ -17,8 +17,8 @@ pub enum DesignError {
         family: Family,
         /// The model it is made for.
         expected: &'static str,
-        /// The given PSF.
-        psf: Psf,
+        /// The given PSF; boxed, for a measured one is long.
+        psf: Box<Psf>,
     },
     /// No frequency of the pixel grid tells depths apart.
     #[error("with a blur of at most {max_blur_px} px no frequency tells depths apart")]

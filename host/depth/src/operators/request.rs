@@ -90,6 +90,10 @@ impl Request {
             Family::Gro => ("gaussian", matches!(psf, Psf::Gaussian { .. })),
             Family::Ggro => ("generalised", matches!(psf, Psf::Generalised { .. })),
         };
-        if fits { Ok(()) } else { Err(DesignError::FamilyNeedsOtherPsf { family, expected, psf }) }
+        if fits {
+            Ok(())
+        } else {
+            Err(DesignError::FamilyNeedsOtherPsf { family, expected, psf: psf.into() })
+        }
     }
 }

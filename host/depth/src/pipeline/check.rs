@@ -202,7 +202,7 @@ impl Input<'_> {
         let mut warnings = self.pixel_warnings();
         let psf = operators.request().psf;
         if psf != optics.psf() {
-            warnings.push(Warning::PsfMismatch { operators: psf, optics: optics.psf() });
+            warnings.push(Warning::PsfMismatch { operators: psf.into(), optics: optics.psf().into() });
         }
         warnings
     }

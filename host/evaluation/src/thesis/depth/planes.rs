@@ -21,6 +21,9 @@ const SEED: u64 = 5_400;
 /// The methods of fig. 6.4; "Li" is GGRO.
 const OF_CHAPTER_6: [Method; 4] = [Method::Subbarao, Method::Favaro, Method::Raj, Method::Ggro];
 
+/// What is drawn over depth, and how it is taken from a flat target.
+type Figure = (&'static str, fn(&Flat) -> f64);
+
 /// A flat surface as every method measures it, in the order of [`Method::ALL`].
 struct Plane {
     true_mm: f64,
@@ -359,7 +362,7 @@ pub fn corrections(page: &mut Page, planes: &Planes) -> Result<()> {
         }
         let smoothed = planes.judged(method, Some(Taught::Cdc))?;
         let full = planes.judged(method, Some(Taught::ClsfFull))?;
-        let parts: [(&'static str, fn(&Flat) -> f64); 3] = [
+        let parts: [Figure; 3] = [
             ("estimated depth, mm", |flat| flat.mean_mm),
             ("RMSE, mm", |flat| flat.rmse_mm),
             ("variance, mm2", |flat| flat.sd_mm.powi(2)),

@@ -27,6 +27,7 @@ struct Line {
     sd: Option<[f64; 4]>,
 }
 
+#[expect(clippy::approx_constant, reason = "millimetres, some of which look like pi")]
 const LINES: [Line; 8] = [
     Line {
         name: "Raj",
