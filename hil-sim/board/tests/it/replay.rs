@@ -18,7 +18,9 @@ fn a_trace_is_made_again_to_its_end_and_a_changed_one_is_told_where() {
     assert_eq!((outcome.broken.as_slice(), outcome.resets > 0), (&[][..], true));
 
     let text = fs::read_to_string(&path).expect("a trace");
-    for signal in [" step_lens ", " exposing ", " to_board ", "spower-loss h", "s/power-loss h", "\n0w", "\n1e"] {
+    for signal in
+        [" step_lens ", " exposing ", " to_board ", "spower-loss h", "s/power-loss h", "\n0w", "\n1e"]
+    {
         assert!(text.contains(signal), "{signal} is missed");
     }
     let (end_ns, departure) = replay(&path, None).unwrap_or_else(|error| panic!("{error}"));
