@@ -69,7 +69,13 @@ fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     block_for(MEMORY_STARTS);
     let mut records = [0; MEMORY_BYTES];
     fitted.take_if(|memory| !(memory.is_there() && memory.read(&mut records)));
-    RIG.init_with(|| Rig::new(identity, fitted.is_some().then_some(&records), clock::now()))
+    let rig = RIG.init_with(|| Rig::new(identity, fitted.is_some().then_some(&records), clock::now()));
+    if let Some(memory) = fitted {
+        while let Some(order) = rig.keep_boot() {
+            memory.write(&order);
+        }
+    }
+    rig
 }
 
 /// Counts cycles, which the control loop wants to know.

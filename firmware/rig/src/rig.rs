@@ -124,6 +124,25 @@ impl Rig {
         }
     }
 
+    /// What a board writes to its memory before it says or hears anything: call it until it gives `None`. Else the power
+    /// could go once the boot had told its number and before that was kept, and the next boot would have the same one.
+    pub fn keep_boot(&mut self) -> Option<MemoryWrite> {
+        if !self.store.is_marked(RecordName::Counters) {
+            return None;
+        }
+        let contents = Contents {
+            counters: self.counters(),
+            // What moved is to stay there until its alarm is kept.
+            in_motion: self.untold.map_or(self.in_motion, |untold| untold.in_motion),
+            alarms: &self.alarms,
+            values: &self.values,
+            shots: &self.shots,
+            correction: self.correction.stored(),
+        };
+        let (write, _) = self.store.tick(|record, index| contents.block(record, index))?;
+        Some(write)
+    }
+
     /// Whether a host has opened a session since the start.
     pub(crate) const fn has_session(&self) -> bool {
         self.session.is_open()
@@ -146,6 +165,7 @@ impl Rig {
         match found {
             Found::Good { sequence, repaired: true, .. } => {
                 self.counters.repaired = self.counters.repaired.saturating_add(1);
+                self.store.mark(RecordName::Counters);
                 self.events.push(now, EventKind::RecordRepaired { record, sequence });
             }
             Found::Lost => {

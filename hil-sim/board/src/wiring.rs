@@ -378,9 +378,10 @@ impl Wiring {
     fn put_strobe(&mut self, chip: &mut Chip, at: VirtualNanos) {
         let level = Level::from(self.begun.is_some() && !self.strobe_cut);
         chip.drive_pin(at, STROBE, level);
-        if chip.function(STROBE) == Some(TIM2_FUNCTION) {
-            chip.drive_timer(at, TIM2, channel(4), level);
-        }
+        // A pin that is not switched to its timer leaves the timer's input low, also one that a reset has switched off.
+        let connected = chip.function(STROBE) == Some(TIM2_FUNCTION);
+        let input = if connected { level } else { Level::Low };
+        chip.drive_timer(at, TIM2, channel(4), input);
     }
 
     fn stage_mut(&mut self, name: StageName) -> &mut StageWires {

@@ -71,6 +71,11 @@ impl Store {
         }
     }
 
+    /// Whether a record is to be written.
+    pub(crate) const fn is_marked(&self, record: RecordName) -> bool {
+        self.slots[record::index(record)].changed
+    }
+
     /// Whether everything is written.
     pub(crate) fn is_idle(&self) -> bool {
         self.job.is_none() && self.slots.iter().all(|slot| !slot.changed)

@@ -12,7 +12,7 @@ use farnear_protocol::message::{Alarm, Axis, Event, EventKind, Failure, Hello, R
 use farnear_protocol::{
     BoardMicros, Call, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
 };
-use farnear_rig::io::{MEMORY_BYTES, Outputs, TICK_US};
+use farnear_rig::io::{MEMORY_BYTES, MemoryWrite, Outputs, TICK_US};
 use farnear_rig::{Identity, Rig};
 
 /// Boot number of the bench.
@@ -95,6 +95,7 @@ impl Bench {
             reset_at: None,
             deaf: false,
         };
+        bench.keep_boot();
         bench.open_session();
         bench
     }
@@ -114,7 +115,31 @@ impl Bench {
         (self.boot, self.now, self.reset_at) = (self.rig.boot(), 0, None);
         self.events.clear();
         self.answers.clear();
+        self.keep_boot();
         self.open_session();
+    }
+
+    /// Writes what a board writes before it says anything.
+    fn keep_boot(&mut self) {
+        while let Some(write) = self.rig.keep_boot() {
+            self.write(&write);
+        }
+    }
+
+    /// Writes to the FRAM, as long as there is power.
+    fn write(&mut self, write: &MemoryWrite) {
+        let at = usize::from(write.address);
+        let written = self.tear.take().map_or(write.bytes.len(), |bytes| bytes.min(write.bytes.len()));
+        let written = match &mut self.cut_after {
+            None => written,
+            Some(left) => {
+                let last = written.min(*left);
+                *left -= last;
+                last
+            }
+        };
+        self.torn |= written < write.bytes.len();
+        self.memory[at..at + written].copy_from_slice(&write.bytes[..written]);
     }
 
     /// Stage A homed and ready.
@@ -150,18 +175,7 @@ impl Bench {
         let outputs = self.rig.tick(&inputs);
         self.hardware.run(&outputs, self.now);
         if let Some(write) = &outputs.memory {
-            let at = usize::from(write.address);
-            let written = self.tear.take().map_or(write.bytes.len(), |bytes| bytes.min(write.bytes.len()));
-            let written = match &mut self.cut_after {
-                None => written,
-                Some(left) => {
-                    let last = written.min(*left);
-                    *left -= last;
-                    last
-                }
-            };
-            self.torn |= written < write.bytes.len();
-            self.memory[at..at + written].copy_from_slice(&write.bytes[..written]);
+            self.write(write);
         }
         if outputs.reset {
             self.reset_at.get_or_insert(self.now);

@@ -50,10 +50,10 @@ pub fn draw(seed: u64) -> Scenario {
     if happens(noise, 0.9) {
         host.push(Step { deed: Deed::Home(None), goes_on_after_ms: goes_on(noise, 0.1) });
     }
-    for _ in 0..1 + below(noise, 5) {
+    for _ in 0..2 + below(noise, 6) {
         host.push(step(noise));
     }
-    let count = 1 + below(noise, 4);
+    let count = 1 + below(noise, 6);
     let happens = (0..count).map(|_| happening(noise)).collect();
     Scenario { seed: Some(seed), start_um, parts: parts(noise), happens, host, ..Scenario::default() }
 }
@@ -96,7 +96,7 @@ fn program(noise: &mut Noise) -> Program {
 fn step(noise: &mut Noise) -> Step {
     let axis = one_of(noise, &Axis::ALL);
     let stepper = one_of(noise, &[Axis::SensorCoarse, Axis::Lens]);
-    let (deed, patience) = match below(noise, 20) {
+    let (deed, patience) = match below(noise, 23) {
         0 | 1 => (Deed::Home(happens(noise, 0.5).then_some(stepper)), 0.3),
         2..=6 => {
             let high_um = if axis == Axis::SensorFine { 195.0 } else { 1_500.0 };
@@ -116,6 +116,7 @@ fn step(noise: &mut Noise) -> Step {
         15 => (Deed::Halt, 0.0),
         16 => (one_of(noise, &[Waits::Pause, Waits::Resume]).deed(), 0.0),
         17 => (Deed::Clear, 0.0),
+        20..=22 => (Deed::Expose(program(noise)), 0.3),
         18 => (Deed::Wait { ms: rounded(over_orders(noise, 1.0, 500.0)) }, 0.0),
         _ if happens(noise, 0.5) => (Deed::Reboot, 0.0),
         _ => (Deed::Silent { ms: rounded(over_orders(noise, 10.0, 2_500.0)) }, 0.0),
@@ -155,7 +156,8 @@ fn when(noise: &mut Noise, what: &Kind) -> When {
         _ => When::On {
             moment,
             nth: 1 + below(noise, most) as u32,
-            delay_ms: if happens(noise, 0.3) { 0.0 } else { rounded(over_orders(noise, 0.01, 300.0)) },
+            // Most of what breaks something is near to what it breaks.
+            delay_ms: if happens(noise, 0.3) { 0.0 } else { rounded(over_orders(noise, 0.01, 100.0)) },
         },
     }
 }

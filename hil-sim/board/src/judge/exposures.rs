@@ -28,6 +28,7 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
     let mut taken: Vec<(Shot, bool)> = Vec::new();
     let mut shots: std::collections::BTreeMap<u32, u32> = std::collections::BTreeMap::new();
     let mut windows: Vec<i32> = Vec::new();
+    let mut reset_ns = 0;
     for sight in case.sights {
         match &sight.seen {
             Seen::Asked { call, .. } => {
@@ -35,9 +36,11 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
                     windows.push(shot.settle_window.0);
                 }
             }
-            Seen::Exposed(shot) => taken.push((*shot, false)),
+            // The camera ends what it has begun, also where the board was reset meanwhile.
+            Seen::Exposed(shot) if shot.begin_ns >= reset_ns => taken.push((*shot, false)),
             Seen::Reset | Seen::Powered(_) => {
                 // A reset is told by the first event of the next boot.
+                reset_ns = sight.at_ns;
                 taken.clear();
                 shots.clear();
             }
