@@ -34,7 +34,7 @@ pub struct Arguments {
     /// A lens whose focus varies over the field in ellipses, which corrections undo.
     #[arg(long)]
     elliptical_distortion: bool,
-    /// Point spread function: pillbox, gaussian:k=K or generalised:p=P,k=K; without it the one of the optics file.
+    /// Point spread function: pillbox, gaussian:k=K, generalised:p=P,k=K or ring:inner=I; without it the one of the optics file.
     #[arg(long)]
     psf: Option<String>,
     /// The optics file.

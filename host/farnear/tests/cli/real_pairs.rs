@@ -128,3 +128,73 @@ fn a_camera_is_calibrated_and_used() {
     fails(&mut farnear(&pair), 1, &["absent", "camera's frames"]);
     assert!(!folder.path("absent").exists());
 }
+
+#[test]
+fn an_aperture_is_given_as_a_picture() {
+    let folder = Folder::new();
+    let pair = folder.text("pair");
+    let scene = ["--scene", "plane:893", "--psf", "ring:inner=0.7", "--width", "200", "--height", "160"];
+    succeeds(farnear(&["render", "--optics", rig_optics(), "--out", &pair]).args(scene));
+    let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
+    let rho = |y: usize, x: usize| (y as f64 - 31.5).hypot(x as f64 - 31.5) / 32.0;
+    let ring = Array2::from_shape_fn((64, 64), |(y, x)| f32::from((0.7..1.0).contains(&rho(y, x))));
+    let ring = write(&folder, "aperture.png", &ring);
+    let error = |psf: &str, out: &str| {
+        let out = folder.text(out);
+        let command = ["depth", &far, &near, "--optics", rig_optics(), "--psf", psf, "--out", &out, "--json"];
+        (number(&figures(&mut farnear(&command)), "median_mm") - 893.0).abs()
+    };
+    let (of_picture, of_formula, of_disc) =
+        (error(&ring, "a"), error("ring:inner=0.7", "b"), error("pillbox", "c"));
+    assert!(of_picture < 0.3 && of_formula < 0.3 && of_disc > 1.0, "{of_picture} {of_formula} {of_disc}");
+    let record = fs::read_to_string(folder.path("a/depth.toml")).expect("a record");
+    assert!(record.contains("model = \"radial\"") && record.contains("rings = ["), "{record}");
+    let bar = Array2::from_shape_fn((64, 64), |(y, _)| f32::from(y.abs_diff(32) < 5));
+    let bar = write(&folder, "bar.png", &bar);
+    let command = ["depth", &far, &near, "--optics", rig_optics(), "--psf", &bar, "--out", &folder.text("d")];
+    let (_, said) = succeeds(&mut farnear(&command));
+    assert!(said.contains("are not round"), "{said}");
+    let command =
+        ["depth", &far, &near, "--optics", rig_optics(), "--psf", "airy", "--out", &folder.text("e")];
+    fails(&mut farnear(&command), 2, &["unknown PSF \"airy\"", "FILE.png"]);
+}
+
+#[test]
+fn a_region_is_what_the_whole_map_has_there() {
+    let folder = Folder::new();
+    render(&folder, "slant", "pair");
+    let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
+    let depth = |more: &[&str], out: &str| {
+        let out = folder.text(out);
+        let command = ["depth", &far, &near, "--optics", rig_optics(), "--json", "--out", &out];
+        figures(farnear(&command).args(more));
+        map::read(&folder.path(&format!("{}/depth.npy", out.rsplit('/').next().expect("a name"))))
+            .expect("a map")
+    };
+    let (whole, part) = (depth(&[], "whole"), depth(&["--region", "50,30,48,40"], "part"));
+    assert_eq!(part.dim(), (40, 48));
+    for ((y, x), depth) in part.indexed_iter() {
+        let there = whole[(y + 30, x + 50)];
+        assert!(
+            (depth - there).abs() < 0.05 || depth.is_nan() || there.is_nan(),
+            "({x}, {y}) {depth} {there}"
+        );
+    }
+    assert!(part.iter().filter(|depth| depth.is_finite()).count() > 1800);
+    let record = fs::read_to_string(folder.path("part/depth.toml")).expect("a record");
+    assert!(record.contains("[part]\nx = 50\ny = 30\n"), "{record}");
+    // Mesh and measures keep the whole image's axis: the fitted plane is the same in mm.
+    let plane = |name: &str, region: &str| {
+        let map = folder.text(&format!("{name}/depth.npy"));
+        number(&figures(&mut farnear(&["measure", "plane", &map, "--region", region, "--json"])), "z_mm")
+    };
+    let (of_part, of_whole) = (plane("part", "0,0,48,40"), plane("whole", "50,30,48,40"));
+    assert!((of_part - of_whole).abs() < 0.05, "{of_part} {of_whole}");
+    for (region, phrase) in [("0,0,9999,9", "9999x9 at (0, 0)"), ("1,2,3", "column, row, width and height")] {
+        let command =
+            ["depth", &far, &near, "--optics", rig_optics(), "--region", region, "--out", &folder.text("x")];
+        let output = farnear(&command).output().expect("a program");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && said.contains(phrase), "{said}");
+    }
+}
