@@ -32,6 +32,9 @@ export function make(host) {
   const pick = (name) => {
     const found = guides.find(([other]) => other === name) ?? guides[0];
     for (const card of list.children) card.setAttribute("aria-pressed", card.dataset.guide === found[0]);
+    place.dataset.guide = found[0];
+    const card = list.querySelector("[aria-pressed=true]");
+    if (list.scrollWidth > list.clientWidth) list.scrollLeft = card.offsetLeft - list.offsetLeft - 40;
     place.replaceChildren(found[3].element);
     found[3].shown?.();
     if (!host.hidden) history.replaceState(null, "", `#guides/${found[0]}`);
