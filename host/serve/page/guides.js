@@ -131,7 +131,7 @@ function psf() {
   }
   const element = h("div", { class: "guide-body" },
     step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target, square to the rig: at the far or the near focus, or at a distance that you know. With several distances p and k are told apart better.")),
-    step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), button("Capture pair", capture, { "data-needs": "rig" })),
+    step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), h("div", { class: "buttons" }, button("Capture pair", capture, { "data-needs": "rig" }))),
     step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "seat" })), result));
   return { element, shown };
 }
@@ -185,7 +185,7 @@ function series() {
   const element = h("div", { class: "guide-body" },
     step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves by itself. A series that was broken off goes on where it stood."),
       field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", forget, { "data-needs": "rig" })), captured),
-    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), button("Learn", learn, { class: "primary", "data-needs": "seat" })),
+    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), h("div", { class: "buttons" }, button("Learn", learn, { class: "primary", "data-needs": "seat" }))),
     panel("Result", result));
   return { element, shown };
 }
