@@ -25,7 +25,7 @@ export function make(host) {
     ["series", "Flat series and correction", draw.series(), series()], ["shadow", "Shadow by the sun", draw.sun(40, 200, 1.2), people.shadow()],
     ["activity", "What somebody does", draw.person(), people.activity()],
   ];
-  const place = h("div", { class: "guide scroll", tabindex: "-1" });
+  const place = h("div", { class: "guide scroll", tabindex: "0", role: "region", "aria-label": "Guide" });
   const list = h("div", { class: "guide-list", role: "group", "aria-label": "Guides" }, guides.map(([name, title, picture]) =>
     h("button", { type: "button", class: "guide-card", "data-guide": name, onclick: () => pick(name) }, picture, h("span", {}, title))));
   host.append(list, place);
