@@ -200,7 +200,7 @@ impl Recording {
     ///
     /// # Errors
     /// A file that is cut short, or holds something else.
-    pub fn next(&mut self) -> Result<Option<RecordedPair>> {
+    pub fn next_pair(&mut self) -> Result<Option<RecordedPair>> {
         let (path, number) = (self.path.clone(), self.read + 1);
         let wrong = |what: &str| WorkflowError::file(&path, EXPECTED)(format!("pair {number} {what}"));
         let mut head = [0; 13];
@@ -251,7 +251,7 @@ pub fn play(
     let designed = operators::find(None, &optics)?;
     let mut processor = Processor::new(&designed, &optics, computation)?;
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
-    while let Some(RecordedPair { at, far, near }) = recording.next()? {
+    while let Some(RecordedPair { at, far, near }) = recording.next_pair()? {
         while !fast && begin.elapsed() < at {
             context.cancel.check("playing a recording")?;
             std::thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
@@ -302,15 +302,15 @@ mod tests {
         assert_eq!(recorder.finish().expect("a file").pairs, 2);
         let mut recording = Recording::open(&path).expect("pairs");
         for code in [10, 200] {
-            let pair = recording.next().expect("whole").expect("there");
+            let pair = recording.next_pair().expect("whole").expect("there");
             assert_eq!((pair.far, pair.near), (image(code), image(code + 1)));
         }
-        assert_eq!(recording.next().expect("whole"), None);
+        assert_eq!(recording.next_pair().expect("whole"), None);
         let bytes = fs::read(&path).expect("a file");
         fs::write(&path, &bytes[..bytes.len() - 3]).expect("writable");
         let mut recording = Recording::open(&path).expect("pairs");
-        assert!(recording.next().is_ok());
-        let error = recording.next().expect_err("cut").to_string();
+        assert!(recording.next_pair().is_ok());
+        let error = recording.next_pair().expect_err("cut").to_string();
         assert!(error.contains("pair 2 is cut short"), "{error}");
         fs::write(&path, b"something else").expect("writable");
         assert!(Recording::open(&path).err().expect("refused").to_string().contains("FNPAIRS1"));
