@@ -36,7 +36,10 @@ use device::Device;
 const CONTROL_PORT: u16 = 3956;
 /// From one look at the heartbeat to the next.
 const LOOK: Duration = Duration::from_millis(100);
-/// A camera that runs freely waits so long for a picture of its own to be rendered.
+/// A camera that runs freely waits so long for its picture to be rendered before time passes for the next: without that, a slow computer would
+/// render pictures of long ago.
+const RENDERING: Duration = Duration::from_secs(20);
+/// Longest wait for the rig's time to pass, by the wall clock.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Packets that leave at once; a pause after each such burst keeps to about a gigabit a second, which a receiver's buffer stands.
 const BURST: usize = 16;
@@ -134,7 +137,10 @@ pub fn open(
 fn discover(shouts: &UdpSocket, answers: &UdpSocket, device: &Shared) {
     let mut bytes = [0; control::PACKET_MAX];
     while let Ok((length, from)) = shouts.recv_from(&mut bytes) {
-        if let Some(answer) = control::discovery(&bytes[..length], lock(device).registers()) {
+        // A shout in another network is heard here, too; a camera would not hear it, and its frames would not get there.
+        let reachable =
+            from.ip().is_loopback() == answers.local_addr().is_ok_and(|own| own.ip().is_loopback());
+        if reachable && let Some(answer) = control::discovery(&bytes[..length], lock(device).registers()) {
             let _ = answers.send_to(&answer, from); // who asked may have gone
         }
     }
@@ -224,7 +230,8 @@ fn run_freely(device: &Shared, ask: &impl Fn(Control)) {
         ask(Control::AdvanceMicros(u64::from(period.0)));
         let begin = Instant::now();
         thread::sleep(Duration::from_micros(u64::from(period.0)));
-        while lock(device).frames() == frames && begin.elapsed() < PATIENCE {
+        let waits = |device: &Device| device.frames() == frames && device.free_period().is_some();
+        while waits(&lock(device)) && begin.elapsed() < RENDERING {
             thread::sleep(Duration::from_millis(1));
         }
     }

@@ -1,7 +1,7 @@
 // Pictures of the guides, drawn in the colours of the page.
 import { s, number } from "./ui.js";
 
-const picture = (about, ...parts) => s("svg", { viewBox: "0 0 120 80", class: "guide-svg", role: "img", "aria-label": about }, parts);
+const picture = (about, ...parts) => s("svg", { viewBox: "0 0 120 80", class: "guide-svg", role: "img", "aria-label": about }, parts.flat(2));
 const box = (x, y, width, height, cls = "part") => s("rect", { x, y, width, height, rx: 2, class: cls });
 const line = (d, cls = "wire") => s("path", { d, class: cls });
 const round = (cx, cy, r, cls = "part") => s("circle", { cx, cy, r, class: cls });
@@ -23,7 +23,7 @@ export const home = () => picture("a stage that moves to its home switch", line(
 /** The piezo flexure. */
 export const piezo = () => picture("the piezo moves the sensor", box(14, 22, 12, 40, "dark"), line("M26 30 l6 6 l-6 6 l6 6 l-6 6", "accent"), box(34, 28, 16, 28, "accent-part"), box(56, 18, 8, 48), line("M72 42 H104 m-26 -5 l-6 5 l6 5 m20 -10 l6 5 l-6 5", "accent"), words(88, 66, "200 µm"));
 /** Trigger and strobe of the camera. */
-export const camera = () => picture("trigger and strobe of the camera", box(12, 14, 40, 28), round(52, 28, 9, "glass"), line("M12 58 h24 v-8 h34 v8 h38", "accent"), line("M12 74 h28 v-8 h34 v8 h34", "weak"), words(92, 50, "trigger"), words(98, 68, "strobe"));
+export const camera = () => picture("trigger and strobe of the camera", box(12, 14, 40, 28), round(52, 28, 9, "glass"), line("M12 58 h24 v-8 h34 v8 h38", "accent"), line("M12 74 h28 v-8 h34 v8 h34", "weak"), words(98, 54, "trigger"), words(99, 70, "strobe"));
 
 const texture = (x, y) => Array.from({ length: 24 }, (_, at) => box(x + (at % 3) * 4, y + Math.floor(at / 3) * 5, (at * 7) % 3 ? 3 : 2, (at * 5) % 4 ? 3 : 2, "dark"));
 /** The rig before a flat target. */

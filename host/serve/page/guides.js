@@ -25,13 +25,16 @@ export function make(host) {
     ["series", "Flat series and correction", draw.series(), series()], ["shadow", "Shadow by the sun", draw.sun(40, 200, 1.2), people.shadow()],
     ["activity", "What somebody does", draw.person(), people.activity()],
   ];
-  const place = h("div", { class: "guide scroll", tabindex: "-1" });
+  const place = h("div", { class: "guide scroll", tabindex: "0", role: "region", "aria-label": "Guide" });
   const list = h("div", { class: "guide-list", role: "group", "aria-label": "Guides" }, guides.map(([name, title, picture]) =>
     h("button", { type: "button", class: "guide-card", "data-guide": name, onclick: () => pick(name) }, picture, h("span", {}, title))));
   host.append(list, place);
   const pick = (name) => {
     const found = guides.find(([other]) => other === name) ?? guides[0];
     for (const card of list.children) card.setAttribute("aria-pressed", card.dataset.guide === found[0]);
+    place.dataset.guide = found[0];
+    const card = list.querySelector("[aria-pressed=true]");
+    if (list.scrollWidth > list.clientWidth) list.scrollLeft = card.offsetLeft - list.offsetLeft - 40;
     place.replaceChildren(found[3].element);
     found[3].shown?.();
     if (!host.hidden) history.replaceState(null, "", `#guides/${found[0]}`);
@@ -128,7 +131,7 @@ function psf() {
   }
   const element = h("div", { class: "guide-body" },
     step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target, square to the rig: at the far or the near focus, or at a distance that you know. With several distances p and k are told apart better.")),
-    step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), button("Capture pair", capture, { "data-needs": "rig" })),
+    step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), h("div", { class: "buttons" }, button("Capture pair", capture, { "data-needs": "rig" }))),
     step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "seat" })), result));
   return { element, shown };
 }
@@ -182,7 +185,7 @@ function series() {
   const element = h("div", { class: "guide-body" },
     step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves by itself. A series that was broken off goes on where it stood."),
       field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", forget, { "data-needs": "rig" })), captured),
-    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), button("Learn", learn, { class: "primary", "data-needs": "seat" })),
+    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), h("div", { class: "buttons" }, button("Learn", learn, { class: "primary", "data-needs": "seat" }))),
     panel("Result", result));
   return { element, shown };
 }

@@ -49,6 +49,9 @@ function go(name, detail) {
     tab.tabIndex = host.hidden ? -1 : 0;
     if (!host.hidden) current = other;
   }
+  // On a small screen not all tabs are beside each other.
+  const { tab } = view;
+  if (tab.parentElement.scrollWidth > tab.parentElement.clientWidth) tab.parentElement.scrollLeft = tab.offsetLeft - tab.parentElement.offsetLeft - 40;
   history.replaceState(null, "", `#${current}${detail ? `/${detail}` : ""}`);
   view.parts?.shown?.(detail);
 }

@@ -1,7 +1,7 @@
 // The page in a real browser, on the emulated rig: `npm ci && npm test`, or `cargo xtask test`.
 // SCREENSHOTS=folder keeps pictures of every view; docs/images has two of them.
 import assert from "node:assert/strict";
-import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
@@ -185,10 +185,10 @@ test("live depth is recorded and played back", async () => {
 
 test("the guide of the flat series captures targets, learns a correction and finds the point spread function", async () => {
   const page = await open(browser, `${server.address}#guides/series`);
-  await page.getByLabel("Distances", { exact: true }).or(page.getByLabel("Distances in mm")).fill("890, 910, 930");
+  await page.locator("#view-guides").getByLabel("Distances in mm").fill("890, 910, 930");
   await page.getByRole("button", { name: "Capture the series" }).click();
   await page.locator(".status", { hasText: "3 targets: 890.0, 910.0, 930.0 mm" }).waitFor();
-  await page.getByLabel("Method", { exact: true }).selectOption("planar");
+  await page.locator("#view-guides").getByLabel("Method", { exact: true }).selectOption("planar");
   await page.getByRole("button", { name: "Learn", exact: true }).click();
   await page.locator("dt", { hasText: "RMS after" }).waitFor();
   const mm = async (name) => Number.parseFloat(await page.locator("dt", { hasText: name }).locator("+ dd").textContent());
@@ -225,8 +225,9 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
   const page = await open(browser, `${server.address}#guides/activity`);
   const video = join(server.session, "..", `walk-${process.pid}.y4m`);
   writeFileSync(video, walk());
-  await page.getByLabel("Video file to send").or(page.getByLabel("Send one")).setInputFiles(video);
+  await page.locator("#view-guides").getByLabel("Video file to send").setInputFiles(video);
   await page.locator("p", { hasText: "is there" }).waitFor();
+  rmSync(video);
   await page.getByRole("button", { name: "Recognise the video" }).click();
   const { computation } = await until((now) => now.computation?.kind === "recognise" && now.computation.phase !== "running", "it is recognised");
   assert.equal(computation.phase, "done", computation.error);
@@ -235,7 +236,7 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
   await page.locator(".person-answer output", { hasText: "of all 40 frames" }).waitFor();
   assert.ok((await page.locator("canvas.person").evaluate((canvas) => canvas.width)) > 0, "the picture is shown");
   await page.locator("[data-guide=shadow]").click();
-  await page.getByLabel("Time").fill("2026-06-21T12:00");
+  await page.locator("#view-guides").getByLabel("Time", { exact: true }).fill("2026-06-21T12:00");
   await page.locator("dt", { hasText: "shadow's length" }).waitFor();
   await page.getByRole("button", { name: "Take the shadow off" }).click();
   const { computation: cut } = await until((now) => now.computation?.kind === "shadow" && now.computation.phase !== "running", "the shadow is off");

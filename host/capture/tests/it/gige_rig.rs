@@ -59,7 +59,7 @@ impl Rig {
     }
 
     fn client(&self) -> Client {
-        Client::open(&self.port).unwrap()
+        Client::open_emulated(&self.port).unwrap()
     }
 
     fn gige(&self) -> GenicamCamera {
