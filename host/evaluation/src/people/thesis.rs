@@ -8,7 +8,6 @@ use farnear_activity::{
     },
     recognition::{
         classifier::ClassifierKind,
-        clip::Clip,
         experiment::{Experiment, Sweep},
         frames::Mode,
         space::{Layout, PatternKind, SpaceSettings},
