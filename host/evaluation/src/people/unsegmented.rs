@@ -118,7 +118,7 @@ impl Recording {
             let frames = clip.views.iter().map(Track::frames).min().unwrap_or(0);
             let mut part = clip.views[view].select(&(0..frames).collect::<Vec<_>>());
             let end = parts.last().and_then(|last: &Track| {
-                last.boxes.as_ref()?.rows().into_iter().last().map(|r| r.to_owned())
+                last.boxes.as_ref()?.rows().into_iter().next_back().map(|r| r.to_owned())
             });
             if let (Some(end), Some(boxes)) = (end, part.boxes.as_mut().filter(|boxes| boxes.nrows() > 0)) {
                 lead_on(boxes, [end[2], end[3]]);

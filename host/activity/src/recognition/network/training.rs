@@ -145,7 +145,7 @@ pub fn train(
             number += 1;
             let share = number as f32 / steps.max(1) as f32;
             let rate = settings.rate * (0.5 + 0.5 * (std::f32::consts::PI * share).cos());
-            let step = Step { number: number as i32, rate, decay: settings.decay };
+            let step = Step { number, rate, decay: settings.decay };
             one_step(&mut learners, &scaled, labels, chosen, settings, step, &mut rng);
         }
         watch.fold_done(settings.passes);
