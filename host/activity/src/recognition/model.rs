@@ -57,7 +57,7 @@ pub struct Recogniser {
     pub limits: Limits,
     /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
     pub patterns: Array2<f32>,
-    /// Class of each of [`Self::patterns`], where they are training clips or typical of one class; empty in models of older formats.
+    /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
     pub labels: Vec<usize>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
@@ -167,8 +167,11 @@ pub enum ModelError {
         /// Whether the model uses box motion.
         expected_boxes: bool,
     },
-    /// A model without labelled patterns.
-    #[error("the model keeps no labelled patterns to learn on with: train it again")]
+    /// A model without the patterns of its training clips.
+    #[error(
+        "the model keeps no training clips of its own to learn on with (those that come with the program do not, for learning on made them \
+         worse): train one on labelled samples, with this model's features if they are few"
+    )]
     Unlabelled,
     /// Nothing to train on.
     #[error("a model needs clips of at least two activities, found {0}")]
@@ -284,12 +287,10 @@ impl Recogniser {
         let others = Array2::from_shape_fn((rows.len(), self.patterns.ncols()), |(i, k)| rows[i][k]);
         let labelled =
             Labelled { patterns: self.patterns.view(), labels: &self.labels, classes: self.activities.len() };
-        let kind = match self.settings.classifier {
-            // A network's own classifier has no cost.
-            ClassifierKind::Softmax(cost) if cost <= 0.0 => ClassifierKind::Softmax(100.0),
-            kind => kind,
-        };
-        Ok(Self { classifier: self_trained(kind, labelled, others.view(), rounds), ..self.clone() })
+        Ok(Self {
+            classifier: self_trained(self.settings.classifier, labelled, others.view(), rounds),
+            ..self.clone()
+        })
     }
 
     /// Squared distance of a pattern to the nearest of what was learned.

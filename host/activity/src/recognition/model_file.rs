@@ -11,7 +11,6 @@ use super::frames::Mode;
 use super::model::{ModelError, Recogniser, RecogniserSettings};
 use super::network::Network;
 use super::network::features::Features;
-use super::network::recogniser::TYPICAL;
 use super::occupancy::OccupancyGrid;
 use super::space::{Map, Pattern, Space};
 use super::unknown::Limits;
@@ -154,11 +153,6 @@ impl Recogniser {
             neighbours: body.neighbours,
             brought: None,
         };
-        let labels = if unlabelled {
-            typical_labels(&body.patterns, &space.pattern, body.activities.len())
-        } else {
-            labels
-        };
         let recogniser = Self {
             settings: body.settings,
             activities: body.activities,
@@ -172,12 +166,6 @@ impl Recogniser {
         };
         recogniser.checked()
     }
-}
-
-/// Whose typical patterns those of a network are, in models that do not say it: so many of each activity, in order.
-fn typical_labels(patterns: &Array2<f32>, pattern: &Pattern, activities: usize) -> Vec<usize> {
-    let regular = matches!(pattern, Pattern::Network(_)) && patterns.nrows() == TYPICAL * activities;
-    if regular { (0..patterns.nrows()).map(|row| row / TYPICAL).collect() } else { Vec::new() }
 }
 
 /// CRC-32 as in zip files.

@@ -31,7 +31,7 @@ pub struct Worth {
 
 impl Default for Worth {
     fn default() -> Self {
-        Self { change: 2.0, strange: 0.5, spread: 0.6, lengths: [0.3, 2.5] }
+        Self { change: 2.0, strange: 1.5, spread: 0.6, lengths: [0.3, 2.5] }
     }
 }
 
@@ -211,4 +211,95 @@ fn merged(recording: &Recording, borders: &[usize]) -> Vec<Segment> {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embedding::descriptor::ANGLES;
+    use crate::recognition::clip::Clip;
+    use crate::recognition::live::{Live, joined};
+    use crate::recognition::model::RecogniserSettings;
+    use crate::recognition::space::{PatternKind, SpaceSettings};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const ACTIVITIES: [&str; 3] = ["star", "stretch", "turn"];
+
+    /// Somebody whose outline has as many waves as the activity says, which turn.
+    fn track(activity: usize, frames: usize, rng: &mut ChaCha8Rng) -> Track {
+        let phase = rng.random_range(0.0..6.0_f32);
+        let descriptors = Array2::from_shape_fn((frames, ANGLES), |(frame, angle)| {
+            let waves = (activity + 2) as f32 * (angle as f32).to_radians();
+            0.35 + 0.1 * (waves + 0.2 * frame as f32 + phase).sin() + rng.random_range(-0.01..0.01_f32)
+        });
+        let boxes = Array2::from_shape_fn((frames, 4), |(_, k)| {
+            [90.0, 45.0, 60.0, 70.0][k] + rng.random_range(-1.0..1.0_f32)
+        });
+        Track { descriptors, boxes: Some(boxes), empty_frames: 0 }
+    }
+
+    fn model(rng: &mut ChaCha8Rng) -> Recogniser {
+        let mut clips = Vec::new();
+        for person in 0..8 {
+            for (activity, name) in ACTIVITIES.iter().enumerate() {
+                let frames = rng.random_range(20..32);
+                let views = vec![track(activity, frames, rng)];
+                clips.push(Clip { subject: format!("p{person}"), activity: (*name).into(), views });
+            }
+        }
+        let space = SpaceSettings {
+            dimensions: 6,
+            pattern: PatternKind::Codebook(24),
+            residuals: 8,
+            ..SpaceSettings::default()
+        };
+        Recogniser::train(&clips, &RecogniserSettings { space, ..RecogniserSettings::default() })
+            .expect("trained")
+    }
+
+    #[test]
+    fn borders_are_found_where_activities_change() {
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let model = model(&mut rng);
+        let parts =
+            [(0, 30), (2, 22), (1, 41), (0, 26)].map(|(activity, frames)| track(activity, frames, &mut rng));
+        let found = segmented(&model, &[joined(parts.iter())], &[], Worth::default()).expect("fits");
+        let names: Vec<Option<&str>> = found.iter().map(|s| s.activity.as_deref()).collect();
+        assert_eq!(names, [Some("star"), Some("turn"), Some("stretch"), Some("star")], "{found:?}");
+        assert_eq!((found[0].from, found[3].to), (0, 119));
+        for (segment, border) in found.iter().skip(1).zip([30, 52, 93]) {
+            assert!(segment.from.abs_diff(border) <= 3, "{found:?}");
+        }
+        assert!(found.windows(2).all(|pair| pair[0].to == pair[1].from));
+        // What cannot be is not answered, and one activity is one segment, however long or short.
+        let two = ["star".to_owned(), "turn".to_owned()];
+        let among = segmented(&model, &[joined(parts.iter())], &two, Worth::default()).expect("fits");
+        assert!(among.iter().all(|s| s.activity.as_deref() != Some("stretch")));
+        for frames in [3, 25, 140] {
+            let one = segmented(&model, &[track(1, frames, &mut rng)], &[], Worth::default()).expect("fits");
+            assert_eq!((one.len(), one[0].from, one[0].to), (1, 0, frames), "{one:?}");
+        }
+        assert!(segmented(&model, &[parts[0].select(&[])], &[], Worth::default()).expect("fits").is_empty());
+        assert!(segmented(&model, &[], &[], Worth::default()).is_err());
+    }
+
+    #[test]
+    fn live_answers_are_those_for_the_window() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let model = model(&mut rng);
+        let stream = joined([track(0, 14, &mut rng), track(1, 14, &mut rng)].iter());
+        let mut live = Live::new(&model, 10, true);
+        for frame in 0..stream.frames() {
+            // Every fifth frame sees nobody.
+            let shown: &[usize] = if frame % 5 == 4 { &[] } else { &[frame] };
+            let found = live.push_described(vec![stream.select(shown)]).expect("fits");
+            let window: Vec<usize> =
+                (frame.saturating_sub(9)..=frame).filter(|frame| frame % 5 != 4).collect();
+            let whole = model.recognise(&[stream.select(&window)]).expect("fits");
+            assert_eq!(found.activity, whole.activity);
+            assert!((found.confidence - whole.confidence).abs() < 1e-4);
+            assert!((found.outlier_score - whole.outlier_score).abs() < 1e-3 * whole.outlier_score.max(1.0));
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use crate::cases;
 use farnear_activity::mask::area;
 use farnear_activity::readers::recording::{Choices, Recording, RecordingError};
-use farnear_activity::readers::{self, c3d, csv, matlab, skeletons, trc};
+use farnear_activity::readers::{self, c3d, csv, kinect, matlab, ntu, skeletons, trc};
 use farnear_activity::silhouette::parts::{Fill, close, draw, extent};
 use farnear_activity::silhouette::template::Template;
 use farnear_activity::silhouette::view::{Canvas, views_round};
@@ -132,6 +132,8 @@ proptest! {
         }
         let _ = c3d::read(&keyed);
         let _ = csv::read(text.as_bytes());
+        let _ = ntu::read(text.as_bytes());
+        let _ = kinect::read(text.as_bytes());
         let headed =
             format!("PathFileType\t4\nDataRate\tNumMarkers\tUnits\n100\t1\tmm\nFrame#\tTime\tA\n\n{text}");
         let _ = trc::read(headed.as_bytes());
@@ -197,6 +199,13 @@ fn a_trc_file_cut_short_is_refused_with_both_numbers() {
     assert!(error.contains("139") && error.contains("ends after 2") && error.contains("line 3"), "{error}");
 }
 
+/// Two people in two frames.
+fn ntu_skeleton() -> String {
+    let joints = "0.1 0.9 3.2 1 2 3 4 0 0 0 1 2\n".repeat(25);
+    let person = |id: u32| format!("{id} 0 1 1 0 0 0 0.1 0.2 2\n25\n{joints}");
+    format!("2\n2\n{}{}1\n{}", person(71), person(72), person(72))
+}
+
 const CSV: &str = "frame,A_x,A_y,A_z,B_x,B_y,B_z\n1,1,2,3,,,\n2,4,5,6,7,8,9\n";
 
 proptest! {
@@ -219,5 +228,10 @@ proptest! {
         let _ = c3d::read(&bytes[..cut.index(bytes.len())]);
         let _ = trc::read(&damaged(TRC.as_bytes()));
         let _ = csv::read(&damaged(CSV.as_bytes()));
+        let skeleton = ntu_skeleton();
+        assert!(ntu::read(skeleton.as_bytes()).is_ok());
+        let _ = ntu::read(&damaged(skeleton.as_bytes()));
+        let _ = ntu::read(&skeleton.as_bytes()[..cut.index(skeleton.len())]);
+        let _ = kinect::read(&damaged("1 0.5 -2e3 ".repeat(20).as_bytes()));
     }
 }
