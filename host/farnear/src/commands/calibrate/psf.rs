@@ -15,8 +15,9 @@ use crate::{
 /// Find the point spread function from one pair or several of a flat, textured target; without --depth at the far or near focus.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  farnear calibrate psf far.png near.png --optics optics.toml --model gaussian --out calibrated.toml\n  \
-        farnear calibrate psf a/far.png a/near.png b/far.png b/near.png --depth 900 --depth 920 --optics optics.toml --model generalised"
+    after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian --out calibrated.toml\n\
+                  \x20        farnear calibrate psf a/far.png a/near.png b/far.png b/near.png --depth 900 --depth 920 --optics optics.toml \
+                  --model generalised"
 )]
 pub struct Arguments {
     /// The images of each pair: the one focused on the far plane, the one focused on the near plane; then the next pair's.
