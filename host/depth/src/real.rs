@@ -15,7 +15,7 @@ use crate::pipeline::{RunError, Settings, depth_from_pair, fill_rim, warnings_af
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
 use crate::reason::Reason;
-use crate::windowed::{Bank, Estimate, Window, WindowSettings, check_pair, estimate};
+use crate::windowed::{Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth};
 
 /// Part of the pixels without depth for one reason from which it is said.
 const WORTH_SAYING: f64 = 0.002;
@@ -233,27 +233,32 @@ fn measure(
     };
     // Every method is judged by the white residual, whose deviation is known best.
     let white = Bank::whitened(optics)?;
-    let mut judging = estimate(far, near, &white, optics, &of_windows)?;
-    // Of the others only deviation and misfit are wanted, and a map is large.
-    let white_depth_mm = std::mem::take(&mut judging.depth_mm);
-    let white_depth_mm = matches!(method, RealMethod::Whitened).then_some(white_depth_mm);
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
-    let map = match (method, settings.window) {
+    // The map first: what it is judged by needs no depth of its own, and maps are large.
+    let (map, mut judging) = match (method, settings.window) {
         (RealMethod::Whitened, _) => {
-            let depth_mm = white_depth_mm.unwrap_or_default();
-            of_estimate(depth_mm, &judging.deviation_mm, &white, optics, settings)
+            let mut judging = estimate(far, near, &white, optics, &of_windows)?;
+            let depth_mm = std::mem::take(&mut judging.depth_mm);
+            (of_estimate(depth_mm, &judging.deviation_mm, &white, optics, settings), judging)
         }
-        (RealMethod::Rational(operators), Window::Fixed(side)) => {
-            depth_from_pair(far, near, operators, optics, &run(side))?
-        }
-        (RealMethod::Rational(operators), _) => {
-            let bank = Bank::rational(operators);
-            let Estimate { depth_mm, deviation_mm, .. } = estimate(far, near, &bank, optics, &of_windows)?;
-            of_estimate(depth_mm, &deviation_mm, &bank, optics, settings)
-        }
-        (RealMethod::Baseline(method), window) => {
-            let side = if let Window::Fixed(side) = window { side } else { 7 };
-            baselines::depth_from_pair(method, far, near, optics, &run(side))?
+        (method, window) => {
+            let map = match (method, window) {
+                (RealMethod::Rational(operators), Window::Fixed(side)) => {
+                    depth_from_pair(far, near, operators, optics, &run(side))?
+                }
+                (RealMethod::Rational(operators), _) => {
+                    let bank = Bank::rational(operators);
+                    let Estimate { depth_mm, deviation_mm, .. } =
+                        estimate(far, near, &bank, optics, &of_windows)?;
+                    of_estimate(depth_mm, &deviation_mm, &bank, optics, settings)
+                }
+                (RealMethod::Baseline(method), window) => {
+                    let side = if let Window::Fixed(side) = window { side } else { 7 };
+                    baselines::depth_from_pair(method, far, near, optics, &run(side))?
+                }
+                (RealMethod::Whitened, _) => unreachable!("above"),
+            };
+            (map, estimate_without_depth(far, near, &white, optics, &of_windows)?)
         }
     };
     let noisier = match method {

@@ -19,7 +19,7 @@ mod whitened;
 use std::fmt;
 use std::str::FromStr;
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -133,6 +133,30 @@ pub fn estimate(
     optics: &Optics,
     settings: &WindowSettings,
 ) -> Result<Estimate, RunError> {
+    let mut depth_mm = Array2::zeros(far.dim());
+    let estimate = estimate_into(Some(&mut depth_mm), far, near, bank, optics, settings)?;
+    Ok(Estimate { depth_mm, ..estimate })
+}
+
+/// The same with an empty map of depth: what another method's depth is judged by needs none, and a map is large.
+pub(crate) fn estimate_without_depth(
+    far: ArrayView2<f32>,
+    near: ArrayView2<f32>,
+    bank: &Bank,
+    optics: &Optics,
+    settings: &WindowSettings,
+) -> Result<Estimate, RunError> {
+    estimate_into(None, far, near, bank, optics, settings)
+}
+
+fn estimate_into(
+    depth_mm: Option<&mut Array2<f32>>,
+    far: ArrayView2<f32>,
+    near: ArrayView2<f32>,
+    bank: &Bank,
+    optics: &Optics,
+    settings: &WindowSettings,
+) -> Result<Estimate, RunError> {
     check_pair(far, near)?;
     let smoothing_px = if let Window::Fixed(side) = settings.window { side } else { 1 };
     let windows =
@@ -141,16 +165,21 @@ pub fn estimate(
     let size = far.dim();
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let scales = Scales::new(far, near, settings.noise);
-    let mut maps = [(); 3].map(|()| Array2::<f32>::zeros(size));
+    let mut maps = [(); 2].map(|()| Array2::<f32>::zeros(size));
     let rows = band::rows(size);
-    let [depth, deviation, misfit] = &mut maps;
-    let of_bands: Vec<[f64; 3]> = depth
-        .axis_chunks_iter_mut(Axis(0), rows)
+    let [deviation, misfit] = &mut maps;
+    let of_depth: Vec<Option<ArrayViewMut2<'_, f32>>> = match depth_mm {
+        Some(depth_mm) => depth_mm.axis_chunks_iter_mut(Axis(0), rows).map(Some).collect(),
+        None => (0..size.0.div_ceil(rows)).map(|_| None).collect(),
+    };
+    let of_bands: Vec<[f64; 3]> = of_depth
         .into_par_iter()
         .zip(deviation.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
         .zip(misfit.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
         .enumerate()
         .map(|(index, ((depth_mm, deviation_mm), misfit))| {
+            let mut unwanted = Array2::zeros(if depth_mm.is_none() { misfit.dim() } else { (0, 0) });
+            let depth_mm = depth_mm.unwrap_or_else(|| unwanted.view_mut());
             Band { far, near, bank, optics, settings, scales: &scales, backend, top: index * rows }.run(
                 depth_mm,
                 deviation_mm,
@@ -163,8 +192,8 @@ pub fn estimate(
         of_bands.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
     let left_over = if texture > 0.0 { (left - noise) / texture } else { f64::NAN };
     let excess = if noise > 0.0 { left / noise } else { f64::NAN };
-    let [depth_mm, deviation_mm, misfit] = maps;
-    Ok(Estimate { depth_mm, deviation_mm, misfit, left_over, excess })
+    let [deviation_mm, misfit] = maps;
+    Ok(Estimate { depth_mm: Array2::zeros((0, 0)), deviation_mm, misfit, left_over, excess })
 }
 
 /// Refuses images that differ in size, are too small, wholly invalid or constant.
