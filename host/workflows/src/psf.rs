@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use farnear_depth::psf::{Psf, RadialPsf};
-use farnear_files::map;
+use farnear_files::{image_file, map};
 
 use crate::{
     context::Context,
@@ -82,7 +82,9 @@ impl PsfSource {
             Self::Named(psf) => return Ok(*psf),
             Self::Image { file, radius_px } => (file, *radius_px),
         };
-        let drawn = RadialPsf::from_image(map::read(file)?.view(), radius_px)
+        let is_map = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy"));
+        let image = if is_map { map::read(file)? } else { image_file::read_grey(file)?.pixels };
+        let drawn = RadialPsf::from_image(image.view(), radius_px)
             .map_err(|error| WorkflowError::parameter("psf", file.display(), error.to_string()))?;
         if drawn.not_round > NOT_ROUND {
             context.progress.warn(&format!(

@@ -27,6 +27,32 @@ struct Client {
     control: UdpSocket,
     stream: UdpSocket,
     number: u16,
+    /// Frames of which something came, by their numbers: one may begin before what is missing of another has come again.
+    begun: BTreeMap<u16, Packets>,
+    /// The last frame that was given.
+    given: u16,
+}
+
+/// Packets of a frame.
+#[derive(Default)]
+struct Packets {
+    packets: BTreeMap<u32, Vec<u8>>,
+    last: Option<u32>,
+}
+
+impl Packets {
+    fn are_all(&self) -> bool {
+        self.last.is_some_and(|last| self.packets.len() as u32 == last + 1)
+    }
+
+    /// The first gap.
+    fn missing(&self) -> (u32, u32) {
+        // The end is not known where the trailer was lost, too.
+        let end = self.last.unwrap_or_else(|| self.packets.keys().next_back().map_or(0, |last| last + 1000));
+        let is_there = |packet: &u32| self.packets.contains_key(packet);
+        let missing = (0..=end).find(|packet| !is_there(packet)).expect("something is");
+        (missing, (missing..=end).find(is_there).map_or(end, |packet| packet - 1))
+    }
 }
 
 /// A frame that came.
@@ -44,7 +70,7 @@ impl Client {
         control.set_read_timeout(Some(PATIENCE)).expect("a timeout");
         let stream = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a socket");
         stream.set_read_timeout(Some(GAP)).expect("a timeout");
-        Self { control, stream, number: 0 }
+        Self { control, stream, number: 0, begun: BTreeMap::new(), given: 0 }
     }
 
     /// A camera under control, whose frames come here.
@@ -101,52 +127,48 @@ impl Client {
         String::from_utf8(text[..length as usize].to_vec()).expect("text")
     }
 
-    /// Passes over what was on its way.
+    /// Passes over what was on its way; the next acquisition counts anew.
     fn drain(&mut self) {
         while self.stream.recv(&mut [0; 2048]).is_ok() {}
+        (self.begun, self.given) = (BTreeMap::new(), 0);
     }
 
     /// The next frame; what is missing is asked for again until all of it is there.
     fn frame(&mut self) -> Frame {
         let deadline = Instant::now() + PATIENCE;
-        let mut packets = BTreeMap::new();
-        let mut number = None;
-        let mut last = None;
         let mut bytes = [0; 2048];
         loop {
-            assert!(Instant::now() < deadline, "no frame; {} packets of {number:?} came", packets.len());
+            assert!(Instant::now() < deadline, "no frame; begun are {:?}", self.begun.keys());
+            if let Some((&number, found)) = self.begun.first_key_value()
+                && found.are_all()
+            {
+                let Packets { packets, last } = self.begun.remove(&number).unwrap_or_default();
+                self.given = number;
+                let time_ns = u64::from_be_bytes(packets[&0][4..12].try_into().expect("8 bytes"));
+                let payload = (1..last.unwrap_or(1)).flat_map(|packet| packets[&packet].clone()).collect();
+                return Frame { number, time_ns, payload };
+            }
             match self.stream.recv(&mut bytes) {
                 Ok(length) => {
                     let id = u16::from_be_bytes([bytes[2], bytes[3]]);
-                    assert_eq!(*number.get_or_insert(id), id, "a frame before the one before it is whole");
+                    if id <= self.given {
+                        continue; // asked for twice, and came twice
+                    }
+                    let frame = self.begun.entry(id).or_default();
                     let packet = u32::from_be_bytes([0, bytes[5], bytes[6], bytes[7]]);
                     if bytes[4] == 2 {
-                        last = Some(packet);
+                        frame.last = Some(packet);
                     }
-                    packets.insert(packet, bytes[8..length].to_vec());
+                    frame.packets.insert(packet, bytes[8..length].to_vec());
                 }
                 Err(_) => {
-                    let Some(id) = number else { continue };
-                    // The end is not known where the trailer was lost, too.
-                    let end =
-                        last.unwrap_or_else(|| packets.keys().next_back().map_or(0, |last| last + 1000));
-                    let missing =
-                        (0..=end).find(|packet| !packets.contains_key(packet)).expect("something is");
-                    let until =
-                        (missing..=end).find(|packet| packets.contains_key(packet)).map_or(end, |p| p - 1);
-                    let again = [u32::from(id), missing, until].map(u32::to_be_bytes).concat();
+                    let Some((id, frame)) = self.begun.first_key_value() else { continue };
+                    let (from, until) = frame.missing();
+                    let again = [u32::from(*id), from, until].map(u32::to_be_bytes).concat();
                     self.number += 1;
                     let head = [0x42, 0, 0, 0x40, 0, 12, 0, self.number as u8];
                     self.control.send(&[&head[..], &again].concat()).expect("sent");
                 }
-            }
-            if let Some(last) = last
-                && packets.len() as u32 == last + 1
-            {
-                let leader = &packets[&0];
-                let time_ns = u64::from_be_bytes(leader[4..12].try_into().expect("8 bytes"));
-                let payload = (1..last).flat_map(|packet| packets[&packet].clone()).collect();
-                return Frame { number: number.unwrap_or(0), time_ns, payload };
             }
         }
     }

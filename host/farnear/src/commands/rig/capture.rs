@@ -14,8 +14,8 @@ use crate::{report, terminal};
 /// The folder appears when everything is in it: far.png, near.png and capture.toml.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --optics optics.toml --out pair1/\n  \
-        farnear rig capture --port /dev/ttyACM0 --camera genicam: --set gain=2 --average 8 --optics optics.toml --out pair2/"
+    after_help = "Example: farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --optics optics.toml --out pair1/\n\
+                  \x20        farnear rig capture --port /dev/ttyACM0 --camera genicam: --set gain=2 --average 8 --optics optics.toml --out pair2/"
 )]
 pub struct Arguments {
     #[command(flatten)]
