@@ -100,10 +100,11 @@ pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
     for sight in case.sights {
         let at_ns = sight.at_ns;
         match &sight.seen {
-            Seen::Asked { id, boot, call } if is_long(&call.request) => {
-                if !works.iter().any(|work| (work.id, work.boot) == (*id, *boot)) {
-                    works.push(Work { id: *id, boot: *boot, since_ns: at_ns, until_ns: u64::MAX });
-                }
+            Seen::Asked { id, boot, call }
+                if is_long(&call.request)
+                    && !works.iter().any(|work| (work.id, work.boot) == (*id, *boot)) =>
+            {
+                works.push(Work { id: *id, boot: *boot, since_ns: at_ns, until_ns: u64::MAX });
             }
             Seen::Answered { id, boot, answer, .. } if !matches!(**answer, Ok(Response::Accepted)) => {
                 close(&mut works, (*id, *boot), at_ns);

@@ -70,7 +70,7 @@ impl Fuzz {
                 shot.mode = mode[self.below(3) as usize];
                 Request::LoadShot { index: small % 70, shot }
             }
-            8 if small % 2 == 0 => {
+            8 if small.is_multiple_of(2) => {
                 let period = Micros(self.number() as u32);
                 Request::RunContinuously { period, exposures: u32::from(small % 3), silence }
             }
