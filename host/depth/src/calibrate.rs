@@ -177,7 +177,7 @@ pub struct PsfFit {
 /// The PSF of `model` that turns the images of the pairs into each other, jointly for all pairs.
 ///
 /// # Errors
-/// [`CalibrationError`]: pairs without texture, of different size, or of a target in the middle of the range.
+/// [`CalibrationError`]: pairs without texture, of different size, or only of targets in the middle of the range, which are left out.
 pub fn fit_psf(
     pairs: &[CapturedPair<'_>],
     optics: &Optics,
@@ -188,6 +188,7 @@ pub fn fit_psf(
     }
     let mut observations = Vec::with_capacity(pairs.len());
     let mut alphas = Vec::with_capacity(pairs.len());
+    let mut silent = None;
     for (index, pair) in pairs.iter().enumerate() {
         let ((far_height, far_width), (near_height, near_width)) = (pair.far.dim(), pair.near.dim());
         if (far_height, far_width) != (near_height, near_width) {
@@ -205,7 +206,10 @@ pub fn fit_psf(
         let bins = spectra::Bins::new(&far, &near);
         let alpha = match pair.alpha {
             Some(alpha) if alpha.abs() < LEAST_ALPHA => {
-                return Err(CalibrationError::MiddleOfRange { index, alpha });
+                // Blurred alike, the images say nothing of the blur: a series that passes through the middle is found from the rest.
+                silent.get_or_insert(CalibrationError::MiddleOfRange { index, alpha });
+                alphas.push(alpha);
+                continue;
             }
             Some(alpha) => alpha,
             None => {
@@ -221,6 +225,11 @@ pub fn fit_psf(
         };
         alphas.push(alpha);
         observations.push((bins, optics.blur_px(alpha)));
+    }
+    if observations.is_empty()
+        && let Some(error) = silent
+    {
+        return Err(error);
     }
     let (psf, cost) = match model {
         Model::Gaussian => search::gaussian(&observations),

@@ -188,12 +188,12 @@ test("the guide of the flat series captures targets, learns a correction and fin
   await page.locator("#view-guides").getByLabel("Distances in mm").fill("890, 910, 930");
   await page.getByRole("button", { name: "Capture the series" }).click();
   await page.locator(".status", { hasText: "3 targets: 890.0, 910.0, 930.0 mm" }).waitFor();
-  await page.locator("#view-guides").getByLabel("Method", { exact: true }).selectOption("planar");
+  await page.locator("#view-guides").getByLabel("Method", { exact: true }).selectOption("cdc");
   await page.getByRole("button", { name: "Learn", exact: true }).click();
   await page.locator("dt", { hasText: "RMS after" }).waitFor();
   const mm = async (name) => Number.parseFloat(await page.locator("dt", { hasText: name }).locator("+ dd").textContent());
   assert.ok((await mm("RMS after")) <= (await mm("RMS before")), "a correction makes it no worse");
-  await page.locator("[data-guide=psf]").click();
+  await page.locator("button[data-guide=psf]").click();
   await page.getByLabel("the flat series: 3 targets at known distances").check();
   await page.getByRole("button", { name: "Find", exact: true }).click();
   const found = page.locator("dt", { hasText: "point spread function" }).locator("+ dd");
@@ -235,7 +235,7 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
   assert.ok(computation.result.empty_frames < 40, "somebody is seen");
   await page.locator(".person-answer output", { hasText: "of all 40 frames" }).waitFor();
   assert.ok((await page.locator("canvas.person").evaluate((canvas) => canvas.width)) > 0, "the picture is shown");
-  await page.locator("[data-guide=shadow]").click();
+  await page.locator("button[data-guide=shadow]").click();
   await page.locator("#view-guides").getByLabel("Time", { exact: true }).fill("2026-06-21T12:00");
   await page.locator("dt", { hasText: "shadow's length" }).waitFor();
   await page.getByRole("button", { name: "Take the shadow off" }).click();
@@ -267,7 +267,7 @@ for (const [width, height] of SIZES) {
       }
       for (const guide of GUIDES) {
         await page.locator("#tab-guides").click();
-        await page.locator(`[data-guide=${guide}]`).click();
+        await page.locator(`button[data-guide=${guide}]`).click();
         await page.waitForTimeout(400);
         if (process.env.SCREENSHOTS) await page.screenshot({ path: join(process.env.SCREENSHOTS, `guide-${guide}-${width}-${colorScheme}.png`) });
         await page.evaluate(AXE);

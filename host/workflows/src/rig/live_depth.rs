@@ -1,6 +1,9 @@
 //! Live depth: pair after pair by the piezo, each with its map, until somebody wishes it to end.
 
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use farnear_capture::{
     camera::Image,
@@ -14,6 +17,9 @@ use ndarray::Array2;
 
 use super::{RigAddress, camera::CameraSettings, camera::EquippedRig};
 use crate::{context::Context, error::Result, operators, optics::GivenOptics};
+
+/// So long pairs may be passed over for newer ones.
+const PASSED_OVER: Duration = Duration::from_millis(100);
 
 /// What is looked at, and how depth is computed.
 #[derive(Clone, PartialEq, Debug)]
@@ -69,6 +75,7 @@ pub fn watch(
     let wait = settings.camera.image_wait;
     let mut stream = Continuous::start(&rig.client, camera.as_mut(), &shots, pace, wait)?;
     let mut cycles = Cycles::of(&shots);
+    let mut shown: Option<Instant> = None;
     while let Some(outcome) = stream.outcome()? {
         context.cancel.check("watching depth")?;
         let Outcome::Taken(frame) = outcome else { continue };
@@ -76,11 +83,13 @@ pub fn watch(
         else {
             continue;
         };
-        // Where this computer is slower than the rig, the newest pair is shown and not one from long ago.
-        if stream.waiting()? >= shots.len() {
+        // Where this computer is slower than the rig, the newest pair is shown and not one from long ago; but some are shown, however
+        // far ahead the rig is.
+        if stream.waiting()? >= shots.len() && shown.is_some_and(|shown| shown.elapsed() < PASSED_OVER) {
             continue;
         }
         let arrived = Instant::now();
+        shown = Some(arrived);
         let map = processor.run(grey(&far.image).view(), grey(&near.image).view())?;
         let pair_us = near.record.strobe_end.0.saturating_sub(far.record.strobe_start.0);
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
