@@ -63,6 +63,7 @@ const COMMANDS: &[&[&str]] = &[
     &["shadow", "score"],
     &["silhouettes"],
     &["silhouettes", "markers"],
+    &["silhouettes", "passages"],
     &["silhouettes", "skeletons"],
     &["silhouettes", "synthetic"],
     &["silhouettes", "video"],
