@@ -1,6 +1,8 @@
 //! Joins the emulator to the plant and to the outside: what happens whenever the firmware touches a pin, and at each
 //! moment at which the emulator stops.
 
+mod scenario;
+
 use std::{
     path::PathBuf,
     sync::mpsc::{Receiver, RecvTimeoutError},
@@ -27,7 +29,7 @@ use crate::{
     parts::Parts,
     pictures::Pictures,
     plant::StageName,
-    replay::{Entry, Script},
+    replay::Script,
     report::{Report, StageReport},
     scenario::Scenario,
     serial::Line,
@@ -52,11 +54,6 @@ struct Last {
     /// Bytes written to the memory, and when.
     memory: (u64, u64),
 }
-
-/// A motor that steps after so long has set off anew.
-const MOTION_GAP_NS: u64 = 20_000_000;
-/// A byte that is written to the memory after so long begins a write.
-const WRITE_GAP_NS: u64 = 5_000_000;
 
 /// See the module.
 pub struct Driver {
@@ -275,38 +272,6 @@ impl Driver {
         self.trace.as_mut().and_then(Trace::vcd)
     }
 
-    /// Does from now on what a trace says, to its end, and holds what comes of it against it.
-    pub fn follow(&mut self, mut script: Script) {
-        let comparer = std::mem::take(&mut script.comparer);
-        self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));
-        self.script = Some(script);
-    }
-
-    /// Does what the script has for this moment; gives until when the emulator may run, `None` at the end.
-    fn next_of_script(
-        &mut self,
-        session: &mut Session<RigBoard>,
-        stop: Stop,
-        host: &mut dyn Host,
-    ) -> Option<u64> {
-        let now_ns = stop.at.0;
-        while let Some(entry) = self.script.as_mut().and_then(|script| script.take_due(now_ns)) {
-            match entry {
-                Entry::Sent(bytes) => self.put_on_the_line(bytes, now_ns),
-                Entry::Ordered(order) => self.order(order, session, stop, host),
-                Entry::Healed => self.heal(session, stop, host),
-                Entry::Looked { asked_ns } => {
-                    if let Some(vcd) = self.vcd() {
-                        vcd.looked(now_ns, asked_ns);
-                    }
-                }
-            }
-        }
-        let departs = self.vcd().is_some_and(|vcd| vcd.departs());
-        let next_ns = self.script.as_ref()?.next_ns(now_ns).filter(|_| !departs)?;
-        Some(next_ns.min(now_ns + self.pacing.quantum_ns()))
-    }
-
     /// The camera's host gives an order.
     fn order(
         &mut self,
@@ -319,57 +284,6 @@ impl Driver {
             vcd.ordered(stop.at.0, order);
         }
         self.access(|rig| order.give(rig), session, stop, host);
-    }
-
-    /// Takes back what the scenario did.
-    fn heal(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
-        if let Some(vcd) = self.vcd() {
-            vcd.healed(stop.at.0);
-        }
-        for due in self.schedule.end() {
-            self.access(|rig| due.happen(rig), session, stop, host);
-        }
-        self.witness.note(stop.at.0, Seen::Healed);
-    }
-
-    /// Lets happen what is due.
-    fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
-        let now_ns = stop.at.0;
-        self.notice(session, now_ns);
-        for due in self.schedule.take_due(now_ns) {
-            let what = due.happening.what.name;
-            if let Some(vcd) = self.vcd() {
-                vcd.happened(now_ns, what, due.mends);
-            }
-            self.witness.note(now_ns, Seen::Happened { what, mends: due.mends });
-            self.access(|rig| due.happen(rig), session, stop, host);
-        }
-    }
-
-    /// Looks for the moments of a run that no frame tells of.
-    fn notice(&mut self, session: &mut Session<RigBoard>, now_ns: u64) {
-        for burst in self.wiring.take_bursts(now_ns, false) {
-            self.witness.note(burst.last_ns, Seen::Stepped(burst));
-        }
-        let Last { step_edges, exposures, memory } = &mut self.last;
-        for (edges, stage) in step_edges.iter_mut().zip([StageName::Sensor, StageName::Lens]) {
-            let (before, now) = (*edges, self.wiring.step_edges(stage));
-            *edges = (now, if now == before.0 { before.1 } else { now_ns });
-            if now != before.0 && (before.0 == 0 || now_ns > before.1 + MOTION_GAP_NS) {
-                self.schedule.notice(Moment::MotionBegins, now_ns);
-            }
-        }
-        for _ in *exposures..self.wiring.exposures_begun() {
-            self.schedule.notice(Moment::ExposureBegins, now_ns);
-        }
-        *exposures = self.wiring.exposures_begun();
-        let written = session.board_mut().chip.memory().map_or(0, |memory| memory.written());
-        if written != memory.0 {
-            if now_ns > memory.1 + WRITE_GAP_NS {
-                self.schedule.notice(Moment::MemoryWrite, now_ns);
-            }
-            *memory = (written, now_ns);
-        }
     }
 
     /// Puts on the line what came for the board, unless time passes on request.

@@ -1,0 +1,106 @@
+//! What a scenario lets happen to the rig, and what a trace says was done to it.
+
+use rigless::{
+    emulator::{Host, Stop},
+    session::Session,
+};
+
+use super::{Driver, Last};
+use crate::{
+    board::RigBoard,
+    faults::Moment,
+    plant::StageName,
+    replay::{Entry, Script},
+    trace::{Trace, vcd::Vcd},
+    witness::Seen,
+};
+
+/// A motor that steps after so long has set off anew.
+const MOTION_GAP_NS: u64 = 20_000_000;
+/// A byte that is written to the memory after so long begins a write.
+const WRITE_GAP_NS: u64 = 5_000_000;
+
+impl Driver {
+    /// Does from now on what a trace says, to its end, and holds what comes of it against it.
+    pub fn follow(&mut self, mut script: Script) {
+        let comparer = std::mem::take(&mut script.comparer);
+        self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));
+        self.script = Some(script);
+    }
+
+    /// Does what the script has for this moment; gives until when the emulator may run, `None` at the end.
+    pub(super) fn next_of_script(
+        &mut self,
+        session: &mut Session<RigBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<u64> {
+        let now_ns = stop.at.0;
+        while let Some(entry) = self.script.as_mut().and_then(|script| script.take_due(now_ns)) {
+            match entry {
+                Entry::Sent(bytes) => self.put_on_the_line(bytes, now_ns),
+                Entry::Ordered(order) => self.order(order, session, stop, host),
+                Entry::Healed => self.heal(session, stop, host),
+                Entry::Looked { asked_ns } => {
+                    if let Some(vcd) = self.vcd() {
+                        vcd.looked(now_ns, asked_ns);
+                    }
+                }
+            }
+        }
+        let departs = self.vcd().is_some_and(|vcd| vcd.departs());
+        let next_ns = self.script.as_ref()?.next_ns(now_ns).filter(|_| !departs)?;
+        Some(next_ns.min(now_ns + self.pacing.quantum_ns()))
+    }
+
+    /// Takes back what the scenario did.
+    pub(super) fn heal(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
+        if let Some(vcd) = self.vcd() {
+            vcd.healed(stop.at.0);
+        }
+        for due in self.schedule.end() {
+            self.access(|rig| due.happen(rig), session, stop, host);
+        }
+        self.witness.note(stop.at.0, Seen::Healed);
+    }
+
+    /// Lets happen what is due.
+    pub(super) fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
+        let now_ns = stop.at.0;
+        self.notice(session, now_ns);
+        for due in self.schedule.take_due(now_ns) {
+            let what = due.happening.what.name;
+            if let Some(vcd) = self.vcd() {
+                vcd.happened(now_ns, what, due.mends);
+            }
+            self.witness.note(now_ns, Seen::Happened { what, mends: due.mends });
+            self.access(|rig| due.happen(rig), session, stop, host);
+        }
+    }
+
+    /// Looks for the moments of a run that no frame tells of.
+    fn notice(&mut self, session: &mut Session<RigBoard>, now_ns: u64) {
+        for burst in self.wiring.take_bursts(now_ns, false) {
+            self.witness.note(burst.last_ns, Seen::Stepped(burst));
+        }
+        let Last { step_edges, exposures, memory } = &mut self.last;
+        for (edges, stage) in step_edges.iter_mut().zip([StageName::Sensor, StageName::Lens]) {
+            let (before, now) = (*edges, self.wiring.step_edges(stage));
+            *edges = (now, if now == before.0 { before.1 } else { now_ns });
+            if now != before.0 && (before.0 == 0 || now_ns > before.1 + MOTION_GAP_NS) {
+                self.schedule.notice(Moment::MotionBegins, now_ns);
+            }
+        }
+        for _ in *exposures..self.wiring.exposures_begun() {
+            self.schedule.notice(Moment::ExposureBegins, now_ns);
+        }
+        *exposures = self.wiring.exposures_begun();
+        let written = session.board_mut().chip.memory().map_or(0, |memory| memory.written());
+        if written != memory.0 {
+            if now_ns > memory.1 + WRITE_GAP_NS {
+                self.schedule.notice(Moment::MemoryWrite, now_ns);
+            }
+            *memory = (written, now_ns);
+        }
+    }
+}
