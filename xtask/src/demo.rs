@@ -60,7 +60,7 @@ pub fn run() -> Result<()> {
 }
 
 /// The number behind a key of a flat JSON object.
-fn figure<'a>(json: &'a str, key: &str) -> Result<&'a str> {
+pub fn figure<'a>(json: &'a str, key: &str) -> Result<&'a str> {
     let quoted = format!("\"{key}\":");
     let after = json.split_once(&quoted).with_context(|| format!("no {key} in {json}"))?.1;
     Ok(after.split([',', '}']).next().unwrap_or(after).trim())

@@ -14,6 +14,7 @@ mod host;
 mod install;
 mod instructions;
 mod python;
+mod release;
 mod run;
 mod site;
 mod sizes;
@@ -63,6 +64,8 @@ enum Job {
     Evaluate(evaluate::Arguments),
     /// The documents as a site, with search and every command: out/site/html.
     Site,
+    /// What a release hands out, each file tried where nothing else is: programs for two processors, Debian packages, the wheel.
+    Release(release::Arguments),
     /// Install farnear and farnear-sim (with the firmware's ELF beside it) into cargo's bin folder.
     Install,
 }
@@ -81,6 +84,7 @@ fn main() -> ExitCode {
         Job::Bench(arguments) => bench::run(&arguments),
         Job::Evaluate(arguments) => evaluate::run(&arguments),
         Job::Site => site::run(),
+        Job::Release(arguments) => release::run(&arguments),
         Job::Install => install::run(),
     };
     match result {

@@ -1,0 +1,181 @@
+//! What a release hands out, made by one command and tried where nothing else is: programs that need no library, for two kinds of
+//! processor; Debian packages; the Python package's wheel; the firmware; what is in them, under which licences; checksums.
+//!
+//! Two runs from the same commit on the same toolchain give the same bytes, wherever the repository lies: archives carry the
+//! commit's time, programs no path of this machine.
+
+mod archive;
+mod debian;
+mod inventory;
+mod programs;
+mod trial;
+mod wheel;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::{
+    boards::BOARDS,
+    firmware,
+    run::{ROOT, finish, output, step},
+};
+
+/// Where it goes.
+#[derive(Args)]
+pub struct Arguments {
+    /// Folder for the files; made anew.
+    #[arg(long, value_name = "DIR", default_value = "out/release")]
+    out: PathBuf,
+}
+
+/// What all parts of a release share.
+struct Release {
+    /// Of all crates of the workspace.
+    version: String,
+    /// Seconds since 1970 of the commit: the time that files in archives carry.
+    epoch: String,
+    /// Where the finished files go.
+    out: PathBuf,
+    /// Where parts are put together.
+    work: PathBuf,
+}
+
+/// Makes and tries all of them.
+///
+/// # Errors
+/// What cannot be built, and what does not run where it is installed. What this machine has no tool for is left out and named.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let out = ROOT.join(&arguments.out);
+    let work = out.join("work");
+    for folder in [&out, &work] {
+        if folder.is_dir() {
+            fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", folder.display()))?;
+        }
+        fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    }
+    let git = |arguments: &[&str]| output(Command::new("git").args(arguments).current_dir(&*ROOT));
+    let release = Release {
+        version: env!("CARGO_PKG_VERSION").into(),
+        epoch: git(&["log", "-1", "--format=%ct"])?.trim().into(),
+        out,
+        work,
+    };
+    if !git(&["status", "--porcelain"])?.is_empty() {
+        eprintln!(
+            "note: there are changes that no commit holds; the files carry the last commit's time all the same"
+        );
+    }
+
+    firmware::build()?;
+    let elves: Vec<PathBuf> = BOARDS
+        .iter()
+        .map(|board| crate::run::target_folder().join("release").join(format!("{}.elf", board.program())))
+        .collect();
+    for elf in &elves {
+        copy(elf, &release.out)?;
+    }
+
+    step("what is in it");
+    let notices = inventory::write(&release)?;
+
+    let mut left_out = Vec::new();
+    let mut made = Vec::new();
+    for target in &programs::TARGETS {
+        match programs::build(&release, target)? {
+            Ok(built) => made.push((target, built)),
+            Err(missing) => left_out.push(format!("programs for {}: {missing}", target.triple)),
+        }
+    }
+    let native = made.iter().find(|(target, _)| target.runs_here()).map(|(_, built)| built.clone());
+    let extras = native.as_deref().map(|programs| Extras::write(&release, programs, notices)).transpose()?;
+    if let Some(extras) = &extras {
+        for (target, built) in &made {
+            archive::write(&release, target, built, &elves, extras)?;
+            trial::programs(&release, target, &mut left_out)?;
+        }
+        for (target, built) in &made {
+            match debian::write(&release, target, built, &elves, extras)? {
+                Ok(package) => trial::package(&release, target, &package, &mut left_out)?,
+                Err(missing) => left_out.push(format!("Debian package for {}: {missing}", target.debian)),
+            }
+        }
+    }
+    match wheel::write(&release)? {
+        Ok(wheel) => trial::wheel(&release, &wheel, &mut left_out)?,
+        Err(missing) => left_out.push(format!("wheel: {missing}")),
+    }
+
+    fs::remove_dir_all(&release.work).context("cannot remove the work folder")?;
+    checksums(&release.out)?;
+    for missing in &left_out {
+        eprintln!("left out: {missing}");
+    }
+    Ok(())
+}
+
+/// What goes beside the programs, whatever they run on.
+struct Extras {
+    /// Manual pages.
+    man: PathBuf,
+    /// `farnear.bash`, `farnear.zsh`, `farnear.fish`.
+    completions: PathBuf,
+    /// Licences of everything inside.
+    notices: PathBuf,
+}
+
+impl Extras {
+    fn write(release: &Release, programs: &Path, notices: PathBuf) -> Result<Self> {
+        let farnear = programs.join("farnear");
+        let (man, completions) = (release.work.join("man"), release.work.join("completions"));
+        finish(Command::new(&farnear).args(["man", "--out"]).arg(&man))?;
+        fs::create_dir_all(&completions).context("cannot create the folder of completions")?;
+        for shell in ["bash", "zsh", "fish"] {
+            let text = output(Command::new(&farnear).args(["completions", shell]))?;
+            fs::write(completions.join(format!("farnear.{shell}")), text)
+                .context("cannot write completions")?;
+        }
+        Ok(Self { man, completions, notices })
+    }
+}
+
+/// Copies a file into a folder under its own name.
+fn copy(file: &Path, folder: &Path) -> Result<()> {
+    let name = file.file_name().with_context(|| format!("{} has no name", file.display()))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    fs::copy(file, folder.join(name))
+        .with_context(|| format!("cannot copy {} into {}", file.display(), folder.display()))?;
+    Ok(())
+}
+
+/// Whether a program can be started and ends well.
+fn has(program: &str) -> bool {
+    use std::process::Stdio;
+    Command::new(program)
+        .arg("--version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// `SHA256SUMS`, which `sha256sum --check` reads; prints it with sizes.
+fn checksums(out: &Path) -> Result<()> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(out).with_context(|| format!("cannot read {}", out.display()))? {
+        let entry = entry?;
+        names.push((entry.file_name(), entry.metadata()?.len()));
+    }
+    names.sort();
+    let sums = output(Command::new("sha256sum").args(names.iter().map(|(name, _)| name)).current_dir(out))?;
+    fs::write(out.join("SHA256SUMS"), &sums).context("cannot write SHA256SUMS")?;
+    for (name, bytes) in names {
+        println!("{bytes:>10}  {}", out.join(name).display());
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! Debian packages, put together by `dpkg-deb`.
+//!
+//! The one for this machine's own processor is built against the system's libraries, with every kind of camera for which the
+//! libraries are here, and asks for them; the other holds the programs that need no library.
+
+use std::{
+    fs,
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use anyhow::{Context, Result};
+
+use super::{
+    Extras, Release, copy, has,
+    programs::{Target, without_paths},
+};
+use crate::run::{ROOT, cargo, finish, output, step, target_folder};
+
+/// Where the programs lie; `/usr/bin` points there, since the emulated board looks for its firmware beside itself.
+const PROGRAMS: &str = "usr/lib/farnear";
+
+/// Writes the package; gives its path, or what is missing.
+pub fn write(
+    release: &Release,
+    target: &Target,
+    programs: &Path,
+    elves: &[PathBuf],
+    extras: &Extras,
+) -> Result<Result<PathBuf, String>> {
+    if !has("dpkg-deb") {
+        return Ok(Err("dpkg-deb is missing; Debian's package is dpkg".into()));
+    }
+    let (programs, depends) = match target.runs_here().then(cameras).filter(|kinds| !kinds.is_empty()) {
+        Some(kinds) => with_cameras(release, &kinds)?,
+        None => (programs.to_path_buf(), String::new()),
+    };
+    let name = format!("farnear_{}_{}.deb", release.version, target.debian);
+    step(&name);
+    let root = release.work.join(format!("deb-{}", target.debian));
+    for file in [programs.join("farnear"), programs.join("farnear-sim")].iter().chain(elves) {
+        copy(file, &root.join(PROGRAMS))?;
+    }
+    fs::create_dir_all(root.join("usr/bin")).context("cannot create usr/bin")?;
+    for program in ["farnear", "farnear-sim"] {
+        symlink(format!("../lib/farnear/{program}"), root.join("usr/bin").join(program))
+            .context("cannot make a link in usr/bin")?;
+    }
+    copy(&ROOT.join("packaging/60-farnear.rules"), &root.join("usr/lib/udev/rules.d"))?;
+    let documents = root.join("usr/share/doc/farnear");
+    for page in ["README.md", "CHANGELOG.md"] {
+        copy(&ROOT.join(page), &documents)?;
+    }
+    let notices = fs::read_to_string(&extras.notices).context("cannot read the licences")?;
+    let own = ["LICENSE-MIT", "LICENSE-APACHE"].map(|name| fs::read_to_string(ROOT.join(name)));
+    let mut copyright = String::from("farnear is under MIT or Apache-2.0, as you choose.\n\n");
+    for text in own {
+        copyright += &text.context("cannot read a licence")?;
+        copyright += "\n----\n\n";
+    }
+    fs::write(documents.join("copyright"), copyright + &notices).context("cannot write the copyright")?;
+    for entry in fs::read_dir(&extras.man).context("cannot read the manual")? {
+        copy(&entry?.path(), &root.join("usr/share/man/man1"))?;
+    }
+    finish(
+        Command::new("gzip").args(["--best", "--no-name", "--recursive"]).arg(root.join("usr/share/man")),
+    )?;
+    for (shell, place) in [
+        ("bash", "bash-completion/completions/farnear"),
+        ("zsh", "zsh/vendor-completions/_farnear"),
+        ("fish", "fish/vendor_completions.d/farnear.fish"),
+    ] {
+        let place = root.join("usr/share").join(place);
+        fs::create_dir_all(place.parent().unwrap_or(&root))
+            .context("cannot create a folder for completions")?;
+        fs::copy(extras.completions.join(format!("farnear.{shell}")), place)
+            .context("cannot copy completions")?;
+    }
+
+    let kilobytes = output(Command::new("du").args(["--summarize", "--apparent-size", "-k"]).arg(&root))?;
+    let control = fs::read_to_string(ROOT.join("packaging/control.in"))
+        .context("cannot read packaging/control.in")?
+        .replace("{version}", &release.version)
+        .replace("{architecture}", target.debian)
+        .replace("{kilobytes}", kilobytes.split_whitespace().next().unwrap_or("0"))
+        .replace("{depends}", &depends);
+    // A package that needs nothing has no such line.
+    let control = control.replace("Depends: \n", "");
+    fs::create_dir_all(root.join("DEBIAN")).context("cannot create DEBIAN")?;
+    fs::write(root.join("DEBIAN/control"), control).context("cannot write the control file")?;
+    finish(Command::new("chmod").args(["-R", "u+rwX,go=rX"]).arg(&root))?;
+    let package = release.out.join(name);
+    finish(
+        Command::new("dpkg-deb")
+            .args(["--root-owner-group", "-Zxz", "--build"])
+            .arg(&root)
+            .arg(&package)
+            .env("SOURCE_DATE_EPOCH", &release.epoch),
+    )?;
+    Ok(Ok(package))
+}
+
+/// The kinds of camera whose libraries are here, as cargo features.
+fn cameras() -> Vec<&'static str> {
+    let aravis = Command::new("pkg-config").args(["--exists", "aravis-0.8 >= 0.8.25"]).status();
+    let aravis = aravis.is_ok_and(|status| status.success());
+    let features = [(aravis, "genicam", "libaravis-dev"), (has("clang"), "v4l2", "clang")];
+    for (_, feature, package) in features.iter().filter(|(here, ..)| !here) {
+        eprintln!("the Debian package goes without {feature} cameras: {package} is missing");
+    }
+    features.into_iter().filter(|(here, ..)| *here).map(|(_, feature, _)| feature).collect()
+}
+
+/// The programs with these cameras, and the packages that they need.
+fn with_cameras(release: &Release, kinds: &[&str]) -> Result<(PathBuf, String)> {
+    step(&format!("programs with cameras: {}", kinds.join(", ")));
+    let folder = target_folder().join("release-cameras");
+    finish(
+        cargo(["build", "--release", "--locked", "--package", "farnear", "--package", "farnear-sim"])
+            .args(["--config", "profile.release.strip=true", "--features"])
+            .arg(kinds.iter().map(|kind| format!("farnear/{kind}")).collect::<Vec<_>>().join(","))
+            .arg("--target-dir")
+            .arg(&folder)
+            .env("SOURCE_DATE_EPOCH", &release.epoch)
+            .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
+    )?;
+    let programs = folder.join("release");
+    let source = release.work.join("shlibdeps");
+    fs::create_dir_all(source.join("debian")).context("cannot create a folder for dpkg-shlibdeps")?;
+    fs::write(source.join("debian/control"), "Source: farnear\n\nPackage: farnear\nArchitecture: any\n")
+        .context("cannot write a file for dpkg-shlibdeps")?;
+    let depends = output(
+        Command::new("dpkg-shlibdeps")
+            .arg("-O")
+            .args(["farnear", "farnear-sim"].map(|name| programs.join(name)))
+            .current_dir(&source),
+    )?;
+    Ok((programs, depends.trim().trim_start_matches("shlibs:Depends=").into()))
+}

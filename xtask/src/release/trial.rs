@@ -1,0 +1,150 @@
+//! Each file of a release installed where nothing else is, and used: a pair is rendered and its depth compared with the truth.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use anyhow::{Context, Result, ensure};
+
+use super::{Release, archive, programs::Target};
+use crate::{
+    python,
+    run::{ROOT, finish, output, step},
+};
+
+/// Most that the depth of the tried pair may be off, in mm: the staircase without noise is known to 0.4 (docs/accuracy.md).
+const MOST_OFF_MM: f64 = 0.5;
+/// The optics of the tried pair.
+const OPTICS: &str = "examples/rig.toml";
+
+/// Unpacks an archive into an empty root and runs what is in it there.
+pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) -> Result<()> {
+    let runner = match target.runner() {
+        Ok(runner) => runner,
+        Err(missing) => {
+            left_out.push(format!("trial of the {} programs: {missing}", target.processor));
+            return Ok(());
+        }
+    };
+    let name = archive::name(release, target);
+    step(&format!("{name}.tar.gz, unpacked into an empty root"));
+    let root = empty(release, &format!("root-{}", target.processor))?;
+    let packed = release.out.join(format!("{name}.tar.gz"));
+    finish(Command::new("tar").arg("--extract").arg("--file").arg(packed).arg("--directory").arg(&root))?;
+    let folder = root.join(&name);
+    let Some(runner) = runner else {
+        // As the only thing there is: no library, no shell, no /proc. Where this user may not change the root, beside the rest.
+        let inside = |program: &str| {
+            let mut command = Command::new("unshare");
+            command.args(["--map-root-user", "--root"]).arg(&root).arg(format!("/{name}/{program}"));
+            command
+        };
+        if inside("farnear").arg("--version").status().is_ok_and(|status| status.success()) {
+            let optics = PathBuf::from("/optics.toml");
+            fs::copy(ROOT.join(OPTICS), root.join("optics.toml")).context("cannot copy the optics")?;
+            depth(&|| inside("farnear"), &optics, Path::new("/pair"))?;
+            return finish(inside("farnear-sim").arg("--version"));
+        }
+        left_out.push("an empty root: this user may not make one (unshare --map-root-user --root)".into());
+        depth(&|| Command::new(folder.join("farnear")), &ROOT.join(OPTICS), &root.join("pair"))?;
+        return captures(&folder, &root.join("capture"));
+    };
+    let emulated = || {
+        let mut command = Command::new(&runner);
+        command.arg(folder.join("farnear"));
+        command
+    };
+    depth(&emulated, &ROOT.join(OPTICS), &root.join("pair"))
+}
+
+/// Installs a Debian package into an empty root and runs what is in it.
+pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mut Vec<String>) -> Result<()> {
+    step(&format!("{}, installed into an empty root", package.display()));
+    let root = empty(release, &format!("deb-root-{}", target.debian))?;
+    let database = root.join("var/lib/dpkg");
+    fs::create_dir_all(database.join("info")).context("cannot create dpkg's folder")?;
+    fs::write(database.join("status"), "").context("cannot write dpkg's status")?;
+    // What it depends on is the system's own; whether that is there, the run says.
+    let mut install = Command::new("dpkg");
+    install
+        .arg(format!("--root={}", root.display()))
+        .args(["--force-not-root", "--force-depends", "--force-architecture", "--force-script-chrootless"])
+        .args(["--log=/dev/null", "--install"])
+        .arg(package);
+    finish(&mut install)?;
+    let programs = root.join("usr/bin");
+    ensure!(root.join("usr/share/man/man1/farnear-depth.1.gz").is_file(), "the package lacks its manual");
+    let runner = match target.runner() {
+        Ok(runner) => runner,
+        Err(missing) => {
+            left_out.push(format!("trial of {}: {missing}", package.display()));
+            return Ok(());
+        }
+    };
+    let farnear = || match &runner {
+        Some(runner) => {
+            let mut command = Command::new(runner);
+            command.arg(programs.join("farnear"));
+            command
+        }
+        None => Command::new(programs.join("farnear")),
+    };
+    depth(&farnear, &ROOT.join(OPTICS), &root.join("pair"))?;
+    if target.runs_here() { captures(&programs, &root.join("capture")) } else { Ok(()) }
+}
+
+/// Installs the wheel into a fresh environment and computes a depth map in Python.
+pub fn wheel(release: &Release, wheel: &Path, left_out: &mut Vec<String>) -> Result<()> {
+    step(&format!("{}, installed into a fresh environment", wheel.display()));
+    let needs = [wheel.to_string_lossy()];
+    match python::environment(&release.work.join("wheel-root"), &needs.each_ref().map(AsRef::as_ref)) {
+        Ok(python) => {
+            let first = ROOT.join("packaging/first_depth.py");
+            finish(Command::new(python).arg(first).current_dir(&release.work))
+        }
+        Err(missing) => {
+            left_out.push(format!("trial of the wheel: {missing}"));
+            Ok(())
+        }
+    }
+}
+
+/// Renders a pair, computes its depth and holds it to the truth.
+fn depth(farnear: &dyn Fn() -> Command, optics: &Path, pair: &Path) -> Result<()> {
+    let run = |arguments: &[&str], paths: &[&Path]| {
+        let mut command = farnear();
+        command.args(arguments).args(paths).arg("--optics").arg(optics);
+        command
+    };
+    output(
+        run(&["render", "--scene", "staircase", "--psf", "gaussian:k=0.4578", "--out"], &[pair])
+            .arg("--json"),
+    )?;
+    let images = [pair.join("far.png"), pair.join("near.png")];
+    let images: [&Path; 2] = images.each_ref().map(PathBuf::as_path);
+    output(run(&["depth"], &images).arg("--out").arg(pair).arg("--json"))?;
+    let mut compare = farnear();
+    compare.arg("compare").args(["depth.npy", "truth.npy"].map(|map| pair.join(map)));
+    let compared = output(compare.args(["--away-from-edges", "8", "--json"]))?;
+    let off = crate::demo::figure(&compared, "rmse_mm")?;
+    println!("depth of a rendered pair is off by {off} mm");
+    ensure!(off.parse::<f64>()? <= MOST_OFF_MM, "depth is off by {off} mm, expected at most {MOST_OFF_MM}");
+    Ok(())
+}
+
+/// A pair by the emulated rig, which runs the firmware beside the programs.
+fn captures(programs: &Path, out: &Path) -> Result<()> {
+    let mut capture = Command::new(programs.join("farnear"));
+    capture.args(["rig", "capture", "--port", "sim", "--scene", "staircase", "--json", "--optics"]);
+    let told = output(capture.arg(ROOT.join(OPTICS)).arg("--out").arg(out))?;
+    println!("a pair by the emulated rig in {} ms of its time", crate::demo::figure(&told, "pair_ms")?);
+    Ok(())
+}
+
+fn empty(release: &Release, name: &str) -> Result<PathBuf> {
+    let root = release.work.join(name);
+    fs::create_dir_all(&root).with_context(|| format!("cannot create {}", root.display()))?;
+    Ok(root)
+}
