@@ -420,8 +420,8 @@ fn claims_of_6_4(page: &mut Page, figures: &[Vec<[f64; 2]>]) {
     let [li_cdc, li_clsf] = [figures[3][1][0], figures[3][2][0]];
     let before: Vec<String> = figures.iter().map(|f| format!("{:.2}", f[0][0])).collect();
     let rows = [
-        row("both corrections reduce the RMSE of all four methods", reduced == 4, format!("of {reduced} of 4")),
-        row("both reduce the variance of all four", quieter == 4, format!("of {quieter} of 4")),
+        row("both corrections reduce the RMSE of all four methods", reduced == 4, format!("{reduced} of 4")),
+        row("both reduce the variance of all four", quieter == 4, format!("{quieter} of 4")),
         row(
             "CDC is better than CLSF for Subbarao, Favaro and Raj",
             cdc_first == 3,
