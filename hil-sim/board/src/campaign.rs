@@ -90,6 +90,22 @@ impl Summary {
         self.counts.iter_mut().zip(seen).for_each(|(sum, one)| *sum += one);
     }
 
+    /// As JSON for programs, nothing that differs between two runs; files by their names.
+    pub fn json(&self) -> serde_json::Value {
+        let [answered, done, failed, alarms, exposures, resets] = self.counts;
+        let broken = self.broken.iter().map(|(seed, broken, file)| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let at_s = broken.at_ns as f64 * 1e-9;
+            serde_json::json!({
+                "seed": seed, "property": broken.property, "at_s": at_s, "what": broken.what, "file": name,
+            })
+        });
+        serde_json::json!({
+            "scenarios": self.played, "board_s": self.board_s, "answered": answered, "done": done, "failed": failed,
+            "alarms": alarms, "exposures": exposures, "resets": resets, "broken": broken.collect::<Vec<_>>(),
+        })
+    }
+
     /// As a table for people. `cpu`: what it took.
     pub fn table(&self, cpu: Duration) -> String {
         let [answered, done, failed, alarms, exposures, resets] = self.counts;

@@ -80,6 +80,9 @@ struct Seeds {
     /// Write the scenario of the first seed to the standard output instead of playing any.
     #[arg(long)]
     show: bool,
+    /// Print the sum as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
@@ -174,7 +177,11 @@ fn play_seeds(seeds: &Seeds) -> Result<()> {
             eprintln!("{played} scenarios, {:.0} s of CPU", cpu_time().as_secs_f64());
         }
     })?;
-    stdout.write_all(summary.table(cpu_time()).as_bytes())?;
+    if seeds.json {
+        writeln!(stdout, "{}", summary.json())?;
+    } else {
+        stdout.write_all(summary.table(cpu_time()).as_bytes())?;
+    }
     anyhow::ensure!(
         summary.broken.is_empty(),
         "{} of {} scenarios break a property; play one again: farnear-sim run --scenario FILE",

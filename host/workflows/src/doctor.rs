@@ -110,7 +110,6 @@ fn processor() -> Finding {
 
 fn emulated_rig() -> Finding {
     const WHAT: &str = "emulated rig";
-    const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
     let Ok(program) = simulator::find() else {
         let remedy = "`cargo xtask install` in a clone installs it; without it there is no --port sim";
         return Finding::bad(
@@ -120,11 +119,10 @@ fn emulated_rig() -> Finding {
             remedy,
         );
     };
-    let firmware = program.with_file_name(FIRMWARE);
-    if firmware.is_file() {
+    if simulator::firmware_of(&program).is_file() {
         return Finding::ok(WHAT, program.display().to_string());
     }
-    let found = format!("{} without {FIRMWARE} beside it", program.display());
+    let found = format!("{} without {} beside it", program.display(), simulator::FIRMWARE);
     Finding::bad(
         Health::Missing,
         WHAT,

@@ -19,6 +19,8 @@ use crate::{
 
 /// Name of the program.
 const PROGRAM: &str = "farnear-sim";
+/// Name of the firmware beside it.
+pub(crate) const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
 /// Time to end by itself before it is killed.
 const FAREWELL: Duration = Duration::from_secs(3);
 
@@ -226,4 +228,9 @@ pub(crate) fn find() -> Result<PathBuf, SimulatorError> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let on_path = std::env::split_paths(&path).map(|folder| folder.join(&name));
     beside.into_iter().chain(on_path).find(|place| place.is_file()).ok_or(SimulatorError::Missing)
+}
+
+/// The firmware that the simulator takes by itself: the one that FARNEAR_FIRMWARE names, else the one beside it.
+pub(crate) fn firmware_of(program: &Path) -> PathBuf {
+    std::env::var_os("FARNEAR_FIRMWARE").map_or_else(|| program.with_file_name(FIRMWARE), PathBuf::from)
 }

@@ -278,6 +278,58 @@ fn each_kind_gives_what_its_command_gives() {
 }
 
 #[test]
+fn methods_and_models_are_evaluated_as_jobs() {
+    let folder = Folder::new();
+    let people = [
+        "--subjects",
+        "3",
+        "--activities",
+        "walk,dig",
+        "--views",
+        "1",
+        "--rate-hz",
+        "6",
+        "--mm-per-px",
+        "25",
+    ];
+    succeeds(farnear(&["silhouettes", "synthetic", "--out", &folder.text("people")]).args(people));
+    let manifest = folder.file(
+        "compared.toml",
+        "[evaluate]\nsamples = 'people/samples.toml'\n\
+         [[job]]\ndo = 'evaluate'\nleave_one_subject_out = true\nno_search = true\nout = 'b/others'\n\
+         [[job]]\ndo = 'evaluate'\nmodel = 'everyday'\nout = 'b/shipped'\n\
+         [[job]]\ndo = 'evaluate'\nout = 'b/none'\n\
+         [[job]]\ndo = 'evaluate'\nmodel = 'everyday'\nsame = 'dig'\nout = 'b/same'\n",
+    );
+    let run = || {
+        let output = farnear(&["batch", &manifest]).output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(1));
+        lines(&output.stdout)
+    };
+    let said = run();
+    for (line, phrase) in said[2..].iter().zip(["leave_one_subject_out", "NAME IN THE SAMPLES"]) {
+        assert!(line["error"].as_str().expect("a message").contains(phrase), "{line}");
+    }
+    let samples = folder.text("people/samples.toml");
+    for (arguments, name) in
+        [(&["--leave-one-subject-out", "--no-search"][..], "others"), (&["--model", "everyday"], "shipped")]
+    {
+        let mut expected = figures(farnear(&["activity", "evaluate", &samples, "--json"]).args(arguments));
+        let kept = fs::read(folder.path(&format!("b/{name}/figures.json"))).expect("figures");
+        let kept: Value = serde_json::from_slice(&kept).expect("JSON");
+        // Times differ from run to run.
+        expected.as_object_mut().expect("figures").retain(|name, _| !name.starts_with("seconds"));
+        assert_eq!(kept, expected);
+    }
+    // A mask that is named by the samples, not by the manifest.
+    let masks = files(&folder.path("people/p01-dig-1/view1"));
+    let first = masks.keys().next().expect("a mask");
+    fs::remove_file(folder.path("people/p01-dig-1/view1").join(first)).expect("a mask");
+    let again: Vec<Value> = run().iter().map(|line| line["state"].clone()).collect();
+    assert_eq!(again, ["done", "done", "failed", "failed"]);
+}
+
+#[test]
 fn a_manifest_that_is_none_is_refused_before_anything_is_done() {
     let folder = Folder::new();
     let manifest = folder.file("list.txt", "");

@@ -173,3 +173,32 @@ fn the_firmwares_log_is_decoded_with_its_elf() {
     let wrong = folder.file("wrong.elf", "no program");
     fails(&mut on_the_rig(&["log", "--elf", &wrong]), 1, &["wrong.elf", "is not the firmware's ELF file"]);
 }
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn campaigns_are_jobs_of_a_batch() {
+    let folder = Folder::new();
+    let manifest = folder
+        .file("seeds.csv", "do,first,seeds,out\ncampaign,1,1,one\ncampaign,2,1,two\ncampaign,,,three\n");
+    let run = || {
+        let output = farnear(&["batch", &manifest]).output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(1), "the third has no number of seeds");
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        let mut said: Vec<(u64, String)> = text
+            .lines()
+            .map(|line| {
+                let line: serde_json::Value = serde_json::from_str(line).expect(line);
+                (line["job"].as_u64().expect("a number"), line["state"].as_str().expect("a state").into())
+            })
+            .collect();
+        said.sort();
+        said.into_iter().map(|(_, state)| state).collect::<Vec<_>>()
+    };
+    assert_eq!(run(), ["done", "done", "failed"]);
+    for place in ["one", "two"] {
+        let told = std::fs::read(folder.path(&format!("{place}/campaign.json"))).expect("figures");
+        let told: serde_json::Value = serde_json::from_slice(&told).expect("JSON");
+        assert_eq!((&told["scenarios"], &told["broken"]), (&1.into(), &serde_json::json!([])), "{told}");
+    }
+    assert_eq!(run(), ["already", "already", "failed"]);
+}

@@ -156,16 +156,30 @@ pub fn are_full_frames(masks: &[Mask]) -> bool {
     masks.first().is_some_and(|mask| mask.dim() != (SIDE_PX, SIDE_PX))
 }
 
+/// What a file of samples lists.
+fn listed(path: &Path) -> Result<Vec<Sample>> {
+    let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
+    let file: File = toml::from_str(&text).about(|| path.display().to_string())?;
+    Ok(file.samples)
+}
+
 impl Samples {
+    /// The folders of masks that a file of samples names.
+    ///
+    /// # Errors
+    /// A file that cannot be read or understood.
+    pub fn folders(path: &Path) -> Result<Vec<PathBuf>> {
+        let base = path.parent().unwrap_or(Path::new(""));
+        Ok(listed(path)?.iter().map(|sample| base.join(&sample.masks)).collect())
+    }
+
     /// Reads a file of samples and describes all of its masks.
     ///
     /// # Errors
     /// Files, folders and masks that cannot be read or hold nothing, samples of which some are full frames and others are not.
     pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
-        let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
-        let file: File = toml::from_str(&text).about(|| path.display().to_string())?;
         let base = path.parent().unwrap_or(Path::new(""));
-        Self::described(file.samples, base, path, context).about(|| path.display().to_string())
+        Self::described(listed(path)?, base, path, context).about(|| path.display().to_string())
     }
 
     fn described(samples: Vec<Sample>, base: &Path, path: &Path, context: &Context<'_>) -> Result<Self> {

@@ -1,6 +1,8 @@
 //! The kinds of jobs: a new one is a line in the table and a function that makes a workflow's settings of fields.
 
+mod campaign;
 mod depth;
+mod evaluate;
 mod people;
 
 use std::path::{Path, PathBuf};
@@ -32,6 +34,8 @@ const KINDS: &[Kind] = &[
     Kind { name: "silhouettes-markers", makes_file: false, work: people::markers },
     Kind { name: "shadow-remove", makes_file: false, work: people::shadow },
     Kind { name: "recognise", makes_file: false, work: people::recognise },
+    Kind { name: "evaluate", makes_file: false, work: evaluate::work },
+    Kind { name: "campaign", makes_file: false, work: campaign::work },
 ];
 
 /// A job that is understood: everything but where its result goes.
