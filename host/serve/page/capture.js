@@ -3,7 +3,9 @@ import { act, drives, ended, on, store } from "./link.js";
 import { h, button, choice, field, panel } from "./ui.js";
 import { key } from "./keys.js";
 
+/** @type {HTMLElement | null} */
 let warnings = null;
+/** @type {(name: string) => void} */
 let go = () => {};
 
 /** Told by the page: opens the depth of a capture. */

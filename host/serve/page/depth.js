@@ -17,6 +17,7 @@ export function make(host, remember) {
   const viewer = new Viewer("Depth map");
   const surface = h("div", { class: "surface", hidden: true });
   const side = measure.make();
+  /** @type {{ name: string | null, layer: string, colours: string, other: string, maps: any, loading: number, capture: any, mesh?: ArrayBuffer | null }} */
   const show = { name: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, capture: null };
   const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
   const layers = h("div", { class: "group", role: "group", "aria-label": "What is shown" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
@@ -185,6 +186,7 @@ async function load(path) {
   return { width: picture.width, height: picture.height, data: Float32Array.from({ length: data.length / 4 }, (_, at) => data[4 * at]) };
 }
 
+/** @param {import("./maps.js").NumberMap} map @param {number[]} ends */
 function counts({ data }, [low, high]) {
   const bins = new Array(96).fill(0);
   const scale = bins.length / (high - low || 1);

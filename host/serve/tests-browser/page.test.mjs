@@ -1,6 +1,7 @@
 // The page in a real browser, on the emulated rig: `npm ci && npm test`, or `cargo xtask test`.
 // SCREENSHOTS=folder keeps pictures of every view; docs/images has two of them.
 import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
 import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
@@ -43,6 +44,12 @@ async function until(fits, what) {
 
 const moving = ({ rig }) => rig.info.coarse.moving || rig.info.lens.moving;
 const still = (now) => !moving(now) && now.job?.phase !== "running";
+
+test("the page's JavaScript agrees with its types", () => {
+  const compiler = createRequire(import.meta.url).resolve("typescript/bin/tsc");
+  const { status, stdout } = spawnSync(process.execPath, [compiler, "--project", import.meta.dirname], { encoding: "utf8" });
+  assert.equal(status, 0, stdout);
+});
 
 test("the OpenAPI document is valid", async () => {
   const found = await new Validator().validate(await server.ask("/openapi.json"));
