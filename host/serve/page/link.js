@@ -60,7 +60,7 @@ function pictured(data) {
   if (data.byteLength < 4) return;
   const length = new DataView(data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  emit(header.type, header, data.slice(4 + length));
+  emit(header.type, header, new Uint8Array(data, 4 + length));
 }
 
 /** Asks for something; throws what went wrong, with `hint`. */

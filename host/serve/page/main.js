@@ -176,5 +176,6 @@ function begin() {
   go(name || "live", detail);
 }
 
-begin();
+// What stands in the page itself is painted before its views are built.
+requestAnimationFrame(() => setTimeout(begin));
 export { help };

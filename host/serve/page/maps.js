@@ -52,6 +52,18 @@ export function paint({ width, height, data }, [low, high], name, fade) {
   return image;
 }
 
+/** Depths as codes of 16 bits (0 = none) as a picture; what is unsure (confidence of 255) is paler.
+ * @param {ImageData} image @param {Uint16Array} codes @param {Uint8Array} confidence @param {string} name */
+export function paintCodes(image, codes, confidence, name) {
+  const colours = table(name);
+  // Little-endian, as every computer with a browser is: red, green, blue, alpha from the lowest byte on.
+  const colour = Uint32Array.from({ length: 256 }, (_, at) => colours[3 * at] | (colours[3 * at + 1] << 8) | (colours[3 * at + 2] << 16));
+  const alpha = Uint32Array.from({ length: 256 }, (_, at) => Math.round(40 + 215 * Math.min(1, (2 * at) / 255)) << 24);
+  const words = new Uint32Array(image.data.buffer);
+  for (let at = 0; at < words.length; at++) words[at] = codes[at] ? colour[codes[at] >> 8] | alpha[confidence[at]] : 0;
+  return image;
+}
+
 /** The values between which all but the outermost percent lie. @param {NumberMap} map @param {number} outliers @returns {[number, number]} */
 export function range({ data }, outliers = 0.01) {
   const some = [];

@@ -29,6 +29,8 @@ export interface State {
     measure: string;
     error: string | null;
     recording: string | null;
+    /** A camera without a rig: its image can be seen live. */
+    camera_alone: boolean;
   };
   seats: { driver: number | null; asking: number | null; count: number };
   question: string | null;

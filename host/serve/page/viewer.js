@@ -26,6 +26,8 @@ export class Viewer {
     this.onshape = undefined;
     /** Draws above the picture. @type {((context: CanvasRenderingContext2D, point: (x: number, y: number) => number[]) => void) | undefined} */
     this.overlay = undefined;
+    /** Told when a picture is painted. @type {(() => void) | undefined} */
+    this.onpainted = undefined;
     this.frame = 0;
     new ResizeObserver(() => this.draw()).observe(this.element);
     this.listen();
@@ -73,6 +75,7 @@ export class Viewer {
     context.drawImage(source, ...place);
     if (this.second) this.paintSecond(context, place, height);
     this.paintShape(context);
+    this.onpainted?.();
     this.overlay?.(context, (x, y) => [this.left + x * this.scale, this.top + y * this.scale]);
   }
 

@@ -190,6 +190,52 @@ test("live depth is recorded and played back", async () => {
   assert.deepEqual(page.complaints, []);
 });
 
+/** What the page painted in a while: pictures a second, and how old they were then (median, ms). */
+async function painted(page, canvas, seconds) {
+  const [begin, ages] = [Date.now(), []];
+  const count = async () => Number((await canvas.getAttribute("data-painted")) ?? 0);
+  const first = await count();
+  while (Date.now() - begin < 1000 * seconds) {
+    ages.push(Number(await canvas.getAttribute("data-age-ms")));
+    await page.waitForTimeout(50);
+  }
+  const rate = (await count() - first) / ((Date.now() - begin) / 1000);
+  return { rate, age: ages.sort((a, b) => a - b)[Math.floor(ages.length / 2)] };
+}
+
+test("a camera without a rig is seen live, and nothing that needs a rig is offered", async () => {
+  const alone = await serve(["--camera", `command:640x480:gray:${process.execPath} ${join(import.meta.dirname, "camera.mjs")}`]);
+  try {
+    const page = await open(browser, alone.address, {}, "absent");
+    await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
+    const canvas = page.locator("#view-live .viewer canvas").first();
+    await page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 5);
+    const { rate, age } = await painted(page, canvas, 5);
+    console.log(`live image of 640x480 px, 30 a second: ${rate.toFixed(1)} painted a second, ${age} ms old (median)`);
+    assert.ok(await page.getByRole("button", { name: "Live depth" }).isDisabled());
+    assert.ok(await page.getByRole("button", { name: "Capture pair" }).isDisabled());
+    await page.getByText("Gain, region and what else it has").click();
+    await page.getByText("A camera of the kind command has nothing to set").waitFor();
+    assert.deepEqual(page.complaints, []);
+    await page.context().close();
+  } finally {
+    assert.equal(await alone.close(), 0);
+  }
+});
+
+test("the first power-up goes through the checklist, with a verdict for each step", async () => {
+  const page = await open(browser, `${server.address}#guides/power`);
+  await page.getByRole("button", { name: "Start the checklist" }).click();
+  const { job } = await until((now) => now.job?.kind === "check" && now.job.phase !== "running", "the list is gone through");
+  assert.equal(job.phase, "done", job.error);
+  assert.equal(job.result.failed, 0, JSON.stringify(job.result.steps));
+  await page.locator("#view-guides .status", { hasText: `${job.result.passed} passed, 0 failed` }).waitFor();
+  assert.equal(await page.locator(".verdict[data-verdict=passed]").count(), job.result.passed);
+  assert.ok(job.result.passed > 8, JSON.stringify(job.result.steps));
+  if (process.env.SCREENSHOTS) await page.screenshot({ path: join(process.env.SCREENSHOTS, "power-up.png") });
+  assert.deepEqual(page.complaints, []);
+});
+
 test("the guide of the flat series captures targets, learns a correction and finds the point spread function", async () => {
   const page = await open(browser, `${server.address}#guides/series`);
   await page.locator("#view-guides").getByLabel("Distances in mm").fill("890, 910, 930");
