@@ -54,6 +54,7 @@ async function take(wish, depth) {
   const begun = await act("/api/captures", wish);
   if (!begun) return;
   const job = await ended("job", begun.job);
+  performance.mark("captured");
   if (job.phase !== "done" || !depth) return;
   const [name] = begun.names;
   const computing = await act(`/api/captures/${name}/depth`, {});

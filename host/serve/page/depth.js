@@ -77,15 +77,19 @@ export function make(host, remember) {
     try {
       const { capture } = await get(`/api/captures/${name}`);
       const names = Object.keys(FILES).filter((layer) => capture.files.includes(FILES[layer]));
-      const loaded = await Promise.all(names.map((layer) => load(`/api/captures/${name}/files/${FILES[layer]}`)));
       if (loading !== show.loading) return;
       show.capture = capture;
-      show.maps = Object.fromEntries(names.map((layer, at) => [layer, loaded[at]]));
-      show.mesh = null;
-      viewer.shape = null;
-      if (!show.maps[show.layer] && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
+      if (!names.includes(show.layer) && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
+      // What is looked at comes first, the rest after it is on the screen.
+      const first = names.filter((layer) => layer === show.layer || layer === "confidence" || (show.layer === "surface" && layer === "depth"));
+      for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
+        const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${name}/files/${FILES[layer]}`)));
+        if (loading !== show.loading) return;
+        if (part === first) [show.maps, show.mesh, viewer.shape] = [{}, null, null];
+        part.forEach((layer, at) => { show.maps[layer] = loaded[at]; });
+        await refresh();
+      }
       await list();
-      await refresh();
     } catch (error) {
       notice(error.message, "error", error.hint);
     }
@@ -109,6 +113,7 @@ export function make(host, remember) {
     const ends = limits(layer, map);
     const picture = paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
     viewer.wipe = wipe.value / 100;
+    viewer.onpainted = () => { performance.mark("depth-shown"); viewer.onpainted = undefined; };
     viewer.show(picture, await beside(ends));
     viewer.canvas.dataset.layer = layer;
     bar(legend, colours(layer), ends, UNITS[layer]);

@@ -1,8 +1,9 @@
 // The page in a real browser, on the emulated rig: `npm ci && npm test`, or `cargo xtask test`.
-// SCREENSHOTS=folder keeps pictures of every view; docs/images has two of them.
+// SCREENSHOTS=folder keeps pictures of every view; PICTURES=1 makes those of docs/page.md anew.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createHash } from "node:crypto";
+import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
@@ -73,7 +74,8 @@ test("from the open page to a turning surface in two clicks", async () => {
   assert.notEqual(pictures[0], pictures[1], "it turns");
   assert.deepEqual(page.complaints, []);
   const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
-  console.log(`first paint after ${Math.round(paint)} ms`);
+  const shown = await page.evaluate(() => performance.getEntriesByName("depth-shown")[0]?.startTime - performance.getEntriesByName("captured").at(-1)?.startTime);
+  console.log(`first paint after ${Math.round(paint)} ms; depth on the screen ${Math.round(shown)} ms after the pair`);
   await page.context().close();
 });
 
@@ -159,6 +161,10 @@ test("live depth comes, and stop ends it", async () => {
   const page = await open(browser, server.address);
   await page.getByRole("button", { name: "Live depth" }).click();
   await page.locator(".status", { hasText: "ms from image to map" }).waitFor();
+  const canvas = page.getByLabel("Live depth;");
+  await page.waitForFunction(() => [...document.querySelectorAll("#view-live canvas")].some((canvas) => Number(canvas.dataset.painted) > 2));
+  const { age } = await painted(page, canvas, 3);
+  console.log(`live depth: a map is painted ${age} ms after its pair came (median)`);
   await page.keyboard.press("Escape");
   await until((now) => now.live.mode === "off", "live depth ends");
   await page.getByRole("button", { name: "Live image" }).click();
@@ -181,11 +187,12 @@ test("live depth is recorded and played back", async () => {
   await until((now) => now.live.mode === "off", "live depth ends");
   await page.getByLabel("Recording", { exact: true }).locator("option", { hasText: "live-001" }).waitFor({ state: "attached" });
   await page.getByLabel("as fast as it goes").check();
+  const before = Number(await page.getByLabel("Live depth;").getAttribute("data-painted"));
   await page.getByRole("button", { name: "Play" }).click();
   const { computation } = await until((now) => now.computation?.kind === "play" && now.computation.phase !== "running", "it is played");
   assert.equal(computation.phase, "done", computation.error);
   assert.ok(computation.result.pairs >= 1 && computation.result.maps_per_second > 0, JSON.stringify(computation.result));
-  console.log(`recording: ${computation.result.pairs} pairs, ${computation.result.maps_per_second} maps/s, ${computation.result.latency_ms} ms a map`);
+  console.log(`recording: ${computation.result.pairs} pairs, ${computation.result.maps_per_second} maps/s, ${computation.result.latency_ms} ms a map, ${Number(await page.getByLabel("Live depth;").getAttribute("data-painted")) - before} painted`);
   await page.locator("p", { hasText: "maps/s" }).last().waitFor();
   assert.deepEqual(page.complaints, []);
 });
@@ -297,6 +304,35 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
   await page.locator(".masks img").first().waitFor();
   assert.ok(await page.locator(".masks img").first().evaluate((image) => image.decode().then(() => image.naturalWidth === 160)));
   assert.deepEqual(page.complaints, []);
+});
+
+/** The pictures of docs/page.md: where the page stands, and what is waited for. */
+const IMAGES = join(import.meta.dirname, "../../../docs/images");
+const PICTURES = [
+  ["live", "#live", async (page) => page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 3)],
+  ["depth", "#depth/pair-001", async (page) => page.locator("canvas[data-layer=depth]").waitFor()],
+  ["optics", "#optics", async (page) => page.locator(".to-scale").waitFor()],
+  ["guide", "#guides/power", async (page) => page.locator(".check-step").first().waitFor()],
+];
+
+test("the pictures in the page's document are of this page", async () => {
+  const folder = join(import.meta.dirname, "../page");
+  const hash = createHash("sha256");
+  for (const name of readdirSync(folder).filter((name) => /\.(js|css|html)$/.test(name)).sort()) hash.update(readFileSync(join(folder, name)));
+  const made = `${hash.digest("hex")}\n`;
+  const stamp = join(IMAGES, "page.sha256");
+  if (process.env.PICTURES) {
+    for (const [name, place, ready] of PICTURES) {
+      const page = await open(browser, `${server.address}${place}`, { viewport: { width: 1120, height: 720 }, colorScheme: "light" });
+      await ready(page);
+      await page.waitForTimeout(1000);
+      const picture = await page.screenshot({ path: join(IMAGES, `page-${name}.png`) });
+      assert.ok(picture.length <= 150 * 1024, `page-${name}.png has ${picture.length} bytes`);
+      await page.context().close();
+    }
+    writeFileSync(stamp, made);
+  }
+  assert.equal(readFileSync(stamp, "utf8"), made, "the page has changed since: PICTURES=1 npm test in host/serve/tests-browser makes them anew");
 });
 
 for (const [width, height] of SIZES) {

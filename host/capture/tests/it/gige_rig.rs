@@ -174,7 +174,11 @@ fn each_frame_of_a_lossy_line_is_of_its_own_exposure() {
         match outcome {
             Outcome::Taken(frame) => {
                 let same = endpoint.image(&frame.record, WAIT).unwrap();
-                assert!(frame.image == same, "exposure {} has another's picture", frame.record.trigger_number);
+                assert!(
+                    frame.image == same,
+                    "exposure {} has another's picture",
+                    frame.record.trigger_number
+                );
                 whole += 1;
             }
             Outcome::Dropped { loss: Loss::Image { reason, .. }, .. } => {
