@@ -62,7 +62,10 @@ fn missing(folder: &Path) -> Option<&'static str> {
     let node = Command::new("node").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !node.is_ok_and(|status| status.success()) {
         Some("there is no node; Debian's package is nodejs")
-    } else if !folder.join("node_modules/playwright-core").is_dir() {
+    } else if !["playwright-core", "typescript"]
+        .iter()
+        .all(|name| folder.join("node_modules").join(name).is_dir())
+    {
         Some("`npm ci` in host/serve/tests-browser fetches what it needs")
     } else if !browser {
         Some("there is no Chromium; Debian's package is chromium, and CHROMIUM names another")

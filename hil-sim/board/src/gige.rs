@@ -10,18 +10,20 @@
 //! - gain (a factor), black level, region and pixel format are applied to the finished picture, as digital cameras do behind the converter.
 //!
 //! [`control`]: the control channel (GVCP, UDP port 3956); [`registers`]: what can be read and written; [`features`]: the camera's features, one
-//! table from which registers and the GenICam [`description`] are made; [`stream`]: frames as packets (GVSP); [`device`]: what the camera does.
+//! table from which registers and the GenICam [`description`] are made; [`stream`]: frames as packets (GVSP); [`pace`]: when they leave; [`device`]: what
+//! the camera does.
 
 pub mod control;
 pub mod description;
 pub mod device;
 pub mod features;
+pub mod pace;
 pub mod registers;
 pub mod stream;
 
 use std::{
     io::ErrorKind,
-    net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket},
+    net::{Ipv4Addr, SocketAddrV4, UdpSocket},
     sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc::Receiver},
     thread,
     time::{Duration, Instant},
@@ -30,7 +32,8 @@ use std::{
 use farnear_protocol::camera::Control;
 
 use crate::{error::SimError, imager::Picture};
-use device::Device;
+use device::{Device, Sending};
+use pace::Pace;
 
 /// Where cameras listen, by the standard.
 const CONTROL_PORT: u16 = 3956;
@@ -41,10 +44,6 @@ const LOOK: Duration = Duration::from_millis(100);
 const RENDERING: Duration = Duration::from_secs(20);
 /// Longest wait for the rig's time to pass, by the wall clock.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// Packets that leave at once; a pause after each such burst keeps to about a gigabit a second, which a receiver's buffer stands.
-const BURST: usize = 16;
-/// See [`BURST`].
-const PAUSE: Duration = Duration::from_micros(150);
 
 /// What a GigE Vision camera is made of.
 #[derive(Clone, Debug)]
@@ -155,6 +154,7 @@ fn obey(
     now: &impl Fn() -> u64,
 ) {
     let mut bytes = [0; control::PACKET_MAX];
+    let mut pace = Pace::new(Instant::now());
     loop {
         let received = control.recv_from(&mut bytes);
         // Each time, not in silence only: others may be talking all the while.
@@ -174,8 +174,8 @@ fn obey(
             if let Some(answer) = done.answer {
                 let _ = control.send_to(&answer, from); // who asked may have gone
             }
-            if let Some((to, packets)) = done.again {
-                send(stream, to, &packets);
+            if let Some(again) = done.again {
+                send(stream, &again, &mut pace);
             }
         }
     }
@@ -199,20 +199,19 @@ fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
 
 /// Sends pictures as frames while there is an acquisition.
 fn show(pictures: &Receiver<Picture>, stream: &UdpSocket, device: &Shared) {
+    let mut pace = Pace::new(Instant::now());
     for picture in pictures {
         let frame = lock(device).frame(&picture);
-        if let Some((to, packets)) = frame {
-            send(stream, to, &packets);
+        if let Some(frame) = frame {
+            send(stream, &frame, &mut pace);
         }
     }
 }
 
-fn send(stream: &UdpSocket, to: SocketAddr, packets: &[Vec<u8>]) {
-    for burst in packets.chunks(BURST) {
-        for packet in burst {
-            let _ = stream.send_to(packet, to); // the line tells of nothing that is lost
-        }
-        thread::sleep(PAUSE);
+fn send(stream: &UdpSocket, sending: &Sending, pace: &mut Pace) {
+    for packet in &sending.packets {
+        pace.hold(packet.len(), sending.gap);
+        let _ = stream.send_to(packet, sending.to); // the line tells of nothing that is lost
     }
 }
 

@@ -37,6 +37,24 @@ pub struct Image {
     pub bits: u8,
 }
 
+impl Image {
+    /// Grey values from 0 to 1.
+    pub fn grey(&self) -> Array2<f32> {
+        let largest = f32::from(((1u32 << self.bits.min(16)) - 1) as u16);
+        self.pixels.mapv(|code| f32::from(code) / largest)
+    }
+
+    /// The upper eight bits of each pixel, row by row.
+    pub fn eight_bits(&self) -> Vec<u8> {
+        let (bits, pixels) = (self.bits, self.pixels.iter());
+        if bits >= 8 {
+            pixels.map(|code| (code >> (bits - 8)).min(255) as u8).collect()
+        } else {
+            pixels.map(|code| (code << (8 - bits)).min(255) as u8).collect()
+        }
+    }
+}
+
 /// A picture as it came, to look at.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
@@ -217,4 +235,20 @@ pub enum CameraError {
         /// What was expected.
         expected: String,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::Image;
+
+    #[test]
+    fn pixels_keep_their_upper_bits() {
+        let image = |bits, code| Image { pixels: array![[code]], bits };
+        assert_eq!(image(8, 200).eight_bits(), [200]);
+        assert_eq!(image(12, 0xabc).eight_bits(), [0xab]);
+        assert_eq!(image(4, 0xf).eight_bits(), [0xf0]);
+        assert_eq!(image(12, 4095).grey(), array![[1.0]]);
+    }
 }

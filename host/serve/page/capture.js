@@ -3,7 +3,9 @@ import { act, drives, ended, on, store } from "./link.js";
 import { h, button, choice, field, panel } from "./ui.js";
 import { key } from "./keys.js";
 
+/** @type {HTMLElement | null} */
 let warnings = null;
+/** @type {(name: string) => void} */
 let go = () => {};
 
 /** Told by the page: opens the depth of a capture. */
@@ -52,6 +54,7 @@ async function take(wish, depth) {
   const begun = await act("/api/captures", wish);
   if (!begun) return;
   const job = await ended("job", begun.job);
+  performance.mark("captured");
   if (job.phase !== "done" || !depth) return;
   const [name] = begun.names;
   const computing = await act(`/api/captures/${name}/depth`, {});

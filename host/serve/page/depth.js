@@ -17,6 +17,7 @@ export function make(host, remember) {
   const viewer = new Viewer("Depth map");
   const surface = h("div", { class: "surface", hidden: true });
   const side = measure.make();
+  /** @type {{ name: string | null, layer: string, colours: string, other: string, maps: any, loading: number, capture: any, mesh?: ArrayBuffer | null }} */
   const show = { name: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, capture: null };
   const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
   const layers = h("div", { class: "group", role: "group", "aria-label": "What is shown" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
@@ -76,15 +77,19 @@ export function make(host, remember) {
     try {
       const { capture } = await get(`/api/captures/${name}`);
       const names = Object.keys(FILES).filter((layer) => capture.files.includes(FILES[layer]));
-      const loaded = await Promise.all(names.map((layer) => load(`/api/captures/${name}/files/${FILES[layer]}`)));
       if (loading !== show.loading) return;
       show.capture = capture;
-      show.maps = Object.fromEntries(names.map((layer, at) => [layer, loaded[at]]));
-      show.mesh = null;
-      viewer.shape = null;
-      if (!show.maps[show.layer] && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
+      if (!names.includes(show.layer) && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
+      // What is looked at comes first, the rest after it is on the screen.
+      const first = names.filter((layer) => layer === show.layer || layer === "confidence" || (show.layer === "surface" && layer === "depth"));
+      for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
+        const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${name}/files/${FILES[layer]}`)));
+        if (loading !== show.loading) return;
+        if (part === first) [show.maps, show.mesh, viewer.shape] = [{}, null, null];
+        part.forEach((layer, at) => { show.maps[layer] = loaded[at]; });
+        await refresh();
+      }
       await list();
-      await refresh();
     } catch (error) {
       notice(error.message, "error", error.hint);
     }
@@ -108,6 +113,7 @@ export function make(host, remember) {
     const ends = limits(layer, map);
     const picture = paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
     viewer.wipe = wipe.value / 100;
+    viewer.onpainted = () => { performance.mark("depth-shown"); viewer.onpainted = undefined; };
     viewer.show(picture, await beside(ends));
     viewer.canvas.dataset.layer = layer;
     bar(legend, colours(layer), ends, UNITS[layer]);
@@ -185,6 +191,7 @@ async function load(path) {
   return { width: picture.width, height: picture.height, data: Float32Array.from({ length: data.length / 4 }, (_, at) => data[4 * at]) };
 }
 
+/** @param {import("./maps.js").NumberMap} map @param {number[]} ends */
 function counts({ data }, [low, high]) {
   const bins = new Array(96).fill(0);
   const scale = bins.length / (high - low || 1);

@@ -39,9 +39,9 @@ export function make(host) {
     found[3].shown?.();
     if (!host.hidden) history.replaceState(null, "", `#guides/${found[0]}`);
   };
-  on("state", () => {
-    for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !drives() || store.state.rig.phase !== "ready" || store.state.job?.phase === "running";
-    for (const control of host.querySelectorAll("[data-needs=seat]")) control.disabled = !store.seat || store.state.computation?.phase === "running";
+  on("state", ({ rig, job, computation }) => {
+    for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !drives() || rig.phase !== "ready" || job?.phase === "running";
+    for (const control of host.querySelectorAll("[data-needs=seat]")) control.disabled = !store.seat || computation?.phase === "running";
   });
   pick("power");
   return { shown: (name) => pick(name ?? place.dataset.guide) };

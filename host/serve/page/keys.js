@@ -17,7 +17,7 @@ export function listen() {
       stop();
       return;
     }
-    const typing = event.target.matches?.("input, textarea, select, [contenteditable], dialog *, [role=application]");
+    const typing = event.target instanceof Element && event.target.matches("input, textarea, select, [contenteditable], dialog *, [role=application]");
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
     const found = keys.get(event.key) ?? keys.get(event.key.toLowerCase());
     if (found) {

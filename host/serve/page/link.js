@@ -1,18 +1,23 @@
 // The way to the rig's program: one socket that tells, and requests that ask. Everything the page does goes through here.
 import { notice } from "./ui.js";
 
-/** What is known: the state as it was told last, and the own seat. */
+/**
+ * What is known: the state as it was told last, and the own seat.
+ * @type {{ state: import("./state.js").State | null, seat: import("./state.js").Hello | null, connected: boolean }}
+ */
 export const store = { state: null, seat: null, connected: false };
 
+/** @type {Map<string, Set<(...values: any[]) => void>>} */
 const listeners = new Map();
+/** @type {WebSocket | null} */
 let socket = null;
 let wait = 250;
 
 /** Listens to `state`, `image`, `depth` or `link`; gives what ends it. */
 export function on(event, listener) {
-  if (!listeners.has(event)) listeners.set(event, new Set());
-  listeners.get(event).add(listener);
-  return () => listeners.get(event).delete(listener);
+  const those = listeners.get(event) ?? new Set();
+  listeners.set(event, those.add(listener));
+  return () => those.delete(listener);
 }
 
 function emit(event, ...values) {
@@ -55,7 +60,7 @@ function pictured(data) {
   if (data.byteLength < 4) return;
   const length = new DataView(data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  emit(header.type, header, data.slice(4 + length));
+  emit(header.type, header, new Uint8Array(data, 4 + length));
 }
 
 /** Asks for something; throws what went wrong, with `hint`. */

@@ -3,9 +3,10 @@ import { act, drives, ended, get, on, store } from "./link.js";
 import { h, button, choice, field, number, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
-import { paint } from "./maps.js";
+import { paintCodes } from "./maps.js";
 import { key } from "./keys.js";
 import * as capture from "./capture.js";
+import * as camera from "./camera.js";
 
 const MEASURES = [["modified-laplacian", "Modified Laplacian"], ["tenengrad", "Tenengrad"], ["fft-sum", "FFT sum (Li 2014)"]];
 const REMEMBERED = 300;
@@ -59,7 +60,7 @@ export function make(host) {
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
       panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
-      panel("Exposure", field("Exposure", exposure, "µs"), histogram, figures, warnings))));
+      panel("Camera", field("Exposure", exposure, "µs"), histogram, figures, warnings, camera.make()))));
   depth.element.hidden = true;
   key("l", "Live image on or off", () => mode("image"));
 
@@ -69,7 +70,9 @@ export function make(host) {
     const { live, rig } = state;
     off.setAttribute("aria-pressed", live.mode === "image");
     deep.setAttribute("aria-pressed", live.mode === "depth");
-    for (const control of [off, deep, exposure, measure]) control.disabled = !drives() || rig.phase !== "ready";
+    const seen = rig.phase === "ready" || live.camera_alone;
+    for (const control of [off, exposure, measure]) control.disabled = !drives() || !seen;
+    deep.disabled = !drives() || rig.phase !== "ready";
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
     measure.value = live.measure;
     const playing = state.computation?.kind === "play" && state.computation.phase === "running";
@@ -79,7 +82,7 @@ export function make(host) {
     record.textContent = live.recording ? "Stop recording" : "Record";
     if (before?.live.recording !== live.recording) listed();
     const moving = state.job?.phase === "running";
-    if (rig.phase !== "ready") status.textContent = "";
+    if (!seen) status.textContent = "";
     else if (live.error) status.textContent = live.error;
     else if (live.mode === "off") status.textContent = "live is off";
     else if (moving) status.textContent = "held while the rig works";
@@ -88,7 +91,8 @@ export function make(host) {
   on("image", (header, pixels) => {
     if (host.hidden) return;
     const found = header.figures;
-    image.show(shade(new Uint8Array(pixels), found.width, found.height, saturation.box.checked, peaking.box.checked));
+    image.show(shade(blank(found, reused.image), pixels, saturation.box.checked, peaking.box.checked));
+    time(image, header);
     status.textContent = `${number(header.rate_hz, 1)} frames/s`;
     values.push(found.focus ?? null);
     if (values.length > REMEMBERED) values.shift();
@@ -105,16 +109,10 @@ export function make(host) {
     if (host.hidden) return;
     const { width, height, low_mm, high_mm } = header;
     const count = width * height;
-    const codes = new Uint16Array(pixels.slice(0, 2 * count));
-    const confidence = new Uint8Array(pixels, 2 * count, count);
-    const data = new Float32Array(count);
-    const fade = new Float32Array(count);
-    for (let at = 0; at < count; at++) {
-      data[at] = codes[at] ? codes[at] : NaN;
-      fade[at] = confidence[at] / 255;
-    }
-    depth.show(paint({ width, height, data }, [1, 65535], "viridis", fade));
-    image.show(shade(new Uint8Array(pixels, 3 * count, count), width, height, false, false));
+    const codes = new Uint16Array(pixels.buffer, pixels.byteOffset, count);
+    depth.show(paintCodes(blank(header, reused.depth), codes, pixels.subarray(2 * count, 3 * count), "viridis"));
+    image.show(shade(blank(header, reused.image), pixels.subarray(3 * count, 4 * count), false, false));
+    time(depth, header);
     status.textContent = `${number(header.rate_hz, 1)} maps/s · ${number(header.latency_ms, 0)} ms from image to map · ${number(low_mm, 0)} to ${number(high_mm, 0)} mm`;
   });
   return { shown: () => { image.draw(); plot.size(); } };
@@ -125,9 +123,28 @@ function check(text, checked) {
   return { box, label: h("label", { class: "check" }, box, text) };
 }
 
-/** Grey pixels as a picture; what is saturated red, sharp edges orange. */
-function shade(pixels, width, height, saturation, peaking) {
-  const image = new ImageData(width, height);
+/** Pictures that are painted over again and again. @type {Record<string, ImageData[]>} */
+const reused = { image: [], depth: [] };
+
+/** A picture of this size: the one before, where it has it. @param {{ width: number, height: number }} size @param {ImageData[]} kept */
+function blank({ width, height }, kept) {
+  if (kept[0]?.width !== width || kept[0]?.height !== height) kept[0] = new ImageData(width, height);
+  return kept[0];
+}
+
+/** Where the program runs on this computer both have one clock: then the picture says how old it was when it was painted, in ms. */
+function time(viewer, { arrived_ms }) {
+  viewer.onpainted = () => {
+    const { dataset } = viewer.canvas;
+    dataset.ageMs = String(Math.round(performance.timeOrigin + performance.now() - arrived_ms));
+    dataset.painted = String(Number(dataset.painted ?? 0) + 1);
+    viewer.onpainted = undefined;
+  };
+}
+
+/** Grey pixels as a picture; what is saturated red, sharp edges orange. @param {ImageData} image @param {Uint8Array} pixels */
+function shade(image, pixels, saturation, peaking) {
+  const { width, height } = image;
   const words = new Uint32Array(image.data.buffer);
   for (let at = 0; at < pixels.length; at++) {
     const grey = pixels[at];

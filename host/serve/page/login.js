@@ -1,13 +1,13 @@
 // Sends the token; the answer is a cookie that this page cannot read.
-const form = document.getElementById("login");
+const form = /** @type {HTMLFormElement} */ (document.getElementById("login"));
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
-  const token = document.getElementById("token").value.trim();
+  const token = /** @type {HTMLInputElement} */ (document.getElementById("token")).value.trim();
   const answer = await fetch("/login", {
     method: "POST",
     headers: { "content-type": "application/json" },
     body: JSON.stringify({ token }),
   });
   if (answer.ok) location.reload();
-  else document.getElementById("wrong").textContent = "This is not the token.";
+  else /** @type {HTMLElement} */ (document.getElementById("wrong")).textContent = "This is not the token.";
 });

@@ -12,7 +12,8 @@ import * as guides from "./guides.js";
 import * as log from "./log.js";
 import { whenCaptured } from "./capture.js";
 
-const $ = (id) => document.getElementById(id);
+/** @param {string} id */
+const $ = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const views = new Map();
 let current = null;
 
@@ -102,7 +103,7 @@ function showAlarm({ rig: { info } }) {
   const alarm = $("alarm");
   const words = info?.alarm ? [h("strong", {}, `Alarm ${info.alarm}`), h("span", {}, info.alarm_text), button("Clear", () => act("/api/rig/alarms/clear", { number: info.alarm }), { disabled: !drives() })]
     : info?.emergency_stop ? [h("strong", {}, "Emergency stop is pressed"), h("span", {}, "Release it to go on.")] : null;
-  const text = words?.map((part) => part.textContent).join(" ") + drives();
+  const text = `${words?.map((part) => part.textContent).join(" ") ?? ""} ${drives()}`;
   if (alarm.dataset.text === text) return;
   alarm.dataset.text = text;
   alarm.hidden = !words;
@@ -119,7 +120,8 @@ function showJob(state, before) {
   };
   keep(place, running.map((job) => [job.id, job.kind]), () => running.map(line));
   running.forEach((job, at) => {
-    const [, said, bar] = place.children[at].children;
+    const [, said, progress] = place.children[at].children;
+    const bar = /** @type {HTMLProgressElement} */ (progress);
     said.textContent = job.said ?? "";
     if (job.progress?.total) bar.value = job.progress.done / job.progress.total;
     else bar.removeAttribute("value");
@@ -174,5 +176,6 @@ function begin() {
   go(name || "live", detail);
 }
 
-begin();
+// What stands in the page itself is painted before its views are built.
+requestAnimationFrame(() => setTimeout(begin));
 export { help };

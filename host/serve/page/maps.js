@@ -1,4 +1,6 @@
 // Colour maps that every eye tells apart, from a few anchors (viridis: van der Walt & Smith; cividis: Nuñez et al. 2018).
+import { pen } from "./ui.js";
+
 const ANCHORS = {
   viridis: ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"],
   cividis: ["00224e", "123570", "3b496c", "575d6d", "707173", "8a8678", "a59c74", "c3b369", "e1cc55", "fee838"],
@@ -30,7 +32,10 @@ function build(anchors) {
   return colours;
 }
 
-/** A map of numbers as a picture; what has no value is transparent. `fade` (0 to 1 per pixel) pales what is unsure. */
+/** @typedef {{ width: number, height: number, data: Float32Array }} NumberMap */
+
+/** A map of numbers as a picture; what has no value is transparent. `fade` (0 to 1 per pixel) pales what is unsure.
+ * @param {NumberMap} map @param {number[]} ends @param {string} name @param {ArrayLike<number> | null} [fade] */
 export function paint({ width, height, data }, [low, high], name, fade) {
   const colours = table(name);
   const image = new ImageData(width, height);
@@ -47,7 +52,19 @@ export function paint({ width, height, data }, [low, high], name, fade) {
   return image;
 }
 
-/** The values between which all but the outermost percent lie. */
+/** Depths as codes of 16 bits (0 = none) as a picture; what is unsure (confidence of 255) is paler.
+ * @param {ImageData} image @param {Uint16Array} codes @param {Uint8Array} confidence @param {string} name */
+export function paintCodes(image, codes, confidence, name) {
+  const colours = table(name);
+  // Little-endian, as every computer with a browser is: red, green, blue, alpha from the lowest byte on.
+  const colour = Uint32Array.from({ length: 256 }, (_, at) => colours[3 * at] | (colours[3 * at + 1] << 8) | (colours[3 * at + 2] << 16));
+  const alpha = Uint32Array.from({ length: 256 }, (_, at) => Math.round(40 + 215 * Math.min(1, (2 * at) / 255)) << 24);
+  const words = new Uint32Array(image.data.buffer);
+  for (let at = 0; at < words.length; at++) words[at] = codes[at] ? colour[codes[at] >> 8] | alpha[confidence[at]] : 0;
+  return image;
+}
+
+/** The values between which all but the outermost percent lie. @param {NumberMap} map @param {number} outliers @returns {[number, number]} */
 export function range({ data }, outliers = 0.01) {
   const some = [];
   const step = Math.max(1, Math.floor(data.length / 20000));
@@ -59,10 +76,10 @@ export function range({ data }, outliers = 0.01) {
   return high > low ? [low, high] : [low - 0.5, high + 0.5];
 }
 
-/** A bar with ticks for a legend. */
+/** A bar with ticks for a legend. @param {HTMLCanvasElement} canvas @param {string} name @param {number[]} ends @param {string} unit */
 export function bar(canvas, name, [low, high], unit) {
   const colours = table(name);
-  const context = canvas.getContext("2d");
+  const context = pen(canvas);
   canvas.width = 256;
   canvas.height = 1;
   const image = context.createImageData(256, 1);

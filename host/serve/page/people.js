@@ -62,8 +62,7 @@ export function activity() {
     keep(details, [found.best, found.flags], () => [rows(found.best.map(({ activity: name, share }) => [name, h("meter", { min: 0, max: 1, value: share, "aria-label": name }, `${number(100 * share, 0)} %`)])),
       found.flags?.length ? h("p", { class: "dim" }, found.flags.join(", ")) : ""]);
   };
-  on("person", ({ width, height, answer: found }, bytes) => {
-    const pixels = new Uint8Array(bytes);
+  on("person", ({ width, height, answer: found }, pixels) => {
     show(canvas, pixels, width, height);
     tell(found, `at frame ${found.frame}`);
     past.push(found.activity);

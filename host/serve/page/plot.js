@@ -1,6 +1,6 @@
 // Curves and histograms in the page's colours.
 import uPlot from "./vendor/uplot.js";
-import { colour } from "./ui.js";
+import { colour, pen } from "./ui.js";
 
 /** A plot that fills its place. `series` are names; `band` draws ±1 deviation around the first from the next two. */
 export class Plot {
@@ -50,18 +50,20 @@ export class Plot {
   }
 }
 
-/** Bars on a canvas: `counts` from left to right; the marked ones in the warning colour. */
+/** Bars on a canvas: `counts` from left to right; the marked ones in the warning colour.
+ * @param {HTMLCanvasElement} canvas @param {number[]} counts @param {(at: number) => boolean} marked */
 export function bars(canvas, counts, marked = () => false) {
   const ratio = devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (!width) return;
   canvas.width = width * ratio;
   canvas.height = height * ratio;
-  const context = canvas.getContext("2d");
+  const context = pen(canvas);
   context.scale(ratio, ratio);
   const sorted = [...counts].sort((a, b) => a - b);
+  const largest = sorted.at(-1) ?? 0;
   // A single full bin, such as saturation, does not flatten the rest.
-  const most = Math.max(1, Math.min(sorted.at(-1), 1.5 * sorted[Math.floor(0.98 * (sorted.length - 1))] || sorted.at(-1)));
+  const most = Math.max(1, Math.min(largest, 1.5 * sorted[Math.floor(0.98 * (sorted.length - 1))] || largest));
   const each = width / counts.length;
   const [plain, warn] = [colour("accent"), colour("bad")];
   counts.forEach((count, at) => {

@@ -1,6 +1,6 @@
 // How good depth is, as owners of depth cameras ask: fill rate, plane fit, noise over time, accuracy against a known distance.
 import { act, ended, get, on, store } from "./link.js";
-import { h, button, field, number, panel, rows, notice } from "./ui.js";
+import { h, button, field, number, panel, notice } from "./ui.js";
 
 /** Makes the view. */
 export function make(host) {

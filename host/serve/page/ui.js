@@ -59,13 +59,18 @@ export function rows(pairs) {
 
 /** Tells something that goes away by itself; an error stays until it is closed. */
 export function notice(text, kind = "info", hint) {
-  const place = document.getElementById("notices");
+  const place = /** @type {HTMLElement} */ (document.getElementById("notices"));
   const close = () => box.remove();
   const box = h("div", { class: `notice ${kind}` }, h("p", {}, text), hint ? h("p", { class: "dim" }, hint) : null,
     button("×", close, { "aria-label": "Close", class: "quiet" }));
   for (const old of [...place.children].slice(0, -2)) old.remove();
   place.append(box);
   if (kind !== "error") setTimeout(close, 5000);
+}
+
+/** What is drawn with on a canvas. @param {HTMLCanvasElement} canvas */
+export function pen(canvas) {
+  return /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 }
 
 /** A value of a colour of the style sheet, as it is now. */

@@ -9,18 +9,31 @@ export class Viewer {
     this.canvas = h("canvas", { tabindex: 0, role: "application", "aria-label": `${label}; plus, minus and arrows zoom and move, 0 fits` });
     this.element = h("div", { class: "viewer" }, this.canvas);
     this.source = document.createElement("canvas");
+    /** @type {HTMLCanvasElement | null} */
     this.second = null;
     this.wipe = 1;
     this.tool = "pan";
     this.fit = true;
-    [this.scale, this.left, this.top] = [1, 0, 0];
+    this.scale = 1;
+    this.left = 0;
+    this.top = 0;
+    /** @type {{ kind: string, from: number[], to: number[], open: boolean } | null} */
     this.shape = null;
     this.pointers = new Map();
+    /** Told of the pixel under the pointer, `[x, y]`, or null. @type {((at: number[] | null) => void) | undefined} */
+    this.onprobe = undefined;
+    /** Told of a region or line that was drawn. @type {((kind: string, from: number[], to: number[]) => void) | undefined} */
+    this.onshape = undefined;
+    /** Draws above the picture. @type {((context: CanvasRenderingContext2D, point: (x: number, y: number) => number[]) => void) | undefined} */
+    this.overlay = undefined;
+    /** Told when a picture is painted. @type {(() => void) | undefined} */
+    this.onpainted = undefined;
+    this.frame = 0;
     new ResizeObserver(() => this.draw()).observe(this.element);
     this.listen();
   }
 
-  /** Shows a picture (ImageData); `second` beside it, right of the wipe. */
+  /** Shows a picture; `second` beside it, right of the wipe. @param {ImageData} image @param {ImageData | null} second */
   show(image, second = null) {
     put(this.source, image);
     this.second = second ? put(this.second ?? document.createElement("canvas"), second) : null;
@@ -57,13 +70,16 @@ export class Viewer {
     context.clearRect(0, 0, width, height);
     if (!source.width) return;
     context.imageSmoothingEnabled = this.scale < 2;
+    /** @type {[number, number, number, number]} */
     const place = [this.left, this.top, source.width * this.scale, source.height * this.scale];
     context.drawImage(source, ...place);
     if (this.second) this.paintSecond(context, place, height);
     this.paintShape(context);
+    this.onpainted?.();
     this.overlay?.(context, (x, y) => [this.left + x * this.scale, this.top + y * this.scale]);
   }
 
+  /** @param {CanvasRenderingContext2D} context @param {number[]} place @param {number} bottom */
   paintSecond(context, [left, top, width, height], bottom) {
     const at = left + width * this.wipe;
     context.save();
@@ -71,7 +87,7 @@ export class Viewer {
     context.rect(at, 0, left + width - at, bottom);
     context.clip();
     context.clearRect(at, top, left + width - at, height);
-    context.drawImage(this.second, left, top, width, height);
+    if (this.second) context.drawImage(this.second, left, top, width, height);
     context.restore();
     context.fillStyle = "#fff";
     context.fillRect(at - 1, top, 2, height);
@@ -80,6 +96,7 @@ export class Viewer {
   paintShape(context) {
     if (!this.shape) return;
     const { from, to, kind } = this.shape;
+    /** @param {number[]} at @returns {[number, number]} */
     const point = ([x, y]) => [this.left + (x + 0.5) * this.scale, this.top + (y + 0.5) * this.scale];
     const [a, b] = [point(from), point(to)];
     for (const [colour, width] of [["#000", 3], ["#fff", 1.5]]) {
@@ -164,6 +181,7 @@ export class Viewer {
     const now = [event.clientX, event.clientY];
     if (this.pointers.size === 2) {
       const [other] = [...this.pointers].filter(([id]) => id !== event.pointerId).map(([, place]) => place);
+      /** @param {number[]} at */
       const apart = ([x, y]) => Math.hypot(x - other[0], y - other[1]) || 1;
       const box = this.canvas.getBoundingClientRect();
       this.zoom(apart(now) / apart(before), other[0] - box.left, other[1] - box.top);

@@ -11,13 +11,19 @@ use std::{
 };
 
 use axum::body::Bytes;
+use farnear_capture::camera::Setting;
 use farnear_depth::focus_measure::FocusMeasure;
 use farnear_files::staging::write_file;
 use farnear_protocol::Micros;
 use farnear_workflows::{
     Cancel, WorkflowError,
     optics::GivenOptics,
-    rig::{RigAddress, camera::CameraSettings, open::OpenRig, recording::Recorder},
+    rig::{
+        RigAddress,
+        camera::{CameraAddress, CameraSettings},
+        open::OpenRig,
+        recording::Recorder,
+    },
 };
 use tokio::sync::watch;
 
@@ -44,7 +50,7 @@ pub struct App {
     pub address: Option<RigAddress>,
     /// The connection, while there is one.
     rig: Mutex<Option<OpenRig>>,
-    camera: CameraSettings,
+    camera: Mutex<CameraSettings>,
     /// Jobs on the rig.
     pub rig_lane: Lane,
     /// Computations.
@@ -106,14 +112,14 @@ impl App {
             measure: FocusMeasure::ModifiedLaplacian,
             cancel: Cancel::default(),
         };
-        let state = beginning(rig.as_ref(), &live);
+        let state = beginning(rig.as_ref(), &camera, &live);
         Ok(Arc::new(Self {
             guard,
             session,
             reconnect: AtomicBool::new(rig.is_some()),
             address: rig,
             rig: Mutex::default(),
-            camera,
+            camera: Mutex::new(camera),
             rig_lane: Lane::default(),
             computing: Lane::default(),
             seats: Mutex::default(),
@@ -135,7 +141,19 @@ impl App {
 
     /// The camera, with the exposure that is set.
     pub fn camera(&self) -> CameraSettings {
-        CameraSettings { exposure: self.live().exposure, ..self.camera.clone() }
+        let exposure = self.live().exposure;
+        CameraSettings { exposure, ..lock(&self.camera).clone() }
+    }
+
+    /// Changes what is set on the camera; what is seen now ends, and begins again with it.
+    pub fn set_camera(&self, settings: Vec<Setting>) {
+        lock(&self.camera).settings = settings;
+        self.interrupt_live();
+    }
+
+    /// Whether there is a camera though there is no rig: one looks through it.
+    pub fn has_camera_alone(&self) -> bool {
+        self.address.is_none() && lock(&self.camera).address != CameraAddress::Emulated
     }
 
     /// The rig, where it is connected.
@@ -172,8 +190,9 @@ impl App {
         let Live { mode, exposure, measure, .. } = live.clone();
         drop(live);
         self.change(|state| {
-            let recording = state.live.recording.take();
-            state.live = LiveState { mode, exposure_us: exposure.0, measure, error: None, recording };
+            let LiveState { recording, camera_alone, .. } = state.live.clone();
+            state.live =
+                LiveState { mode, exposure_us: exposure.0, measure, error: None, recording, camera_alone };
         });
     }
 
@@ -317,7 +336,7 @@ impl App {
     }
 }
 
-fn beginning(address: Option<&RigAddress>, live: &Live) -> State {
+fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live) -> State {
     State {
         rig: RigState {
             phase: if address.is_some() { Phase::Connecting } else { Phase::Absent },
@@ -339,6 +358,7 @@ fn beginning(address: Option<&RigAddress>, live: &Live) -> State {
             measure: live.measure,
             error: None,
             recording: None,
+            camera_alone: address.is_none() && camera.address != CameraAddress::Emulated,
         },
         seats: SeatsState { driver: None, asking: None, count: 0 },
         question: None,

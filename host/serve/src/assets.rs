@@ -34,7 +34,7 @@ const ASSETS: &[Asset] = assets![
     CSS "style.css", CSS "vendor/uplot.css",
     SVG "icon.svg",
     JS "main.js", JS "link.js", JS "ui.js", JS "keys.js", JS "login.js",
-    JS "rig.js", JS "stages.js", JS "live.js", JS "plot.js", JS "viewer.js",
+    JS "rig.js", JS "stages.js", JS "live.js", JS "camera.js", JS "plot.js", JS "viewer.js",
     JS "lens.js", JS "capture.js", JS "depth.js", JS "measure.js", JS "maps.js", JS "npy.js", JS "mesh.js",
     JS "sessions.js", JS "log.js", JS "quality.js", JS "guides.js", JS "guide-pictures.js", JS "people.js",
     JS "vendor/three.js", JS "vendor/uplot.js",
@@ -76,6 +76,18 @@ mod tests {
     fn the_page_is_small() {
         let bytes: usize = ASSETS.iter().map(|asset| asset.bytes.len()).sum();
         assert!(bytes <= 1_500_000, "{bytes} bytes");
+    }
+
+    /// All that is needed at once is asked for at once; only the surface in 3-D comes when somebody wants it.
+    #[test]
+    fn every_module_that_is_needed_at_once_is_announced() {
+        let page = ASSETS.iter().find(|asset| asset.path == "index.html").map(|asset| asset.bytes).unwrap();
+        let page = std::str::from_utf8(page).unwrap();
+        for asset in ASSETS.iter().filter(|asset| asset.media == JS) {
+            let later = ["login.js", "mesh.js", "vendor/three.js"].contains(&asset.path);
+            let announced = page.contains(&format!("rel=\"modulepreload\" href=\"/{}\"", asset.path));
+            assert!(announced != later, "{}", asset.path);
+        }
     }
 
     #[test]

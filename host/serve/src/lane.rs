@@ -143,7 +143,9 @@ pub fn start(app: &Arc<App>) -> io::Result<Lanes> {
 /// Jobs on the rig, and what is seen live between them.
 fn run_rig(app: &App, jobs: &Receiver<Begun>) {
     loop {
-        let seen = app.live().mode != LiveMode::Off && app.rig().is_some() && app.state().seats.count > 0;
+        let seen = app.live().mode != LiveMode::Off
+            && (app.rig().is_some() || app.has_camera_alone())
+            && app.state().seats.count > 0;
         let begun = if seen && !app.is_ending() {
             match jobs.try_recv() {
                 Ok(begun) => Some(begun),

@@ -1,14 +1,21 @@
 //! Images and depth as they come, between jobs.
 
-use std::{cell::RefCell, path::Path, time::Instant};
+use std::{
+    cell::RefCell,
+    path::Path,
+    time::{Instant, SystemTime, UNIX_EPOCH},
+};
 
 use farnear_capture::camera::Image;
 use farnear_depth::{optics::Optics, pipeline::Settings};
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
-    Context, Nobody, Result, WorkflowError, optics, picture,
+    Context, Nobody, Result, WorkflowError,
+    camera::{self, CameraChoice},
+    optics, picture,
     rig::{
         RigAddress,
+        camera::CameraSettings,
         live::{self, LiveSettings},
         live_depth::{self, LiveDepth, LiveDepthSettings},
         recording::{self, PlayFigures},
@@ -18,29 +25,38 @@ use serde_json::json;
 
 use crate::{
     app::{App, Live, lock},
-    picture_message::{depth_codes, eight_bits, message},
+    picture_message::{depth_codes, message},
     view::LiveMode,
 };
 
 /// Weight of the newest frame in the shown rate.
 const NEWEST: f64 = 0.15;
 
+/// How live depth is computed: on all cores, so that the map is there soon.
+fn computation() -> Settings {
+    Settings { threads: 0, ..Settings::default() }
+}
+
 /// Looks until something else is wanted. What goes wrong is told, and nothing is looked at until somebody wants it again.
 pub fn look(app: &App) {
     let live = app.live();
-    let Some(rig) = app.rig() else { return };
+    let rig = app.rig();
+    if rig.is_none() && !app.has_camera_alone() {
+        return;
+    }
     let context = Context { progress: &Nobody, questions: &Nobody, cancel: live.cancel.clone() };
     let rate = Rate::default();
-    let ended = match live.mode {
-        LiveMode::Off => return,
-        LiveMode::Image => {
+    let ended = match (live.mode, rig) {
+        (LiveMode::Off, _) => return,
+        (_, None) => look_through_camera(app, &live, &context, &rate),
+        (LiveMode::Image, Some(rig)) => {
             let settings = LiveSettings { rig: RigAddress::Open(rig), camera: app.camera() };
             live::watch(&settings, &context, |record, image| {
-                app.pictures.send_replace(image_message(&record, &image, &live, rate.next()));
+                app.pictures.send_replace(image_message(Some(&record), &image, &live, rate.next()));
                 enough(app)
             })
         }
-        LiveMode::Depth => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
+        (LiveMode::Depth, Some(rig)) => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
     };
     match ended {
         Err(error) if !error.is_cancelled() && !app.is_ending() => {
@@ -60,18 +76,35 @@ fn enough(app: &App) -> Result<()> {
     Ok(())
 }
 
-fn image_message(record: &ShotRecord, image: &Image, live: &Live, rate_hz: f64) -> axum::body::Bytes {
+/// Without a rig a camera runs freely.
+fn look_through_camera(app: &App, live: &Live, context: &Context<'_>, rate: &Rate) -> Result<()> {
+    let CameraSettings { address, settings, .. } = app.camera();
+    camera::live::watch(&CameraChoice { address, settings }, live.exposure, context, |frame| {
+        app.pictures.send_replace(image_message(None, &frame.image, live, rate.next()));
+        enough(app)
+    })
+}
+
+/// Milliseconds since 1970 by this computer's clock, which a browser on it has, too.
+fn unix_ms() -> f64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0.0, |since| since.as_secs_f64() * 1e3)
+}
+
+fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_hz: f64) -> axum::body::Bytes {
+    let arrived_ms = unix_ms();
     let figures = picture::figures(image, live.measure);
     let header = json!({
         "type": "image",
         "figures": figures,
         "measure": live.measure.name(),
         "rate_hz": rate_hz,
-        "trigger": record.trigger_number,
-        "fine_um": f64::from(record.fine.0) / 1e3,
-        "coarse_um": f64::from(record.coarse.0) / 1e3,
+        "arrived_ms": arrived_ms,
+        "trigger": record.map(|record| record.trigger_number),
+        "fine_um": record.map(|record| f64::from(record.fine.0) / 1e3),
+        "coarse_um": record.map(|record| f64::from(record.coarse.0) / 1e3),
     });
-    message(&header, &eight_bits(image))
+    message(&header, &image.eight_bits())
 }
 
 fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate) -> Result<()> {
@@ -80,7 +113,7 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
         rig,
         camera: app.camera(),
         optics: app.optics_file(),
-        computation: Settings::default(),
+        computation: computation(),
     };
     let ended = live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
         record(app, &depth);
@@ -116,11 +149,12 @@ fn depth_message(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> axum::b
         "rate_hz": rate_hz,
         "pair_ms": depth.pair_ms,
         "latency_ms": depth.latency_ms,
+        "arrived_ms": unix_ms() - depth.latency_ms,
         "low_texture_fraction": depth.map.low_texture_fraction,
     });
     let mut pixels = depth_codes(&depth.map.depth_mm, ends);
     pixels.extend(depth.map.confidence.iter().map(|value| (value * 255.0) as u8));
-    pixels.extend(eight_bits(depth.far));
+    pixels.extend(depth.far.eight_bits());
     message(&header, &pixels)
 }
 
@@ -134,7 +168,7 @@ fn ends(optics: &Optics) -> [f32; 2] {
 /// Shows a recording as it was recorded, or as fast as depth is computed.
 pub fn play(app: &App, path: &Path, fast: bool, context: &Context<'_>) -> Result<PlayFigures> {
     let rate = Rate::default();
-    recording::play(path, &Settings::default(), fast, context, |depth, optics| {
+    recording::play(path, &computation(), fast, context, |depth, optics| {
         app.pictures.send_replace(depth_message(&depth, ends(optics), rate.next()));
         Ok(())
     })

@@ -1,6 +1,7 @@
 //! All routes, one file per subject.
 
 pub mod calibrate;
+pub mod camera;
 pub mod captures;
 pub mod depth;
 pub mod files;
@@ -44,6 +45,7 @@ pub type Shared = State<Arc<App>>;
 pub fn api() -> (Router<Arc<App>>, serde_json::Value) {
     let api = general::routes(Api::default());
     let api = rig::routes(api);
+    let api = camera::routes(api);
     let api = lens::routes(api);
     let api = captures::routes(api);
     let api = files::routes(api);

@@ -122,6 +122,8 @@ pub struct LiveState {
     pub error: Option<String>,
     /// Name of the recording that live depth goes into.
     pub recording: Option<String>,
+    /// Whether there is a camera though no rig: its image can be seen live, nothing else.
+    pub camera_alone: bool,
 }
 
 /// What is looked at live.

@@ -1,7 +1,9 @@
 // The page in a real browser, on the emulated rig: `npm ci && npm test`, or `cargo xtask test`.
-// SCREENSHOTS=folder keeps pictures of every view; docs/images has two of them.
+// SCREENSHOTS=folder keeps pictures of every view; PICTURES=1 makes those of docs/page.md anew.
 import assert from "node:assert/strict";
-import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { spawnSync } from "node:child_process";
+import { createHash } from "node:crypto";
+import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
@@ -44,6 +46,12 @@ async function until(fits, what) {
 const moving = ({ rig }) => rig.info.coarse.moving || rig.info.lens.moving;
 const still = (now) => !moving(now) && now.job?.phase !== "running";
 
+test("the page's JavaScript agrees with its types", () => {
+  const compiler = createRequire(import.meta.url).resolve("typescript/bin/tsc");
+  const { status, stdout } = spawnSync(process.execPath, [compiler, "--project", import.meta.dirname], { encoding: "utf8" });
+  assert.equal(status, 0, stdout);
+});
+
 test("the OpenAPI document is valid", async () => {
   const found = await new Validator().validate(await server.ask("/openapi.json"));
   assert.ok(found.valid, JSON.stringify(found.errors));
@@ -66,7 +74,8 @@ test("from the open page to a turning surface in two clicks", async () => {
   assert.notEqual(pictures[0], pictures[1], "it turns");
   assert.deepEqual(page.complaints, []);
   const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
-  console.log(`first paint after ${Math.round(paint)} ms`);
+  const shown = await page.evaluate(() => performance.getEntriesByName("depth-shown")[0]?.startTime - performance.getEntriesByName("captured").at(-1)?.startTime);
+  console.log(`first paint after ${Math.round(paint)} ms; depth on the screen ${Math.round(shown)} ms after the pair`);
   await page.context().close();
 });
 
@@ -152,6 +161,10 @@ test("live depth comes, and stop ends it", async () => {
   const page = await open(browser, server.address);
   await page.getByRole("button", { name: "Live depth" }).click();
   await page.locator(".status", { hasText: "ms from image to map" }).waitFor();
+  const canvas = page.getByLabel("Live depth;");
+  await page.waitForFunction(() => [...document.querySelectorAll("#view-live canvas")].some((canvas) => Number(canvas.dataset.painted) > 2));
+  const { age } = await painted(page, canvas, 3);
+  console.log(`live depth: a map is painted ${age} ms after its pair came (median)`);
   await page.keyboard.press("Escape");
   await until((now) => now.live.mode === "off", "live depth ends");
   await page.getByRole("button", { name: "Live image" }).click();
@@ -174,12 +187,59 @@ test("live depth is recorded and played back", async () => {
   await until((now) => now.live.mode === "off", "live depth ends");
   await page.getByLabel("Recording", { exact: true }).locator("option", { hasText: "live-001" }).waitFor({ state: "attached" });
   await page.getByLabel("as fast as it goes").check();
+  const before = Number(await page.getByLabel("Live depth;").getAttribute("data-painted"));
   await page.getByRole("button", { name: "Play" }).click();
   const { computation } = await until((now) => now.computation?.kind === "play" && now.computation.phase !== "running", "it is played");
   assert.equal(computation.phase, "done", computation.error);
   assert.ok(computation.result.pairs >= 1 && computation.result.maps_per_second > 0, JSON.stringify(computation.result));
-  console.log(`recording: ${computation.result.pairs} pairs, ${computation.result.maps_per_second} maps/s, ${computation.result.latency_ms} ms a map`);
+  console.log(`recording: ${computation.result.pairs} pairs, ${computation.result.maps_per_second} maps/s, ${computation.result.latency_ms} ms a map, ${Number(await page.getByLabel("Live depth;").getAttribute("data-painted")) - before} painted`);
   await page.locator("p", { hasText: "maps/s" }).last().waitFor();
+  assert.deepEqual(page.complaints, []);
+});
+
+/** What the page painted in a while: pictures a second, and how old they were then (median, ms). */
+async function painted(page, canvas, seconds) {
+  const [begin, ages] = [Date.now(), []];
+  const count = async () => Number((await canvas.getAttribute("data-painted")) ?? 0);
+  const first = await count();
+  while (Date.now() - begin < 1000 * seconds) {
+    ages.push(Number(await canvas.getAttribute("data-age-ms")));
+    await page.waitForTimeout(50);
+  }
+  const rate = (await count() - first) / ((Date.now() - begin) / 1000);
+  return { rate, age: ages.sort((a, b) => a - b)[Math.floor(ages.length / 2)] };
+}
+
+test("a camera without a rig is seen live, and nothing that needs a rig is offered", async () => {
+  const alone = await serve(["--camera", `command:640x480:gray:${process.execPath} ${join(import.meta.dirname, "camera.mjs")}`]);
+  try {
+    const page = await open(browser, alone.address, {}, "absent");
+    await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
+    const canvas = page.locator("#view-live .viewer canvas").first();
+    await page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 5);
+    const { rate, age } = await painted(page, canvas, 5);
+    console.log(`live image of 640x480 px, 30 a second: ${rate.toFixed(1)} painted a second, ${age} ms old (median)`);
+    assert.ok(await page.getByRole("button", { name: "Live depth" }).isDisabled());
+    assert.ok(await page.getByRole("button", { name: "Capture pair" }).isDisabled());
+    await page.getByText("Gain, region and what else it has").click();
+    await page.getByText("A camera of the kind command has nothing to set").waitFor();
+    assert.deepEqual(page.complaints, []);
+    await page.context().close();
+  } finally {
+    assert.equal(await alone.close(), 0);
+  }
+});
+
+test("the first power-up goes through the checklist, with a verdict for each step", async () => {
+  const page = await open(browser, `${server.address}#guides/power`);
+  await page.getByRole("button", { name: "Start the checklist" }).click();
+  const { job } = await until((now) => now.job?.kind === "check" && now.job.phase !== "running", "the list is gone through");
+  assert.equal(job.phase, "done", job.error);
+  assert.equal(job.result.failed, 0, JSON.stringify(job.result.steps));
+  await page.locator("#view-guides .status", { hasText: `${job.result.passed} passed, 0 failed` }).waitFor();
+  assert.equal(await page.locator(".verdict[data-verdict=passed]").count(), job.result.passed);
+  assert.ok(job.result.passed > 8, JSON.stringify(job.result.steps));
+  if (process.env.SCREENSHOTS) await page.screenshot({ path: join(process.env.SCREENSHOTS, "power-up.png") });
   assert.deepEqual(page.complaints, []);
 });
 
@@ -244,6 +304,35 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
   await page.locator(".masks img").first().waitFor();
   assert.ok(await page.locator(".masks img").first().evaluate((image) => image.decode().then(() => image.naturalWidth === 160)));
   assert.deepEqual(page.complaints, []);
+});
+
+/** The pictures of docs/page.md: where the page stands, and what is waited for. */
+const IMAGES = join(import.meta.dirname, "../../../docs/images");
+const PICTURES = [
+  ["live", "#live", async (page) => page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 3)],
+  ["depth", "#depth/pair-001", async (page) => page.locator("canvas[data-layer=depth]").waitFor()],
+  ["optics", "#optics", async (page) => page.locator(".to-scale").waitFor()],
+  ["guide", "#guides/power", async (page) => page.locator(".check-step").first().waitFor()],
+];
+
+test("the pictures in the page's document are of this page", async () => {
+  const folder = join(import.meta.dirname, "../page");
+  const hash = createHash("sha256");
+  for (const name of readdirSync(folder).filter((name) => /\.(js|css|html)$/.test(name)).sort()) hash.update(readFileSync(join(folder, name)));
+  const made = `${hash.digest("hex")}\n`;
+  const stamp = join(IMAGES, "page.sha256");
+  if (process.env.PICTURES) {
+    for (const [name, place, ready] of PICTURES) {
+      const page = await open(browser, `${server.address}${place}`, { viewport: { width: 1120, height: 720 }, colorScheme: "light" });
+      await ready(page);
+      await page.waitForTimeout(1000);
+      const picture = await page.screenshot({ path: join(IMAGES, `page-${name}.png`) });
+      assert.ok(picture.length <= 150 * 1024, `page-${name}.png has ${picture.length} bytes`);
+      await page.context().close();
+    }
+    writeFileSync(stamp, made);
+  }
+  assert.equal(readFileSync(stamp, "utf8"), made, "the page has changed since: PICTURES=1 npm test in host/serve/tests-browser makes them anew");
 });
 
 for (const [width, height] of SIZES) {

@@ -8,10 +8,10 @@ import { chromium } from "playwright-core";
 const FARNEAR = process.env.FARNEAR ?? join(import.meta.dirname, "../../../target/debug/farnear");
 const BROWSERS = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome", chromium.executablePath()];
 
-/** Serves until `close`. */
-export async function serve() {
+/** Serves until `close`; the emulated rig where nothing else is named. */
+export async function serve(what = ["--rig", "sim"]) {
   const session = mkdtempSync(join(tmpdir(), "farnear-page-"));
-  const child = spawn(FARNEAR, ["serve", "--rig", "sim", "--session", session, "--port", "0"], { stdio: ["ignore", "pipe", "inherit"] });
+  const child = spawn(FARNEAR, ["serve", ...what, "--session", session, "--port", "0"], { stdio: ["ignore", "pipe", "inherit"] });
   const address = await new Promise((done, failed) => {
     child.stdout.once("data", (data) => done(String(data).trim()));
     child.once("exit", (code) => failed(new Error(`farnear serve ended with ${code}`)));
@@ -31,7 +31,7 @@ export function browser() {
 }
 
 /** A page; what its console says of errors is kept in `page.complaints`. */
-export async function open(browser, address, options = {}) {
+export async function open(browser, address, options = {}, phase = "ready") {
   const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, ...options });
   const page = await context.newPage();
   page.complaints = [];
@@ -39,6 +39,6 @@ export async function open(browser, address, options = {}) {
   page.on("pageerror", (error) => page.complaints.push(String(error)));
   page.setDefaultTimeout(120_000);
   await page.goto(address);
-  await page.locator("#link[data-phase=ready]").waitFor();
+  await page.locator(`#link[data-phase=${phase}]`).waitFor();
   return page;
 }

@@ -7,8 +7,12 @@ use farnear_capture::camera::{Camera, Setting, v4l};
 use serde::Serialize;
 
 use crate::{
+    context::Context,
     error::{Result, WorkflowError},
-    rig::camera::CameraAddress,
+    rig::{
+        RigAddress,
+        camera::{CameraAddress, CameraSettings},
+    },
 };
 
 /// A kind of camera.
@@ -155,6 +159,20 @@ pub struct ShowFigures {
 pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
     let mut camera = choice.open()?;
     Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })
+}
+
+/// The same of a camera that hangs on a rig.
+///
+/// # Errors
+/// As [`CameraSettings::connect`]; [`WorkflowError::Camera`].
+pub fn show_at_rig(
+    settings: &CameraSettings,
+    rig: &RigAddress,
+    context: &Context<'_>,
+) -> Result<ShowFigures> {
+    let mut equipped = settings.connect(rig, None, context)?;
+    let camera = equipped.camera.as_mut();
+    Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera)? })
 }
 
 fn controls_of(camera: &mut dyn Camera) -> Result<Vec<ControlFigures>> {

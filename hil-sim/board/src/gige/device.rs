@@ -19,7 +19,10 @@ use super::{
         ACQUISITION, BLACK_LEVEL, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, MONO_8, OFFSET_X,
         OFFSET_Y, PIXEL_FORMAT, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
     },
-    registers::{FIRE_TEST, HEARTBEAT_MS, PACKET_SIZE, PRIVILEGE, PRIVILEGE_CONTROL, Refusal, Registers},
+    registers::{
+        FIRE_TEST, HEARTBEAT_MS, PACKET_DELAY_NS, PACKET_SIZE, PRIVILEGE, PRIVILEGE_CONTROL, Refusal,
+        Registers,
+    },
     stream::{Frame, HEADERS_BYTES, UDP_HEADERS_BYTES},
 };
 use crate::{imager::Picture, plant::Noise};
@@ -42,8 +45,18 @@ pub struct Done {
     pub answer: Option<Vec<u8>>,
     /// What the rig is asked for.
     pub asks: Vec<Control>,
-    /// Packets that are to be sent (again), and where.
-    pub again: Option<(SocketAddr, Vec<Vec<u8>>)>,
+    /// Packets that are to be sent (again).
+    pub again: Option<Sending>,
+}
+
+/// Packets for the stream.
+pub struct Sending {
+    /// Where they go.
+    pub to: SocketAddr,
+    /// The packets, in order.
+    pub packets: Vec<Vec<u8>>,
+    /// From one to the next, at least: what the client asked for.
+    pub gap: Duration,
 }
 
 /// The camera.
@@ -117,7 +130,9 @@ impl Device {
                 read.map(|bytes| [&address.to_be_bytes(), bytes].concat())
             }
             Ok(Ask::Resend { frame, first, last }) => {
-                done.again = self.again(*frame, *first, *last).filter(|_| controls);
+                // The client's stream asks, by a port of its own.
+                let of_client = self.controller.is_some_and(|(controller, _)| controller.ip() == from.ip());
+                done.again = self.again(*frame, *first, *last).filter(|_| of_client);
                 Ok(Vec::new())
             }
             Ok(Ask::Write(writes)) => {
@@ -153,7 +168,7 @@ impl Device {
             PACKET_SIZE if value & FIRE_TEST != 0 => {
                 self.registers.put(PACKET_SIZE, value & !FIRE_TEST);
                 let test = vec![0; self.packet_bytes() - UDP_HEADERS_BYTES];
-                done.again = self.registers.destination().map(|to| (to, vec![test]));
+                done.again = self.sending(vec![test]);
             }
             ACQUISITION if value == START => {
                 self.acquires_since_ns = Some(now_ns);
@@ -226,7 +241,7 @@ impl Device {
 
     /// A picture as packets and where they go; `None` where it is nobody's: without an acquisition, exposed before it began, or not triggered
     /// as the camera is now.
-    pub fn frame(&mut self, picture: &Picture) -> Option<(SocketAddr, Vec<Vec<u8>>)> {
+    pub fn frame(&mut self, picture: &Picture) -> Option<Sending> {
         let since_ns = self.acquires_since_ns?;
         let free = picture.header.shot_id == FREE_RUNNING;
         let software = picture.header.shot_id & SOFTWARE_SHOTS != 0 && !free;
@@ -238,7 +253,7 @@ impl Device {
         if !wanted || picture.begin_ns < since_ns {
             return None;
         }
-        let to = self.registers.destination()?;
+        self.registers.destination()?;
         self.frames += 1;
         let frame = self.picture(picture)?;
         let packets = frame.packets(self.packet_bytes());
@@ -247,18 +262,23 @@ impl Device {
         if self.kept.len() > KEPT {
             self.kept.pop_front();
         }
-        Some((to, sent))
+        self.sending(sent)
+    }
+
+    /// Packets on their way to whoever has the camera; `None` where it has not said where they go.
+    fn sending(&self, packets: Vec<Vec<u8>>) -> Option<Sending> {
+        let gap = Duration::from_nanos(u64::from(self.registers.get(PACKET_DELAY_NS)));
+        self.registers.destination().map(|to| Sending { to, packets, gap })
     }
 
     /// The packets of a frame that can be sent again; some of them are lost again.
-    fn again(&mut self, frame: u16, first: u32, last: u32) -> Option<(SocketAddr, Vec<Vec<u8>>)> {
-        let to = self.registers.destination()?;
+    fn again(&mut self, frame: u16, first: u32, last: u32) -> Option<Sending> {
         let (_, packets) = self.kept.iter().find(|(number, _)| *number == frame)?;
         let (first, last) = (first as usize, (last as usize).min(packets.len().saturating_sub(1)));
         let asked = packets.get(first..=last)?;
         let lost = self.lost;
         let sent = asked.iter().filter(|_| self.losses.uniform() >= lost).cloned().collect();
-        Some((to, sent))
+        self.sending(sent)
     }
 
     /// The region, with gain and black level, in the pixel format.

@@ -22,6 +22,8 @@ pub const HEARTBEAT_MS: u32 = 0x0938;
 pub const STREAM_PORT: u32 = 0x0D00;
 /// Size of the stream's packets with their headers of IP and UDP, and flags.
 pub const PACKET_SIZE: u32 = 0x0D04;
+/// From one packet to the next at least, in ticks of the camera's clock, which are ns.
+pub const PACKET_DELAY_NS: u32 = 0x0D08;
 /// Address to which frames go.
 pub const STREAM_ADDRESS: u32 = 0x0D18;
 /// Bytes that a discovery is answered with.
@@ -43,7 +45,7 @@ const WRITABLE: [(u32, u32, u32); 9] = [
     (HEARTBEAT_MS, 500, 600_000),
     (STREAM_PORT, 0, 65_535),
     (PACKET_SIZE, 0, u32::MAX),
-    (0x0D08, 0, u32::MAX), // delay between packets, which here is its own
+    (PACKET_DELAY_NS, 0, 10_000_000),
     (STREAM_ADDRESS, 0, u32::MAX),
     (CHUNK_MODE, 0, 1),
     (CHUNK_SELECTOR, 0, CHUNKS.len() as u32 - 1),

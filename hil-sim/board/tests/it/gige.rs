@@ -167,7 +167,9 @@ impl Client {
                     let again = [u32::from(*id), from, until].map(u32::to_be_bytes).concat();
                     self.number += 1;
                     let head = [0x42, 0, 0, 0x40, 0, 12, 0, self.number as u8];
-                    self.control.send(&[&head[..], &again].concat()).expect("sent");
+                    // As Aravis' client does: the stream itself asks, and so by another port than that of the control channel.
+                    let camera = self.control.peer_addr().expect("connected");
+                    self.stream.send_to(&[&head[..], &again].concat(), camera).expect("sent");
                 }
             }
         }

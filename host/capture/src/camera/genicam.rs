@@ -10,8 +10,8 @@ use std::{
 };
 
 use aravis::{
-    AcquisitionMode, Aravis, Auto, Buffer, BufferStatus, GvStream, PixelFormat, Stream, glib::object::Cast,
-    prelude::*,
+    AcquisitionMode, Aravis, Auto, Buffer, BufferStatus, GvDevice, GvStream, PixelFormat, Stream,
+    glib::object::Cast, prelude::*,
 };
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
@@ -105,6 +105,13 @@ impl GenicamCamera {
         let lost = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&lost);
         let device = camera.device();
+        // Aravis opens one that another program holds, too, and then nothing can be written.
+        let held = device.as_ref().and_then(|device| device.downcast_ref::<GvDevice>());
+        if held.is_some_and(|device| !device.is_controller()) {
+            let reason =
+                "another program holds it; end that one (one that was killed holds it for some seconds more)";
+            return Err(unusable(&id, reason.into()));
+        }
         if let Some(device) = &device {
             device.connect_control_lost(move |_| told.store(true, Ordering::Relaxed));
         }

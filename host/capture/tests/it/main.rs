@@ -6,6 +6,8 @@ mod command_camera;
 mod continuous;
 #[cfg(feature = "genicam")]
 mod genicam_camera;
+#[cfg(feature = "genicam")]
+mod gige_rig;
 mod line;
 mod pair;
 mod requests;

@@ -168,6 +168,7 @@ async fn compute(
             smoothing_px: wish.smooth_px,
             median_px: wish.median_px,
             fill: wish.fill,
+            threads: 0,
             ..Settings::default()
         },
         window: None,

@@ -120,6 +120,16 @@ fn every_route_answers_in_its_own_words() {
 }
 
 #[test]
+fn a_setting_that_no_camera_has_is_refused_by_name() {
+    let served = Served::with_board(Faults::default());
+    served.ready();
+    let socket = Socket::open(&served);
+    let refused = served.post("/api/camera", &socket.secret, r#"{"set":["gian=1"]}"#);
+    assert_eq!(refused.status, 400);
+    assert!(refused.error().contains("gian") && refused.error().contains("black_level"), "{refused:?}");
+}
+
+#[test]
 fn the_page_and_its_files_are_there_with_a_policy() {
     let served = Served::captures_only();
     for (path, media) in [("/", "text/html"), ("/main.js", "text/javascript"), ("/style.css", "text/css")] {

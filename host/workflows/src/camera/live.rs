@@ -2,8 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use farnear_capture::camera::Image;
+use farnear_capture::camera::{Frame, Image, Setting};
 use farnear_depth::focus_measure::FocusMeasure;
+use farnear_protocol::Micros;
 use serde::Serialize;
 
 use super::CameraChoice;
@@ -86,6 +87,30 @@ pub fn live(
         (all, since, frames) = (all + frames, Instant::now(), 0);
     }
     Ok(all + frames)
+}
+
+/// Gives picture after picture to `on_frame` until it or the context wants no more. The exposure is set where the camera has one.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`], [`WorkflowError::Camera`], [`WorkflowError::Cancelled`] at the wished end; what `on_frame` gives.
+pub fn watch(
+    choice: &CameraChoice,
+    exposure: Micros,
+    context: &Context<'_>,
+    mut on_frame: impl FnMut(Frame) -> Result<()>,
+) -> Result<()> {
+    let mut camera = choice.open()?;
+    let exposure = Setting::ExposureUs(f64::from(exposure.0));
+    if camera.controls()?.iter().any(|control| control.name == exposure.name()) {
+        camera.set(&exposure)?;
+    }
+    camera.watch()?;
+    loop {
+        context.cancel.check("looking through the camera")?;
+        if let Some(frame) = camera.newest(SLICE)? {
+            on_frame(frame)?;
+        }
+    }
 }
 
 fn figures(image: &Image, measure: FocusMeasure, frames_per_s: f64) -> LiveFigures {

@@ -13,7 +13,6 @@ use farnear_capture::{
 };
 use farnear_depth::pipeline::{DepthMap, Processor, Settings};
 use farnear_protocol::{Micros, Settle, message::Axis};
-use ndarray::Array2;
 
 use super::{RigAddress, camera::CameraSettings, camera::EquippedRig};
 use crate::{context::Context, error::Result, operators, optics::GivenOptics};
@@ -90,7 +89,7 @@ pub fn watch(
         }
         let arrived = Instant::now();
         shown = Some(arrived);
-        let map = processor.run(grey(&far.image).view(), grey(&near.image).view())?;
+        let map = processor.run(far.image.grey().view(), near.image.grey().view())?;
         let pair_us = near.record.strobe_end.0.saturating_sub(far.record.strobe_start.0);
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
         on_depth(LiveDepth {
@@ -102,10 +101,4 @@ pub fn watch(
         })?;
     }
     Ok(())
-}
-
-/// Grey values from 0 to 1.
-pub(super) fn grey(image: &Image) -> Array2<f32> {
-    let largest = f32::from(((1u32 << image.bits.min(16)) - 1) as u16);
-    image.pixels.mapv(|code| f32::from(code) / largest)
 }

@@ -15,7 +15,7 @@ use farnear_files::{mesh::Projection, staging::write_file};
 use ndarray::{Array2, s};
 use serde::{Deserialize, Serialize};
 
-use super::{RigAddress, camera::CameraSettings, live_depth::grey, pair::take};
+use super::{RigAddress, camera::CameraSettings, pair::take};
 use crate::{
     clock,
     context::Context,
@@ -115,7 +115,7 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
     for index in 0..settings.pairs {
         context.cancel.check("measuring the depth quality")?;
         let (pair, _) = take(&mut rig, &optics, &settings.camera, context)?;
-        let (far, near) = (grey(&pair.far.image), grey(&pair.near.image));
+        let (far, near) = (pair.far.image.grey(), pair.near.image.grey());
         let map = depth_from_pair(far.view(), near.view(), &designed, &optics.optics, &computation)?;
         if index == 0 {
             let (far, near) = (far.view(), near.view());

@@ -11,10 +11,12 @@ use std::{
     fs::{self, File},
     io::{BufReader, BufWriter, ErrorKind, Read, Write},
     path::{Path, PathBuf},
+    sync::mpsc::{self, SyncSender},
+    thread,
     time::{Duration, Instant},
 };
 
-use farnear_capture::camera::Image;
+use farnear_capture::camera::{Image, pixels::Layout};
 use farnear_depth::{
     optics::Optics,
     pipeline::{Processor, Settings},
@@ -22,7 +24,7 @@ use farnear_depth::{
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::live_depth::{LiveDepth, grey};
+use super::live_depth::LiveDepth;
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -40,6 +42,8 @@ pub const PAIRS_MAX: usize = 2000;
 const OPTICS_MAX: u32 = 1 << 20;
 /// Most pixels of an image.
 const PIXELS_MAX: usize = 1 << 26;
+/// Pairs that are read before they are due.
+const AHEAD: usize = 2;
 /// From one look at the wish to stop to the next.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -59,7 +63,7 @@ pub struct PlayFigures {
     pub pairs: usize,
     /// Over the time that it took.
     pub maps_per_second: f64,
-    /// From a pair to its map, median, in ms of this computer's clock.
+    /// From a pair's grey values to its map, median, in ms of this computer's clock.
     pub latency_ms: f64,
     /// Recorded time, s.
     pub seconds: f64,
@@ -224,10 +228,10 @@ impl Recording {
         let mut image = || -> Result<Image> {
             let mut bytes = vec![0; 2 * pixels];
             self.file.read_exact(&mut bytes).map_err(cut)?;
-            let codes = bytes.chunks_exact(2).map(|code| u16::from_le_bytes([code[0], code[1]])).collect();
-            let size = (usize::from(height), usize::from(width));
-            let pixels = Array2::from_shape_vec(size, codes).map_err(|error| wrong(&error.to_string()))?;
-            Ok(Image { pixels, bits })
+            let layout = Layout::Grey16 { bits };
+            layout
+                .decode(&bytes, usize::from(width), usize::from(height))
+                .map_err(|bad| wrong(&format!("has {bad}")))
         };
         let (far, near) = (image()?, image()?);
         self.read = number;
@@ -235,7 +239,29 @@ impl Recording {
     }
 }
 
-/// Plays a recording and gives each pair with its depth to `on_depth`.
+/// A pair of a recording with its grey values, made while depth of the one before is computed.
+struct Ready {
+    pair: RecordedPair,
+    far: Array2<f32>,
+    near: Array2<f32>,
+}
+
+/// Reads ahead, by at most [`AHEAD`] pairs, until the end, an error, or nobody wants more.
+fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
+    loop {
+        let ready = match recording.next_pair() {
+            Ok(Some(pair)) => Ok(Ready { far: pair.far.grey(), near: pair.near.grey(), pair }),
+            Ok(None) => return,
+            Err(error) => Err(error),
+        };
+        let last = ready.is_err();
+        if to.send(ready).is_err() || last {
+            return;
+        }
+    }
+}
+
+/// Plays a recording and gives each pair with its depth to `on_depth`. One thread reads, another computes.
 ///
 /// # Errors
 /// The file, optics, operators, computation; [`WorkflowError::Cancelled`]; what `on_depth` gives.
@@ -246,25 +272,32 @@ pub fn play(
     context: &Context<'_>,
     mut on_depth: impl FnMut(LiveDepth<'_>, &Optics) -> Result<()>,
 ) -> Result<PlayFigures> {
-    let mut recording = Recording::open(path)?;
+    let recording = Recording::open(path)?;
     let optics = recording.optics;
     let designed = operators::find(None, &optics)?;
     let mut processor = Processor::new(&designed, &optics, computation)?;
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
-    while let Some(RecordedPair { at, far, near }) = recording.next_pair()? {
-        while !fast && begin.elapsed() < at {
+    thread::scope(|scope| {
+        // Whoever reads ends when the receiver goes, which is at the end of this closure.
+        let (to, pairs) = mpsc::sync_channel(AHEAD);
+        scope.spawn(move || read_ahead(recording, &to));
+        for ready in pairs {
+            let Ready { pair: RecordedPair { at, far, near }, far: far_grey, near: near_grey } = ready?;
+            while !fast && begin.elapsed() < at {
+                context.cancel.check("playing a recording")?;
+                thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
+            }
             context.cancel.check("playing a recording")?;
-            std::thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
+            let arrived = Instant::now();
+            let map = processor.run(far_grey.view(), near_grey.view())?;
+            let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+            latencies_ms.push(latency_ms);
+            seconds = at.as_secs_f64();
+            context.progress.advance("pairs", latencies_ms.len(), None);
+            on_depth(LiveDepth { far: &far, near: &near, map, pair_ms: 0.0, latency_ms }, &optics)?;
         }
-        context.cancel.check("playing a recording")?;
-        let arrived = Instant::now();
-        let map = processor.run(grey(&far).view(), grey(&near).view())?;
-        let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
-        latencies_ms.push(latency_ms);
-        seconds = at.as_secs_f64();
-        context.progress.advance("pairs", latencies_ms.len(), None);
-        on_depth(LiveDepth { far: &far, near: &near, map, pair_ms: 0.0, latency_ms }, &optics)?;
-    }
+        Ok::<_, WorkflowError>(())
+    })?;
     latencies_ms.sort_by(f64::total_cmp);
     let pairs = latencies_ms.len();
     Ok(PlayFigures {

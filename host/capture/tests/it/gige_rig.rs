@@ -1,0 +1,195 @@
+//! The whole way over GigE Vision: the emulated rig's board triggers, its camera answers over the real transport through Aravis, and what
+//! comes is held against the same rig's TCP endpoint.
+
+use std::{
+    io::{BufRead, BufReader},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+
+use super::genicam_camera::ALONE;
+use farnear_capture::{
+    Client,
+    camera::{Camera, CameraError, GenicamCamera, Setting, SimCamera},
+    continuous::{Continuous, Loss, Outcome, Pace},
+    pair::{CaptureError, Exposures, Pair, capture_pair, reach},
+    plan::SensorPair,
+};
+use farnear_protocol::units::Micros;
+
+/// Far and near focus of the emulated rig's usual lens.
+const SENSOR: SensorPair = SensorPair { far_mm: 52.831_257, near_mm: 52.987_52 };
+const WAIT: Duration = Duration::from_secs(60);
+
+/// `farnear-sim` as `cargo xtask test` builds it, beside this test.
+fn simulator() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let folder = test.ancestors().nth(2).unwrap_or(Path::new("."));
+    folder.join("farnear-sim")
+}
+
+/// An emulated rig with its two cameras.
+struct Rig {
+    child: Child,
+    port: String,
+    camera: String,
+    gige: String,
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Rig {
+    fn start(seed: u64, arguments: &[&str]) -> Self {
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut child = Command::new(simulator())
+            .args(["run", "--gige", "lo", "--seed", &seed.to_string()])
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let value = |key: &str| {
+            let (_, rest) =
+                line.split_once(&format!("\"{key}\": \"")).unwrap_or_else(|| panic!("{key}: {line}"));
+            rest.split('"').next().unwrap().to_string()
+        };
+        let (port, camera, gige) = (value("port"), value("camera"), value("gige"));
+        Self { child, port, camera, gige, _alone: alone }
+    }
+
+    fn client(&self) -> Client {
+        Client::open_emulated(&self.port).unwrap()
+    }
+
+    fn gige(&self) -> GenicamCamera {
+        let until = Instant::now() + WAIT;
+        loop {
+            match GenicamCamera::open(&self.gige) {
+                Ok(camera) => return camera,
+                // One that was killed holds it until its heartbeat runs out.
+                Err(error) => assert!(Instant::now() < until, "{error}"),
+            }
+        }
+    }
+}
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn pair(client: &Client, camera: &mut dyn Camera) -> Result<Pair, CaptureError> {
+    capture_pair(client, camera, &SENSOR, &Exposures::default(), &mut |_| {})
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_pair_over_gige_is_that_of_the_endpoint_bit_for_bit() {
+    let by_tcp = {
+        let rig = Rig::start(5, &[]);
+        let mut camera = SimCamera::connect(&rig.camera).unwrap();
+        pair(&rig.client(), &mut camera).unwrap()
+    };
+    // One packet in a hundred is lost, and sent again.
+    let rig = Rig::start(5, &["--gige-lost", "10"]);
+    let mut camera = rig.gige();
+    let by_gige = pair(&rig.client(), &mut camera).unwrap();
+    assert!(by_gige.far.image == by_tcp.far.image && by_gige.near.image == by_tcp.near.image);
+    assert!(by_gige.far.image != by_gige.near.image);
+    assert_eq!(by_gige.far.record, by_tcp.far.record);
+    // What is set acts: half the sensor, a quarter of it in bits.
+    camera.set(&Setting::Region([64, 32, 320, 240])).unwrap();
+    let part = pair(&rig.client(), &mut camera).unwrap();
+    assert_eq!(part.far.image.pixels.dim(), (240, 320));
+    let refused = camera.set(&Setting::Gain(17.0)).unwrap_err().to_string();
+    assert!(refused.contains("1 to 16"), "{refused}");
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_rig_killed_in_mid_capture_is_said_and_the_next_one_works() {
+    let mut rig = Rig::start(6, &["--paced"]);
+    let (client, mut camera) = (rig.client(), rig.gige());
+    let exposing = Arc::new(Mutex::new(false));
+    let told = Arc::clone(&exposing);
+    let capture = std::thread::spawn(move || {
+        let say = &mut |text: &str| *told.lock().unwrap() |= text.starts_with("exposing");
+        let pairs = std::iter::repeat_with(|| {
+            capture_pair(&client, &mut camera, &SENSOR, &Exposures::default(), say)
+        });
+        pairs.filter_map(Result::err).next().unwrap().to_string()
+    });
+    let until = Instant::now() + WAIT;
+    while !*exposing.lock().unwrap() {
+        assert!(Instant::now() < until, "it never exposes");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    rig.child.kill().unwrap();
+    let said = capture.join().unwrap();
+    assert!(said.contains("answer") || said.contains("gone") || said.contains("away"), "{said}");
+    drop(rig);
+    let rig = Rig::start(6, &[]);
+    let mut camera = rig.gige();
+    pair(&rig.client(), &mut camera).unwrap();
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn software_triggers_give_their_frames_and_a_camera_that_is_held_says_so() {
+    let rig = Rig::start(7, &[]);
+    let mut camera = rig.gige();
+    let held = GenicamCamera::open(&rig.gige).err().unwrap();
+    assert!(
+        matches!(&held, CameraError::Unusable { .. }) && held.to_string().contains("another program"),
+        "{held}"
+    );
+    camera.watch().unwrap();
+    let mut newest = || camera.newest(WAIT).unwrap().expect("a frame within the wait");
+    let (first, second) = (newest(), newest());
+    // Chunks carry number and time in the rig's own time, whatever this computer does meanwhile.
+    let frames = second.stamp.count.unwrap() - first.stamp.count.unwrap();
+    let time = second.stamp.time.unwrap() - first.stamp.time.unwrap();
+    assert_eq!(time, Duration::from_millis(40) * u32::try_from(frames).unwrap());
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn each_frame_of_a_lossy_line_is_of_its_own_exposure() {
+    // FARNEAR_GIGE_FRAMES=10000 for the long run.
+    let frames = std::env::var("FARNEAR_GIGE_FRAMES").ok().and_then(|text| text.parse().ok()).unwrap_or(24);
+    let rig = Rig::start(8, &["--gige-lost", "10"]);
+    let (client, mut camera) = (rig.client(), rig.gige());
+    // The endpoint has the same pictures, each with the number of its trigger.
+    let mut endpoint = SimCamera::connect(&rig.camera).unwrap();
+    let shots = reach(&client, &SENSOR, &Exposures::default(), &mut |_| {}).unwrap().shots;
+    let pace = Pace { period: Micros(0), exposures: frames };
+    let mut stream = Continuous::start(&client, &mut camera, &shots, pace, WAIT).unwrap();
+    let (mut whole, mut told) = (0, 0);
+    while let Some(outcome) = stream.outcome().unwrap() {
+        match outcome {
+            Outcome::Taken(frame) => {
+                let same = endpoint.image(&frame.record, WAIT).unwrap();
+                assert!(
+                    frame.image == same,
+                    "exposure {} has another's picture",
+                    frame.record.trigger_number
+                );
+                whole += 1;
+            }
+            Outcome::Dropped { loss: Loss::Image { reason, .. }, .. } => {
+                assert!(reason.contains("packets were lost"), "{reason}");
+                told += 1;
+            }
+            // The board waits for its camera's read-out where it must.
+            Outcome::Dropped { .. } => {}
+        }
+    }
+    println!("{frames} exposures: {whole} frames whole, {told} told as incomplete");
+    // What is lost is sent again, and again; five losses of one packet in a row are not to be seen in a lifetime.
+    assert!(whole > 0 && told * 20 <= whole, "{whole} whole, {told} incomplete");
+}

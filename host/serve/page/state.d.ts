@@ -1,0 +1,45 @@
+// What the program tells the page, for the page's type check: `/openapi.json` has the same, word for word, with what each means.
+export interface Job {
+  id: number;
+  kind: string;
+  title: string;
+  phase: "running" | "done" | "failed" | "stopped";
+  said: string | null;
+  warnings: string[];
+  progress: { unit: string; done: number; total: number | null } | null;
+  /** The figures of its kind. */
+  result: any;
+  error: string | null;
+  hint: string | null;
+}
+export interface State {
+  rig: {
+    phase: "absent" | "connecting" | "ready" | "lost";
+    name: string | null;
+    emulated: boolean;
+    error: string | null;
+    /** As `farnear rig info --json` prints it. */
+    info: any;
+  };
+  job: Job | null;
+  computation: Job | null;
+  live: {
+    mode: "off" | "image" | "depth";
+    exposure_us: number;
+    measure: string;
+    error: string | null;
+    recording: string | null;
+    /** A camera without a rig: its image can be seen live. */
+    camera_alone: boolean;
+  };
+  seats: { driver: number | null; asking: number | null; count: number };
+  question: string | null;
+  captures: number;
+  optics: number;
+  log: number;
+}
+export interface Hello {
+  seat: number;
+  secret: string;
+  version: string;
+}

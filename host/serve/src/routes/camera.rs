@@ -1,0 +1,77 @@
+//! The camera: what can be set on it.
+
+use std::str::FromStr;
+
+use axum::{
+    Json,
+    extract::State,
+    http::{HeaderMap, StatusCode},
+};
+use farnear_capture::camera::Setting;
+use farnear_workflows::{
+    Context,
+    camera::{self, CameraChoice},
+    rig::RigAddress,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{Body, Shared, driver};
+use crate::{
+    api::{Api, For},
+    app::App,
+    failure::Failure,
+    lane::Task,
+    routes::rig::{begin, connected, figures},
+    view::Begun,
+};
+
+/// What is set on the camera; what is not named stays.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraWish {
+    /// As on the command line: `gain=2`, `region=0,0,640,480`.
+    #[serde(default)]
+    pub set: Vec<String>,
+}
+
+/// Adds the routes.
+pub fn routes(api: Api) -> Api {
+    api.post::<CameraWish, Begun, _, _>(
+        "/api/camera",
+        For::Driver,
+        "Sets something on the camera, for everything that looks through it from now on; the job's result has all that can be set, with its range.",
+        set,
+    )
+}
+
+async fn set(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(wish): Body<CameraWish>,
+) -> Result<Json<Begun>, Failure> {
+    driver(&app, &headers)?;
+    let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, reason);
+    let wished: Vec<Setting> =
+        wish.set.iter().map(|text| Setting::from_str(text)).collect::<Result<_, _>>().map_err(wrong)?;
+    let alone = app.has_camera_alone();
+    let rig = if alone { None } else { Some(RigAddress::Open(connected(&app)?)) };
+    let mut camera = app.camera();
+    for setting in wished {
+        camera.settings.retain(|other| other.name() != setting.name());
+        camera.settings.push(setting);
+    }
+    let work = move |app: &App, context: &Context<'_>| {
+        let found = match rig {
+            Some(rig) => camera::show_at_rig(&camera, &rig, context)?,
+            None => {
+                let (address, settings) = (camera.address.clone(), camera.settings.clone());
+                camera::show(&CameraChoice { address, settings })?
+            }
+        };
+        // What the camera refused is not tried again at the next picture.
+        app.set_camera(camera.settings);
+        figures(found)
+    };
+    begin(&app, Task { kind: "camera", title: "Set up the camera".into(), work: Box::new(work) })
+}

@@ -1,0 +1,13 @@
+// A camera for `command:`: grey pictures of 640x480 px to standard output, 30 a second, a bright bar wandering through a texture.
+const [width, height] = [640, 480];
+const texture = Buffer.from({ length: width * height }, (_, at) => 60 + (((at * 2654435761) >>> 13) % 90));
+let number = 0;
+
+function next() {
+  const picture = Buffer.from(texture);
+  const left = (8 * number++) % (width - 40);
+  for (let row = 0; row < height; row++) picture.fill(230, row * width + left, row * width + left + 40);
+  process.stdout.write(picture);
+}
+setInterval(next, 1000 / 30);
+process.stdout.on("error", () => process.exit(0));
