@@ -2,6 +2,7 @@
 //!
 //! One file per job. Every step says what it does before it does it, and every failure says what to type next.
 
+mod arm;
 mod bench;
 mod boards;
 mod browser;

@@ -5,6 +5,7 @@ use std::{process::Stdio, time::Instant};
 use anyhow::{Result, bail};
 
 use crate::{
+    arm,
     boards::BOARDS,
     browser::{self, Counts},
     firmware, instructions, python,
@@ -53,6 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     step("tests on the host and on the emulated board");
     let mut total = test_programs::run(&elf, arguments.all)?;
+    step("the vectors of 64-bit ARM");
+    arm::run(&mut total)?;
     step("the page in a browser");
     add(&mut total, &browser::run()?);
     step("the Python package");

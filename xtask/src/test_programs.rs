@@ -175,7 +175,7 @@ fn listing(folder: &Path, hasher: &mut DefaultHasher) {
 }
 
 /// Runs tests to their end, shows and adds what they say; gives the summary if all passed.
-fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>> {
+pub fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>> {
     let mut child = command.stdout(Stdio::piped()).spawn().context("cannot start a test program")?;
     let stdout = child.stdout.take().context("a test program has no output")?;
     let mut result = None;

@@ -1,7 +1,8 @@
 //! The inner loops of the run time for whatever vector unit the processor has.
 //!
-//! Each loop is written once over [`Lanes`] and compiled three times: AVX-512, AVX2 with FMA, and portable code of
-//! four lanes that any compiler turns into what it can. Which one runs is decided at run time ([`Backend::best`]).
+//! Each loop is written once over [`Lanes`] and compiled for each unit: AVX-512, AVX2 with FMA, NEON on 64-bit ARM, and
+//! portable code of four lanes that any compiler turns into what it can. Which one runs is decided at run time
+//! ([`Backend::best`]).
 //! All rows are *valid* convolutions: output column `x` comes from the input columns `x..x + 2r`, so every load of an
 //! output vector starts aligned and rows only get shorter. Rows are padded to [`Plane::PADDING`] beyond their content,
 //! because a vector may read past the last useful column.
@@ -14,8 +15,12 @@ mod convolve;
 mod lags;
 mod lanes;
 mod median;
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+mod neon;
 mod peak;
 mod rows;
+#[cfg(test)]
+mod same_everywhere;
 mod windows;
 
 use serde::{Deserialize, Serialize};
@@ -51,6 +56,9 @@ macro_rules! dispatch {
                 crate::simd::Backend::Avx512 => unsafe { avx512($($argument),*) },
                 #[cfg(target_arch = "x86_64")]
                 crate::simd::Backend::Avx2 => unsafe { avx2($($argument),*) },
+                // The target promises NEON to all of its code: nothing to enable, nothing to detect.
+                #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+                crate::simd::Backend::Neon => $generic::<crate::simd::neon::Neon>($($argument),*),
                 _ => $generic::<crate::simd::lanes::Portable>($($argument),*),
             }
         }
@@ -66,6 +74,8 @@ pub enum Backend {
     Avx512,
     /// 8 lanes, x86-64 with AVX2 and FMA.
     Avx2,
+    /// 4 lanes, 64-bit ARM.
+    Neon,
     /// Whatever the compiler makes of four lanes, on any processor.
     Portable,
 }
@@ -78,7 +88,10 @@ impl Backend {
 
     /// All that this processor has, the fastest first.
     pub fn available() -> Vec<Self> {
-        [Self::Avx512, Self::Avx2, Self::Portable].into_iter().filter(|b| b.is_available()).collect()
+        [Self::Avx512, Self::Avx2, Self::Neon, Self::Portable]
+            .into_iter()
+            .filter(|b| b.is_available())
+            .collect()
     }
 
     /// Whether this processor has it.
@@ -90,6 +103,7 @@ impl Backend {
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx512 | Self::Avx2 => false,
+            Self::Neon => cfg!(all(target_arch = "aarch64", target_feature = "neon")),
             Self::Portable => true,
         }
     }

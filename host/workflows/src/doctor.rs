@@ -101,9 +101,11 @@ fn processor() -> Finding {
     match Backend::best() {
         Backend::Avx512 => Finding::ok(WHAT, format!("{cores}, AVX-512")),
         Backend::Avx2 => Finding::ok(WHAT, format!("{cores}, AVX2")),
+        Backend::Neon => Finding::ok(WHAT, format!("{cores}, NEON")),
         Backend::Portable => {
-            let remedy = "depth is right and some times slower than on a processor with AVX2 (docs/speed.md)";
-            Finding::bad(Health::Optional, WHAT, format!("{cores}, neither AVX2 nor AVX-512"), remedy)
+            let remedy =
+                "depth is right and some times slower than on a processor with AVX2 or NEON (docs/speed.md)";
+            Finding::bad(Health::Optional, WHAT, format!("{cores}, neither AVX2, AVX-512 nor NEON"), remedy)
         }
     }
 }

@@ -48,7 +48,9 @@ mod tests {
 
     #[test]
     fn operations_are_counted_by_lanes() {
-        for (backend, lanes) in [(Backend::Avx512, 16), (Backend::Avx2, 8), (Backend::Portable, 4)] {
+        for (backend, lanes) in
+            [(Backend::Avx512, 16), (Backend::Avx2, 8), (Backend::Neon, 4), (Backend::Portable, 4)]
+        {
             if backend.is_available() {
                 assert_eq!(backend.multiply_adds(10), 10 * 2 * 12 * lanes);
             }

@@ -1,0 +1,117 @@
+//! The run time's vectors on 64-bit ARM (NEON): their tests under qemu, where it, a linker and the target are there.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context, Result};
+
+use crate::{
+    run::{ROOT, cargo},
+    test_programs::{self, Total},
+};
+
+/// The target of a Raspberry Pi or a Jetson with a 64-bit system.
+pub const TARGET: &str = "aarch64-unknown-linux-gnu";
+/// Debian's cross compiler, which brings the C library that programs for the target are linked with and run with.
+const LINKER: &str = "aarch64-linux-gnu-gcc";
+const SYSROOT: &str = "/usr/aarch64-linux-gnu";
+/// Runs the target's programs.
+pub const QEMU: &str = "qemu-aarch64";
+
+/// The modules of host/depth whose tests reach the vectors.
+const MODULES: [&str; 4] = ["simd", "filter", "pipeline", "windowed"];
+
+/// Runs the tests and adds them to the total, or says what is missing and counts them as skipped.
+///
+/// # Errors
+/// A cargo that cannot be started, though everything is there.
+pub fn run(total: &mut Total) -> Result<()> {
+    if let Some(missing) = missing() {
+        eprintln!("skipped: the vectors of 64-bit ARM ({missing})");
+        for module in MODULES {
+            total.ignored += tests_of(module)?;
+        }
+        return Ok(());
+    }
+    let mut command = cargo(["test", "--locked", "--package", "farnear-depth", "--lib", "--target", TARGET]);
+    command.arg("--").args(MODULES.map(|module| format!("{module}::")));
+    test_programs::watch(for_target(&mut command), total)?;
+    Ok(())
+}
+
+/// What there is not, and what brings it.
+pub fn missing() -> Option<&'static str> {
+    if !starts(QEMU, "--version") {
+        Some("there is no qemu-aarch64; Debian's package is qemu-user")
+    } else if !links() {
+        Some("nothing links for it; Debian's packages are gcc-aarch64-linux-gnu and libc6-dev-arm64-cross")
+    } else if !target_installed() {
+        Some("the target is missing; `rustup target add aarch64-unknown-linux-gnu`")
+    } else {
+        None
+    }
+}
+
+/// Tells cargo how to link and to run programs of the target.
+pub fn for_target(command: &mut Command) -> &mut Command {
+    command
+        .env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", LINKER)
+        .env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER", emulator().join(" "))
+}
+
+/// The words with which a call of the target's programs begins.
+pub fn emulator() -> [&'static str; 3] {
+    [QEMU, "-L", SYSROOT]
+}
+
+/// Whether the cross compiler is there and finds the C library's start files, which another package brings.
+fn links() -> bool {
+    let found = Command::new(LINKER).arg("-print-file-name=crti.o").output();
+    found.is_ok_and(|found| Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_absolute())
+}
+
+fn starts(program: &str, argument: &str) -> bool {
+    let status = Command::new(program).arg(argument).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
+}
+
+fn target_installed() -> bool {
+    let folder = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    folder.is_ok_and(|found| Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_dir())
+}
+
+/// How many tests a module of host/depth has, those below it included.
+fn tests_of(module: &str) -> Result<u32> {
+    let file = ROOT.join(format!("host/depth/src/{module}.rs"));
+    let below = file.with_extension("");
+    Ok(written(&file)? + if below.is_dir() { written(&below)? } else { 0 })
+}
+
+/// How many tests stand in a file, or in the files of a folder.
+fn written(place: &Path) -> Result<u32> {
+    let seen = || format!("cannot read {}", place.display());
+    if place.is_dir() {
+        let mut count = 0;
+        for entry in fs::read_dir(place).with_context(seen)? {
+            count += written(&entry.with_context(seen)?.path())?;
+        }
+        return Ok(count);
+    }
+    let text = fs::read_to_string(place).with_context(seen)?;
+    Ok(text.lines().filter(|line| line.trim() == "#[test]").count() as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn skipped_tests_are_those_in_the_files() {
+        for module in MODULES {
+            assert!(tests_of(module).is_ok_and(|count| count > 0), "{module}");
+        }
+    }
+}
