@@ -24,6 +24,7 @@ use crate::{
     error::SimError,
     faults::{Lines, Moment, Schedule},
     kept_memory,
+    link_rates::LinkRates,
     memory::MemoryChip,
     pacing::Pacing,
     parts::Parts,
@@ -65,6 +66,7 @@ pub struct Driver {
     pacing: Pacing,
     pictures: Pictures,
     lines: Lines,
+    rates: LinkRates,
     scenario: Scenario,
     parts: Parts,
     /// What is still to happen.
@@ -107,6 +109,7 @@ impl Driver {
             pacing: Pacing::new(config.pace),
             pictures,
             lines: Lines::new(config.scenario.bit_error_rate, config.seed),
+            rates: LinkRates::new(),
             scenario: config.scenario.clone(),
             parts: config.parts.clone(),
             schedule: Schedule::new(&config.scenario.happens, config.seed),
@@ -194,6 +197,7 @@ impl Driver {
         if let Some(vcd) = self.vcd() {
             vcd.received(now_ns, &bytes);
         }
+        self.rates.carry(&mut bytes);
         self.lines.to_host.carry(&mut bytes);
         self.hand_out(bytes);
         if self.scenario.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
@@ -230,6 +234,7 @@ impl Driver {
                 self.held.extend(bytes);
                 self.send_held(now_ns);
             }
+            Command::HostRate(baud) => self.rates.set_host(baud),
             Command::Advance { nanos, done } => self.pacing.advance(now_ns, nanos, done),
             Command::Settle { done } => self.pacing.settle(done),
             Command::Access(work) => {
@@ -304,10 +309,11 @@ impl Driver {
 
     /// Bytes of the host go on the line to the board.
     fn put_on_the_line(&mut self, mut bytes: Vec<u8>, now_ns: u64) {
+        self.pacing.lockstep.sent(&bytes, now_ns);
+        self.rates.carry(&mut bytes);
         if let Some(vcd) = self.vcd() {
             vcd.sent(now_ns, &bytes);
         }
-        self.pacing.lockstep.sent(&bytes, now_ns);
         self.lines.to_board.carry(&mut bytes);
         for _ in 0..self.witness.sent(now_ns, &bytes) {
             self.schedule.notice(Moment::Request, now_ns);
@@ -357,6 +363,7 @@ impl Driver {
         self.witness.reset();
         (self.resets, self.powered) = (resets, powered);
         self.wiring.board_reset(at);
+        self.rates.reset();
         self.pacing.lockstep.reset(at.0);
     }
 
@@ -423,6 +430,13 @@ impl emulator::Driver<RigBoard> for Driver {
                 return;
             }
             Settled::Access { access, .. }
+                if access.kind == AccessKind::Write && LinkRates::watches(access.address) =>
+            {
+                // The register has 16 bits.
+                self.rates.divide(access.value as u32);
+                return;
+            }
+            Settled::Access { access, .. }
                 if access.kind == AccessKind::Write && Wiring::watches(access.address) =>
             {
                 (access.virtual_time, Some(access.address))
@@ -447,6 +461,7 @@ impl emulator::Driver<RigBoard> for Driver {
         }
         self.note_resets(session, stop.at);
         self.exchange(stop.at.0);
+        self.rates.settle();
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.board_mut().chip.join_breaks(stop.at);
         self.happen(session, stop, host);
