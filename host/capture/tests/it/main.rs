@@ -7,6 +7,7 @@ mod continuous;
 #[cfg(feature = "genicam")]
 mod genicam_camera;
 mod line;
+mod link_rate;
 mod pair;
 mod requests;
 mod scripted;
