@@ -27,6 +27,9 @@ const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 /// An encoded frame, ready for the wire.
 pub type Encoded = Vec<u8, FRAME_MAX>;
 
+/// A frame as it travels: see [`delimited`].
+pub type Delimited = Vec<u8, { FRAME_MAX + 1 }>;
+
 /// What a frame carries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -117,6 +120,16 @@ pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
     wire.truncate(length);
     wire.push(0).ok()?;
     Some(wire)
+}
+
+/// A frame with a delimiter in front as well: one that the line spoils then costs one frame and not the next, too. Both sides
+/// send so, and neither expects it.
+pub fn delimited(frame: &Encoded) -> Delimited {
+    let mut bytes = Delimited::new();
+    // There is room for the longest frame and one byte.
+    let _ = bytes.push(0);
+    let _ = bytes.extend_from_slice(frame);
+    bytes
 }
 
 /// Decodes the bytes between two delimiters (delimiters not included).

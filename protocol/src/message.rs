@@ -19,6 +19,7 @@ mod board;
 mod calibration;
 mod call;
 mod event;
+mod link;
 mod maths;
 mod memory;
 mod request;
@@ -34,6 +35,7 @@ pub use self::{
     calibration::{Calibration, Routine},
     call::{Call, ID_STEP_MAX, NO_SESSION},
     event::{Event, EventKind, Failure},
+    link::{LINK_TRIAL, LinkRate},
     maths::{
         CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,
         QueryDeviations, ShadowAnswer, ShadowQuery, ShadowReliability, SunAnswer, SunQuery,

@@ -1,6 +1,6 @@
 //! The board: its pins, and what the control loop asks of them ([`farnear_rig::control::Board`]).
 
-use defmt::{error, info};
+use defmt::{error, info, warn};
 use embassy_stm32::{
     Peri, Peripherals,
     gpio::{Input, Pull},
@@ -8,7 +8,7 @@ use embassy_stm32::{
     usart::ConfigError,
     wdg::IndependentWatchdog,
 };
-use farnear_protocol::{BoardMicros, Log, frame::Encoded};
+use farnear_protocol::{BoardMicros, Log, message::LinkRate};
 use farnear_rig::{
     control::{Board, Note},
     io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges},
@@ -151,12 +151,16 @@ impl Board for Nucleo {
         self.link.has_room()
     }
 
-    fn send(&mut self, frame: Encoded) {
-        self.link.send(frame);
+    fn send(&mut self, bytes: &[u8]) {
+        self.link.send(bytes);
     }
 
     fn all_sent(&self) -> bool {
         self.link.is_idle()
+    }
+
+    fn set_link_rate(&mut self, rate: LinkRate) {
+        self.link.set_rate(rate);
     }
 
     fn take_log(&mut self) -> Option<(u32, Log)> {
@@ -167,6 +171,12 @@ impl Board for Nucleo {
         match note {
             Note::StepQueueDry { time } => error!("a STEP queue ran dry at {} us", time.0),
             Note::Reset => info!("reset on request"),
+            Note::Alarm(record) => error!("alarm {}: {}", record.number, record.alarm),
+            Note::AlarmCleared { number } => info!("alarm {} is cleared", number),
+            Note::Refused { request, error } => warn!("request {} is refused: {}", request, error),
+            Note::Position { axis, state } => info!("position of {}: {}", axis, state),
+            Note::Session { request } => info!("a session is opened by request {}", request),
+            Note::LinkRate(rate) => info!("the link's rate is {} baud from now on", rate.baud()),
         }
     }
 

@@ -17,29 +17,19 @@
 //!
 //! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
 
-use farnear_protocol::frame::{Encoded, Header, Kind, encode};
+use farnear_protocol::frame::{Header, Kind, delimited, encode};
+use farnear_protocol::message::LinkRate;
 use farnear_protocol::{BoardMicros, Log, Micros, PROTOCOL_CURRENT};
 
 use crate::Rig;
 use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, StrobeEdges};
 use crate::motion::since;
+pub use crate::notes::Note;
 
 /// Answers and events after which the log has a turn.
 const FRAMES_BEFORE_LOG: u8 = 8;
 /// A reset waits so long for the last frame: the longest takes 1.3 ms on the wire, and one may wait before it.
 pub const LAST_FRAME: Micros = Micros(10_000);
-
-/// What the loop has to tell whoever reads the board's log.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Note {
-    /// A STEP queue ran dry; said once, until none is dry any more.
-    StepQueueDry {
-        /// When it was seen.
-        time: BoardMicros,
-    },
-    /// The board is going to be reset, for the host asked for it.
-    Reset,
-}
 
 /// The hardware of a board, as the loop sees it. Each method does one thing, at once.
 pub trait Board {
@@ -79,11 +69,14 @@ pub trait Board {
     /// Whether another frame can be sent.
     fn has_room(&self) -> bool;
 
-    /// Sends a frame; only where there is room.
-    fn send(&mut self, frame: Encoded);
+    /// Sends a frame with its delimiters, [`farnear_protocol::frame::Delimited`]; only where there is room.
+    fn send(&mut self, bytes: &[u8]);
 
     /// Whether the last bit of the last frame has left the board.
     fn all_sent(&self) -> bool;
+
+    /// Gives the link another rate, now.
+    fn set_link_rate(&mut self, rate: LinkRate);
 
     /// The next piece of the board's log and its number.
     fn take_log(&mut self) -> Option<(u32, Log)>;
@@ -106,8 +99,6 @@ pub struct Control<'r> {
     dry: bool,
     /// Since when the board is about to be reset.
     leaving: Option<BoardMicros>,
-    /// Something has been said since the start.
-    spoken: bool,
     /// Frames since the log had its turn.
     frames_before_log: u8,
     /// What is to be done for the host was put off in the tick before.
@@ -117,7 +108,7 @@ pub struct Control<'r> {
 impl<'r> Control<'r> {
     /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
-        Self { rig, dry: false, leaving: None, spoken: false, frames_before_log: 0, put_off: false }
+        Self { rig, dry: false, leaving: None, frames_before_log: 0, put_off: false }
     }
 
     /// One tick.
@@ -137,6 +128,12 @@ impl<'r> Control<'r> {
         }
         let outputs = self.rig.tick(&inputs);
         board.apply(&outputs);
+        if let Some(note) = self.rig.take_note() {
+            board.note(note);
+        }
+        if let Some(rate) = self.rig.link_rate_due(inputs.now, || board.all_sent()) {
+            board.set_link_rate(rate);
+        }
         // Frames without a pause put it off by a tick at most; the memory's writes leave a tick out by themselves.
         let has_time = outputs.memory.is_none() && (!frame_came || self.put_off);
         self.put_off = !has_time;
@@ -174,7 +171,7 @@ impl<'r> Control<'r> {
             return !self.rig.has_work() && self.speak_log(board);
         };
         self.frames_before_log = self.frames_before_log.saturating_add(1);
-        self.send(board, frame);
+        board.send(&delimited(&frame));
         true
     }
 
@@ -188,19 +185,9 @@ impl<'r> Control<'r> {
         self.frames_before_log = 0;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Log, id, boot: self.rig.boot() };
         if let Some(frame) = encode(header, &log) {
-            self.send(board, frame);
+            board.send(&delimited(&frame));
         }
         true
-    }
-
-    /// Sends a frame. The first one begins with a delimiter: it ends what a reset has cut off, which would spoil this frame too.
-    fn send(&mut self, board: &mut impl Board, mut frame: Encoded) {
-        if !self.spoken {
-            self.spoken = true;
-            // There is no room in a frame of full length only; what the board says first is short.
-            let _ = frame.insert(0, 0);
-        }
-        board.send(frame);
     }
 }
 

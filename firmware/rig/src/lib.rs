@@ -11,6 +11,7 @@
 //! |- requests   what each is checked for and starts, no one left out    report: hello and status
 //! |- progress   how long work goes on and ends                      work: what is under way, on each axis or on all
 //! |- events     numbered; kept for whoever saw a gap
+//! |- link_rate  its change, and the way back                       notes: what the log is told
 //! |- alarms     latched, numbered, cleared one by one               silence: the host must stay in touch
 //! |- memory     records in two copies: their form, the writing, what is in them
 //! |- correction, sun_query    depth correction and the sun over the link (farnear-maths)
@@ -51,9 +52,11 @@ pub mod events;
 pub mod gains;
 pub mod identity;
 pub mod io;
+mod link_rate;
 mod matrix;
 mod memory;
 mod motion;
+pub mod notes;
 mod piezo;
 pub mod program;
 mod progress;

@@ -15,6 +15,7 @@ use farnear_protocol::message::{
 };
 
 use crate::correction::Correction;
+use crate::notes::Note;
 use crate::rig::{Reboot, Rig};
 use crate::session::Incoming;
 use crate::sun_query;
@@ -28,7 +29,8 @@ impl Rig {
         let id = incoming.id;
         match &incoming.request {
             Request::Hello => Ok(Response::Hello(self.hello())),
-            Request::OpenSession => Ok(self.stop()),
+            Request::OpenSession => Ok(self.open_session(id)),
+            Request::SetLinkRate { rate } => self.set_link_rate(*rate, now),
             Request::Status => Ok(Response::Status(self.status(now))),
             Request::ReadEvent { number } => self.read_event(*number),
             Request::Stop => Ok(self.stop()),
@@ -69,6 +71,11 @@ impl Rig {
                 answer(self.correction()?.get_row(*first, *count), Response::Row)
             }
         }
+    }
+
+    fn open_session(&mut self, request: u32) -> Response {
+        self.notes.add(Note::Session { request });
+        self.stop()
     }
 
     fn stop(&mut self) -> Response {

@@ -2,7 +2,9 @@
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::frame::{self, Encoded, Kind};
-use farnear_protocol::message::{Alarm, Axis, Counters, EventKind, Failure, RecordName, ResetCause};
+use farnear_protocol::message::{
+    Alarm, Axis, Counters, EventKind, Failure, LinkRate, RecordName, ResetCause,
+};
 
 use crate::alarms::{self, Alarms};
 use crate::camera::Camera;
@@ -10,11 +12,13 @@ use crate::correction::Correction;
 use crate::events::Events;
 use crate::identity::{Identity, LastWords};
 use crate::io::{Inputs, MEMORY_BYTES, MemoryWrite, MotorOutputs, Outputs};
+use crate::link_rate::LinkSpeed;
 use crate::memory::contents::{Contents, Restored};
 use crate::memory::record::{self, Found, RECORDS};
 use crate::memory::store::Store;
 use crate::motion::since;
 use crate::motion::stage::Stage;
+use crate::notes::{Note, Notes};
 use crate::program::Shots;
 use crate::session::Session;
 use crate::settings::{Settings, Values};
@@ -48,6 +52,8 @@ pub struct Rig {
     pub(crate) correction: Correction,
     pub(crate) events: Events,
     pub(crate) session: Session,
+    pub(crate) link_speed: LinkSpeed,
+    pub(crate) notes: Notes,
     pub(crate) reboot: Option<Reboot>,
     pub(crate) store: Store,
     /// As of the start of this boot; what was counted since is added.
@@ -112,6 +118,8 @@ impl Rig {
             correction: Correction::new(correction),
             events,
             session: Session::new(boot),
+            link_speed: LinkSpeed::new(),
+            notes: Notes::new(),
             reboot: None,
             store,
             counters,
@@ -252,9 +260,29 @@ impl Rig {
         }
         if let Some(incoming) = incoming {
             let answer = self.carry_out(&incoming, now);
+            if let Err(error) = &answer {
+                self.notes.add(Note::Refused { request: incoming.id, error: error.clone() });
+            }
             self.session.answer(incoming, answer);
         }
         true
+    }
+
+    /// The next thing to be told in the log.
+    pub(crate) fn take_note(&mut self) -> Option<Note> {
+        self.notes.take()
+    }
+
+    /// The rate that the link is to have from now on, where that is another. `sent`: whether all frames have left the board.
+    pub(crate) fn link_rate_due(
+        &mut self,
+        now: BoardMicros,
+        sent: impl FnOnce() -> bool,
+    ) -> Option<LinkRate> {
+        let (session, requests) = (&self.session, self.session.counters().frames);
+        let rate = self.link_speed.due(now, requests, || session.all_sent() && sent())?;
+        self.notes.add(Note::LinkRate(rate));
+        Some(rate)
     }
 
     /// The next frame for the link, answers before events; call it until it gives `None`.
@@ -274,6 +302,8 @@ impl Rig {
         // First: an open circuit has cut the pulses, which is no fault of the step timers then.
         self.watch_inputs(inputs);
         self.stage.sense(inputs);
+        let stage = &self.stage;
+        self.notes.look(|axis| stage.state(axis));
         self.camera.sense(inputs);
         self.watch(now);
         self.advance(now);
@@ -328,6 +358,7 @@ impl Rig {
     pub(crate) fn alarm(&mut self, alarm: Alarm, now: BoardMicros) {
         let Some(record) = self.alarms.raise(alarm, self.boot, now) else { return };
         self.counters.alarms = self.counters.alarms.saturating_add(1);
+        self.notes.add(Note::Alarm(record));
         self.events.push(now, EventKind::Alarm(record));
         self.store.mark(RecordName::Alarms);
         self.store.mark(RecordName::Counters);

@@ -40,6 +40,8 @@ impl CameraOrder {
 pub enum Command {
     /// Put bytes on the line to the board.
     Bytes(Vec<u8>),
+    /// The host's end of the line has this rate from now on, in baud.
+    HostRate(u32),
     /// Let this much time pass.
     Advance {
         /// How much.

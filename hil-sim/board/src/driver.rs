@@ -24,6 +24,7 @@ use crate::{
     error::SimError,
     faults::{Lines, Moment, Schedule},
     kept_memory,
+    link_rates::LinkRates,
     memory::MemoryChip,
     pacing::Pacing,
     parts::Parts,
@@ -65,6 +66,7 @@ pub struct Driver {
     pacing: Pacing,
     pictures: Pictures,
     lines: Lines,
+    rates: LinkRates,
     scenario: Scenario,
     parts: Parts,
     /// What is still to happen.
@@ -79,6 +81,8 @@ pub struct Driver {
     looks_at_ns: Option<u64>,
     /// Where the memory's contents are kept at the end, and what they are then.
     memory: Option<(PathBuf, Vec<u8>)>,
+    /// Bytes for the host that its adapter keeps, and until when.
+    kept: (Vec<u8>, u64),
     /// Bytes for the board that came while time passes on request.
     held: Vec<u8>,
     resets: usize,
@@ -107,6 +111,7 @@ impl Driver {
             pacing: Pacing::new(config.pace),
             pictures,
             lines: Lines::new(config.scenario.bit_error_rate, config.seed),
+            rates: LinkRates::new(),
             scenario: config.scenario.clone(),
             parts: config.parts.clone(),
             schedule: Schedule::new(&config.scenario.happens, config.seed),
@@ -116,6 +121,7 @@ impl Driver {
             script: None,
             looks_at_ns: None,
             memory: config.memory.clone().map(|path| (path, Vec::new())),
+            kept: (Vec::new(), 0),
             held: Vec::new(),
             resets: 0,
             powered: true,
@@ -128,6 +134,19 @@ impl Driver {
     fn hand_out(&mut self, bytes: Vec<u8>) {
         if let Some(outlet) = self.outlets.bytes.as_ref().filter(|_| !bytes.is_empty()) {
             let _ = outlet.send(bytes); // whoever listened may have gone
+        }
+    }
+
+    /// Bytes come to the host's adapter, which keeps them for its latency from the first one on.
+    fn adapt(&mut self, bytes: Vec<u8>, now_ns: u64) {
+        let (kept, until_ns) = &mut self.kept;
+        if kept.is_empty() {
+            *until_ns = now_ns + self.lines.latency_ns;
+        }
+        kept.extend(bytes);
+        if now_ns >= *until_ns {
+            let bytes = std::mem::take(kept);
+            self.hand_out(bytes);
         }
     }
 
@@ -194,8 +213,9 @@ impl Driver {
         if let Some(vcd) = self.vcd() {
             vcd.received(now_ns, &bytes);
         }
+        self.rates.carry(&mut bytes);
         self.lines.to_host.carry(&mut bytes);
-        self.hand_out(bytes);
+        self.adapt(bytes, now_ns);
         if self.scenario.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
             self.outlets.bytes = None;
         }
@@ -230,6 +250,7 @@ impl Driver {
                 self.held.extend(bytes);
                 self.send_held(now_ns);
             }
+            Command::HostRate(baud) => self.rates.set_host(baud),
             Command::Advance { nanos, done } => self.pacing.advance(now_ns, nanos, done),
             Command::Settle { done } => self.pacing.settle(done),
             Command::Access(work) => {
@@ -304,10 +325,11 @@ impl Driver {
 
     /// Bytes of the host go on the line to the board.
     fn put_on_the_line(&mut self, mut bytes: Vec<u8>, now_ns: u64) {
+        self.pacing.lockstep.sent(&bytes, now_ns);
+        self.rates.carry(&mut bytes);
         if let Some(vcd) = self.vcd() {
             vcd.sent(now_ns, &bytes);
         }
-        self.pacing.lockstep.sent(&bytes, now_ns);
         self.lines.to_board.carry(&mut bytes);
         for _ in 0..self.witness.sent(now_ns, &bytes) {
             self.schedule.notice(Moment::Request, now_ns);
@@ -357,6 +379,7 @@ impl Driver {
         self.witness.reset();
         (self.resets, self.powered) = (resets, powered);
         self.wiring.board_reset(at);
+        self.rates.reset();
         self.pacing.lockstep.reset(at.0);
     }
 
@@ -377,6 +400,7 @@ impl Driver {
             self.send_held(now_ns);
             // Its time goes on until what it was sent has arrived and what moves has come to rest, also when its host has gone.
             let at_work = self.line.is_sending()
+                || !self.kept.0.is_empty()
                 || self.wiring.is_stepping(now_ns)
                 || self.pacing.is_realtime() && self.is_awaited();
             let waiting = self.pacing.take_waiting(now_ns, at_work);
@@ -423,6 +447,13 @@ impl emulator::Driver<RigBoard> for Driver {
                 return;
             }
             Settled::Access { access, .. }
+                if access.kind == AccessKind::Write && LinkRates::watches(access.address) =>
+            {
+                // The register has 16 bits.
+                self.rates.divide(access.value as u32);
+                return;
+            }
+            Settled::Access { access, .. }
                 if access.kind == AccessKind::Write && Wiring::watches(access.address) =>
             {
                 (access.virtual_time, Some(access.address))
@@ -447,6 +478,7 @@ impl emulator::Driver<RigBoard> for Driver {
         }
         self.note_resets(session, stop.at);
         self.exchange(stop.at.0);
+        self.rates.settle();
         self.wiring.put(&mut session.board_mut().chip, stop.at);
         session.board_mut().chip.join_breaks(stop.at);
         self.happen(session, stop, host);

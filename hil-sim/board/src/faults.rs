@@ -42,7 +42,7 @@ pub struct Kind {
 }
 
 /// All kinds.
-pub const KINDS: [Kind; 37] = [
+pub const KINDS: [Kind; 39] = [
     motion::EMERGENCY_STOP,
     motion::EMERGENCY_STOP_RELEASED,
     power::RESET_BUTTON,
@@ -67,6 +67,7 @@ pub const KINDS: [Kind; 37] = [
     motion::SWITCH_NOISE,
     chips::PIEZO_DEAD,
     chips::GAUGE_DEAD,
+    chips::GAUGE_DRIFTS,
     chips::DAC_DEAD,
     chips::MEMORY_BIT_FLIPS,
     chips::MEMORY_DEAD,
@@ -77,6 +78,7 @@ pub const KINDS: [Kind; 37] = [
     link::LINK_BIT_ERRORS,
     link::LINK_LOSES_BYTES,
     link::LINK_INSERTS_BYTES,
+    link::LINK_LATENCY,
     link::LINK_CUT,
     link::LINK_NOISE,
     link::LINK_FRAMING_ERRORS,

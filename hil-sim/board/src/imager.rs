@@ -14,7 +14,7 @@ use farnear_protocol::{
     BoardMicros,
     camera::{FRAME_HEADER, FrameHeader},
 };
-use farnear_scene::{Camera, Lens, Psf, Renderer, Scene};
+use farnear_scene::{Camera, Lens, Psf, Renderer, Scene, View};
 
 use crate::{error::SimError, wiring::Shot};
 
@@ -49,6 +49,8 @@ impl Picture {
 pub struct Imager {
     renderer: Renderer,
     camera: Camera,
+    /// How fast the scene moves, px/s right and down.
+    speed_px_per_s: [f64; 2],
     exposures: u32,
 }
 
@@ -66,7 +68,14 @@ impl Imager {
                 camera.width_px, camera.height_px
             )));
         }
-        Ok(Self { renderer, camera, exposures: 0 })
+        Ok(Self { renderer, camera, speed_px_per_s: [0.0; 2], exposures: 0 })
+    }
+
+    /// The same before a scene that moves across the image, from where it was at power-on. What moves less than a pixel during an
+    /// exposure is sharp; more would be smeared, which is left out.
+    #[must_use]
+    pub fn moving(self, speed_px_per_s: [f64; 2]) -> Self {
+        Self { speed_px_per_s, ..self }
     }
 
     /// One exposure as the endpoint sends it: length, header, pixels.
@@ -80,6 +89,13 @@ impl Imager {
     fn picture(&mut self, shot: &Shot) -> Result<Picture, SimError> {
         let number = self.exposures;
         self.exposures += 1;
+        if self.speed_px_per_s != [0.0; 2] {
+            let middle_s = 0.5e-9 * (shot.begin_ns + shot.end_ns) as f64;
+            self.renderer.look(View {
+                shift_px: self.speed_px_per_s.map(|speed| speed * middle_s),
+                ..View::default()
+            });
+        }
         let image = self
             .renderer
             .expose(shot.truth.sensor_mm, number)
@@ -124,5 +140,81 @@ impl Imager {
                 }
             })
             .map_err(|source| SimError::Io { what: "cannot start the camera's thread".into(), source })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_scene::{Noise, OpticsFile, standard};
+
+    use super::*;
+    use crate::{parts::Parts, plant::ExposureTruth};
+
+    fn shot(begin_ns: u64, sensor_mm: f64) -> Shot {
+        let truth = ExposureTruth {
+            sensor_mm,
+            coarse_um: 0.0,
+            lens_um: 0.0,
+            piezo_um: 0.0,
+            piezo_min_um: 0.0,
+            piezo_max_um: 0.0,
+        };
+        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth }
+    }
+
+    /// Codes of a picture of 64 x 48 px.
+    fn codes(imager: &mut Imager, shot: &Shot) -> Vec<i32> {
+        let picture = imager.picture(shot).expect("a picture");
+        picture.pixels().chunks(2).map(|code| i32::from(u16::from_le_bytes([code[0], code[1]]))).collect()
+    }
+
+    fn imager(parts: &str) -> (Imager, f64) {
+        let imaging = Parts::parse(parts).expect("good parts").imaging;
+        let optics = OpticsFile::parse(standard::OPTICS).expect("optics");
+        let lens = imaging.lens(Lens::from_optics(&optics).expect("a lens"));
+        let camera = Camera { defects: imaging.defects(), ..Camera::new(64, 48, Noise::None) };
+        let scene: Scene = "plane:900".parse().expect("a scene");
+        let far_mm = lens.sensor_far_mm;
+        let imager = Imager::new(&scene, &lens, &standard::PSF, camera, 3).expect("an imager");
+        (imager.moving(imaging.scene_px_per_s), far_mm)
+    }
+
+    #[test]
+    fn a_scene_that_moves_is_found_again_where_it_has_moved_to() {
+        let (mut imager, far_mm) = imager("[imaging]\nscene_px_per_s = [40.0, -20.0]");
+        let (before, after) = (shot(0, far_mm), shot(100_000_000, far_mm));
+        let (before, after) = (codes(&mut imager, &before), codes(&mut imager, &after));
+        // 4 px to the right and 2 px up, away from the borders that the blur reaches from.
+        for row in 10..38 {
+            for column in 10..54 {
+                let (was, is) = (before[row * 64 + column - 4], after[(row - 2) * 64 + column]);
+                // Whole pixels need no interpolation; rounding of the sum in f32, of 65,535.
+                assert!((was - is).abs() <= 2, "{was} {is} at row {row}, column {column}");
+            }
+        }
+        assert_ne!(before, after);
+    }
+
+    #[test]
+    fn the_parts_say_what_lens_and_light_are_like() {
+        let (mut plain, far_mm) = imager("");
+        let plain = codes(&mut plain, &shot(0, far_mm));
+        for parts in [
+            "field_curvature = 0.45",
+            "vignetting = 0.2",
+            "uneven_light = [0.3, 0.0]",
+            "hot_pixel_share = 0.01",
+        ] {
+            let (mut other, _) = imager(&format!("[imaging]\n{parts}"));
+            assert_ne!(codes(&mut other, &shot(0, far_mm)), plain, "{parts}");
+        }
+        assert!(Parts::parse("[imaging]\nvignetting = 2.0").is_ok_and(|parts| {
+            let camera = Camera { defects: parts.imaging.defects(), ..Camera::default() };
+            let lens =
+                Lens::from_optics(&OpticsFile::parse(standard::OPTICS).expect("optics")).expect("a lens");
+            let scene: Scene = "plane:900".parse().expect("a scene");
+            Imager::new(&scene, &lens, &standard::PSF, camera, 3)
+                .is_err_and(|error| error.to_string().contains("vignetting = 2"))
+        }));
     }
 }

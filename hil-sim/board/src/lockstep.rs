@@ -21,6 +21,8 @@ const ANSWER_NS: u64 = 60_000_000;
 /// Work without a terminal event after this long will never end: the longest exposure program is far shorter. A continuous run
 /// tells of each frame, and so long after the last of them it will never end either.
 const WORK_NS: u64 = 600_000_000_000;
+/// From the answer to another rate of the link: a control tick, and a little.
+const RATE_NS: u64 = 1_000_000;
 /// A reset without the started event after this long: the firmware does not run.
 pub const BOOT_NS: u64 = 2_000_000_000;
 /// Ended requests that are remembered, more than the board remembers answers.
@@ -65,6 +67,8 @@ enum Work {
     Resume,
     /// A reset.
     Reset,
+    /// Another rate of the link, which comes when the answer has left.
+    Rate,
 }
 
 impl Work {
@@ -78,6 +82,7 @@ impl Work {
             | Request::Calibrate { .. } => Self::Long,
             Request::ResumeProgram => Self::Resume,
             Request::Reboot => Self::Reset,
+            Request::SetLinkRate { .. } => Self::Rate,
             Request::Hello
             | Request::OpenSession
             | Request::Status
@@ -168,6 +173,9 @@ impl Lockstep {
                 match packet.message::<Response>() {
                     Some(Response::Accepted) if work == Some(Work::Long) && !self.ended.contains(&id) => {
                         self.running.insert(id, now_ns + WORK_NS);
+                    }
+                    Some(Response::Accepted) if work == Some(Work::Rate) => {
+                        self.running.insert(id, now_ns + RATE_NS);
                     }
                     Some(Response::Accepted) if work == Some(Work::Resume) => self.paused = None,
                     Some(Response::Accepted) if work == Some(Work::Reset) => self.reset(now_ns),

@@ -10,7 +10,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
-use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, standard};
+use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, SceneArgument, standard};
 use farnear_sim::{
     Pace, Parts, RigConfig, Scenario,
     campaign::{self, Campaign, Shard, cpu_time},
@@ -87,9 +87,9 @@ struct Seeds {
 
 #[derive(Args)]
 struct Run {
-    /// What stands before the camera: plane:MM, staircase, slant, cone or sphere.
+    /// What stands before the camera: plane:MM, staircase, slant, cone or sphere; or a scene file, as `farnear render` reads it.
     #[arg(long, default_value = standard::SCENE)]
-    scene: Scene,
+    scene: SceneArgument,
     /// The lens' blur: pillbox, gaussian:k=K or generalised:p=P,k=K.
     #[arg(long, default_value_t = standard::PSF)]
     psf: Psf,
@@ -282,9 +282,12 @@ fn serve(run: &Run) -> Result<()> {
         }
         None => OpticsFile::parse(standard::OPTICS)?,
     };
-    let lens = Lens::from_optics(&optics)?;
-    let camera = Camera::new(standard::SIZE_PX.0, standard::SIZE_PX.1, run.noise);
-    let imager = Imager::new(&run.scene, &lens, &run.psf, camera, config.seed)?;
+    let imaging = &config.parts.imaging;
+    let lens = imaging.lens(Lens::from_optics(&optics)?);
+    let defects = imaging.defects();
+    let camera = Camera { defects, ..Camera::new(standard::SIZE_PX.0, standard::SIZE_PX.1, run.noise) };
+    let scene = run.scene.clone().read()?;
+    let imager = Imager::new(&scene, &lens, &run.psf, camera, config.seed)?.moving(imaging.scene_px_per_s);
     let gige = run.gige.map(|address| GigeConfig {
         address,
         seed: config.seed,

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use farnear_scene::{Defects, EllipticalDistortion, Lens};
 use rigless::chip::fram::DEVICE_ID;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +31,60 @@ pub struct Parts {
     pub switches: SwitchParts,
     /// The motors' driver chips.
     pub driver: DriverParts,
+    /// Lens, light and sensor besides blur and noise.
+    pub imaging: ImagingParts,
+}
+
+/// Lens, light and sensor besides blur and noise.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImagingParts {
+    /// [`EllipticalDistortion::offset`].
+    pub field_offset: f64,
+    /// [`EllipticalDistortion::curvature`].
+    pub field_curvature: f64,
+    /// [`EllipticalDistortion::slope`].
+    pub field_slope: f64,
+    /// [`EllipticalDistortion::centre`].
+    pub field_centre: [f64; 2],
+    /// [`EllipticalDistortion::radius`].
+    pub field_radius: [f64; 2],
+    /// [`Defects::vignetting`].
+    pub vignetting: f64,
+    /// [`Defects::uneven_light`].
+    pub uneven_light: [f64; 2],
+    /// [`Defects::hot_pixel_share`].
+    pub hot_pixel_share: f64,
+    /// [`Defects::hot_pixel_e`].
+    pub hot_pixel_e: f64,
+    /// How fast the scene moves across the image.
+    pub scene_px_per_s: [f64; 2],
+}
+
+impl ImagingParts {
+    /// The lens with the focus that varies over its field, where it does.
+    pub fn lens(&self, lens: Lens) -> Lens {
+        if [self.field_offset, self.field_curvature, self.field_slope] == [0.0; 3] {
+            return lens;
+        }
+        lens.with_distortion(EllipticalDistortion {
+            offset: self.field_offset,
+            curvature: self.field_curvature,
+            slope: self.field_slope,
+            centre: self.field_centre,
+            radius: self.field_radius,
+        })
+    }
+
+    /// What light and sensor do.
+    pub fn defects(&self) -> Defects {
+        Defects {
+            vignetting: self.vignetting,
+            uneven_light: self.uneven_light,
+            hot_pixel_share: self.hot_pixel_share,
+            hot_pixel_e: self.hot_pixel_e,
+        }
+    }
 }
 
 /// What instructions cost.
@@ -237,6 +292,15 @@ impl Parts {
             ("gauge.noise_um", self.gauge.noise_um, 0.0, 10.0),
             ("switches.bounces_per_ms", self.switches.bounces_per_ms, 0.0, 1e3),
             ("switches.glitches_per_s", self.switches.glitches_per_s, 0.0, 1e4),
+            ("imaging.field_offset", self.imaging.field_offset, -2.0, 2.0),
+            ("imaging.field_curvature", self.imaging.field_curvature, -5.0, 5.0),
+            ("imaging.field_slope", self.imaging.field_slope, -5.0, 5.0),
+            ("imaging.field_centre, x", self.imaging.field_centre[0], -10.0, 10.0),
+            ("imaging.field_centre, y", self.imaging.field_centre[1], -10.0, 10.0),
+            ("imaging.field_radius, x", self.imaging.field_radius[0], 0.1, 100.0),
+            ("imaging.field_radius, y", self.imaging.field_radius[1], 0.1, 100.0),
+            ("imaging.scene_px_per_s, x", self.imaging.scene_px_per_s[0], -1e5, 1e5),
+            ("imaging.scene_px_per_s, y", self.imaging.scene_px_per_s[1], -1e5, 1e5),
         ];
         for (name, value, min, max) in ranges {
             if !(min..=max).contains(&value) {

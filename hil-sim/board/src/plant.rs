@@ -56,6 +56,19 @@ struct Exposing {
     piezo_max_um: f64,
 }
 
+/// The gauge's zero on its way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Drift {
+    since_ns: u64,
+    um_per_s: f64,
+}
+
+impl Drift {
+    fn um(&self, now_ns: u64) -> f64 {
+        self.um_per_s * 1e-9 * now_ns.saturating_sub(self.since_ns) as f64
+    }
+}
+
 /// Both stages, piezo and gauge.
 #[derive(Debug)]
 pub struct Plant {
@@ -64,6 +77,7 @@ pub struct Plant {
     lens_stage: Stage,
     piezo: Piezo,
     gauge: GaugeParts,
+    drift: Drift,
     gauge_noise: Noise,
     exposing: Option<Exposing>,
 }
@@ -78,6 +92,7 @@ impl Plant {
             lens_stage: Stage::new(StageName::Lens, seed, start_um.map(|[_, lens]| lens)),
             piezo: Piezo::new(),
             gauge: parts.gauge,
+            drift: Drift::default(),
             gauge_noise: Noise::new(seed, "gauge"),
             exposing: None,
         }
@@ -128,8 +143,16 @@ impl Plant {
     pub fn sample_gauge(&mut self, now_ns: u64) -> u32 {
         self.advance(now_ns);
         let GaugeParts { gain, offset_um, noise_um } = self.gauge;
-        let um = offset_um + gain * self.piezo.position_um() + noise_um * self.gauge_noise.normal();
+        let um = offset_um
+            + self.drift.um(now_ns)
+            + gain * self.piezo.position_um()
+            + noise_um * self.gauge_noise.normal();
         libm::round(GAUGE_CODE_ZERO + 1000.0 * um).clamp(0.0, GAUGE_CODE_MAX) as u32
+    }
+
+    /// The gauge's zero moves from now on as it warms up, so fast; 0 takes all of it back.
+    pub fn drift_gauge(&mut self, now_ns: u64, um_per_s: f64) {
+        self.drift = Drift { since_ns: now_ns, um_per_s };
     }
 
     /// The sensor begins to collect light.
@@ -208,6 +231,19 @@ mod tests {
         assert!((truth.lens_um - lens_um).abs() < 1e-6);
         let sum_um = truth.coarse_um + truth.lens_um + truth.piezo_um;
         assert!((truth.sensor_mm - (DATUM_MM + 1e-3 * sum_um)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_gauge_that_warms_up_drifts_and_one_that_is_mended_does_not() {
+        let mut parts = Parts::default();
+        parts.gauge.noise_um = 0.0;
+        let mut plant = Plant::new(1, &parts, None);
+        let cold = plant.sample_gauge(0);
+        plant.drift_gauge(0, 0.05);
+        // 0.05 um/s for 2 s; a code is 1 nm.
+        assert_eq!(plant.sample_gauge(2_000_000_000), cold + 100);
+        plant.drift_gauge(2_000_000_000, 0.0);
+        assert_eq!(plant.sample_gauge(2_000_000_000), cold);
     }
 
     #[test]

@@ -17,21 +17,21 @@ use std::{
 use farnear_protocol::frame::FRAME_MAX;
 use serialport::{SerialPort, TTYPort};
 
-use crate::error::SimError;
+use crate::{command::Command, error::SimError};
 
 /// How long a read waits before it looks whether the port has been unplugged.
 const LOOK: Duration = Duration::from_millis(20);
 /// A client that reads nothing for this long loses bytes, as on a real serial line.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Opens a pty; gives its name. Bytes of `to_client` go out; whole frames that come in go to `from_client`,
-/// which says whether it still wants them. When `to_client` ends, the port goes away.
+/// Opens a pty; gives its name. Bytes of `to_client` go out; whole frames that come in, and the rate that the client has given its
+/// end where that is another than before, go to `from_client`, which says whether it still wants them. When `to_client` ends, the port goes away.
 ///
 /// # Errors
 /// [`SimError::Port`] where there is no pty, [`SimError::Io`] where no thread can be started.
 pub fn open(
     to_client: Receiver<Vec<u8>>,
-    from_client: impl Fn(Vec<u8>) -> bool + Send + 'static,
+    from_client: impl Fn(Command) -> bool + Send + 'static,
 ) -> Result<String, SimError> {
     let (mut writer, slave) = TTYPort::pair()?;
     let name = slave.name().unwrap_or_default();
@@ -60,14 +60,21 @@ pub fn open(
     Ok(name)
 }
 
-fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Vec<u8>) -> bool) {
+fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Command) -> bool) {
     let mut cutter = FrameCutter::default();
     let mut bytes = [0; 4096];
+    let mut rate = None;
     while !unplugged.load(Ordering::Relaxed) {
         match port.read(&mut bytes) {
             Ok(count) => {
+                // What a pseudo-terminal's client sets its rate to can be read at this end.
+                let now = port.baud_rate().ok();
+                if now != rate && !now.is_some_and(|baud| from_client(Command::HostRate(baud))) {
+                    return;
+                }
+                rate = now;
                 for frame in cutter.cut(&bytes[..count]) {
-                    if !from_client(frame) {
+                    if !from_client(Command::Bytes(frame)) {
                         return;
                     }
                 }

@@ -68,6 +68,14 @@ impl EmulatedRig {
         self.commands.send(Command::Bytes(bytes.to_vec())).map_err(|_| SimError::Stopped)
     }
 
+    /// Gives the host's end of the line a rate, in baud; bytes pass only where the board has the same.
+    ///
+    /// # Errors
+    /// [`SimError::Stopped`].
+    pub fn set_host_rate(&mut self, baud: u32) -> Result<(), SimError> {
+        self.commands.send(Command::HostRate(baud)).map_err(|_| SimError::Stopped)
+    }
+
     /// Lets this much virtual time pass.
     ///
     /// # Errors

@@ -64,7 +64,7 @@ impl ServedRig {
         imager.watch(shots, frames_out, second, pictures)?;
         let camera = endpoint::open(frames, ask)?;
         let to_board = commands.clone();
-        let port = port::open(bytes, move |frame| to_board.send(Command::Bytes(frame)).is_ok())?;
+        let port = port::open(bytes, move |command| to_board.send(command).is_ok())?;
         Ok(Self { port, camera, gige, commands, thread })
     }
 

@@ -185,7 +185,10 @@ mod tests {
         refused(&happens("\"reset-button\"\nfor_ms = 3"), &["line 3", "for_ms means nothing"]);
         refused(&happens("\"reset-button\"\non = \"alarm\""), &["line 3", "exclude each other"]);
         refused(&happens("\"reset-button\"\nnth = 2"), &["line 3", "nth"]);
-        refused("[[happens]]\nwhat = \"reset-button\"", &["line 1", "after_ms, on and chance_per_s"]);
+        refused(
+            "[[happens]]\nwhat = \"reset-button\"",
+            &["line 1", "after_ms, after_cycles, on and chance_per_s"],
+        );
         refused("[[happens]]\non = \"dawn\"\nwhat = \"reset-button\"", &["line 2", "dawn", "motion-begins"]);
         refused("[[host]]\ndoes = \"dance\"", &["line 2", "dance", "home"]);
         refused("[[host]]\ndoes = \"move\"\naxis = \"lens\"", &["to_um"]);

@@ -14,6 +14,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Poisson};
 use thiserror::Error;
 
+use crate::defects::Defects;
+
 /// What the camera adds to the light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Noise {
@@ -114,6 +116,8 @@ pub struct Camera {
     pub exposure_level: f64,
     /// Standard deviation of the read noise, electrons.
     pub read_noise_e: f64,
+    /// Shading and hot pixels.
+    pub defects: Defects,
 }
 
 impl Default for Camera {
@@ -131,7 +135,15 @@ impl Camera {
     /// of 12 electrons.
     #[must_use]
     pub fn new(width_px: usize, height_px: usize, noise: Noise) -> Self {
-        Self { width_px, height_px, noise, full_well_e: 20_000.0, exposure_level: 0.45, read_noise_e: 12.0 }
+        Self {
+            width_px,
+            height_px,
+            noise,
+            full_well_e: 20_000.0,
+            exposure_level: 0.45,
+            read_noise_e: 12.0,
+            defects: Defects::default(),
+        }
     }
 
     /// # Errors
@@ -155,7 +167,7 @@ impl Camera {
         if !(self.read_noise_e >= 0.0 && self.read_noise_e <= 1e9) {
             return unusable("read_noise_e", self.read_noise_e, "0 to 1e9 electrons");
         }
-        Ok(())
+        self.defects.check()
     }
 
     /// Codes of one exposure of `radiance` (blurred scene, mean 1). The noise is a function of `seed` and
@@ -168,8 +180,13 @@ impl Camera {
             (electrons.clamp(0.0, self.full_well_e) / self.full_well_e * max_code).round() as u16
         };
         let mean_e = self.exposure_level * self.full_well_e;
+        let mut radiance = radiance.to_owned();
+        self.defects.shade(&mut radiance);
+        let hot_e = self.defects.hot_e(radiance.dim(), seed);
+        let mut hot_e = hot_e.iter().flatten().copied().chain(std::iter::repeat(0.0));
+        let mut hot_e = || hot_e.next().unwrap_or_default();
         if self.noise == Noise::None {
-            return radiance.map(|&radiance| code(f64::from(radiance) * mean_e));
+            return radiance.map(|&radiance| code(f64::from(radiance) * mean_e + hot_e()));
         }
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(1 + u64::from(exposure_number)); // stream 0 is the texture's
@@ -179,7 +196,7 @@ impl Camera {
             let expected_e = f64::from(radiance) * mean_e;
             // No light has no Poisson distribution, and no electrons.
             let collected_e = Poisson::new(expected_e).map_or(0.0, |shot| shot.sample(&mut random));
-            code(collected_e + read_noise.map_or(0.0, |read_noise| read_noise.sample(&mut random)))
+            code(hot_e() + collected_e + read_noise.map_or(0.0, |read_noise| read_noise.sample(&mut random)))
         })
     }
 }

@@ -14,7 +14,7 @@
 //!    change the magnification.
 //! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its own blur radius, integrated over the cell and
 //!    over the pixel ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
-//! 4. **Exposure.** Electrons, shot noise, read noise, full well, quantisation ([`camera`]).
+//! 4. **Exposure.** Shading and hot pixels, where asked for ([`defects`]); electrons, shot noise, read noise, full well, quantisation ([`camera`]).
 //!
 //! [`render()`] makes one exposure; [`Renderer`] keeps the texture for many. Everything is a function of its
 //! arguments and the seed: no clock, no thread count, no CPU feature enters.
@@ -36,6 +36,7 @@
 pub mod blur;
 pub mod camera;
 mod composite;
+pub mod defects;
 mod fourier;
 pub mod kernel;
 pub mod lens;
@@ -45,6 +46,8 @@ pub mod psf;
 mod quadrature;
 mod render;
 pub mod scene;
+#[cfg(feature = "files")]
+mod scene_argument;
 mod scene_error;
 mod scene_file;
 mod scene_text;
@@ -54,12 +57,15 @@ mod thin_lens;
 pub mod view;
 
 pub use camera::{Camera, CameraError, Noise};
+pub use defects::Defects;
 pub use lens::{EllipticalDistortion, Lens, LensError};
 pub use maps::{HeightMap, Picture};
 pub use optics::{OpticsError, OpticsFile};
 pub use psf::{Psf, PsfError};
 pub use render::{RenderError, Renderer, render, render_f32, truth};
 pub use scene::{Scene, Shape};
+#[cfg(feature = "files")]
+pub use scene_argument::{SceneArgument, SceneFileError};
 pub use scene_error::SceneError;
 pub use scene_file::SceneFile;
 pub use texture::Texture;

@@ -170,6 +170,11 @@ impl Renderer {
         self
     }
 
+    /// The same, for a scene that moves: where it lies from now on.
+    pub fn look(&mut self, view: View) {
+        self.view = view;
+    }
+
     /// How the scene lies in an exposure: the camera's own view, and the magnification of a lens that is not telecentric.
     fn view_at(&self, sensor_distance_mm: f64) -> View {
         let grown = if self.lens.telecentric { 1.0 } else { sensor_distance_mm / self.lens.sensor_far_mm };

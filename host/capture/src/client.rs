@@ -18,7 +18,7 @@ use std::{
 
 use farnear_protocol::{
     Request, Response,
-    message::{Axis, Hello, Status},
+    message::{Axis, Hello, LinkRate, Status},
 };
 
 use crate::{
@@ -26,7 +26,7 @@ use crate::{
     log_stream::LogStream,
     owner::{Command, Connect, Listener, Owner, Session, nonsense},
     timing::{Pace, Timing},
-    transport::{Place, Transport},
+    transport::{Place, Transport, with_rate},
 };
 
 /// From one attempt to reach a board that restarts to the next.
@@ -44,6 +44,8 @@ pub struct Client {
 struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
+    /// The rate that the link was to have.
+    wanted: Option<LinkRate>,
     /// How fast the axes move, as far as the board was asked.
     paces: Mutex<Vec<(Axis, Pace)>>,
     inbox: Option<Sender<Command>>,
@@ -60,12 +62,15 @@ impl Drop for Port {
 }
 
 impl Client {
-    /// Opens a serial port and says hello. Once the board was there, the port is opened again whenever it comes back.
+    /// Opens a serial port and says hello. Once the board was there, the port is opened again whenever it comes back. A rate
+    /// behind its name, `/dev/ttyACM0@921600`, is asked of the board; where it is not heard at it, the link goes on at the rate
+    /// it had, see [`Client::link_note`].
     ///
     /// # Errors
     /// As [`Client::connect`].
     pub fn open(port: &str) -> Result<Self, ClientError> {
-        Self::connect(serial(port), port)
+        let (port, wanted) = with_rate(port)?;
+        Self::start(serial(port), port, false, wanted)
     }
 
     /// As [`Client::open`], where the board is known to be emulated: hello is asked as patiently as all else, so
@@ -74,7 +79,7 @@ impl Client {
     /// # Errors
     /// As [`Client::connect`].
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
-        Self::start(serial(port), port, true)
+        Self::start(serial(port), port, true, None)
     }
 
     /// Says hello over what `connect` opens, the first time and whenever the line broke. `port` is its name in messages.
@@ -82,10 +87,23 @@ impl Client {
     /// # Errors
     /// [`ClientError`] where nothing can be opened, nobody answers, or no protocol version is shared.
     pub fn connect(connect: Connect, port: &str) -> Result<Self, ClientError> {
-        Self::start(connect, port, false)
+        Self::start(connect, port, false, None)
     }
 
-    fn start(connect: Connect, port: &str, emulated: bool) -> Result<Self, ClientError> {
+    /// As [`Client::connect`], at this rate of the link, where both ends can have it.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
+    pub fn connect_at(connect: Connect, port: &str, rate: LinkRate) -> Result<Self, ClientError> {
+        Self::start(connect, port, false, Some(rate))
+    }
+
+    fn start(
+        connect: Connect,
+        port: &str,
+        emulated: bool,
+        wanted: Option<LinkRate>,
+    ) -> Result<Self, ClientError> {
         let (inbox, commands) = channel();
         let timing = Arc::new(Mutex::new(Timing::REAL));
         let choose = |hello: &Hello| {
@@ -94,12 +112,13 @@ impl Client {
             }
             Arc::clone(&timing)
         };
-        let owner = Owner::start(connect, port, emulated, choose, commands)?;
+        let owner = Owner::start(connect, port, emulated, wanted, choose, commands)?;
         let session = owner.session();
         let thread = std::thread::spawn(move || owner.run());
         let port = Port {
             name: port.into(),
             timing,
+            wanted,
             paces: Mutex::default(),
             inbox: Some(inbox),
             thread: Some(thread),
@@ -158,6 +177,23 @@ impl Client {
             format!(
                 "the board's firmware is version {theirs}, this program {ours}; they speak the same protocol, but consider \
                  flashing the firmware that belongs to it"
+            )
+        })
+    }
+
+    /// The link's rate in this session.
+    pub fn link_rate(&self) -> LinkRate {
+        self.session.rate
+    }
+
+    /// What is to be said about the link's rate, where it is another than was asked for.
+    pub fn link_note(&self) -> Option<String> {
+        let (wanted, has) = (self.port.wanted?, self.link_rate());
+        (wanted != has).then(|| {
+            format!(
+                "the link stays at {} baud: the board is not heard at {}; its adapter or its firmware cannot have that rate",
+                has.baud(),
+                wanted.baud()
             )
         })
     }

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use farnear_protocol::{
     RequestError,
-    message::{AlarmRecord, Axis, Failure, ResetCause},
+    message::{AlarmRecord, Axis, Failure, LinkRate, ResetCause},
 };
 
 use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
@@ -31,6 +31,14 @@ pub enum PortError {
     SeveralBoards {
         /// Theirs.
         ports: Vec<String>,
+    },
+    /// The link does not have the rate that was asked for.
+    #[error("{port} is asked for {rate} baud, but the link has {} baud", rates())]
+    Rate {
+        /// The port.
+        port: String,
+        /// What was asked for.
+        rate: String,
     },
     /// The path leads to something else.
     #[error("{port} is not a serial port")]
@@ -62,6 +70,10 @@ pub enum PortError {
         /// What the system says.
         reason: String,
     },
+}
+
+fn rates() -> String {
+    LinkRate::ALL.map(|rate| rate.baud().to_string()).join(" or ")
 }
 
 fn present_ports(present: &[String]) -> String {

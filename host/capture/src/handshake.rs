@@ -5,14 +5,16 @@ use std::time::Duration;
 use farnear_protocol::{
     PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response,
     frame::{Kind, Packet},
-    message::{Hello, SCHEMA_KEY},
+    message::{Hello, LinkRate, SCHEMA_KEY},
 };
 
 use crate::{error::ClientError, link::Link, timing::Timing};
 
-/// How often hello is asked, the wait doubling each time from [`Timing::REAL`]'s: 3 s altogether. The board
-/// may still be starting, and whether it is an emulated one is not known yet.
-const ATTEMPTS: u32 = 6;
+/// Hello is asked with these waits: 3 s altogether, for the board may still be starting, and whether it is an emulated one is not
+/// known yet. In between it is asked at the link's other rates: a host that ended may have left it there.
+const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
+const OTHER_RATE_MS: [u64; 2] = [50, 50];
+const LAST_MS: [u64; 2] = [800, 1500];
 const DURING: &str = "asking the board who it is";
 /// The session of an emulated board: a number drawn at random would make the run another one. Two programs that use it one
 /// after the other are told apart by their request ids.
@@ -22,17 +24,57 @@ const EMULATED_SESSION: u32 = 0x5eed_0001;
 /// own time: hello asked twice, because this computer is slow, would make the run another one.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
-    let waits: Vec<Duration> = if known_emulated {
-        vec![Timing::EMULATED.reply; Timing::EMULATED.retries as usize + 1]
+    let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();
+    let (first, other, last) = if known_emulated {
+        let patient = Timing::EMULATED.reply;
+        (vec![patient; Timing::EMULATED.retries as usize + 1], vec![patient], Vec::new())
     } else {
-        (0..ATTEMPTS).map(|attempt| Timing::REAL.reply * (1 << attempt)).collect()
+        (millis(&FIRST_MS), millis(&OTHER_RATE_MS), millis(&LAST_MS))
     };
-    // Events of this boot are not lost by being passed over here: the status that follows tells where their
-    // numbers stand.
-    let (_, packet) = link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(()))?;
+    let present = link.rate();
+    let others = LinkRate::ALL.into_iter().filter(|rate| *rate != present).map(|rate| (rate, other.clone()));
+    let rounds = std::iter::once((present, first)).chain(others).chain([(present, last)]);
+    let packet = say_hello(link, rounds)?;
     let hello = read_answer(&packet)?;
     let version = agree(&hello)?;
     Ok((hello, version))
+}
+
+/// Asks with these waits at one rate after the other until somebody answers; that rate is the link's then.
+fn say_hello(
+    link: &mut Link,
+    rounds: impl Iterator<Item = (LinkRate, Vec<Duration>)>,
+) -> Result<Packet, ClientError> {
+    let mut silent: Option<ClientError> = None;
+    for (rate, waits) in rounds {
+        link.set_rate(rate, DURING)?;
+        // Events of this boot are not lost by being passed over here: the status that follows tells where their
+        // numbers stand.
+        match link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(())) {
+            Ok((_, packet)) => return Ok(packet),
+            Err(error @ ClientError::Silent { .. }) => silent = Some(both(silent, error)),
+            Err(error) => return Err(error),
+        }
+    }
+    Err(silent.unwrap_or_else(|| ClientError::Nonsense { during: DURING.into(), answer: "no rate".into() }))
+}
+
+/// What was not answered before, and now.
+fn both(before: Option<ClientError>, now: ClientError) -> ClientError {
+    match (before, now) {
+        (
+            Some(ClientError::Silent { attempts: a, waited: w, bad_frames: f, bytes: b, .. }),
+            ClientError::Silent { port, during, attempts, waited, bad_frames, bytes },
+        ) => ClientError::Silent {
+            port,
+            during,
+            attempts: attempts + a,
+            waited: waited + w,
+            bad_frames: bad_frames + f,
+            bytes: bytes + b,
+        },
+        (_, now) => now,
+    }
 }
 
 /// Opens a session: what another host had begun on this board ends, and its requests are refused from now on.

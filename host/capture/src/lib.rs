@@ -47,6 +47,7 @@ pub mod find;
 pub mod focus;
 mod handshake;
 mod link;
+mod link_rate;
 pub mod log_stream;
 mod owner;
 pub mod pair;

@@ -11,8 +11,8 @@ use std::{
 
 use farnear_protocol::{
     Call, Request, RequestError,
-    frame::{Decoder, Header, Kind, Packet, encode},
-    message::NO_SESSION,
+    frame::{Decoder, Header, Kind, Packet, delimited, encode},
+    message::{LinkRate, NO_SESSION},
 };
 
 use crate::{error::ClientError, transport::Transport};
@@ -41,6 +41,7 @@ pub(crate) struct Link {
     /// `None` between an unplugging and the next connection.
     transport: Option<Box<dyn Transport>>,
     port: String,
+    rate: LinkRate,
     decoder: Decoder,
     buffer: [u8; 512],
     /// Bytes of `buffer` that were received and not decoded yet.
@@ -56,6 +57,7 @@ impl Link {
         Self {
             transport: Some(transport),
             port: port.into(),
+            rate: LinkRate::START,
             decoder: Decoder::new(),
             buffer: [0; 512],
             unread: 0..0,
@@ -72,11 +74,33 @@ impl Link {
         self.next_id = last_id.wrapping_add(1);
     }
 
-    /// Goes on over another transport, after the first broke.
+    /// Goes on over another transport, after the first broke; at the rate of a board that was just reset.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
         self.transport = Some(transport);
+        self.rate = LinkRate::START;
         self.decoder = Decoder::new();
         self.unread = 0..0;
+    }
+
+    /// The rate of this end.
+    pub(crate) const fn rate(&self) -> LinkRate {
+        self.rate
+    }
+
+    /// Gives this end another rate.
+    pub(crate) fn set_rate(&mut self, rate: LinkRate, during: &str) -> Result<(), ClientError> {
+        if rate == self.rate {
+            return Ok(());
+        }
+        let set = match &mut self.transport {
+            Some(transport) => transport.set_rate(rate),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        set.map_err(|source| self.gone(source, during))?;
+        self.rate = rate;
+        self.decoder = Decoder::new();
+        self.unread = 0..0;
+        Ok(())
     }
 
     /// Closes the port. As long as a program holds a port that has gone, the system gives the board that comes back another
@@ -107,12 +131,10 @@ impl Link {
             ClientError::Nonsense { during: during.into(), answer: "the request does not fit a frame".into() }
         })?;
         let begin = Instant::now();
-        let (bytes, bad_frames) = (self.bytes, self.bad_frames);
-        for (attempt, wait) in waits.iter().enumerate() {
-            // A delimiter in front ends what the line has made of the last attempt, or an earlier program has
-            // left of a frame. One write for both, so that an emulated board never sees the one alone.
-            let in_doubt = attempt > 0 || *request == Request::Hello;
-            let bytes = if in_doubt { [&[0], frame.as_slice()].concat() } else { frame.to_vec() };
+        let (bytes_before, bad_frames) = (self.bytes, self.bad_frames);
+        // One write for both delimiters, so that an emulated board never sees the first alone.
+        let bytes = delimited(&frame);
+        for wait in waits {
             self.send(&bytes, *wait, during)?;
             let until = Instant::now() + *wait;
             while let Some(packet) = self.receive(until, during)? {
@@ -132,7 +154,7 @@ impl Link {
             attempts: waits.len() as u32,
             waited: begin.elapsed(),
             bad_frames: self.bad_frames - bad_frames,
-            bytes: self.bytes - bytes,
+            bytes: self.bytes - bytes_before,
         })
     }
 

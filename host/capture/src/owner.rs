@@ -19,7 +19,7 @@ use std::{
 use farnear_protocol::{
     Log, Request, RequestError, Response,
     frame::{Kind, Packet},
-    message::{EventKind, Hello, Status},
+    message::{EventKind, Hello, LinkRate, Status},
 };
 
 use crate::{
@@ -27,6 +27,7 @@ use crate::{
     events::{Events, is_under_way, request_of},
     handshake::{open_session, shake_hands},
     link::Link,
+    link_rate,
     log_stream::{LogPart, Readers},
     timing::Timing,
     transport::Transport,
@@ -87,6 +88,8 @@ pub(crate) enum Command {
 pub(crate) struct Owner {
     link: Link,
     connect: Connect,
+    /// The rate that the link is to have, where somebody asked for one.
+    wanted: Option<LinkRate>,
     inbox: Receiver<Command>,
     timing: Arc<Mutex<Timing>>,
     session: Session,
@@ -111,19 +114,27 @@ impl Owner {
         mut connect: Connect,
         port: &str,
         emulated: bool,
+        wanted: Option<LinkRate>,
         timing: impl FnOnce(&Hello) -> Arc<Mutex<Timing>>,
         inbox: Receiver<Command>,
     ) -> Result<Self, ClientError> {
         let mut link = Link::new(connect()?, port);
+        // A host before this one may have asked for the same.
+        link.set_rate(wanted.unwrap_or(LinkRate::START), "opening the port")?;
         let (hello, version) = shake_hands(&mut link, emulated)?;
         open_session(&mut link, (&hello, version))?;
         let timing = timing(&hello);
+        if let Some(wanted) = wanted {
+            let timing = *timing.lock().unwrap_or_else(PoisonError::into_inner);
+            link_rate::change(&mut link, (version, hello.boot), wanted, timing)?;
+        }
         let events = Events { boot: hello.boot, ..Events::default() };
-        let session = Session { number: 1, hello: Arc::new(hello), version };
+        let session = Session { number: 1, hello: Arc::new(hello), version, rate: link.rate() };
         let now = Instant::now();
         let mut owner = Self {
             link,
             connect,
+            wanted,
             inbox,
             timing,
             session,

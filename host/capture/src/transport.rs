@@ -7,12 +7,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use farnear_protocol::message::LinkRate;
 use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 
 use crate::error::PortError;
-
-/// Speed of the board's UART behind the ST-LINK virtual COM port, in baud. A pseudo-terminal ignores it.
-pub const BAUD: u32 = 2_000_000;
 
 /// A byte pipe to a board.
 pub trait Transport: Send {
@@ -25,6 +23,11 @@ pub trait Transport: Send {
 
     /// Throws away what has arrived and was not read.
     fn discard_input(&mut self) -> io::Result<()>;
+
+    /// Sends and receives at another rate from now on. A pipe that has none does nothing.
+    fn set_rate(&mut self, _: LinkRate) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// A serial port, held exclusively: a second program that opens it gets [`PortError::Busy`].
@@ -33,10 +36,10 @@ pub struct SerialTransport {
 }
 
 impl SerialTransport {
-    /// Opens the port at [`BAUD`], 8 data bits, no parity, no flow control.
+    /// Opens the port at the rate that the board begins with, 8 data bits, no parity, no flow control.
     pub fn open(path: &str) -> Result<Self, PortError> {
         refuse_what_is_no_port(path)?;
-        let port = serialport::new(path, BAUD)
+        let port = serialport::new(path, LinkRate::START.baud())
             .timeout(Duration::from_millis(50))
             .open()
             .map_err(|error| explain(path, error))?;
@@ -106,6 +109,21 @@ fn refuse_what_is_no_port(_: &str) -> Result<(), PortError> {
     Ok(())
 }
 
+/// Parts a port from the rate that the link is to have: `/dev/ttyACM0@921600`. A name that exists as it is has none.
+///
+/// # Errors
+/// [`PortError::Rate`] where the link does not have that rate.
+pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortError> {
+    let is_number = |rate: &str| !rate.is_empty() && rate.bytes().all(|byte| byte.is_ascii_digit());
+    let parts = given.rsplit_once('@').filter(|(_, rate)| is_number(rate));
+    let Some((port, rate)) = parts.filter(|_| !std::path::Path::new(given).exists()) else {
+        return Ok((given, None));
+    };
+    let known = rate.parse().ok().and_then(LinkRate::of);
+    let rate = known.ok_or_else(|| PortError::Rate { port: port.into(), rate: rate.into() })?;
+    Ok((port, Some(rate)))
+}
+
 /// The ports behind which a board may be: those on USB.
 pub fn ports() -> Vec<String> {
     let present = serialport::available_ports().unwrap_or_default();
@@ -166,11 +184,26 @@ impl Transport for SerialTransport {
     fn discard_input(&mut self) -> io::Result<()> {
         Ok(self.port.clear(ClearBuffer::Input)?)
     }
+
+    fn set_rate(&mut self, rate: LinkRate) -> io::Result<()> {
+        Ok(self.port.set_baud_rate(rate.baud())?)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_port_may_name_the_links_rate() {
+        assert_eq!(with_rate("/dev/ttyACM0").unwrap(), ("/dev/ttyACM0", None));
+        assert_eq!(with_rate("/dev/ttyACM0@921600").unwrap(), ("/dev/ttyACM0", Some(LinkRate::Baud921600)));
+        for other in ["/dev/usb@left", "/dev/usb@"] {
+            assert_eq!(with_rate(other).unwrap(), (other, None));
+        }
+        let error = with_rate("/dev/ttyACM0@115200").err().unwrap().to_string();
+        assert!(error.contains("115200") && error.contains("2000000 or 921600"), "{error}");
+    }
 
     #[test]
     fn an_absent_port_is_named() {

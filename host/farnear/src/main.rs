@@ -10,7 +10,6 @@ mod commands;
 mod hints;
 mod render;
 mod report;
-mod scene;
 mod terminal;
 
 use std::process::ExitCode;

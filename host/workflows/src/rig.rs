@@ -115,7 +115,7 @@ impl Rig {
             }
         };
         client.interrupt_by(context.cancel.flag());
-        if let Some(note) = client.firmware_note() {
+        for note in [client.firmware_note(), client.link_note()].into_iter().flatten() {
             context.say(&note);
         }
         Ok(Self { client, emulation })

@@ -9,6 +9,7 @@ use crate::units::{BoardMicros, Nanometres};
 
 /// An alarm that came up.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AlarmRecord {
     /// Running number of alarms in this board's life, from 1.
     pub number: u32,
@@ -22,6 +23,7 @@ pub struct AlarmRecord {
 
 /// What stopped the rig.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Alarm {
     /// The emergency-stop input is open. Clearing is refused while it is.
     EmergencyStop,

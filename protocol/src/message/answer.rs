@@ -38,6 +38,7 @@ pub enum Response {
 
 /// Why the board did not do what was asked. Nothing has changed when one of these comes.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequestError {
     /// The frame's version is not spoken here. This variant keeps its bytes in all versions.
     Version {

@@ -7,6 +7,7 @@ use crate::units::Nanometres;
 
 /// A movable part of the rig.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
     /// Stage A's stepper and screw, 0 at the home switch.
     SensorCoarse,
@@ -47,6 +48,7 @@ pub fn sensor_distance_nm(datum: Nanometres, mut position: impl FnMut(Axis) -> N
 
 /// What is known of an axis' position.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PositionState {
     /// Never homed since the reset, and at rest before it.
     Unknown,

@@ -55,6 +55,7 @@ pub struct CorrectionInfo {
 
 /// What is wrong with a request about depth correction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CorrectionFault {
     /// None is open or stored.
     None,

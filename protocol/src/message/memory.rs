@@ -7,6 +7,7 @@ use super::Axis;
 
 /// A record in the board's memory. Each has a version, a CRC and two copies.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RecordName {
     /// The settings.
     Settings,
@@ -22,6 +23,7 @@ pub enum RecordName {
 
 /// Names a setting; the unit of its value is in the name.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SettingKey {
     /// Distance from the lens' principal plane to the sensor with all axes at 0.
     DatumNm,
@@ -190,6 +192,7 @@ impl StepperKeys {
 
 /// A setting and what it may be.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setting {
     /// Which.
     pub key: SettingKey,

@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{Axis, Codes, CoefficientBits, CorrectionInfo, Routine, SettingKey, Shot, SunQuery};
+use super::{Axis, Codes, CoefficientBits, CorrectionInfo, LinkRate, Routine, SettingKey, Shot, SunQuery};
 use crate::units::{Micros, Nanometres};
 
 /// What the host can ask. Each request carries an id, larger than all before it; the board answers a repeated id with
@@ -179,5 +179,12 @@ pub enum Request {
         exposures: u32,
         /// How long the host may say nothing, see [`Request::Move`].
         silence: Micros,
+    },
+    /// Change the link's rate, while nothing is under way: the answer still comes at the old one. Where no good request comes in
+    /// at the new one within [`super::LINK_TRIAL`], the board goes back; each reset begins with [`LinkRate::START`]. Answer:
+    /// [`super::Response::Accepted`].
+    SetLinkRate {
+        /// The new rate.
+        rate: LinkRate,
     },
 }

@@ -27,6 +27,7 @@ pub struct Shot {
 
 /// What is wrong with a shot.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ShotFault {
     /// The index is not below [`super::Limits::shots_max`], or the program has no shots.
     Index,
@@ -123,6 +124,7 @@ pub struct ProgramStatus {
 
 /// What the exposure program does.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ProgramState {
     /// Not armed: shots may be loaded.
     Idle,

@@ -95,6 +95,13 @@ impl Board {
                 self.answer(id, Ok(Response::Accepted));
                 self.end_by_stop();
             }
+            Request::SetLinkRate { .. } if self.faults.one_rate => {
+                self.answer(id, Err(RequestError::Malformed));
+            }
+            Request::SetLinkRate { rate } => {
+                self.answer(id, Ok(Response::Accepted));
+                self.change_rate(rate);
+            }
             Request::Reboot => {
                 self.answer(id, Ok(Response::Accepted));
                 self.reset(ResetCause::Software);

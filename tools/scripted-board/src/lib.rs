@@ -10,7 +10,7 @@ use std::{
     collections::{BTreeMap, VecDeque},
     io,
     sync::{Arc, Mutex, MutexGuard},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use farnear_capture::Transport;
@@ -18,9 +18,9 @@ use farnear_protocol::{
     Event, Log, PROTOCOL_CURRENT, PROTOCOL_MIN, Request, Response,
     frame::{Decoder, Kind},
     message::{
-        Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, Limits,
-        LinkCounters, NO_SESSION, PositionState, ProgramState, ProgramStatus, ResetCause, SCHEMA_KEY, Shot,
-        Status,
+        Alarm, AlarmRecord, Axis, AxisStatus, Capabilities, Counters, EventKind, Failure, Hello, LINK_TRIAL,
+        Limits, LinkCounters, LinkRate, NO_SESSION, PositionState, ProgramState, ProgramStatus, ResetCause,
+        SCHEMA_KEY, Shot, Status,
     },
     units::{BoardMicros, Micros, Nanometres},
 };
@@ -72,6 +72,10 @@ pub struct Faults {
     pub brakes_for: u32,
     /// The board refuses every version but this.
     pub other_version: Option<u8>,
+    /// The board does not know the request for another rate.
+    pub one_rate: bool,
+    /// The adapter passes nothing at this rate.
+    pub no_rate: Option<LinkRate>,
 }
 
 /// The board: what it is, where it stands, what it was told.
@@ -133,6 +137,10 @@ pub struct Board {
     pub braking: u32,
     asking: u32,
     logs: u32,
+    /// The rate of the board's end, the one it goes back to and when, and the rate of the host's end.
+    pub rate: LinkRate,
+    trial: Option<(LinkRate, Instant)>,
+    host_rate: LinkRate,
     /// The number of the open session.
     pub session: u32,
     remembered: BTreeMap<u32, Vec<u8>>,
@@ -228,6 +236,9 @@ impl Peer {
             braking: 0,
             asking: 0,
             logs: 0,
+            rate: LinkRate::START,
+            trial: None,
+            host_rate: LinkRate::START,
             session: NO_SESSION,
             remembered: BTreeMap::new(),
             decoder: Decoder::new(),
@@ -249,7 +260,10 @@ impl Peer {
 
     /// One more connection to this board.
     fn connection(&self) -> Connection {
-        self.board().connections += 1;
+        let mut board = self.board();
+        board.connections += 1;
+        board.host_rate = LinkRate::START;
+        drop(board);
         Connection(self.clone())
     }
 
@@ -285,6 +299,9 @@ impl Transport for Connection {
         if board.gone {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
+        if !board.hears_the_host() {
+            return Ok(());
+        }
         for byte in bytes {
             if let Some(Ok(packet)) = board.decoder.push(*byte) {
                 board.receive(&packet);
@@ -297,12 +314,36 @@ impl Transport for Connection {
         self.0.board().out.clear();
         Ok(())
     }
+
+    fn set_rate(&mut self, rate: LinkRate) -> io::Result<()> {
+        self.0.board().host_rate = rate;
+        Ok(())
+    }
 }
 
 impl Board {
     fn put<T: Serialize>(&mut self, kind: Kind, id: u32, message: &T) {
         let frame = answers::frame(self.hello.boot, kind, id, message);
         self.send(&frame);
+    }
+
+    /// Whether both ends have one rate, which the adapter passes. A rate at which nobody was heard is left.
+    fn hears_the_host(&mut self) -> bool {
+        if let Some((back, _)) = self.trial.filter(|(_, until)| Instant::now() >= *until) {
+            (self.rate, self.trial) = (back, None);
+        }
+        let hears = self.host_rate == self.rate && self.faults.no_rate != Some(self.rate);
+        if hears {
+            self.trial = None;
+        }
+        hears
+    }
+
+    /// Has another rate from now on, on trial.
+    fn change_rate(&mut self, rate: LinkRate) {
+        let until = Instant::now() + Duration::from_micros(u64::from(LINK_TRIAL.0));
+        self.trial = Some((self.rate, until));
+        self.rate = rate;
     }
 
     /// A frame, behind whatever garbage the line adds.
@@ -351,6 +392,7 @@ impl Board {
     /// The board starts anew, in its next boot.
     pub fn reset(&mut self, cause: ResetCause) {
         self.hello.boot += 1;
+        (self.rate, self.trial) = (LinkRate::START, None);
         self.hello.reset_cause = cause;
         self.homed = false;
         self.lens_homed = false;

@@ -1,10 +1,11 @@
 //! Requests about alarms, settings and events.
 
 use farnear_protocol::BoardMicros;
-use farnear_protocol::message::{Alarm, EventKind, RecordName, RequestError, Response, SettingKey};
+use farnear_protocol::message::{Alarm, EventKind, LinkRate, RecordName, RequestError, Response, SettingKey};
 
 use super::Answer;
 use crate::motion::axis::Stepper;
+use crate::notes::Note;
 use crate::rig::Rig;
 
 impl Rig {
@@ -18,6 +19,14 @@ impl Rig {
         })?;
         self.store.mark(RecordName::Alarms);
         self.events.push(now, EventKind::AlarmCleared { number });
+        self.notes.add(Note::AlarmCleared { number });
+        Ok(Response::Accepted)
+    }
+
+    pub(super) fn set_link_rate(&mut self, rate: LinkRate, now: BoardMicros) -> Answer {
+        self.must_stand()?;
+        self.all_must_be_free()?;
+        self.link_speed.ask(rate, now);
         Ok(Response::Accepted)
     }
 

@@ -5,7 +5,9 @@ mod fake;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use farnear_protocol::frame::{Decoder, Kind, Packet};
-use farnear_protocol::message::{Alarm, Axis, EventKind, ResetCause};
+use farnear_protocol::message::{
+    Alarm, Axis, EventKind, LINK_TRIAL, LinkRate, PositionState, RequestError, ResetCause,
+};
 use farnear_protocol::{BoardMicros, Event, Log, Request};
 use farnear_rig::Rig;
 use farnear_rig::control::{Control, LAST_FRAME, Note};
@@ -80,7 +82,9 @@ fn a_stage_is_homed_by_way_of_the_loop_and_each_tick_feeds_the_watchdog() {
         assert!(ticks < 50_000, "it is not homed after ten seconds: {:?}", events(&fake));
     }
     assert!(ticks > 5_000 && fake.hardware.position_um().abs() <= 0.5, "{}", fake.hardware.position_um());
-    assert_eq!((fake.fed, fake.notes.as_slice(), fake.resets), (ticks, [].as_slice(), 0));
+    assert_eq!((fake.fed, fake.resets), (ticks, 0));
+    let homed = Note::Position { axis: Axis::SensorCoarse, state: PositionState::Homed };
+    assert_eq!(fake.notes, [Note::Session { request: 1 }, homed]);
 }
 
 #[test]
@@ -174,12 +178,11 @@ fn reset_after(ticks_until_sent: usize) -> u64 {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     fake.ask(&Request::Reboot);
-    while fake.notes.is_empty() {
+    while !fake.notes.contains(&Note::Reset) {
         fake.sending = ticks_until_sent;
         run(&mut control, &mut fake, 1);
         assert!(fake.now < 100_000, "it was not asked to reset");
     }
-    assert_eq!(fake.notes, [Note::Reset]);
     let (asked, fed) = (fake.now - u64::from(TICK_US), fake.fed);
     fake.calls.clear();
     while fake.resets == 0 {
@@ -201,4 +204,93 @@ fn a_reset_waits_for_the_last_frame() {
 #[test]
 fn a_reset_does_not_wait_for_ever() {
     assert_eq!(reset_after(usize::MAX), u64::from(LAST_FRAME.0));
+}
+
+/// A board whose host has asked for the slow rate; the last frame takes three ticks on the wire.
+fn asked_for_the_slow_rate(control: &mut Control<'_>, fake: &mut Fake) -> u64 {
+    fake.ask(&Request::SetLinkRate { rate: LinkRate::Baud921600 });
+    while fake.rates.is_empty() {
+        let sent = fake.sent.len();
+        run(control, fake, 1);
+        if fake.sent.len() > sent {
+            fake.sending = 3;
+        }
+        assert!(fake.now < 20_000, "the rate does not change");
+    }
+    let answers = packets(fake).iter().filter(|packet| packet.header.kind == Kind::Response).count();
+    assert_eq!((answers, fake.sending), (2, 0), "the answers have left at the old rate");
+    let (at, rate) = fake.rates[0];
+    assert_eq!(rate, LinkRate::Baud921600);
+    at
+}
+
+#[test]
+fn a_link_rate_stays_where_the_host_is_heard_at_it() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    asked_for_the_slow_rate(&mut control, &mut fake);
+    fake.ask(&Request::Status);
+    run(&mut control, &mut fake, 5_000);
+    assert_eq!(fake.rates.len(), 1);
+    assert!(fake.notes.contains(&Note::LinkRate(LinkRate::Baud921600)));
+}
+
+#[test]
+fn a_link_rate_at_which_nobody_is_heard_is_left() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    let at = asked_for_the_slow_rate(&mut control, &mut fake);
+    fake.hear(&[1, 2, 3, 0]); // noise is nobody
+    run(&mut control, &mut fake, 5_000);
+    assert_eq!(fake.rates[1..], [(at + u64::from(LINK_TRIAL.0), LinkRate::START)]);
+}
+
+#[test]
+fn a_link_rate_does_not_change_under_work() {
+    let (mut rig, mut fake) = (rig(), Fake::new(4_000.0));
+    let mut control = Control::new(&mut rig);
+    fake.ask(&bench::home(Axis::SensorCoarse));
+    fake.ask(&Request::SetLinkRate { rate: LinkRate::Baud921600 });
+    run(&mut control, &mut fake, 100);
+    assert_eq!(fake.rates, []);
+    let refused = Note::Refused { request: 3, error: RequestError::Busy { request: 2 } };
+    assert!(fake.notes.contains(&refused), "{:?}", fake.notes);
+}
+
+#[test]
+fn each_frame_has_a_delimiter_before_it_too() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    for _ in 0..3 {
+        fake.ask(&Request::Status);
+        run(&mut control, &mut fake, 10);
+    }
+    assert!(fake.sent.len() > 3);
+    for bytes in &fake.sent {
+        assert!(bytes.starts_with(&[0]) && bytes.ends_with(&[0]), "{bytes:02x?}");
+    }
+    // One flipped delimiter, whichever, costs one frame.
+    let frames = packets(&fake).len();
+    let bytes: Vec<u8> = fake.sent.concat();
+    for place in 0..bytes.len() {
+        if bytes[place] == 0 {
+            let mut spoilt = bytes.clone();
+            spoilt[place] = 0x10;
+            let mut decoder = Decoder::new();
+            let read = spoilt.iter().filter(|byte| matches!(decoder.push(**byte), Some(Ok(_)))).count();
+            assert!(read + 1 >= frames, "{read} of {frames}");
+        }
+    }
+}
+
+#[test]
+fn alarms_and_their_end_are_in_the_log() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    fake.ask(&Request::Halt);
+    run(&mut control, &mut fake, 10);
+    fake.ask(&Request::ClearAlarm { number: 1 });
+    run(&mut control, &mut fake, 10);
+    let halted = |note: &Note| matches!(note, Note::Alarm(record) if record.alarm == Alarm::Halt);
+    assert!(fake.notes.iter().any(halted) && fake.notes.contains(&Note::AlarmCleared { number: 1 }));
 }

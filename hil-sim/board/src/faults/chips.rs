@@ -23,6 +23,19 @@ pub const GAUGE_DEAD: Kind = Kind {
     happen: |rig, _| rig.disconnect(SpiChip::Gauge, true),
     mend: Some(|rig, _| rig.disconnect(SpiChip::Gauge, false)),
 };
+/// The gauge's zero drifts by so many nanometres a second, as it does while it warms up.
+pub const GAUGE_DRIFTS: Kind = Kind {
+    name: "gauge-drifts",
+    takes: Takes::amount(-1000.0, 1000.0, 20.0),
+    happen: |rig, at| {
+        let now_ns = rig.now_ns();
+        rig.plant(|plant| plant.drift_gauge(now_ns, 1e-3 * at.amount));
+    },
+    mend: Some(|rig, _| {
+        let now_ns = rig.now_ns();
+        rig.plant(|plant| plant.drift_gauge(now_ns, 0.0));
+    }),
+};
 /// The piezo's DAC no longer hears anything, and keeps its output.
 pub const DAC_DEAD: Kind = Kind {
     name: "dac-dead",

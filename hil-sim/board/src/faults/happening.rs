@@ -56,6 +56,8 @@ struct Row {
     #[serde(skip_serializing_if = "Option::is_none")]
     after_ms: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    after_cycles: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     on: Option<Moment>,
     #[serde(skip_serializing_if = "Option::is_none")]
     nth: Option<u32>,
@@ -79,6 +81,9 @@ struct Row {
 /// The longest time that a file may name: a day.
 const LONGEST_MS: f64 = 86_400_000.0;
 
+/// Cycles of the core, at 168 MHz. Written back, such a moment is one in milliseconds.
+const CYCLES_PER_MS: f64 = 168_000.0;
+
 /// Checks that a number is in its range.
 fn within(name: &str, value: f64, (min, max): (f64, f64)) -> Result<f64, String> {
     // Not a number is in no range.
@@ -91,7 +96,12 @@ fn within(name: &str, value: f64, (min, max): (f64, f64)) -> Result<f64, String>
 
 impl Row {
     fn when(&self) -> Result<When, String> {
-        let after_ms = self.after_ms.map(|ms| within("after_ms", ms, (0.0, LONGEST_MS))).transpose()?;
+        if self.after_ms.is_some() && self.after_cycles.is_some() {
+            return Err("after_ms and after_cycles exclude each other: name one of them".into());
+        }
+        let after_cycles = self.after_cycles.map(|cycles| cycles as f64 / CYCLES_PER_MS);
+        let after_ms = self.after_ms.or(after_cycles);
+        let after_ms = after_ms.map(|ms| within("after_ms", ms, (0.0, LONGEST_MS))).transpose()?;
         let delay_ms = self.delay_ms.map(|ms| within("delay_ms", ms, (0.0, LONGEST_MS))).transpose()?;
         let per_s = self.chance_per_s.map(|rate| within("chance_per_s", rate, (1e-6, 1e4))).transpose()?;
         if self.on.is_none() && (self.nth.is_some() || delay_ms.is_some()) {
@@ -105,7 +115,8 @@ impl Row {
             },
             (None, None, Some(per_s)) => Ok(When::Chance { per_s }),
             (None, None, None) => {
-                Err("when does it happen? One of after_ms, on and chance_per_s is expected".into())
+                Err("when does it happen? One of after_ms, after_cycles, on and chance_per_s is expected"
+                    .into())
             }
             _ => Err("after_ms, on and chance_per_s exclude each other: name one of them".into()),
         }
@@ -165,6 +176,7 @@ impl From<Happening> for Row {
         let takes = what.takes;
         Self {
             after_ms,
+            after_cycles: None,
             on: on.map(|(moment, ..)| moment),
             nth: on.map(|(_, nth, _)| nth).filter(|nth| *nth != 1),
             delay_ms: on.map(|(_, _, ms)| ms).filter(|ms| *ms != 0.0),

@@ -135,6 +135,8 @@ pub struct Lines {
     pub to_board: NoisyLine,
     /// From the board to the host.
     pub to_host: NoisyLine,
+    /// The host's adapter keeps what comes for so long, from the first byte on.
+    pub latency_ns: u64,
 }
 
 impl Lines {
@@ -143,6 +145,7 @@ impl Lines {
         Self {
             to_board: NoisyLine::new(rate, seed, "line to the board"),
             to_host: NoisyLine::new(rate, seed, "line to the host"),
+            latency_ns: 0,
         }
     }
 

@@ -23,6 +23,13 @@ pub const LINK_INSERTS_BYTES: Kind = Kind {
     happen: |rig, at| rig.lines().each(|line| line.set_rates(|rates| rates.inserted = at.amount)),
     mend: Some(|rig, _| rig.lines().each(|line| line.set_rates(|rates| rates.inserted = 0.0))),
 };
+/// The adapter keeps back what the board says, so long, as adapters on USB do.
+pub const LINK_LATENCY: Kind = Kind {
+    name: "link-latency",
+    takes: Takes::amount(0.0, 100.0, 16.0),
+    happen: |rig, at| rig.lines().latency_ns = (at.amount * 1e6) as u64,
+    mend: Some(|rig, _| rig.lines().latency_ns = 0),
+};
 /// Nothing passes, in either direction.
 pub const LINK_CUT: Kind = Kind {
     name: "link-cut",

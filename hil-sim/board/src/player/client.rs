@@ -2,7 +2,7 @@
 
 use farnear_protocol::{
     Call, Event, EventKind, PROTOCOL_CURRENT, Request, RequestError, Response,
-    frame::{Header, Kind, encode},
+    frame::{Header, Kind, delimited, encode},
     message::{Failure, NO_SESSION, ProgramState, SettingKey, Status},
 };
 
@@ -79,7 +79,7 @@ impl Client {
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
         // Requests of a scenario fit; one that did not would simply not be sent.
         encode(header, &Call { session, request: request.clone() })
-            .map(|bytes| bytes.to_vec())
+            .map(|frame| delimited(&frame).to_vec())
             .unwrap_or_default()
     }
 
@@ -140,11 +140,7 @@ impl Client {
         self.last_id += 1;
         let id = self.last_id;
         let frame = self.frame(id, request);
-        for attempt in 0..ATTEMPTS {
-            if attempt > 0 {
-                // Whatever the line has made of the frame before it ends here.
-                self.rig.send(&[0])?;
-            }
+        for _ in 0..ATTEMPTS {
             self.rig.send(&frame)?;
             for _ in 0..ANSWER_US / LOOK_US {
                 self.pass(LOOK_US)?;

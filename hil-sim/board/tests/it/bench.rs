@@ -78,9 +78,15 @@ impl Bench {
     /// Sends a request and gives its id, without letting time pass.
     pub fn send(&mut self, request: &Request) -> u32 {
         self.next += 1;
-        let frame = request_frame(self.next, self.boot, request);
-        self.rig.send(&frame).expect("the rig runs");
-        self.next
+        let id = self.next;
+        self.put(id, request);
+        id
+    }
+
+    /// Puts a request's frame on the line, between two delimiters.
+    fn put(&mut self, id: u32, request: &Request) {
+        let frame = request_frame(id, self.boot, request);
+        self.rig.send(&[&[0], frame.as_slice()].concat()).expect("the rig runs");
     }
 
     /// The answers that have come; events are kept in [`Bench::events`].
@@ -104,7 +110,7 @@ impl Bench {
         let id = self.send(request);
         for attempt in 0..4 {
             if attempt > 0 {
-                self.rig.send(&request_frame(id, self.boot, request)).expect("the rig runs");
+                self.put(id, request);
             }
             for _ in 0..50 {
                 self.rig.advance_us(200).expect("the rig runs");

@@ -6,13 +6,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_protocol::message::{Hello, ResetCause};
+use farnear_protocol::message::{Hello, LinkRate, ResetCause};
 
 use super::{Note, Owner};
 use crate::{
     error::ClientError,
     events::Events,
     handshake::{open_session, shake_hands},
+    link_rate,
 };
 
 /// From one attempt to reach the board again to the next.
@@ -25,6 +26,8 @@ pub(crate) struct Session {
     pub number: u32,
     pub hello: Arc<Hello>,
     pub version: u8,
+    /// The link's rate.
+    pub rate: LinkRate,
 }
 
 /// What ended a session.
@@ -150,6 +153,12 @@ impl Owner {
         }
         let opened = open_session(&mut self.link, (&hello, version));
         opened.inspect_err(|error| self.break_off(error))?;
+        if let Some(wanted) = self.wanted {
+            let timing = self.timing();
+            let changed = link_rate::change(&mut self.link, (version, hello.boot), wanted, timing);
+            changed.inspect_err(|error| self.break_off(error))?;
+        }
+        self.session.rate = self.link.rate();
         self.session.number += 1;
         self.events = Events { boot: hello.boot, ..Events::default() };
         self.next_log = None;

@@ -9,6 +9,7 @@ mod genicam_camera;
 #[cfg(feature = "genicam")]
 mod gige_rig;
 mod line;
+mod link_rate;
 mod pair;
 mod requests;
 mod scripted;

@@ -4,13 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_scene::{Camera, Noise};
+use farnear_scene::{Camera, Noise, SceneArgument};
 
 use crate::{
     render::{self, RenderSettings},
-    report,
-    scene::SceneArgument,
-    terminal,
+    report, terminal,
 };
 
 /// Render a far- and a near-focused image of a known scene, with its true depth.

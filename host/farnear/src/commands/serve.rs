@@ -30,7 +30,7 @@ pub struct Arguments {
     /// Set this on the camera first, as far as its kind has it: gain, black_level, pixel_format, region, trigger_source.
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<farnear_capture::camera::Setting>,
-    /// Scene before the emulated camera: plane:MM, staircase, slant, cone or sphere [default: staircase].
+    /// Scene before the emulated camera: plane:MM, staircase, slant, cone, sphere or a scene file [default: staircase].
     #[arg(long, value_parser = scene)]
     scene: Option<String>,
     /// Folder of captures; made where it is missing.
@@ -56,8 +56,8 @@ pub struct Arguments {
     open: bool,
 }
 
-fn scene(text: &str) -> Result<String, <farnear_scene::Scene as std::str::FromStr>::Err> {
-    text.parse::<farnear_scene::Scene>().map(|_| text.to_owned())
+fn scene(text: &str) -> Result<String, farnear_scene::SceneError> {
+    text.parse::<farnear_scene::SceneArgument>().map(|_| text.to_owned())
 }
 
 /// Runs the command, until Ctrl-C.

@@ -3,7 +3,7 @@
 use farnear_protocol::{
     Call, Micros, Nanometres, Request,
     frame::Kind,
-    message::{Axis, Routine, SettingKey, SunQuery},
+    message::{Axis, LinkRate, Routine, SettingKey, SunQuery},
 };
 
 use super::{
@@ -55,6 +55,7 @@ pub fn table() -> Vec<Request> {
         Request::GetRow { first: 568, count: 72 },
         Request::OpenSession,
         Request::RunContinuously { period: Micros(40_000), exposures: 15_000, silence },
+        Request::SetLinkRate { rate: LinkRate::Baud921600 },
     ]
 }
 
@@ -109,6 +110,7 @@ fn requests() {
             "1303010d0c0b0a04030201080706051db80448049327c700",
             "1403010d0c0b0a04030201080706051e15e0768c00",
             "1c03010d0c0b0a04030201080706051fc0b802987580897a199a08ce00",
+            "1503010d0c0b0a040302010807060520016d56918900",
         ],
     );
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use farnear_protocol::frame::Encoded;
+use farnear_protocol::message::LinkRate;
 use farnear_protocol::{BoardMicros, Log, Request};
 use farnear_rig::control::{Board, Note};
 use farnear_rig::io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges, TICK_US};
@@ -25,6 +25,7 @@ pub enum Call {
     Strobe,
     Apply,
     Send,
+    SetLinkRate,
     TakeLog,
     FeedWatchdog,
     Reset,
@@ -49,7 +50,9 @@ pub struct Fake {
     taken: usize,
     /// Ticks until the last frame has left.
     pub sending: usize,
-    pub sent: Vec<Encoded>,
+    pub sent: Vec<Vec<u8>>,
+    /// When the link was given another rate, and which.
+    pub rates: Vec<(u64, LinkRate)>,
     pub logs: VecDeque<Log>,
     log_number: u32,
     pub notes: Vec<Note>,
@@ -74,6 +77,7 @@ impl Fake {
             taken: 0,
             sending: 0,
             sent: Vec::new(),
+            rates: Vec::new(),
             logs: VecDeque::new(),
             log_number: 0,
             notes: Vec::new(),
@@ -91,6 +95,11 @@ impl Fake {
         }
         self.received.extend(request_frame(self.next_id, BOOT, SESSION, request));
         self.next_id += 1;
+    }
+
+    /// Puts bytes on the line.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        self.received.extend(bytes);
     }
 
     /// Time passes until the next tick.
@@ -172,15 +181,20 @@ impl Board for Fake {
         self.taken < self.room
     }
 
-    fn send(&mut self, frame: Encoded) {
+    fn send(&mut self, bytes: &[u8]) {
         assert!(self.has_room(), "a frame without room");
         self.did(Call::Send);
         self.taken += 1;
-        self.sent.push(frame);
+        self.sent.push(bytes.to_vec());
     }
 
     fn all_sent(&self) -> bool {
         self.sending == 0
+    }
+
+    fn set_link_rate(&mut self, rate: LinkRate) {
+        self.did(Call::SetLinkRate);
+        self.rates.push((self.now, rate));
     }
 
     fn take_log(&mut self) -> Option<(u32, Log)> {

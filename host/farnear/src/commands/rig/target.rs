@@ -7,7 +7,7 @@ use clap::Args;
 use farnear_capture::camera::Setting;
 use farnear_depth::psf::Psf;
 use farnear_protocol::Micros;
-use farnear_scene::{Noise, Scene};
+use farnear_scene::{Noise, SceneArgument};
 use farnear_workflows::{
     rig::{RigAddress, camera::CameraSettings},
     simulator::Scenery,
@@ -19,7 +19,7 @@ use crate::report::Usage;
 #[derive(Args, Clone)]
 pub struct Target {
     /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig. Without it the only NUCLEO that is
-    /// plugged in.
+    /// plugged in. /dev/ttyACM0@921600 asks for that rate of the link, for adapters that lose bytes at 2000000.
     #[arg(long, value_name = "PORT|sim", env = "FARNEAR_PORT")]
     port: Option<String>,
     #[command(flatten)]
@@ -30,8 +30,9 @@ pub struct Target {
 #[derive(Args, Clone)]
 #[command(next_help_heading = "Emulated rig (--port sim)")]
 struct SceneryArguments {
-    /// Scene before the emulated camera: plane:MM, staircase, slant, cone or sphere [default: staircase].
-    #[arg(long, value_parser = checked::<Scene>)]
+    /// Scene before the emulated camera: plane:MM, staircase, slant, cone, sphere or a scene file as `farnear render` has
+    /// them [default: staircase].
+    #[arg(long, value_parser = checked::<SceneArgument>)]
     scene: Option<String>,
     /// Point spread function of the emulated lens [default: the one of the optics file].
     #[arg(long, value_parser = checked::<Psf>)]

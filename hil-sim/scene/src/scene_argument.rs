@@ -6,6 +6,7 @@
 //! texture = "bricks.png"  # any picture that `farnear depth` reads; or: "sand" (also without the line), "fractal"
 //! contrast = 0.3          # standard deviation of sand or fractal, whose mean is 1
 //! ```
+//! Only with the feature `files`: the rest of this crate opens none.
 
 use std::{
     fs,
@@ -13,9 +14,12 @@ use std::{
     str::FromStr,
 };
 
-use anyhow::{Context, Result, bail};
 use farnear_files::{image_file::read_grey, map};
-use farnear_scene::{Scene, SceneError, SceneFile};
+use thiserror::Error;
+
+use crate::scene::Scene;
+use crate::scene_error::SceneError;
+use crate::scene_file::SceneFile;
 
 /// A scene as an argument names it.
 #[derive(Clone, Debug)]
@@ -24,6 +28,16 @@ pub enum SceneArgument {
     Named(Box<Scene>),
     /// A scene file.
     File(PathBuf),
+}
+
+/// Why a scene file was refused.
+#[derive(Debug, Error)]
+#[error("the scene {}: {reason}", path.display())]
+pub struct SceneFileError {
+    /// The scene file.
+    pub path: PathBuf,
+    /// Which file cannot be read, or what in it makes no scene.
+    pub reason: String,
 }
 
 impl FromStr for SceneArgument {
@@ -44,32 +58,33 @@ impl SceneArgument {
     /// The scene, with its maps.
     ///
     /// # Errors
-    /// Which file cannot be read, or what in it makes no scene.
-    pub fn read(self) -> Result<Scene> {
+    /// [`SceneFileError`].
+    pub fn read(self) -> Result<Scene, SceneFileError> {
         match self {
             Self::Named(scene) => Ok(*scene),
-            Self::File(path) => read(&path).with_context(|| format!("the scene {}", path.display())),
+            Self::File(path) => read(&path).map_err(|reason| SceneFileError { path, reason }),
         }
     }
 }
 
-fn read(path: &Path) -> Result<Scene> {
-    let text = fs::read_to_string(path).context("cannot read it")?;
-    let file = SceneFile::parse(&text)?;
+fn read(path: &Path) -> Result<Scene, String> {
+    let text = fs::read_to_string(path).map_err(|error| format!("cannot read it: {error}"))?;
+    let file = SceneFile::parse(&text).map_err(|error| error.to_string())?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let depth_mm = file.depth.as_ref().map(|name| map::read(&folder.join(name))).transpose()?;
+    let depth_mm = file.depth.as_ref().map(|name| map::read(&folder.join(name)));
+    let depth_mm = depth_mm.transpose().map_err(|error| error.to_string())?;
     let texture = match &file.texture {
         Some(name) => {
             let picture = folder.join(name);
             if !picture.is_file() {
-                bail!(
+                return Err(format!(
                     "texture = \"{name}\" is neither sand nor fractal, and there is no file {}",
                     picture.display()
-                );
+                ));
             }
-            Some(read_grey(&picture)?.pixels)
+            Some(read_grey(&picture).map_err(|error| error.to_string())?.pixels)
         }
         None => None,
     };
-    Ok(file.into_scene(depth_mm, texture)?)
+    file.into_scene(depth_mm, texture).map_err(|error| error.to_string())
 }

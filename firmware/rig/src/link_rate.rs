@@ -1,0 +1,113 @@
+//! The link's rate: when it changes, and when it changes back.
+//!
+//! The answer to the request still leaves at the old rate. Then the new one is on trial: the first good request that comes in at it
+//! makes it stay, and where none comes within [`LINK_TRIAL`] the old one is back, so a host whose adapter cannot follow finds
+//! the board where it was.
+
+use farnear_protocol::message::{LINK_TRIAL, LinkRate};
+use farnear_protocol::{BoardMicros, Micros};
+
+use crate::motion::since;
+
+/// The answer has left after so long, whatever else is said: the longest frame takes 1.3 ms at the fast rate.
+const ANSWER_LEAVES: Micros = Micros(20_000);
+
+#[derive(Clone, Copy, Debug)]
+enum Change {
+    /// None is under way.
+    None,
+    /// Asked for; the answer is to leave first.
+    Asked { to: LinkRate, at: BoardMicros },
+    /// On trial since then; so many good requests had come before.
+    Trial { back: LinkRate, at: BoardMicros, requests: u32 },
+}
+
+/// See the module.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinkSpeed {
+    now: LinkRate,
+    change: Change,
+}
+
+impl LinkSpeed {
+    /// As after a reset.
+    pub(crate) const fn new() -> Self {
+        Self { now: LinkRate::START, change: Change::None }
+    }
+
+    /// Takes a request on. It came in at the present rate, which is a good one then.
+    pub(crate) fn ask(&mut self, to: LinkRate, at: BoardMicros) {
+        self.change = if to == self.now { Change::None } else { Change::Asked { to, at } };
+    }
+
+    /// The rate that the link is to have from now on, where that is another. `said`: nothing that was said at the old one is
+    /// still on its way; `requests`: good ones so far.
+    pub(crate) fn due(
+        &mut self,
+        now: BoardMicros,
+        requests: u32,
+        said: impl FnOnce() -> bool,
+    ) -> Option<LinkRate> {
+        let (rate, change) = match self.change {
+            Change::Asked { to, at } if said() || since(at, now) >= ANSWER_LEAVES => {
+                (to, Change::Trial { back: self.now, at: now, requests })
+            }
+            Change::Trial { requests: before, .. } if requests != before => (self.now, Change::None),
+            Change::Trial { back, at, .. } if since(at, now) >= LINK_TRIAL => (back, Change::None),
+            Change::None | Change::Asked { .. } | Change::Trial { .. } => return None,
+        };
+        self.change = change;
+        let changes = rate != self.now;
+        self.now = rate;
+        changes.then_some(rate)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLOW: LinkRate = LinkRate::Baud921600;
+
+    fn at(micros: u32) -> BoardMicros {
+        BoardMicros(u64::from(micros))
+    }
+
+    /// A link that has been changed to the slow rate at 1 ms, after three requests.
+    fn changed() -> LinkSpeed {
+        let mut speed = LinkSpeed::new();
+        speed.ask(SLOW, at(0));
+        assert_eq!(speed.due(at(200), 3, || false), None, "the answer has not left");
+        assert_eq!(speed.due(at(1_000), 3, || true), Some(SLOW));
+        speed
+    }
+
+    #[test]
+    fn a_rate_at_which_a_request_comes_in_stays() {
+        let mut speed = changed();
+        assert_eq!(speed.due(at(2_000), 4, || true), None);
+        assert_eq!(speed.due(at(10 * LINK_TRIAL.0), 4, || true), None);
+    }
+
+    #[test]
+    fn a_rate_at_which_nothing_comes_in_is_left_again() {
+        let mut speed = changed();
+        assert_eq!(speed.due(at(LINK_TRIAL.0 + 999), 3, || true), None);
+        assert_eq!(speed.due(at(LINK_TRIAL.0 + 1_000), 3, || true), Some(LinkRate::START));
+        assert_eq!(speed.due(at(10 * LINK_TRIAL.0), 3, || true), None);
+    }
+
+    #[test]
+    fn an_answer_that_never_leaves_holds_nothing_up() {
+        let mut speed = LinkSpeed::new();
+        speed.ask(SLOW, at(0));
+        assert_eq!(speed.due(at(ANSWER_LEAVES.0), 0, || false), Some(SLOW));
+    }
+
+    #[test]
+    fn the_rate_that_is_there_is_no_change() {
+        let mut speed = LinkSpeed::new();
+        speed.ask(LinkRate::START, at(0));
+        assert_eq!(speed.due(at(200), 0, || true), None);
+    }
+}

@@ -1,0 +1,90 @@
+//! The link at another rate: both ends change, or the board goes back. And an adapter that takes its time.
+
+use farnear_protocol::{
+    Request, Response,
+    message::{LINK_TRIAL, LinkRate, ResetCause},
+};
+
+use farnear_sim::{RigConfig, Scenario};
+
+use crate::bench::Bench;
+
+const SLOW: LinkRate = LinkRate::Baud921600;
+
+fn set(bench: &mut Bench, rate: LinkRate) {
+    assert_eq!(bench.ask(&Request::SetLinkRate { rate }), Ok(Response::Accepted));
+    bench.rig.advance_us(1_000).expect("the rig runs");
+}
+
+fn rate_of_host(bench: &mut Bench, rate: LinkRate) {
+    bench.rig.set_host_rate(rate.baud()).expect("the rig runs");
+}
+
+#[test]
+fn the_board_speaks_at_the_rate_that_its_host_asks_for_until_it_is_reset() {
+    let mut bench = Bench::new(1);
+    rate_of_host(&mut bench, LinkRate::START);
+    set(&mut bench, SLOW);
+    rate_of_host(&mut bench, SLOW);
+    for _ in 0..20 {
+        bench.status();
+        bench.rig.advance_us(50_000).expect("the rig runs");
+    }
+    assert_eq!(bench.status().link.bad_frames, 0);
+    // And back, and once more.
+    for rate in [LinkRate::START, SLOW] {
+        set(&mut bench, rate);
+        rate_of_host(&mut bench, rate);
+        bench.status();
+    }
+    bench.access(|rig| rig.press_reset());
+    bench.rig.advance_us(500_000).expect("the rig runs");
+    assert_eq!(bench.try_ask(&Request::Hello), None, "it is back at the rate of the start");
+    rate_of_host(&mut bench, LinkRate::START);
+    assert_eq!(bench.say_hello().reset_cause, ResetCause::Pin);
+}
+
+#[test]
+fn a_host_that_does_not_follow_finds_the_board_where_it_was() {
+    let mut bench = Bench::new(1);
+    rate_of_host(&mut bench, LinkRate::START);
+    set(&mut bench, SLOW);
+    assert_eq!(bench.try_ask(&Request::Status), None);
+    bench.rig.advance_us(u64::from(LINK_TRIAL.0)).expect("the rig runs");
+    bench.status();
+    bench.rig.advance_us(2 * u64::from(LINK_TRIAL.0)).expect("the rig runs");
+    bench.status();
+}
+
+#[test]
+fn an_adapter_that_keeps_what_it_hears_delays_answers_and_loses_none() {
+    let scenario = "[[happens]]\nafter_ms = 200\nwhat = \"link-latency\"\namount = 16";
+    let scenario = Scenario::parse(scenario).expect("a good file");
+    let mut bench = Bench::with(&RigConfig { seed: 1, scenario, ..RigConfig::default() });
+    bench.rig.advance_us(300_000).expect("the rig runs");
+    for _ in 0..5 {
+        let id = bench.send(&Request::Status);
+        let mut waited_us = 0;
+        while !bench.answers().iter().any(|(answered, _)| *answered == id) {
+            bench.rig.advance_us(200).expect("the rig runs");
+            waited_us += 200;
+            assert!(waited_us < 100_000, "no answer");
+        }
+        // The answer's first byte comes within 2 ms; it waits 16 ms, or what was left of them for the log before it.
+        assert!(waited_us <= 18_200, "{waited_us} us");
+        assert!(waited_us >= 1_000, "{waited_us} us");
+        bench.rig.advance_us(40_000).expect("the rig runs");
+    }
+}
+
+#[test]
+fn a_scenario_may_count_cycles() {
+    let text = "[[happens]]\nafter_cycles = 84000000\nwhat = \"reset-button\"";
+    let scenario = Scenario::parse(text).expect("a good file");
+    let mut bench = Bench::with(&RigConfig { seed: 1, scenario, ..RigConfig::default() });
+    let now_us = bench.report().now_ns / 1_000;
+    bench.rig.advance_us(499_900 - now_us).expect("the rig runs");
+    assert_eq!(bench.report().resets, 0);
+    bench.rig.advance_us(200).expect("the rig runs");
+    assert_eq!(bench.report().resets, 1);
+}
