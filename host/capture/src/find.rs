@@ -1,5 +1,7 @@
 //! Which port has the board, where nobody names one.
 
+use std::path::Path;
+
 use serialport::{SerialPortInfo, SerialPortType};
 
 use crate::error::PortError;
@@ -14,7 +16,16 @@ const ST_LINKS: [u16; 7] = [0x374b, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754, 0x37
 /// # Errors
 /// [`PortError::NoBoard`] without any, [`PortError::SeveralBoards`] where a choice would be a guess.
 pub fn board_port() -> Result<String, PortError> {
-    only(&serialport::available_ports().unwrap_or_default())
+    only(&present())
+}
+
+/// The serial ports of this computer; none where it does not tell.
+pub(crate) fn present() -> Vec<SerialPortInfo> {
+    // On Linux the listing panics where there is no such folder, as in some containers.
+    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
+        return Vec::new();
+    }
+    serialport::available_ports().unwrap_or_default()
 }
 
 fn only(present: &[SerialPortInfo]) -> Result<String, PortError> {

@@ -10,7 +10,7 @@ use std::{
 use farnear_protocol::message::LinkRate;
 use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 
-use crate::error::PortError;
+use crate::{error::PortError, find};
 
 /// A byte pipe to a board.
 pub trait Transport: Send {
@@ -63,7 +63,7 @@ impl Place {
 
     /// Opens the port, and remembers whose it is.
     pub(crate) fn open(&mut self) -> Result<SerialTransport, PortError> {
-        let present = serialport::available_ports().unwrap_or_default();
+        let present = find::present();
         let name = self.find(&present).unwrap_or(&self.name).to_owned();
         let opened = SerialTransport::open(&name)?;
         if self.usb_serial.is_none() {
@@ -126,13 +126,13 @@ pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortErr
 
 /// The ports behind which a board may be: those on USB.
 pub fn ports() -> Vec<String> {
-    let present = serialport::available_ports().unwrap_or_default();
+    let present = find::present();
     let on_usb = present.into_iter().filter(|port| matches!(port.port_type, SerialPortType::UsbPort(_)));
     on_usb.map(|port| port.port_name).collect()
 }
 
 fn absent(path: &str) -> PortError {
-    let ports = serialport::available_ports().unwrap_or_default();
+    let ports = find::present();
     PortError::Absent { port: path.into(), present: ports.into_iter().map(|port| port.port_name).collect() }
 }
 
