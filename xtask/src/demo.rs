@@ -1,12 +1,13 @@
 //! The whole rig without hardware: build, capture on the emulated board, compute depth, compare with the truth.
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, panic::resume_unwind, path::Path, process::Command, thread};
 
 use anyhow::{Context, Result};
 
 use crate::{
     firmware, host,
     run::{ROOT, output, step},
+    thumb::Way,
 };
 
 /// The demo's scene: the noisy 8-bit staircase under a Gaussian point spread function.
@@ -17,8 +18,16 @@ const AWAY_FROM_EDGES_PX: &str = "8";
 
 /// Runs the demo; ends with its one line of figures.
 pub fn run() -> Result<()> {
-    firmware::build_emulated()?;
-    let programs = host::build()?;
+    let way = Way::find()?;
+    step("firmware and host programs, side by side (the first build takes some minutes)");
+    // Neither has work for all cores from its beginning to its end.
+    let (elf, programs) = thread::scope(|scope| {
+        let firmware = scope.spawn(|| firmware::build_emulated(way));
+        let programs = host::build_silently();
+        (firmware.join().unwrap_or_else(|panic| resume_unwind(panic)), programs)
+    });
+    elf?;
+    let programs = programs?;
     let farnear = |arguments: &[&str]| {
         let mut command = Command::new(programs.join("farnear"));
         command.args(arguments).current_dir(&*ROOT);

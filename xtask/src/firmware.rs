@@ -63,9 +63,8 @@ pub fn build() -> Result<PathBuf> {
 }
 
 /// Builds what the emulated board runs, and nothing else.
-pub fn build_emulated() -> Result<PathBuf> {
-    step("firmware");
-    build_board(EMULATED, Way::find()?, Selection::Firmware)
+pub fn build_emulated(way: Way) -> Result<PathBuf> {
+    build_board(EMULATED, way, Selection::Firmware)
 }
 
 /// Builds the firmware in a way that was found before.

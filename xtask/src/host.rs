@@ -13,6 +13,11 @@ const PACKAGES: [&str; 4] = ["--package", "farnear", "--package", "farnear-sim"]
 /// who runs both compiles everything once.
 pub fn build() -> Result<PathBuf> {
     step("host programs (the first build takes some minutes)");
+    build_silently()
+}
+
+/// The same without saying so.
+pub fn build_silently() -> Result<PathBuf> {
     finish(cargo(["build", "--locked"]).args(PACKAGES))?;
     Ok(target_folder().join("debug"))
 }
