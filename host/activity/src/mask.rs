@@ -4,12 +4,15 @@
 //! A mask is an `Array2<bool>` of shape (height, width), row 0 at the top, `true` where the subject is.
 //! Coordinates are pixels; a pixel's centre lies at (row + 0.5, column + 0.5).
 
+pub mod assignment;
 pub mod bits;
 pub mod centre;
 pub mod cleaning;
 pub mod extractor;
+pub mod people;
 pub mod regions;
 pub mod subject;
+pub mod tracking;
 
 use ndarray::{Array2, ArrayView2};
 

@@ -1,9 +1,10 @@
 //! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`], [`running`] with the
-//! pictures), evaluating
+//! pictures, [`everybody`] in a picture by themselves), evaluating
 //! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
 mod confusion_picture;
 pub mod evaluation;
+pub mod everybody;
 mod film;
 pub mod judging;
 pub mod method;

@@ -268,6 +268,9 @@ pub enum WorkflowError {
     /// Other views than a model's.
     #[error(transparent)]
     Views(#[from] crate::activity::recognition::ViewsError),
+    /// What several people cannot be recognised in.
+    #[error(transparent)]
+    Everybody(#[from] crate::activity::everybody::EverybodyError),
     /// An evaluation.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),

@@ -5,6 +5,7 @@
 use ndarray::Array2;
 
 use super::{
+    Mask,
     cleaning::Cleaning,
     subject::{Flag, Subject, SubjectChooser, SubjectSettings},
 };
@@ -54,6 +55,15 @@ pub struct Extracted {
     pub labels: Array2<Label>,
 }
 
+/// All that moves in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moving {
+    /// The cleaned mask, or why there is none.
+    pub mask: Result<Mask, Flag>,
+    /// The background model's answer before cleaning.
+    pub labels: Array2<Label>,
+}
+
 /// Turns a video's frames into silhouettes one by one.
 pub struct Extractor {
     settings: ExtractorSettings,
@@ -87,18 +97,32 @@ impl Extractor {
     /// # Errors
     /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
+        let Moving { mask, labels } = self.moving(frame)?;
+        let subject = match mask {
+            Ok(mask) => self.chooser.choose(mask.view()),
+            Err(flag) => {
+                Subject { mask: Array2::from_elem(labels.dim(), false), bounds: None, flags: vec![flag] }
+            }
+        };
+        Ok(Extracted { subject, labels })
+    }
+
+    /// As [`Self::extract`], for whoever wants all that moves and not one subject.
+    ///
+    /// # Errors
+    /// As [`Self::extract`].
+    pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
         let labels = self.model.apply(frame)?;
         let moving = labels.mapv(|label| label == Label::Foreground);
         if self.model.frames_seen() <= self.settings.learning_frames {
-            return Ok(Extracted { subject: nobody(&moving, Flag::Learning), labels });
+            return Ok(Moving { mask: Err(Flag::Learning), labels });
         }
         let share = super::area(moving.view()) as f64 / moving.len() as f64;
         if share >= self.settings.scene_change_share {
             let flag = Flag::SceneChanged { moving_percent: (100.0 * share) as u8 };
-            return Ok(Extracted { subject: nobody(&moving, flag), labels });
+            return Ok(Moving { mask: Err(flag), labels });
         }
-        let clean = self.settings.cleaning.clean(moving.view());
-        Ok(Extracted { subject: self.chooser.choose(clean.view()), labels })
+        Ok(Moving { mask: Ok(self.settings.cleaning.clean(moving.view())), labels })
     }
 
     /// The background model, for its picture of the empty scene.
@@ -106,11 +130,6 @@ impl Extractor {
     pub fn background(&self) -> &BackgroundModel {
         &self.model
     }
-}
-
-/// No silhouette, and why.
-fn nobody(like: &Array2<bool>, flag: Flag) -> Subject {
-    Subject { mask: Array2::from_elem(like.dim(), false), bounds: None, flags: vec![flag] }
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! The subject among the regions of a cleaned mask, and what is doubtful about the frame.
 //!
-//! Regions that are near and above one another are one person (a body broken by a belt or by bad contrast). The
-//! subject is the person nearest to the last one, or the largest where there is no last. Whatever is doubtful is
+//! The subject is the person ([`super::people`]) nearest to the last one, or the largest where there is no last. Whatever is doubtful is
 //! flagged; a frame without a person gives an empty mask, never a guess.
 
 use std::fmt;
@@ -10,7 +9,7 @@ use ndarray::ArrayView2;
 
 use super::{
     BoundingBox, Mask,
-    regions::{Connectivity, Region, regions},
+    people::{Person, people},
 };
 
 /// What is doubtful about a frame.
@@ -103,25 +102,6 @@ pub struct SubjectChooser {
     absent_frames: u32,
 }
 
-/// Fragments that are one person.
-struct Person {
-    fragments: Vec<Region>,
-    area: usize,
-    bounds: BoundingBox,
-}
-
-impl Person {
-    fn centroid(&self) -> (f64, f64) {
-        let mut mean = (0.0, 0.0);
-        for fragment in &self.fragments {
-            let share = fragment.area as f64 / self.area as f64;
-            let (row, column) = fragment.centroid();
-            mean = (mean.0 + share * row, mean.1 + share * column);
-        }
-        mean
-    }
-}
-
 impl SubjectChooser {
     /// A chooser that has seen nobody yet.
     #[must_use]
@@ -132,10 +112,9 @@ impl SubjectChooser {
     /// The subject of the next frame, from its cleaned mask of shape (height, width).
     pub fn choose(&mut self, mask: ArrayView2<'_, bool>) -> Subject {
         let size = mask.dim();
-        let mut people = self.people(mask);
+        let mut people = people(mask, &self.settings);
         let largest = people.iter().map(|person| person.area).max().unwrap_or(0);
         people.retain(|person| person.area as f64 >= self.settings.rival_share * largest as f64);
-        let mut chosen = Mask::from_elem(size, false);
         let subject = match self.last {
             Some(last) => people.iter().min_by(|a, b| distance(a, last).total_cmp(&distance(b, last))),
             None => people.iter().max_by_key(|person| person.area),
@@ -145,11 +124,10 @@ impl SubjectChooser {
             if self.absent_frames >= self.settings.forget_after_frames {
                 self.last = None;
             }
-            return Subject { mask: chosen, bounds: None, flags: vec![Flag::Empty] };
+            return Subject { mask: Mask::from_elem(size, false), bounds: None, flags: vec![Flag::Empty] };
         };
         self.absent_frames = 0;
         self.last = Some(subject.centroid());
-        subject.fragments.iter().for_each(|fragment| fragment.paint(&mut chosen, true));
         let mut flags = Vec::new();
         if people.len() > 1 {
             flags.push(Flag::SeveralPeople { count: people.len() });
@@ -157,34 +135,7 @@ impl SubjectChooser {
         if subject.bounds.touches_edge(size) {
             flags.push(Flag::CutByEdge);
         }
-        Subject { bounds: Some(subject.bounds), mask: chosen, flags }
-    }
-
-    /// Groups of fragments that are large enough to be people.
-    fn people(&self, mask: ArrayView2<'_, bool>) -> Vec<Person> {
-        let mut people: Vec<Person> = Vec::new();
-        for region in regions(mask, true, Connectivity::Eight) {
-            if region.area < self.settings.smallest_fragment_px {
-                continue;
-            }
-            let mut whole = Person { area: region.area, bounds: region.bounds, fragments: vec![region] };
-            // A fragment may join several groups into one, whose box may then reach further ones.
-            while let Some(at) = people.iter().position(|other| self.one_person(other.bounds, whole.bounds)) {
-                let other = people.swap_remove(at);
-                whole.area += other.area;
-                whole.bounds = whole.bounds.union(other.bounds);
-                whole.fragments.extend(other.fragments);
-            }
-            people.push(whole);
-        }
-        people.retain(|person| person.area >= self.settings.smallest_person_px);
-        people
-    }
-
-    /// Near each other, and one above the other: at least half of the narrower lies over or under the wider.
-    fn one_person(&self, a: BoundingBox, b: BoundingBox) -> bool {
-        let shared = a.right.min(b.right).saturating_sub(a.left.max(b.left));
-        2 * shared >= a.width().min(b.width()) && a.gap(b) <= self.settings.widest_break_px
+        Subject { bounds: Some(subject.bounds), mask: subject.mask(size), flags }
     }
 }
 

@@ -1,6 +1,7 @@
 //! `farnear activity` on synthetic people: training, recognition in masks and video, evaluation, and what is refused.
 
 mod motion;
+mod people;
 mod shipped;
 
 use std::{fs, path::Path, sync::LazyLock};

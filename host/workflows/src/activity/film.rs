@@ -30,6 +30,16 @@ pub(super) struct Film {
     frames: usize,
 }
 
+/// One of several people, to be drawn.
+pub(super) struct Shown {
+    /// First row, first column, one past the last row and column.
+    pub spans: [usize; 4],
+    /// What is written above.
+    pub text: String,
+    /// Whether the answer is an activity.
+    pub known: bool,
+}
+
 impl Film {
     /// Begins a new folder.
     pub fn begin(folder: &Path) -> Result<Self> {
@@ -58,6 +68,36 @@ impl Film {
             let text = format!("{name} {:.0} %{unknown}", 100.0 * share);
             self.writer.write(&mut page, 2 * GAP_PX, top, &text, INK);
         }
+        self.write(&page)
+    }
+
+    /// Draws a frame with everybody in a box of their own, and the answers so far.
+    pub fn draw_people(&mut self, picture: Option<&Pixels>, mask: &Mask, people: &[Shown]) -> Result<()> {
+        let mut page = with_outline(picture, mask);
+        let times = page.height() / mask.nrows().max(1) as u32;
+        for person in people {
+            let colour = if person.known { KNOWN } else { UNKNOWN };
+            let [top, left, bottom, right] = person.spans.map(|at| at as u32 * times);
+            let (right, bottom) = (right.min(page.width()), bottom.min(page.height()));
+            let sides = (left..right).flat_map(|x| [(x, top), (x, bottom.saturating_sub(1))]);
+            let ends = (top..bottom).flat_map(|y| [(left, y), (right.saturating_sub(1), y)]);
+            let (wide, high) = page.dimensions();
+            for (x, y) in sides.chain(ends).filter(|(x, y)| *x < wide && *y < high) {
+                page.put_pixel(x, y, colour);
+            }
+            let (width, height) = (self.writer.width(&person.text), self.writer.height());
+            let (x, y) = (left.min(page.width().saturating_sub(width)), top.saturating_sub(height));
+            for at in (x..(x + width).min(page.width())).flat_map(|x| (y..y + height).map(move |y| (x, y))) {
+                if at.1 < page.height() {
+                    page.put_pixel(at.0, at.1, colour);
+                }
+            }
+            self.writer.write(&mut page, x, y, &person.text, INK);
+        }
+        self.write(&page)
+    }
+
+    fn write(&mut self, page: &RgbImage) -> Result<()> {
         self.frames += 1;
         let mut png = Cursor::new(Vec::new());
         page.write_to(&mut png, ImageFormat::Png).map_err(EncodeError::of("a frame with its answer"))?;

@@ -101,6 +101,11 @@ impl Model {
         self.cut_out.as_ref().filter(|_| !full_frames).unwrap_or(&self.recogniser)
     }
 
+    /// Its file or name.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// What it can answer.
     pub fn activities(&self) -> &[String] {
         &self.recogniser.activities
@@ -110,7 +115,7 @@ impl Model {
     ///
     /// # Errors
     /// [`WorkflowError::Parameter`] for one that it does not know.
-    fn check_known(&self, activities: &[String]) -> Result<()> {
+    pub(super) fn check_known(&self, activities: &[String]) -> Result<()> {
         let Some(unknown) = activities.iter().find(|name| !self.activities().contains(name)) else {
             return Ok(());
         };
@@ -332,12 +337,8 @@ impl<'m> Recognition<'m> {
             confidence: rounded_share(answer.confidence),
             strangeness: outlier_score(&answer),
             reason: unknown_because(&answer, self.frames),
-            activity: answer.activity,
-            shares: answer
-                .probabilities
-                .into_iter()
-                .map(|(activity, value)| Share { activity, share: rounded_share(value) })
-                .collect(),
+            activity: answer.activity.clone(),
+            shares: shares(answer),
             frames: self.frames,
             empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
             flagged_frames: self.flagged_frames,
@@ -352,13 +353,19 @@ impl<'m> Recognition<'m> {
     }
 }
 
+/// Probability of every activity.
+pub(super) fn shares(answer: Answer) -> Vec<Share> {
+    let share = |(activity, value)| Share { activity, share: rounded_share(value) };
+    answer.probabilities.into_iter().map(share).collect()
+}
+
 /// The answer if only some activities can be; all can where none is named.
-fn restricted(answer: Answer, among: &[String]) -> Answer {
+pub(super) fn restricted(answer: Answer, among: &[String]) -> Answer {
     if among.is_empty() { answer } else { answer.among(among) }
 }
 
 /// Why an answer is unknown, in words; `None` where it is not.
-fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
+pub(super) fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     if answer.activity.is_some() {
         return None;
     }
@@ -373,11 +380,11 @@ fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
 }
 
 /// A share with four decimals, without the digits that f32 does not have.
-fn rounded_share(value: f32) -> f64 {
+pub(super) fn rounded_share(value: f32) -> f64 {
     rounded(f64::from(value), 4)
 }
 
 /// JSON has no infinity: nothing was seen.
-fn outlier_score(answer: &Answer) -> Option<f64> {
+pub(super) fn outlier_score(answer: &Answer) -> Option<f64> {
     answer.outlier_score.is_finite().then(|| rounded_share(answer.outlier_score))
 }

@@ -88,6 +88,23 @@ pub(super) struct Seen {
     pub picture: Option<Pixels>,
 }
 
+/// All that moves in a frame, whoever it is.
+pub(super) struct Moved {
+    pub name: String,
+    /// Or why there is no mask.
+    pub mask: std::result::Result<Mask, Flag>,
+    /// The video's frame; `None` for masks.
+    pub picture: Option<Pixels>,
+}
+
+/// Height and width.
+pub(super) fn size(picture: &Pixels) -> (usize, usize) {
+    match picture {
+        Pixels::Grey(grey) => grey.dim(),
+        Pixels::Rgb(rgb) => (rgb.dim().0, rgb.dim().1),
+    }
+}
+
 /// The frames of a view, one by one.
 pub(super) enum Frames {
     Masks { files: std::vec::IntoIter<PathBuf>, first: Option<First> },
@@ -120,19 +137,60 @@ impl Frames {
     }
 }
 
-fn seen_in_mask(file: &Path, first: &mut Option<First>) -> Result<Seen> {
+impl Frames {
+    /// The next frame's mask of everybody; `None` at the end.
+    pub fn next_moving(&mut self) -> Result<Option<Moved>> {
+        match self {
+            Self::Masks { files, first } => files
+                .next()
+                .map(|file| {
+                    let (name, mask, _) = like_first(&file, first)?;
+                    Ok(Moved { name, mask: Ok(mask), picture: None })
+                })
+                .transpose(),
+            Self::Video { video, extractor } => video
+                .next()
+                .transpose()?
+                .map(|VideoFrame { name, pixels }| {
+                    let mask = extractor_for(&pixels, extractor)?.moving(frame_of(&pixels))?.mask;
+                    Ok(Moved { name, mask, picture: Some(pixels) })
+                })
+                .transpose(),
+        }
+    }
+}
+
+/// A mask of the size of the view's first.
+fn like_first<'f>(file: &Path, first: &'f mut Option<First>) -> Result<(String, Mask, &'f mut First)> {
     let mask = masks::read(file)?;
     let (name, found) = (pictures::stem(file), mask.dim());
-    let First { name: first_name, size, chooser } = first.get_or_insert_with(|| First {
+    let first = first.get_or_insert_with(|| First {
         name: name.clone(),
         size: found,
         chooser: SubjectChooser::new(SubjectSettings::for_size(found)),
     });
-    if found != *size {
-        let (path, first) = (file.into(), first_name.clone());
-        return Err(MaskError::Size { path, found, first, expected: *size }.into());
+    if found != first.size {
+        let (path, expected) = (file.into(), first.size);
+        return Err(MaskError::Size { path, found, first: first.name.clone(), expected }.into());
     }
-    let mut flags = chooser.choose(mask.view()).flags;
+    Ok((name, mask, first))
+}
+
+fn extractor_for<'e>(
+    pixels: &Pixels,
+    extractor: &'e mut Option<Box<Extractor>>,
+) -> Result<&'e mut Extractor> {
+    let frame = frame_of(pixels);
+    Ok(match extractor {
+        Some(extractor) => extractor,
+        None => extractor.insert(Box::new(Extractor::like(frame, ExtractorSettings::for_frame(frame))?)),
+    })
+}
+
+fn seen_in_mask(file: &Path, first: &mut Option<First>) -> Result<Seen> {
+    let (name, mask, first) = like_first(file, first)?;
+    let found = mask.dim();
+    let mut flags = first.chooser.choose(mask.view()).flags;
     // Cut-out silhouettes fill their picture, so touching its edge says nothing.
     flags.retain(|flag| found != (SIDE_PX, SIDE_PX) || *flag != Flag::CutByEdge);
     Ok(Seen { name, mask, flags, picture: None })
@@ -140,11 +198,6 @@ fn seen_in_mask(file: &Path, first: &mut Option<First>) -> Result<Seen> {
 
 fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> Result<Seen> {
     let VideoFrame { name, pixels } = frame;
-    let frame = frame_of(&pixels);
-    let extractor = match extractor {
-        Some(extractor) => extractor,
-        None => extractor.insert(Box::new(Extractor::like(frame, ExtractorSettings::for_frame(frame))?)),
-    };
-    let found = extractor.extract(frame)?.subject;
+    let found = extractor_for(&pixels, extractor)?.extract(frame_of(&pixels))?.subject;
     Ok(Seen { name, mask: found.mask, flags: found.flags, picture: Some(pixels) })
 }

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use farnear_workflows::activity::{
+    everybody::{Everybody, EverybodySettings},
     recognition::{Model, Recognition, RecognitionSettings},
     views::{View, ViewKind},
 };
@@ -20,7 +21,8 @@ use crate::{report, terminal};
 #[derive(Args)]
 #[command(after_help = "Example: farnear activity recognise masks/ --model everyday\n\
                   \x20        farnear activity recognise masks/ --model everyday --among walk,jog,'sit down','stand up'\n\
-                  \x20        farnear activity recognise walk.y4m --model model.fnm --window 50")]
+                  \x20        farnear activity recognise walk.y4m --model model.fnm --window 50\n\
+                  \x20        farnear activity recognise street.y4m --model everyday --people --video-out street/")]
 pub struct Arguments {
     /// Folders of masks or videos (what `farnear silhouettes video` reads), one per view of the model, in its order; a model of one
     /// view takes any number.
@@ -43,6 +45,10 @@ pub struct Arguments {
     /// frame_%06d.png answer.mp4`).
     #[arg(long, value_name = "DIR")]
     video_out: Option<PathBuf>,
+    /// Follow everybody in one view of full frames and recognise each apart: for every frame the people in it by number, what each does so far, and
+    /// whether two cross or may have been swapped; last, what each did.
+    #[arg(long)]
+    people: bool,
     /// What the folders hold; by default pictures of black and white alone are masks, others video.
     #[arg(long = "as", value_name = "KIND")]
     kind: Option<Kind>,
@@ -67,7 +73,21 @@ pub fn run(arguments: Arguments) -> Result<()> {
         model = model.adapted_to(&arguments.adapt_to, &terminal::counting(arguments.json)?)?;
     }
     let view = |path: PathBuf| -> Result<View> { Ok(View { kind: kind(&path, arguments.kind)?, path }) };
-    let views = arguments.views.into_iter().map(view).collect::<Result<Vec<View>>>()?;
+    let mut views = arguments.views.into_iter().map(view).collect::<Result<Vec<View>>>()?;
+    if arguments.people {
+        ensure!(
+            views.len() == 1,
+            "--people follows everybody in one view, {} were given: run it for each view",
+            views.len()
+        );
+        let settings = EverybodySettings {
+            view: views.swap_remove(0),
+            among: arguments.among,
+            window: arguments.window,
+            film: arguments.video_out,
+        };
+        return everybody(&model, &settings, arguments.json);
+    }
     let settings = RecognitionSettings {
         views,
         among: arguments.among,
@@ -79,6 +99,18 @@ pub fn run(arguments: Arguments) -> Result<()> {
     while let Some(answer) = work.next(&context)? {
         if !arguments.json {
             report::print(&answer, true)?;
+        }
+    }
+    report::print(&work.finish()?, true)
+}
+
+/// Everybody in one view, each apart.
+fn everybody(model: &Model, settings: &EverybodySettings, json: bool) -> Result<()> {
+    let context = terminal::context()?;
+    let mut work = Everybody::begin(model, settings)?;
+    while let Some(people) = work.next(&context)? {
+        if !json {
+            report::print(&people, true)?;
         }
     }
     report::print(&work.finish()?, true)

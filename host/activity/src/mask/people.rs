@@ -1,0 +1,71 @@
+//! People in a cleaned mask: regions that are near and above one another are one person (a body broken by a belt or by bad contrast).
+
+use ndarray::ArrayView2;
+
+use super::{
+    BoundingBox, Mask,
+    regions::{Connectivity, Region, regions},
+    subject::SubjectSettings,
+};
+
+/// Fragments that are one person, or several who hide one another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Person {
+    /// The connected regions.
+    pub fragments: Vec<Region>,
+    /// Their pixels.
+    pub area: usize,
+    /// The smallest box that holds them.
+    pub bounds: BoundingBox,
+}
+
+impl Person {
+    /// The mean of the pixels' centres as (row, column), pixels.
+    #[must_use]
+    pub fn centroid(&self) -> (f64, f64) {
+        let mut mean = (0.0, 0.0);
+        for fragment in &self.fragments {
+            let share = fragment.area as f64 / self.area as f64;
+            let (row, column) = fragment.centroid();
+            mean = (mean.0 + share * row, mean.1 + share * column);
+        }
+        mean
+    }
+
+    /// Only this person, in an image of shape (height, width).
+    #[must_use]
+    pub fn mask(&self, size: (usize, usize)) -> Mask {
+        let mut mask = Mask::from_elem(size, false);
+        self.fragments.iter().for_each(|fragment| fragment.paint(&mut mask, true));
+        mask
+    }
+}
+
+/// Groups of fragments that are large enough to be people, in no particular order. Cost: as [`regions`], then quadratic in fragments.
+#[must_use]
+pub fn people(mask: ArrayView2<'_, bool>, settings: &SubjectSettings) -> Vec<Person> {
+    let mut people: Vec<Person> = Vec::new();
+    for region in regions(mask, true, Connectivity::Eight) {
+        if region.area < settings.smallest_fragment_px {
+            continue;
+        }
+        let mut whole = Person { area: region.area, bounds: region.bounds, fragments: vec![region] };
+        // A fragment may join several groups into one, whose box may then reach further ones.
+        while let Some(at) = people.iter().position(|other| one_person(other.bounds, whole.bounds, settings))
+        {
+            let other = people.swap_remove(at);
+            whole.area += other.area;
+            whole.bounds = whole.bounds.union(other.bounds);
+            whole.fragments.extend(other.fragments);
+        }
+        people.push(whole);
+    }
+    people.retain(|person| person.area >= settings.smallest_person_px);
+    people
+}
+
+/// Near each other, and one above the other: at least half of the narrower lies over or under the wider.
+fn one_person(a: BoundingBox, b: BoundingBox, settings: &SubjectSettings) -> bool {
+    let shared = a.right.min(b.right).saturating_sub(a.left.max(b.left));
+    2 * shared >= a.width().min(b.width()) && a.gap(b) <= settings.widest_break_px
+}

@@ -1,0 +1,426 @@
+//! Several people in one picture, each followed from frame to frame.
+//!
+//! Everybody moves as a filter expects that allows for changes of pace (Kalman 1960; constant velocity). Blobs of the mask ([`super::people`])
+//! are given to people at the least cost in all ([`super::assignment`]): how far they are from where somebody was expected, in spreads of
+//! that expectation, and how much higher or lower. Where people hide one another there is one blob for several: nobody's silhouette is in it, so
+//! nobody gets one, and all are said to be crossing. Where they part again they are told apart by how they moved; if the other way round would
+//! be nearly as likely the crossing counts as ambiguous.
+
+mod motion;
+
+use ndarray::{Array2, ArrayView2};
+
+use super::{
+    BoundingBox, Mask,
+    assignment::assigned,
+    people::{Person, people},
+    subject::SubjectSettings,
+};
+use motion::Motion;
+
+/// How people are followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackingSettings {
+    /// What counts as a person.
+    pub subject: SubjectSettings,
+    /// Somebody new counts from so many frames on; before it may be a speck.
+    pub confirmed_after_frames: usize,
+    /// Somebody who is not seen in so many frames has gone.
+    pub gone_after_frames: usize,
+}
+
+impl TrackingSettings {
+    /// Settings for images of this (height, width).
+    #[must_use]
+    pub fn for_size(size: (usize, usize)) -> Self {
+        Self { subject: SubjectSettings::for_size(size), confirmed_after_frames: 3, gone_after_frames: 12 }
+    }
+}
+
+/// What is seen of somebody in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sight {
+    /// The silhouette, and whether it reaches the picture's edge.
+    Alone {
+        /// Its pixels in the full frame.
+        mask: Mask,
+        /// What it spans.
+        bounds: BoundingBox,
+        /// Part of it may be outside.
+        cut_by_edge: bool,
+        /// Masks of the frames just before, in which nobody knew yet that this is a person.
+        before: Vec<Mask>,
+    },
+    /// In one blob with these people.
+    Crossing {
+        /// Their numbers.
+        with: Vec<usize>,
+        /// What the blob spans.
+        bounds: BoundingBox,
+    },
+    /// Nowhere, for the moment.
+    Missed,
+}
+
+/// Somebody in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Followed {
+    /// The person's number, from 1 in the order of coming.
+    pub person: usize,
+    /// What is seen.
+    pub sight: Sight,
+    /// Crossings that have just ended.
+    pub parted: Vec<Parting>,
+}
+
+/// The end of a crossing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parting {
+    /// The other one.
+    pub from: usize,
+    /// Whether the two might as well be each other.
+    pub ambiguous: bool,
+}
+
+/// Costs beyond which a blob is not somebody's: five spreads.
+const GATE: f64 = 25.0;
+/// The other way round is ruled out from this cost on: odds of twenty to one.
+const SURE: f64 = 6.0;
+/// Spread of the logarithm of a person's height from frame to frame.
+const HEIGHT_SPREAD: f64 = 0.2;
+/// So much of somebody's expected box lies in a blob that hides them.
+const HIDDEN: f64 = 0.4;
+/// A blob of up to so many times one person's area may well hold only one.
+const ONE_ALONE: f64 = 1.15;
+/// How fast usual sizes follow new ones.
+const FOLLOWING: f64 = 0.2;
+
+/// Somebody who is followed.
+#[derive(Clone, Debug)]
+struct Track {
+    /// 0 until it is known to be a person.
+    person: usize,
+    row: Motion,
+    column: Motion,
+    height: f64,
+    width: f64,
+    area: f64,
+    seen: usize,
+    missed: usize,
+    before: Vec<Mask>,
+    /// Whom it is or was crossing with, until they part.
+    crossing: Vec<usize>,
+}
+
+impl Track {
+    fn new(blob: &Person) -> Self {
+        let (row, column) = blob.centroid();
+        let height = blob.bounds.height() as f64;
+        Self {
+            person: 0,
+            row: Motion::new(row, height),
+            column: Motion::new(column, height),
+            height,
+            width: blob.bounds.width() as f64,
+            area: blob.area as f64,
+            seen: 0,
+            missed: 0,
+            before: Vec::new(),
+            crossing: Vec::new(),
+        }
+    }
+
+    /// How unlikely a blob is, squared spreads.
+    fn cost(&self, blob: &Person) -> f64 {
+        let (row, column) = blob.centroid();
+        let of_place = |motion: &Motion, at: f64| (at - motion.at).powi(2) / motion.variance(self.height);
+        let higher = (blob.bounds.height() as f64 / self.height).ln() / HEIGHT_SPREAD;
+        of_place(&self.row, row) + of_place(&self.column, column) + higher * higher
+    }
+
+    fn correct(&mut self, blob: &Person) {
+        let (row, column) = blob.centroid();
+        self.row.correct(row, self.height);
+        self.column.correct(column, self.height);
+        let follow = |usual: &mut f64, now: f64| *usual += FOLLOWING * (now - *usual);
+        follow(&mut self.height, blob.bounds.height() as f64);
+        follow(&mut self.width, blob.bounds.width() as f64);
+        follow(&mut self.area, blob.area as f64);
+    }
+
+    /// Share of the expected box that lies in another.
+    fn covered_by(&self, bounds: BoundingBox) -> f64 {
+        let shared = |at: f64, length: f64, low: usize, high: usize| {
+            let (from, to) = (at - 0.5 * length, at + 0.5 * length);
+            ((to.min(high as f64) - from.max(low as f64)) / length.max(1.0)).max(0.0)
+        };
+        shared(self.row.at, self.height, bounds.top, bounds.bottom)
+            * shared(self.column.at, self.width, bounds.left, bounds.right)
+    }
+}
+
+/// Follows everybody from frame to frame.
+#[derive(Clone, Debug)]
+pub struct Tracker {
+    settings: TrackingSettings,
+    tracks: Vec<Track>,
+    people: usize,
+}
+
+impl Tracker {
+    /// A tracker that has seen nobody yet.
+    #[must_use]
+    pub fn new(settings: TrackingSettings) -> Self {
+        Self { settings, tracks: Vec::new(), people: 0 }
+    }
+
+    /// Everybody in the next frame, from its cleaned mask of shape (height, width); those who have gone are left out.
+    pub fn follow(&mut self, mask: ArrayView2<'_, bool>) -> Vec<Followed> {
+        let size = mask.dim();
+        let blobs = people(mask, &self.settings.subject);
+        for track in &mut self.tracks {
+            track.row.predict(track.height);
+            track.column.predict(track.height);
+        }
+        let costs = Array2::from_shape_fn((self.tracks.len(), blobs.len()), |(track, blob)| {
+            self.tracks[track].cost(&blobs[blob])
+        });
+        let blob_of = assigned(costs.view(), GATE);
+        let shared = self.shared(&blobs, &blob_of);
+        let mut found: Vec<Followed> = Vec::new();
+        let partings = self.partings(&costs, &blob_of, &shared);
+        for (index, parted) in partings.into_iter().enumerate() {
+            let at = shared[index].or(blob_of[index]);
+            let together: Vec<usize> = (0..self.tracks.len())
+                .filter(|&other| other != index && shared[other].is_some() && shared[other] == shared[index])
+                .map(|other| self.tracks[other].person)
+                .collect();
+            let hidden = blob_of[index].is_none();
+            let sight = self.sight(index, at.map(|at| &blobs[at]), (together, hidden), size);
+            found.push(Followed { person: self.tracks[index].person, sight, parted });
+        }
+        let taken = |blob: &usize| blob_of.contains(&Some(*blob)) || shared.contains(&Some(*blob));
+        for blob in (0..blobs.len()).filter(|blob| !taken(blob)).map(|blob| &blobs[blob]) {
+            self.tracks.push(Track::new(blob));
+            self.sight(self.tracks.len() - 1, Some(blob), (Vec::new(), false), size);
+        }
+        let gone = self.settings.gone_after_frames;
+        self.tracks.retain(|track| track.missed < if track.person == 0 { 1 } else { gone });
+        found.retain(|followed| followed.person > 0);
+        found.sort_by_key(|followed| followed.person);
+        found
+    }
+
+    /// The blob that each track shares with others: who has no blob of their own but is expected inside one, and whose that is.
+    fn shared(&self, blobs: &[Person], blob_of: &[Option<usize>]) -> Vec<Option<usize>> {
+        let mut shared = vec![None; self.tracks.len()];
+        for (index, track) in self.tracks.iter().enumerate() {
+            if blob_of[index].is_some() || track.person == 0 {
+                continue;
+            }
+            let cover = |blob: &usize| track.covered_by(blobs[*blob].bounds);
+            let best = (0..blobs.len()).max_by(|a, b| cover(a).total_cmp(&cover(b)));
+            let Some(blob) = best.filter(|blob| cover(blob) >= HIDDEN) else { continue };
+            shared[index] = Some(blob);
+        }
+        for (index, blob) in blob_of.iter().enumerate() {
+            if self.tracks[index].person > 0 && blob.is_some_and(|blob| shared.contains(&Some(blob))) {
+                shared[index] = *blob;
+            }
+        }
+        // Somebody alone in a blob that is not theirs is not sharing it.
+        let alone: Vec<usize> = (0..shared.len())
+            .filter(|&index| {
+                shared[index].is_some() && shared.iter().filter(|other| **other == shared[index]).count() == 1
+            })
+            .collect();
+        for index in alone {
+            shared[index] = None;
+        }
+        shared
+    }
+
+    /// What has parted from whom in this frame.
+    fn partings(
+        &mut self,
+        costs: &Array2<f64>,
+        blob_of: &[Option<usize>],
+        shared: &[Option<usize>],
+    ) -> Vec<Vec<Parting>> {
+        let mut partings = vec![Vec::new(); self.tracks.len()];
+        for index in 0..self.tracks.len() {
+            if shared[index].is_some() {
+                continue;
+            }
+            let Some(own) = blob_of[index] else { continue };
+            let crossed = std::mem::take(&mut self.tracks[index].crossing);
+            for person in crossed {
+                let other = self.tracks.iter().position(|track| track.person == person);
+                let theirs = other
+                    .and_then(|other| Some((other, blob_of[other].filter(|_| shared[other].is_none())?)));
+                let ambiguous = theirs.is_none_or(|(other, theirs)| {
+                    let kept = costs[(index, own)] + costs[(other, theirs)];
+                    costs[(index, theirs)] + costs[(other, own)] - kept < SURE
+                });
+                partings[index].push(Parting { from: person, ambiguous });
+            }
+        }
+        partings
+    }
+
+    /// What is seen of a track in its blob, together with others and perhaps hidden by them; the track learns from it.
+    fn sight(
+        &mut self,
+        index: usize,
+        blob: Option<&Person>,
+        (together, hidden): (Vec<usize>, bool),
+        size: (usize, usize),
+    ) -> Sight {
+        let track = &mut self.tracks[index];
+        let Some(blob) = blob else {
+            track.missed += 1;
+            return Sight::Missed;
+        };
+        let bounds = blob.bounds;
+        if !together.is_empty() {
+            // In a blob no larger than one person the hidden one may have gone.
+            let gone = hidden && blob.area as f64 <= ONE_ALONE * track.area;
+            track.missed = if gone { track.missed + 1 } else { 0 };
+            track.row.keep_within(bounds.top, bounds.bottom);
+            track.column.keep_within(bounds.left, bounds.right);
+            for &person in &together {
+                if !track.crossing.contains(&person) {
+                    track.crossing.push(person);
+                }
+            }
+            return Sight::Crossing { with: together, bounds };
+        }
+        track.correct(blob);
+        (track.seen, track.missed) = (track.seen + 1, 0);
+        let mask = blob.mask(size);
+        if track.person == 0 {
+            if track.seen < self.settings.confirmed_after_frames {
+                track.before.push(mask);
+                return Sight::Missed;
+            }
+            self.people += 1;
+            track.person = self.people;
+        }
+        let before = std::mem::take(&mut track.before);
+        Sight::Alone { mask, bounds, cut_by_edge: bounds.touches_edge(size), before }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::s;
+
+    const SIZE: (usize, usize) = (120, 320);
+
+    /// Boxes by their left and top edges, 20 wide and as high as given.
+    fn frame(boxes: &[(f64, usize, usize)]) -> Mask {
+        let mut mask = Mask::from_elem(SIZE, false);
+        for &(left, top, height) in boxes {
+            let left = left.round() as usize;
+            mask.slice_mut(s![top..top + height, left..(left + 20).min(SIZE.1)]).fill(true);
+        }
+        mask
+    }
+
+    fn tracker() -> Tracker {
+        Tracker::new(TrackingSettings::for_size(SIZE))
+    }
+
+    fn left_of(followed: &[Followed], person: usize) -> Option<usize> {
+        followed.iter().find(|f| f.person == person).and_then(|f| match &f.sight {
+            Sight::Alone { bounds, .. } => Some(bounds.left),
+            _ => None,
+        })
+    }
+
+    #[test]
+    fn two_people_who_keep_apart_keep_their_numbers_and_their_masks() {
+        let mut tracker = tracker();
+        for n in 0..40 {
+            let x = f64::from(n);
+            let found = tracker.follow(frame(&[(20.0 + x, 20, 70), (260.0 - x, 30, 60)]).view());
+            if n < 2 {
+                assert!(found.is_empty(), "not known yet");
+                continue;
+            }
+            assert_eq!(found.len(), 2, "frame {n}");
+            for (followed, (left, top, height)) in found.iter().zip([(20.0 + x, 20, 70), (260.0 - x, 30, 60)])
+            {
+                let Sight::Alone { mask, before, cut_by_edge, .. } = &followed.sight else { panic!("{n}") };
+                assert_eq!(*mask, frame(&[(left, top, height)]));
+                assert_eq!(before.len(), if n == 2 { 2 } else { 0 });
+                assert!(!cut_by_edge && followed.parted.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn people_who_pass_one_another_are_said_to_cross_and_told_apart_by_their_pace() {
+        let mut tracker = tracker();
+        let (mut crossing, mut parted) = (0, Vec::new());
+        let mut last = Vec::new();
+        for n in 0..60 {
+            let x = 4.0 * f64::from(n);
+            last = tracker.follow(frame(&[(20.0 + x, 20, 70), (270.0 - x, 24, 70)]).view());
+            for followed in &last {
+                if let Sight::Crossing { with, .. } = &followed.sight {
+                    assert_eq!(with, &[3 - followed.person]);
+                    crossing += 1;
+                }
+                parted.extend(followed.parted.iter().map(|parting| (followed.person, *parting)));
+            }
+        }
+        // 20 wide and 8 nearer to each other in a frame: five frames of touching, for both.
+        assert!((6..=14).contains(&crossing), "{crossing}");
+        let sure = |from: usize| Parting { from, ambiguous: false };
+        assert_eq!(parted, [(1, sure(2)), (2, sure(1))]);
+        assert_eq!([left_of(&last, 1), left_of(&last, 2)], [Some(256), Some(34)]);
+    }
+
+    #[test]
+    fn people_who_meet_stand_and_part_slowly_are_ambiguous() {
+        let mut tracker = tracker();
+        let mut parted = Vec::new();
+        for n in 0..120 {
+            let gap = match n {
+                0..30 => 80.0 - 2.5 * f64::from(n),
+                30..70 => 5.0,
+                _ => 5.0 + 2.0 * f64::from(n - 70),
+            };
+            let found =
+                tracker.follow(frame(&[(150.0 - 0.5 * gap, 20, 70), (150.0 + 0.5 * gap, 20, 70)]).view());
+            parted.extend(found.iter().flat_map(|followed| followed.parted.clone()));
+            assert!(found.iter().all(|followed| followed.person <= 2), "frame {n}: nobody new");
+        }
+        assert_eq!(parted.len(), 2, "{parted:?}");
+        assert!(parted.iter().all(|parting| parting.ambiguous), "{parted:?}");
+    }
+
+    #[test]
+    fn specks_are_nobody_and_who_goes_is_forgotten() {
+        let mut tracker = tracker();
+        for n in 0..50 {
+            let mut mask = if n < 20 { frame(&[(100.0, 20, 70)]) } else { Mask::from_elem(SIZE, false) };
+            if n % 7 == 0 {
+                mask.slice_mut(s![5..12, 200..210]).fill(true);
+            }
+            let found = tracker.follow(mask.view());
+            let expected = usize::from((2..32).contains(&n));
+            assert_eq!(found.len(), if n == 31 { found.len() } else { expected }, "frame {n}: {found:?}");
+            if n >= 20 {
+                assert!(found.iter().all(|followed| followed.sight == Sight::Missed));
+            }
+        }
+        let mut again = Vec::new();
+        for _ in 0..4 {
+            again = tracker.follow(frame(&[(100.0, 20, 70)]).view());
+        }
+        assert_eq!(again[0].person, 2, "who comes back after long is somebody new");
+    }
+}

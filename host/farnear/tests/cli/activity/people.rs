@@ -1,0 +1,114 @@
+//! Several people in one picture, each recognised apart.
+
+use std::{fs, path::Path};
+
+use image::{GrayImage, Luma};
+use serde_json::Value;
+
+use super::PEOPLE;
+use crate::common::{Folder, fails, farnear, figures, succeeds};
+
+/// The masks of a performance, in order.
+fn masks(name: &str) -> Vec<GrayImage> {
+    let folder = PEOPLE.masks(name, 1);
+    let mut files: Vec<_> =
+        fs::read_dir(&folder).expect("masks").map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files.iter().map(|file| image::open(file).expect("a mask").to_luma8()).collect()
+}
+
+/// Adds a mask to a picture, its left edge at a column, its feet on the ground.
+fn paste(picture: &mut GrayImage, mask: &GrayImage, left: u32) {
+    let top = picture.height() - 10 - mask.height();
+    for (x, y, pixel) in mask.enumerate_pixels().filter(|(.., pixel)| pixel.0[0] > 127) {
+        let (x, y) = (left + x, top + y);
+        if x < picture.width() {
+            picture.put_pixel(x, y, *pixel);
+        }
+    }
+}
+
+fn written(folder: &Folder, name: &str, frames: &[GrayImage]) -> String {
+    let path = folder.text(name);
+    fs::create_dir(&path).expect("a folder");
+    for (number, frame) in frames.iter().enumerate() {
+        frame.save(Path::new(&path).join(format!("{number:03}.png"))).expect("saved");
+    }
+    path
+}
+
+#[test]
+fn two_people_side_by_side_get_an_answer_each() {
+    let folder = Folder::new();
+    let (dig, crouch) = (masks("p01-dig"), masks("p02-crouch"));
+    let count = dig.len().max(crouch.len());
+    let frames: Vec<GrayImage> = (0..count)
+        .map(|n| {
+            let mut picture = GrayImage::new(400, 200);
+            paste(&mut picture, &dig[n % dig.len()], 40);
+            paste(&mut picture, &crouch[n.min(crouch.len() - 1)], 260);
+            picture
+        })
+        .collect();
+    let path = written(&folder, "both", &frames);
+    let film = folder.text("film");
+    let recognise = ["activity", "recognise", &path, "--as", "masks", "--model", "everyday", "--people"];
+    let found = figures(farnear(&recognise).args(["--among", "dig,crouch", "--video-out", &film, "--json"]));
+    let people = found["people"].as_array().expect("people");
+    assert_eq!(people.len(), 2, "{found}");
+    assert_eq!(found["frames"], count);
+    for (person, best) in people.iter().zip(["dig", "crouch"]) {
+        assert_eq!(
+            (&person["silhouettes"], &person["crossing_frames"]),
+            (&count.into(), &0.into()),
+            "{person}"
+        );
+        let share = |name: &str| {
+            let shares = person["shares"].as_array().expect("shares");
+            shares.iter().find(|share| share["activity"] == name).and_then(|share| share["share"].as_f64())
+        };
+        assert!(share(best) > Some(0.5), "{person}");
+    }
+    assert_eq!(fs::read_dir(&film).expect("a film").count(), count);
+
+    // Line by line: both are there from the third frame on, each in a box of their own.
+    let (lines, _) = succeeds(&mut farnear(&recognise));
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let boxes = |line: &Value| -> Vec<u64> {
+        let people = line["people"].as_array().expect("people");
+        people.iter().filter_map(|person| person["top_left_bottom_right"][1].as_u64()).collect()
+    };
+    assert_eq!(boxes(&lines[0]), [0_u64; 0]);
+    let third = boxes(&lines[2]);
+    assert!(third.len() == 2 && third[0] < 200 && third[1] > 200, "{third:?}");
+}
+
+#[test]
+fn people_who_cross_are_said_to_and_what_cannot_be_followed_is_refused() {
+    let folder = Folder::new();
+    let post = GrayImage::from_pixel(24, 90, Luma([255]));
+    let frames: Vec<GrayImage> = (0..50)
+        .map(|n| {
+            let mut picture = GrayImage::new(320, 120);
+            paste(&mut picture, &post, 20 + 5 * n);
+            paste(&mut picture, &post, 270 - 5 * n);
+            picture
+        })
+        .collect();
+    let path = written(&folder, "cross", &frames);
+    let recognise = ["activity", "recognise", &path, "--as", "masks", "--model", "everyday", "--people"];
+    let found = figures(farnear(&recognise).arg("--json"));
+    let people = found["people"].as_array().expect("people");
+    assert_eq!(people.len(), 2, "{found}");
+    for person in people {
+        let crossing = person["crossing_frames"].as_u64().expect("a number");
+        assert!((5..=15).contains(&crossing), "{person}");
+        assert_eq!(person["perhaps_swapped_with"], serde_json::json!([]), "their pace tells them apart");
+        assert_eq!(person["silhouettes"].as_u64().map(|seen| seen + crossing), Some(50), "{person}");
+    }
+    let two = ["activity", "recognise", &path, &path, "--as", "masks", "--model", "everyday", "--people"];
+    fails(&mut farnear(&two), 1, &["one view, 2 were given"]);
+    let small = written(&folder, "small", &[GrayImage::from_pixel(100, 100, Luma([255]))]);
+    let cut_out = ["activity", "recognise", &small, "--as", "masks", "--model", "everyday", "--people"];
+    fails(&mut farnear(&cut_out), 1, &["cut out at 100x100", "full frames"]);
+}

@@ -1,0 +1,365 @@
+//! What everybody in a recording does: people followed apart, a running answer for each, then one for all that was seen of each.
+
+use std::{path::PathBuf, time::Instant};
+
+use farnear_activity::{
+    mask::{
+        Mask,
+        subject::Flag,
+        tracking::{Followed, Sight, Tracker, TrackingSettings},
+    },
+    recognition::{
+        clip::Track,
+        live::{Live, joined},
+        model::{Answer, Recogniser},
+        segmentation::{Worth, segmented},
+    },
+};
+use serde::Serialize;
+
+use super::{
+    film::{Film, Shown},
+    recognition::{Model, Part, Share, outlier_score, restricted, rounded_share, shares, unknown_because},
+    views::{Frames, View},
+};
+use crate::{
+    context::Context,
+    error::{About, Result},
+    figures::rounded,
+    parameters::at_least,
+};
+
+/// What is recognised.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct EverybodySettings {
+    /// Masks of full frames, or a video.
+    pub view: View,
+    /// The only activities that can be; empty for all that the model knows.
+    pub among: Vec<String>,
+    /// Frames of the running answer; without it as many as a training clip had.
+    pub window: Option<usize>,
+    /// A new folder for the frames with everybody's running answer drawn on them.
+    pub film: Option<PathBuf>,
+}
+
+/// Everybody in a frame.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct FrameOfPeople {
+    /// Number of the frame, from 1.
+    pub frame: usize,
+    /// Its name.
+    pub name: String,
+    /// Those who are followed, by their numbers.
+    pub people: Vec<PersonInFrame>,
+    /// Why nobody is looked for in the frame.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flags: Vec<String>,
+}
+
+/// One of them.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PersonInFrame {
+    /// The number, from 1 in the order of coming.
+    pub person: usize,
+    /// First row, first column, one past the last row and column of what is seen; `None` where nothing is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub top_left_bottom_right: Option<[usize; 4]>,
+    /// The activity so far; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
+    pub strangeness: Option<f64>,
+    /// What is doubtful: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flags: Vec<String>,
+}
+
+/// Everybody in the recording.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct EverybodyFigures {
+    /// By their numbers.
+    pub people: Vec<PersonFigures>,
+    /// Frames.
+    pub frames: usize,
+    /// Frames of a window.
+    pub window: usize,
+    /// From a file to everybody's part of a running answer.
+    pub seconds_per_frame: f64,
+}
+
+/// What one of them did.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PersonFigures {
+    /// The number.
+    pub person: usize,
+    /// First frame with a silhouette.
+    pub from: usize,
+    /// Last frame with a silhouette.
+    pub to: usize,
+    /// Frames with a silhouette.
+    pub silhouettes: usize,
+    /// Frames in one blob with others.
+    pub crossing_frames: usize,
+    /// Those with whom this one may have been swapped.
+    pub perhaps_swapped_with: Vec<usize>,
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// Outlier score.
+    pub strangeness: Option<f64>,
+    /// Why the activity is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Probability of every activity.
+    pub shares: Vec<Share>,
+    /// Stretches of one activity each, by a hidden semi-Markov model.
+    pub segments: Vec<Part>,
+}
+
+/// Silhouettes at 100x100 or several views, where one view of full frames is needed.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum EverybodyError {
+    /// Cut-out silhouettes hold one person each.
+    #[error("{}: these are silhouettes cut out at 100x100, which hold one person each; several are looked for in full frames", path.display())]
+    CutOut {
+        /// The masks.
+        path: PathBuf,
+    },
+    /// A model that fuses views.
+    #[error("{}: the model fuses {views} views; several people are recognised by a model of one view", model.display())]
+    Views {
+        /// The model.
+        model: PathBuf,
+        /// Its views.
+        views: usize,
+    },
+}
+
+/// One who is followed.
+struct Somebody<'m> {
+    live: Live<'m>,
+    answer: Option<Answer>,
+    tracks: Vec<Track>,
+    /// Numbers of the frames of the tracks, from 1.
+    numbers: Vec<usize>,
+    crossing_frames: usize,
+    perhaps_swapped_with: Vec<usize>,
+}
+
+/// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
+pub struct Everybody<'m> {
+    model: &'m Recogniser,
+    frames: Frames,
+    tracker: Option<Tracker>,
+    window: usize,
+    among: Vec<String>,
+    people: Vec<Somebody<'m>>,
+    film: Option<Film>,
+    count: usize,
+    seconds: f64,
+}
+
+impl<'m> Everybody<'m> {
+    /// Opens the view.
+    ///
+    /// # Errors
+    /// [`EverybodyError`], a view that cannot be opened.
+    pub fn begin(model: &'m Model, settings: &EverybodySettings) -> Result<Self> {
+        model.check_known(&settings.among)?;
+        if settings.view.is_cut_out()? {
+            return Err(EverybodyError::CutOut { path: settings.view.path.clone() }.into());
+        }
+        let recogniser = model.recogniser(true);
+        if recogniser.views != 1 {
+            return Err(EverybodyError::Views { model: model.path().into(), views: recogniser.views }.into());
+        }
+        if let Some(window) = settings.window {
+            at_least("window", window, 1, "frames")?;
+        }
+        Ok(Self {
+            frames: Frames::open(&settings.view)?,
+            tracker: None,
+            window: settings.window.unwrap_or(recogniser.typical_frames).max(1),
+            among: settings.among.clone(),
+            people: Vec::new(),
+            film: settings.film.as_deref().map(Film::begin).transpose()?,
+            count: 0,
+            seconds: 0.0,
+            model: recogniser,
+        })
+    }
+
+    /// Takes the next frame and answers for everybody in it; `None` where there is none.
+    ///
+    /// # Errors
+    /// Frames that cannot be read, [`crate::WorkflowError::Cancelled`].
+    pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameOfPeople>> {
+        context.cancel.check("recognising")?;
+        let start = Instant::now();
+        let Some(moved) = self.frames.next_moving()? else { return Ok(None) };
+        self.count += 1;
+        let (followed, flag) = match &moved.mask {
+            Ok(mask) => {
+                let like = || Tracker::new(TrackingSettings::for_size(mask.dim()));
+                (self.tracker.get_or_insert_with(like).follow(mask.view()), None)
+            }
+            Err(flag) => (Vec::new(), Some(flag.to_string())),
+        };
+        let people = followed
+            .into_iter()
+            .map(|followed| self.answered(followed).about(|| moved.name.clone()))
+            .collect::<Result<Vec<PersonInFrame>>>()?;
+        self.seconds += start.elapsed().as_secs_f64();
+        if let Some(film) = &mut self.film {
+            let shown: Vec<Shown> = people.iter().filter_map(shown).collect();
+            let nothing = || moved.picture.as_ref().map_or((1, 1), |picture| super::views::size(picture));
+            let mask = moved.mask.unwrap_or_else(|_| Mask::from_elem(nothing(), false));
+            film.draw_people(moved.picture.as_ref(), &mask, &shown)?;
+        }
+        Ok(Some(FrameOfPeople {
+            frame: self.count,
+            name: moved.name,
+            people,
+            flags: flag.into_iter().collect(),
+        }))
+    }
+
+    /// The running answer for one of them.
+    fn answered(
+        &mut self,
+        followed: Followed,
+    ) -> Result<PersonInFrame, farnear_activity::recognition::model::ModelError> {
+        let Followed { person, sight, parted } = followed;
+        while self.people.len() < person {
+            self.people.push(Somebody {
+                live: Live::new(self.model, self.window, true),
+                answer: None,
+                tracks: Vec::new(),
+                numbers: Vec::new(),
+                crossing_frames: 0,
+                perhaps_swapped_with: Vec::new(),
+            });
+        }
+        let somebody = &mut self.people[person - 1];
+        let mut flags = Vec::new();
+        let mut spans = None;
+        match sight {
+            Sight::Alone { mask, bounds, cut_by_edge, before } => {
+                let first = self.count - before.len();
+                for (number, mask) in (first..).zip(before.into_iter().chain([mask])) {
+                    let track = Track::from_masks(&[mask], self.model.settings.scaling, true);
+                    somebody.tracks.push(track.clone());
+                    somebody.numbers.push(number);
+                    let answer = somebody.live.push_described(vec![track])?;
+                    somebody.answer = Some(restricted(answer, &self.among));
+                }
+                flags.extend(cut_by_edge.then(|| Flag::CutByEdge.to_string()));
+                spans = Some(bounds);
+            }
+            Sight::Crossing { with, bounds } => {
+                somebody.crossing_frames += 1;
+                flags.extend(with.iter().map(|other| format!("crossing:{other}")));
+                spans = Some(bounds);
+            }
+            Sight::Missed => flags.push("missed".into()),
+        }
+        for parting in parted {
+            let other = parting.from;
+            flags.push(if parting.ambiguous {
+                format!("perhaps-swapped:{other}")
+            } else {
+                format!("parted:{other}")
+            });
+            if parting.ambiguous && !somebody.perhaps_swapped_with.contains(&other) {
+                somebody.perhaps_swapped_with.push(other);
+            }
+        }
+        let answer = somebody.answer.as_ref();
+        Ok(PersonInFrame {
+            person,
+            top_left_bottom_right: spans.map(|b| [b.top, b.left, b.bottom, b.right]),
+            activity: answer.and_then(|answer| answer.activity.clone()),
+            confidence: answer.map_or(0.0, |answer| rounded_share(answer.confidence)),
+            strangeness: answer.and_then(outlier_score),
+            flags,
+        })
+    }
+
+    /// Answers for all that was seen of everybody.
+    ///
+    /// # Errors
+    /// A model that does not fit.
+    pub fn finish(self) -> Result<EverybodyFigures> {
+        if let Some(film) = self.film {
+            film.finish()?;
+        }
+        let (model, among) = (self.model, &self.among);
+        let people = (1..)
+            .zip(&self.people)
+            .filter(|(_, somebody)| !somebody.tracks.is_empty())
+            .map(|(person, somebody)| figures(model, among, person, somebody))
+            .collect::<Result<Vec<PersonFigures>>>()?;
+        Ok(EverybodyFigures {
+            people,
+            frames: self.count,
+            window: self.window,
+            seconds_per_frame: rounded(self.seconds / self.count.max(1) as f64, 6),
+        })
+    }
+}
+
+fn figures(
+    model: &Recogniser,
+    among: &[String],
+    person: usize,
+    somebody: &Somebody<'_>,
+) -> Result<PersonFigures> {
+    let whole = joined(somebody.tracks.iter());
+    let numbers: Vec<usize> = somebody
+        .numbers
+        .iter()
+        .zip(&somebody.tracks)
+        .filter(|(_, track)| track.frames() > 0)
+        .map(|(n, _)| *n)
+        .collect();
+    let at = |index: usize| numbers.get(index).copied().unwrap_or(0);
+    let answer = restricted(model.recognise(std::slice::from_ref(&whole))?, among);
+    let found = segmented(model, std::slice::from_ref(&whole), among, Worth::default())?;
+    Ok(PersonFigures {
+        person,
+        from: at(0),
+        to: at(numbers.len().saturating_sub(1)),
+        silhouettes: numbers.len(),
+        crossing_frames: somebody.crossing_frames,
+        perhaps_swapped_with: somebody.perhaps_swapped_with.clone(),
+        confidence: rounded_share(answer.confidence),
+        strangeness: outlier_score(&answer),
+        reason: unknown_because(&answer, numbers.len()),
+        activity: answer.activity.clone(),
+        shares: shares(answer),
+        segments: found
+            .iter()
+            .map(|segment| Part {
+                from: at(segment.from),
+                to: at(segment.to.saturating_sub(1)),
+                activity: segment.activity.clone(),
+                confidence: rounded_share(segment.confidence),
+            })
+            .collect(),
+    })
+}
+
+/// What is drawn of one of them.
+fn shown(person: &PersonInFrame) -> Option<Shown> {
+    let spans = person.top_left_bottom_right?;
+    let crossing = person.flags.iter().any(|flag| flag.starts_with("crossing"));
+    let known = person.activity.is_some() && !crossing;
+    let what = match &person.activity {
+        _ if crossing => "crossing".to_owned(),
+        Some(activity) => format!("{activity} {:.0} %", 100.0 * person.confidence),
+        None => "unknown".to_owned(),
+    };
+    Some(Shown { spans, text: format!("{}: {what}", person.person), known })
+}
