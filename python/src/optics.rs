@@ -39,6 +39,7 @@ impl Optics {
             sensor: SensorSection { pixel_um },
             focus: FocusSection { far_mm, max_blur_px, near_mm },
             psf: psf.parse::<Psf>().map_err(wrong)?,
+            distortion: None,
         };
         file.check().map(Self).map_err(wrong)
     }

@@ -4,6 +4,7 @@
 //! machine's own `python3` has; nothing is installed. A peer runs once before and once after our own benches and its
 //! better time counts, so that a machine that slows down in between does not flatter us.
 
+mod arm;
 mod people;
 
 use std::{
@@ -37,6 +38,10 @@ pub struct Arguments {
     /// Only one half: depth or people.
     #[arg(long, value_name = "HALF", conflicts_with = "write")]
     only: Option<Half>,
+    /// Count the instructions on 64-bit ARM; needs qemu-user, gcc-aarch64-linux-gnu and the target
+    /// aarch64-unknown-linux-gnu. With --write only that section is renewed.
+    #[arg(long, conflicts_with_all = ["peers", "only"])]
+    arm: bool,
     /// Write the page docs/speed.md from the figures.
     #[arg(long)]
     write: bool,
@@ -70,6 +75,9 @@ struct Peer {
 
 /// Runs the benches and prints the figures.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.arm {
+        return arm::renew(arguments.write);
+    }
     let (mut with_features, mut with_pair) = (Vec::new(), Vec::new());
     for script in &arguments.peer_script {
         let text = fs::read_to_string(script).with_context(|| format!("cannot read {}", script.display()))?;
@@ -86,10 +94,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         page = page + "\n" + &section;
     }
     if arguments.write {
-        let file = ROOT.join("docs/speed.md");
-        fs::write(&file, page_of(&page)).with_context(|| format!("cannot write {}", file.display()))?;
-        println!("wrote {}", file.display());
+        write_page(&(page_of(&page) + "\n" + &arm::kept()?))?;
     }
+    Ok(())
+}
+
+/// The page's place.
+fn page_file() -> PathBuf {
+    ROOT.join("docs/speed.md")
+}
+
+fn write_page(text: &str) -> Result<()> {
+    let file = page_file();
+    fs::write(&file, text.trim_end().to_owned() + "\n")
+        .with_context(|| format!("cannot write {}", file.display()))?;
+    println!("wrote {}", file.display());
     Ok(())
 }
 

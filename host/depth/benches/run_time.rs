@@ -34,6 +34,7 @@ fn optics(psf: &str) -> Optics {
         sensor: SensorSection { pixel_um: 7.4 },
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: psf.parse().unwrap(),
+        distortion: None,
     }
     .check()
     .unwrap()

@@ -76,7 +76,7 @@ pub fn judge(
         .and(&mut map.confidence)
         .and(&mut deviation_mm)
         .and(&misfit)
-        .for_each(|reason, depth, confidence, deviation, misfit| {
+        .par_for_each(|reason, depth, confidence, deviation, misfit| {
             if settings.filled && *confidence == FILLED_CONFIDENCE && depth.is_finite() {
                 (*reason, *deviation) = (0, f32::NAN);
                 return;
@@ -97,6 +97,7 @@ pub fn judge(
                 (*depth, *confidence, *deviation) = (f32::NAN, 0.0, f32::NAN);
             }
         });
+    drop(misfit); // a map is large, and what follows needs one more
     explain_holes(&mut reasons, map);
     let lost = lost_pixels(&reasons);
     let valid = map.depth_mm.iter().filter(|depth| depth.is_finite()).count();
@@ -172,6 +173,9 @@ fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
             .collect::<Vec<_>>()
     };
     let mut left = unexplained(reasons);
+    if left.is_empty() {
+        return;
+    }
     // Reasons that make holes around them, before the judge's own.
     let spreading =
         [Reason::Saturated, Reason::Dark, Reason::Edge, Reason::Moved, Reason::BadPixel, Reason::NotFinite];

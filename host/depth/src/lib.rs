@@ -18,6 +18,7 @@
 //!     sensor: SensorSection { pixel_um: 7.4 },
 //!     focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
 //!     psf: Psf::PillBox,
+//!     distortion: None,
 //! }
 //! .check()?;
 //! let operators = Operators::for_optics(&optics)?;

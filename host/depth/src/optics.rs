@@ -8,6 +8,7 @@
 //!
 //! Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
 
+mod distortion;
 mod doubt;
 mod error;
 mod file;
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::psf::Psf;
 
+pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
@@ -36,6 +38,7 @@ pub struct Optics {
     max_blur_px: f64,
     psf: Psf,
     telecentric: Option<bool>,
+    distortion: Option<Distortion>,
 }
 
 /// The distances between which a pair measures depth, and where the sensor stands for them.
@@ -89,6 +92,11 @@ impl Optics {
     /// Whether the lens is telecentric on the image side; `None` where the optics file does not say.
     pub fn telecentric(&self) -> Option<bool> {
         self.telecentric
+    }
+
+    /// Distortion of the lens, where the optics file names one.
+    pub fn distortion(&self) -> Option<Distortion> {
+        self.distortion
     }
 
     /// By how much a lens that is not telecentric magnifies the near-focused image more than the far-focused one: the

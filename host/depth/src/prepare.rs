@@ -2,10 +2,11 @@
 //!
 //! 1. The camera's dark and flat frames are taken off ([`CameraFrames`]).
 //! 2. Saturated, black, bad and missing pixels are mended where they stand alone, and left out where they do not.
-//! 3. The near image is laid on the far one ([`align`]): by the magnification that follows from the optics of a lens that is
+//! 3. Lens distortion is taken out of both, where the optics name one ([`straight`]).
+//! 4. The near image is laid on the far one ([`align`]): by the magnification that follows from the optics of a lens that is
 //!    not telecentric, and by what is measured.
-//! 4. Both are brought to one brightness ([`balance`]).
-//! 5. What moved between the exposures is marked, and a pair of different scenes is refused ([`agreement`]).
+//! 5. Both are brought to one brightness ([`balance`]).
+//! 6. What moved between the exposures is marked, and a pair of different scenes is refused ([`agreement`]).
 //!
 //! By itself ([`Align::Auto`], [`Balance::Auto`]) it changes only what it finds to be different beyond doubt: a good pair
 //! goes through untouched.
@@ -17,15 +18,17 @@ pub(crate) mod band;
 mod camera;
 mod defects;
 pub mod noise;
+mod straight;
 pub mod warp;
 
 use std::fmt;
 use std::str::FromStr;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Axis};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::optics::Optics;
+use crate::optics::{Distortion, Optics};
 use crate::reason::Reason;
 use align::{Alignment, Model};
 use balance::Gain;
@@ -241,7 +244,8 @@ pub fn prepare_owned(
         frames.check(size)?;
     }
     let bad = camera.and_then(CameraFrames::bad);
-    let marks = [&far, &near].map(|image| defects::find(image.view(), settings.limits, bad));
+    let find = |image: &Array2<f32>| defects::find(image.view(), settings.limits, bad);
+    let marks: [_; 2] = rayon::join(|| find(&far), || find(&near)).into();
     for (image, marks) in [&mut far, &mut near].into_iter().zip(&marks) {
         if let Some(frames) = camera {
             *image = frames.apply(image.view());
@@ -250,7 +254,21 @@ pub fn prepare_owned(
             defects::mend(image, marks);
         }
     }
-    finish([far, near], marks, optics, settings)
+    let Some(distortion) = optics.distortion() else {
+        return finish([far, near], None, marks, optics, settings);
+    };
+    // Interpolation takes noise away, so it is measured before.
+    let noise = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
+    let recorded = Recorded { near: near.clone(), distortion };
+    let marks = marks.map(|marks| Some(straight::reasons(marks.as_ref(), size, &distortion)));
+    let pair = [far, near].map(|image| straight::image(image.view(), &distortion));
+    finish(pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
+}
+
+/// The near image as the lens recorded it: aligning it interpolates it once, not twice.
+struct Recorded {
+    near: Array2<f32>,
+    distortion: Distortion,
 }
 
 fn check_sizes(
@@ -263,9 +281,10 @@ fn check_sizes(
     Err(crate::pipeline::RunError::SizeMismatch { far_width, far_height, near_width, near_height }.into())
 }
 
-/// What follows once single pixels are mended: geometry, brightness, agreement.
+/// What follows once single pixels are mended and lines are straight: geometry, brightness, agreement.
 fn finish(
     [far, mut near]: [Array2<f32>; 2],
+    recorded: Option<Recorded>,
     marks: [Option<Array2<u8>>; 2],
     optics: &Optics,
     settings: &PrepareSettings,
@@ -275,8 +294,14 @@ fn finish(
     let mut report = Report::default();
     let warp = geometry(&far, &near, optics, settings.align, &mut report);
     if let Some(warp) = &warp {
-        near = warp::resample(near.view(), warp);
+        near = match &recorded {
+            Some(Recorded { near, distortion }) => {
+                warp::resample_by(near.view(), |place| distortion.distorted(warp.at(place)))
+            }
+            None => warp::resample(near.view(), warp),
+        };
     }
+    drop(recorded);
     brightness(&far, &mut near, settings.balance, &mut report);
     let mut reasons = merged(marks, warp.as_ref(), &near);
     report.saturated_fraction = part_of(&reasons, Reason::Saturated);
@@ -388,17 +413,16 @@ fn merged(marks: [Option<Array2<u8>>; 2], warp: Option<&Warp>, near: &Array2<f32
         }
         return reasons;
     };
-    for ((y, x), reason) in reasons.indexed_iter_mut() {
-        if *reason != 0 {
-            continue;
+    reasons.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
+        for (x, reason) in row.iter_mut().enumerate().filter(|(_, reason)| **reason == 0) {
+            let [px, py] = warp.at([x as f64, y as f64]).map(f64::round);
+            let inside = px >= 0.0 && py >= 0.0 && px < width as f64 && py < height as f64;
+            *reason = match &near_marks {
+                _ if !inside => Reason::Edge.code(),
+                Some(marks) => marks[(py as usize, px as usize)],
+                None => 0,
+            };
         }
-        let [px, py] = warp.at([x as f64, y as f64]).map(f64::round);
-        let inside = px >= 0.0 && py >= 0.0 && px < width as f64 && py < height as f64;
-        *reason = match &near_marks {
-            _ if !inside => Reason::Edge.code(),
-            Some(marks) => marks[(py as usize, px as usize)],
-            None => 0,
-        };
-    }
+    });
     reasons
 }

@@ -288,7 +288,7 @@ fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Opt
         let root = (b * b - (1.0 - r) * c).max(0.0).sqrt();
         -c / (b + root)
     };
-    depth_mm.mapv_inplace(|depth| {
+    depth_mm.par_mapv_inplace(|depth| {
         if depth.is_finite() {
             optics.depth_mm(alpha_of(optics.alpha(f64::from(depth)))) as f32
         } else {
@@ -371,6 +371,7 @@ mod tests {
             sensor: SensorSection { pixel_um: 7.4 },
             focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
             psf: Psf::PillBox,
+            distortion: None,
         }
         .check()
         .unwrap();

@@ -36,7 +36,7 @@ use method::{Method, Prepared};
 use noise::{CameraNoise, Source, Uncertainty};
 use output::{Outputs, Results};
 use pair::Pair;
-use part::Cut;
+use part::{AROUND_PX, Cut};
 
 pub use shared::Shared;
 
@@ -226,7 +226,8 @@ impl Inputs {
             None => (optics, doubts),
         };
         let mut pair = Pair::read(&settings.far, &settings.near)?;
-        let cut = settings.region.map(|region| Cut::out_of(&mut pair, region)).transpose()?;
+        let around = optics.distortion().is_none().then_some(AROUND_PX);
+        let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
         let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, shared)?;
         let correction = settings.correction.as_deref().map(|file| shared.correction(file)).transpose()?;
         if let Some(correction) = &correction {

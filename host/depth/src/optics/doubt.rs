@@ -63,6 +63,7 @@ mod tests {
                 sensor: SensorSection { pixel_um: pixel },
                 focus: FocusSection { far_mm: far, max_blur_px: Some(blur), near_mm: None },
                 psf: Default::default(),
+                distortion: None,
             }
             .check()
             .unwrap()

@@ -2,6 +2,9 @@
 
 use crate::psf::PsfError;
 
+/// OpenCV's order.
+const DISTORTION_NAMES: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+
 /// What is wrong with a set of optics.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OpticsError {
@@ -76,6 +79,31 @@ pub enum OpticsError {
         blur_would_be_px: f64,
         /// Relative difference of the blur radii in percent.
         percent: f64,
+    },
+    /// A camera matrix that is not one of OpenCV's.
+    #[error(
+        "[distortion] camera_matrix = {rows:?}: expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels, as cv2.calibrateCamera \
+         returns it"
+    )]
+    CameraMatrix {
+        /// Row by row.
+        rows: [[f64; 3]; 3],
+    },
+    /// A model of distortion that is not known.
+    #[error(
+        "[distortion] has {count} coefficients: expected 4, 5 or 8, in OpenCV's order k1, k2, p1, p2, k3, k4, k5, k6"
+    )]
+    DistortionCount {
+        /// How many were given.
+        count: usize,
+    },
+    /// A coefficient that is not a number.
+    #[error("[distortion] {} = {value}: must be a finite number", DISTORTION_NAMES.get(*index).unwrap_or(&"?"))]
+    DistortionCoefficient {
+        /// Its place in OpenCV's order.
+        index: usize,
+        /// What was given.
+        value: f64,
     },
     /// The point-spread function's parameters are unusable.
     #[error("[psf] {0}")]

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Optics, OpticsError, image_mm};
+use super::{DistortionSection, Optics, OpticsError, image_mm};
 use crate::psf::Psf;
 
 /// The largest relative difference between a given blur radius and the one that `near_mm` leads to.
@@ -65,6 +65,9 @@ pub struct OpticsFile {
     /// Point-spread function; a pill-box where the file names none.
     #[serde(default)]
     pub psf: Psf,
+    /// Distortion of the lens; none where the file names none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<DistortionSection>,
 }
 
 impl OpticsFile {
@@ -80,6 +83,7 @@ impl OpticsFile {
         beyond_focal_length("far_mm", far_mm, focal_length_mm)?;
         let psf = self.psf.checked()?;
         let telecentric = self.lens.telecentric;
+        let distortion = self.distortion.as_ref().map(DistortionSection::check).transpose()?;
         let of_blur = |max_blur_px| Optics {
             focal_length_mm,
             f_number,
@@ -88,6 +92,7 @@ impl OpticsFile {
             max_blur_px,
             psf,
             telecentric,
+            distortion,
         };
         let of_near = |near_mm: f64| -> Result<Optics, OpticsError> {
             beyond_focal_length("near_mm", near_mm, focal_length_mm)?;
@@ -191,6 +196,7 @@ impl From<Optics> for OpticsFile {
                 near_mm: None,
             },
             psf: optics.psf,
+            distortion: optics.distortion.map(DistortionSection::from),
         }
     }
 }
@@ -262,8 +268,15 @@ mod tests {
 
     #[test]
     fn checked_optics_survive_a_round_trip_through_toml() {
-        let optics = rig().check().unwrap();
-        let text = toml::to_string(&optics).unwrap();
-        assert_eq!(toml::from_str::<Optics>(&text).unwrap(), optics);
+        const DISTORTION: &str = "
+            [distortion]
+            camera_matrix = [[1210.5, 0, 318.25], [0, 1208.75, 243.5], [0, 0, 1]]
+            coefficients = [-0.31, 0.12, 0.0011, -0.0007, 0.05]";
+        for file in [rig(), toml::from_str(&(RIG.to_owned() + DISTORTION)).unwrap()] {
+            let optics = file.check().unwrap();
+            let text = toml::to_string(&optics).unwrap();
+            assert_eq!(toml::from_str::<Optics>(&text).unwrap(), optics);
+            assert_eq!(optics.distortion().is_some(), file.distortion.is_some());
+        }
     }
 }

@@ -39,7 +39,7 @@ pub fn compare(far: ArrayView2<f32>, near: ArrayView2<f32>, noise: &PairNoise) -
     let mut variance = noise.mean_variance * band_noise_gain();
     let mut factor = 1;
     while far.len() > FINEST_PX {
-        [far, near] = [halved(far.view()), halved(near.view())];
+        [far, near] = [&far, &near].map(|image| halved(image.view()).into());
         variance *= halving_noise_gain();
         factor *= 2;
     }

@@ -140,17 +140,17 @@ fn levels(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<(Vec<Level>, us
     let [mut far, mut near] = [far, near].map(without_holes);
     let mut skipped = 0;
     while far.len() > FINEST_PX {
-        [far, near] = [halved(far.view()), halved(near.view())];
+        [far, near] = [&far, &near].map(|image| halved(image.view()).into());
         skipped += 1;
     }
     let mut levels = Vec::new();
     loop {
-        let shared = |image: &Array2<f32>| normalised(&band(image.view()));
-        levels.push(Level { far: shared(&far), near: shared(&near) });
+        let [a, b] = [&far, &near].map(|image| normalised(&band(image.view())));
+        levels.push(Level { far: a, near: b });
         if far.nrows().min(far.ncols()) < 2 * COARSEST_PX {
             return Some((levels, skipped));
         }
-        [far, near] = [halved(far.view()), halved(near.view())];
+        [far, near] = [&far, &near].map(|image| halved(image.view()).into());
     }
 }
 

@@ -5,7 +5,7 @@
 //! by the root mean square of that band around each pixel: what is left is alike in both wherever they show the same.
 //! Point spread functions are symmetric and move nothing, so that a difference of blur draws no estimate to one side.
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
 
 use crate::border::reflect;
@@ -40,14 +40,18 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     half
 }
 
-/// The image with its pixels without a value set to the mean of the others.
-pub(crate) fn without_holes(image: ArrayView2<f32>) -> Array2<f32> {
+/// The image with its pixels without a value set to the mean of the others; itself where every pixel has one.
+pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2> {
+    let whole = |row: ndarray::ArrayView1<f32>| row.iter().all(|v| v.is_finite());
+    if image.axis_iter(Axis(0)).into_par_iter().all(whole) {
+        return image.into();
+    }
     let (sum, count) = image
         .iter()
         .filter(|v| v.is_finite())
         .fold((0.0_f64, 0.0_f64), |(sum, count), v| (sum + f64::from(*v), count + 1.0));
     let mean = if count > 0.0 { (sum / count) as f32 } else { 0.0 };
-    image.mapv(|v| if v.is_finite() { v } else { mean })
+    image.mapv(|v| if v.is_finite() { v } else { mean }).into()
 }
 
 /// The band of an image as it is: blurred by a binomial of five taps, less its mean over [`MEAN_PX`].

@@ -153,6 +153,11 @@ impl Lanczos {
 ///
 /// Cost: 36 multiply-adds per pixel, on all threads of the pool that it runs in.
 pub fn resample(image: ArrayView2<f32>, warp: &Warp) -> Array2<f32> {
+    resample_by(image, |place| warp.at(place))
+}
+
+/// The same through any map of pixels.
+pub(crate) fn resample_by(image: ArrayView2<f32>, map: impl Fn([f64; 2]) -> [f64; 2] + Sync) -> Array2<f32> {
     let (height, width) = image.dim();
     let standard = image.as_standard_layout();
     let Some(pixels) = standard.as_slice() else { unreachable!("made in standard layout") };
@@ -160,7 +165,7 @@ pub fn resample(image: ArrayView2<f32>, warp: &Warp) -> Array2<f32> {
     let mut result = Array2::zeros((height, width));
     result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
         for (x, value) in row.iter_mut().enumerate() {
-            let place = warp.at([x as f64, y as f64]);
+            let place = map([x as f64, y as f64]);
             *value = sample(pixels, (height, width), place, &lanczos);
         }
     });

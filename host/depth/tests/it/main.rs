@@ -6,6 +6,7 @@ mod calibrate;
 mod common;
 mod corrections;
 mod designs;
+mod distortion;
 mod input;
 mod optics_files;
 mod planes;

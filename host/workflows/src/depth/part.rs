@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// What is looked at beside the part, px: windows of 21 and operators in a row reach less far.
-const AROUND_PX: usize = 40;
+pub(super) const AROUND_PX: usize = 40;
 
 /// Where a map lies in the images it was made of; stands in `depth.toml`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -43,13 +43,15 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// Cuts a part with its surroundings out of a pair.
-    pub fn out_of(pair: &mut Pair, wanted: Rectangle) -> Result<Self> {
+    /// Cuts a part with its surroundings out of a pair; without a number of pixels all of it is its surroundings, as where
+    /// a lens' distortion is to be taken out, which goes by the place in the whole image.
+    pub fn out_of(pair: &mut Pair, wanted: Rectangle, around: Option<usize>) -> Result<Self> {
         let image @ (height, width) = pair.far.dim();
         wanted.check_within(image)?;
         let along = |begin: usize, size: usize, all: usize| {
-            let from = begin.saturating_sub(AROUND_PX);
-            (from, (begin + size + AROUND_PX).min(all) - from)
+            let around = around.unwrap_or(all);
+            let from = begin.saturating_sub(around);
+            (from, (begin + size + around).min(all) - from)
         };
         let (x, seen_width) = along(wanted.x, wanted.width, width);
         let (y, seen_height) = along(wanted.y, wanted.height, height);

@@ -1,0 +1,48 @@
+//! The run time for a small pair, as often as asked for, and nothing else: what an emulator counts the instructions of.
+//! `cargo xtask bench --arm` subtracts two counts, so that the start falls out. The operators were stored by `farnear operators --psf
+//! pillbox`, for their design would take most of the counting.
+//!
+//! Arguments: vector unit, times.
+#![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
+
+use std::hint::black_box;
+
+use farnear_depth::operators::Operators;
+use farnear_depth::optics::{FocusSection, LensSection, OpticsFile, SensorSection};
+use farnear_depth::pipeline::{Backend, Processor, Settings};
+use ndarray::Array2;
+
+/// Small, for every instruction of it is written down by the emulator; its rims count, so that a large pair takes rather less per pixel.
+const SIZE: (usize, usize) = (96, 128);
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let [unit, times] = &arguments[..] else {
+        println!("one_chain: for `cargo xtask bench --arm`");
+        return;
+    };
+    let backend = *Backend::available().iter().find(|b| format!("{b:?}").to_lowercase() == *unit).unwrap();
+    let optics = OpticsFile {
+        lens: LensSection {
+            focal_length_mm: 50.0,
+            aperture_mm: Some(12.8),
+            f_number: None,
+            telecentric: None,
+        },
+        sensor: SensorSection { pixel_um: 7.4 },
+        focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
+        psf: "pillbox".parse().unwrap(),
+        distortion: None,
+    }
+    .check()
+    .unwrap();
+    let operators: Operators = toml::from_str(include_str!("one_chain_operators.toml")).unwrap();
+    let pair = [3, 5].map(|seed| {
+        Array2::from_shape_fn(SIZE, |(y, x)| ((y * 7 * seed + x * 13 + x * y * seed) % 31) as f32)
+    });
+    let settings = Settings { threads: 1, backend: Some(backend), ..Settings::default() };
+    let mut processor = Processor::new(&operators, &optics, &settings).unwrap();
+    for _ in 0..times.parse::<usize>().unwrap() {
+        black_box(processor.run(pair[0].view(), pair[1].view()).unwrap().low_texture_fraction);
+    }
+}
