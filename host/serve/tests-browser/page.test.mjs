@@ -313,7 +313,11 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
 /** The pictures of docs/page.md: where the page stands, and what is waited for. */
 const IMAGES = join(import.meta.dirname, "../../../docs/images");
 const PICTURES = [
-  ["live", "#live", async (page) => page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 3)],
+  ["live", "#live", async (page) => {
+    const live = page.getByRole("button", { name: "Live image" });
+    if ((await live.getAttribute("aria-pressed")) === "false") await live.click();
+    await page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 1);
+  }],
   ["depth", "#depth/pair-001", async (page) => page.locator("canvas[data-layer=depth]").waitFor()],
   ["optics", "#optics", async (page) => page.locator(".to-scale").waitFor()],
   ["guide", "#guides/power", async (page) => page.locator(".check-step").first().waitFor()],
