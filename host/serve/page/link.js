@@ -61,6 +61,7 @@ function pictured(data) {
   const length = new DataView(data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
   emit(header.type, header, new Uint8Array(data, 4 + length));
+  if (socket?.readyState === WebSocket.OPEN) socket.send('{"type":"seen"}');
 }
 
 /** Asks for something; throws what went wrong, with `hint`. */

@@ -25,8 +25,10 @@ export function make(host) {
   const status = h("p", { class: "status" });
   const place = h("div", {});
   const plot = new Plot(place, { label: "focus value over the last frames", height: 110, names: ["focus"] });
+  const resting = h("p", { class: "empty", hidden: true }, "The live image is off: L begins it.");
   const values = [];
   let best = 0;
+  let shown = false;
   const off = button("Live image", () => mode("image"), { "aria-pressed": "false", title: "L" });
   const deep = button("Live depth", () => mode("depth"), { "aria-pressed": "false", title: "Pair after pair by the piezo" });
   const record = button("Record", () => act("/api/recordings", { on: !store.state?.live.recording }), { "aria-pressed": "false", title: "Keeps the pairs of live depth" });
@@ -55,7 +57,7 @@ export function make(host) {
     h("div", { class: "stage" },
       h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), record, saturation.label, peaking.label,
         h("span", { class: "grow" }), status),
-      h("div", { class: "viewers" }, image.element, depth.element)),
+      h("div", { class: "viewers" }, image.element, depth.element, resting)),
     h("div", { class: "side" },
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
@@ -76,6 +78,7 @@ export function make(host) {
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
     measure.value = live.measure;
     const playing = state.computation?.kind === "play" && state.computation.phase === "running";
+    resting.hidden = live.mode !== "off" || !seen || playing || shown;
     depth.element.hidden = live.mode !== "depth" && !playing;
     record.disabled = !drives() || live.mode !== "depth";
     record.setAttribute("aria-pressed", Boolean(live.recording));
@@ -91,6 +94,7 @@ export function make(host) {
   on("image", (header, pixels) => {
     if (host.hidden) return;
     const found = header.figures;
+    shown = true;
     image.show(shade(blank(found, reused.image), pixels, saturation.box.checked, peaking.box.checked));
     time(image, header);
     status.textContent = `${number(header.rate_hz, 1)} frames/s`;
@@ -110,6 +114,7 @@ export function make(host) {
     const { width, height, low_mm, high_mm } = header;
     const count = width * height;
     const codes = new Uint16Array(pixels.buffer, pixels.byteOffset, count);
+    shown = true;
     depth.show(paintCodes(blank(header, reused.depth), codes, pixels.subarray(2 * count, 3 * count), "viridis"));
     image.show(shade(blank(header, reused.image), pixels.subarray(3 * count, 4 * count), false, false));
     time(depth, header);

@@ -60,14 +60,17 @@ function rail(name, axis, [low, high], marks, absent = false) {
   const inside = (um) => Math.max(RAIL[0] - 7, Math.min(RAIL[1] + 7, place(um)));
   const state = absent ? "absent" : axis.moving ? "moving" : axis.state;
   const text = `${name} ${number(axis.measured_um, 3, "µm")}, ${state}; limits ${low} to ${high} µm`;
+  // Marks that would lie on each other share their words.
+  const shared = marks.length === 2 && Math.abs(inside(marks[0][1]) - inside(marks[1][1])) < 26;
+  const words = (at) => (!shared ? marks[at][0] : at === 0 ? marks.map(([mark]) => mark).join(", ") : "");
   return h("div", { class: "rail", "data-state": state },
     h("div", { class: "rail-head" }, h("span", { class: "rail-name" }, name), h("span", { class: "state" }, state),
       h("output", {}, number(axis.measured_um, 3, "µm"))),
     s("svg", { viewBox: `0 0 ${WIDTH} 30`, role: "img", "aria-label": text },
       s("rect", { x: RAIL[0], y: 10, width: RAIL[1] - RAIL[0], height: 5, rx: 2.5, class: "track" }),
-      marks.map(([mark, um]) => s("g", { class: um < low || um > high ? "mark outside" : "mark" },
+      marks.map(([, um], at) => s("g", { class: um < low || um > high ? "mark outside" : "mark" },
         s("line", { x1: inside(um), y1: 7, x2: inside(um), y2: 18 }),
-        s("text", { x: inside(um), y: 28, "text-anchor": um < low + 0.1 * (high - low) ? "start" : um > high - 0.1 * (high - low) ? "end" : "middle" }, mark))),
+        s("text", { x: inside(um), y: 28, "text-anchor": um < low + 0.1 * (high - low) ? "start" : um > high - 0.1 * (high - low) ? "end" : "middle" }, words(at)))),
       s("circle", { cx: inside(axis.asked_um), cy: 12.5, r: 5.5, class: "asked" }),
       s("circle", { cx: inside(axis.measured_um), cy: 12.5, r: 3.5, class: "measured" })));
 }

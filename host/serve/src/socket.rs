@@ -19,6 +19,11 @@ use crate::{app::App, routes::Shared, view::Hello};
 const ASK: Duration = Duration::from_secs(1);
 /// Longest silence of a browser that is there: it answers by itself, also while its page is busy.
 const SILENCE: Duration = Duration::from_secs(5);
+/// Pictures on the way to a browser that has not said that it has seen them: one is looked at, one travels. More would wait in the line's
+/// buffers, and what is shown would be from seconds ago.
+const ON_THE_WAY: u32 = 2;
+/// A browser that says nothing of what it has seen gets a picture in this time.
+const UNSEEN: Duration = Duration::from_secs(1);
 /// Longest message of a browser.
 const MESSAGE_MAX: usize = 4096;
 
@@ -28,6 +33,8 @@ const MESSAGE_MAX: usize = 4096;
 enum Said {
     /// Stops the rig.
     Stop,
+    /// A picture was taken in: the next one may come.
+    Seen,
 }
 
 /// Opens a socket.
@@ -62,7 +69,9 @@ async fn talk(socket: &mut WebSocket, app: &Arc<App>) {
     let mut ask = interval(ASK);
     ask.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut heard = Instant::now();
+    let (mut on_the_way, mut pictured) = (0, Instant::now());
     loop {
+        let ready = on_the_way < ON_THE_WAY || pictured.elapsed() >= UNSEEN;
         let message = tokio::select! {
             () = app.ended() => return,
             said = socket.recv() => {
@@ -71,6 +80,10 @@ async fn talk(socket: &mut WebSocket, app: &Arc<App>) {
                 match hear(said, app) {
                     Heard::Nothing => continue,
                     Heard::Bye => return,
+                    Heard::Seen => {
+                        on_the_way = on_the_way.saturating_sub(1);
+                        continue;
+                    }
                     Heard::Wrong(text) => Message::text(json!({ "type": "error", "error": text }).to_string()),
                 }
             }
@@ -79,7 +92,10 @@ async fn talk(socket: &mut WebSocket, app: &Arc<App>) {
                 Message::text(format!("{{\"type\":\"state\",\"state\":{state}}}"))
             }
             // The newest only: what came while the one before was sent is never seen.
-            _ = pictures.changed() => Message::Binary(pictures.borrow_and_update().clone()),
+            _ = pictures.changed(), if ready => {
+                (on_the_way, pictured) = ((on_the_way + 1).min(ON_THE_WAY), Instant::now());
+                Message::Binary(pictures.borrow_and_update().clone())
+            }
             _ = ask.tick() => {
                 if heard.elapsed() > SILENCE {
                     return;
@@ -95,6 +111,7 @@ async fn talk(socket: &mut WebSocket, app: &Arc<App>) {
 
 enum Heard {
     Nothing,
+    Seen,
     Bye,
     Wrong(String),
 }
@@ -112,7 +129,10 @@ fn hear(said: Message, app: &Arc<App>) -> Heard {
                 }));
                 Heard::Nothing
             }
-            Err(error) => Heard::Wrong(format!("expected {{\"type\":\"stop\"}}: {error}")),
+            Ok(Said::Seen) => Heard::Seen,
+            Err(error) => {
+                Heard::Wrong(format!("expected {{\"type\":\"stop\"}} or {{\"type\":\"seen\"}}: {error}"))
+            }
         },
         Message::Binary(_) => Heard::Wrong("expected text".into()),
         Message::Ping(_) | Message::Pong(_) => Heard::Nothing,
