@@ -52,7 +52,11 @@ fn say_hello(
         // numbers stand.
         match link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(())) {
             Ok((_, packet)) => return Ok(packet),
-            Err(error @ ClientError::Silent { .. }) => silent = Some(both(silent, error)),
+            Err(error @ ClientError::Silent { .. }) => {
+                silent = Some(both(silent, error));
+                // The same bytes at the next rate: a board that is only slow takes them for the repeat that they are.
+                link.reuse_id();
+            }
             Err(error) => return Err(error),
         }
     }

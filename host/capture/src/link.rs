@@ -74,6 +74,11 @@ impl Link {
         self.next_id = last_id.wrapping_add(1);
     }
 
+    /// The next request has the id of the last one.
+    pub(crate) fn reuse_id(&mut self) {
+        self.next_id = self.next_id.wrapping_sub(1).max(1);
+    }
+
     /// Goes on over another transport, after the first broke; at the rate of a board that was just reset.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
         self.transport = Some(transport);
