@@ -214,7 +214,7 @@ impl<'m> Everybody<'m> {
         self.seconds += start.elapsed().as_secs_f64();
         if let Some(film) = &mut self.film {
             let shown: Vec<Shown> = people.iter().filter_map(shown).collect();
-            let nothing = || moved.picture.as_ref().map_or((1, 1), |picture| super::views::size(picture));
+            let nothing = || moved.picture.as_ref().map_or((1, 1), super::views::size);
             let mask = moved.mask.unwrap_or_else(|_| Mask::from_elem(nothing(), false));
             film.draw_people(moved.picture.as_ref(), &mask, &shown)?;
         }
