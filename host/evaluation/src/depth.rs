@@ -5,6 +5,7 @@ mod coded;
 mod corrections;
 mod designs;
 mod fill;
+mod focus;
 mod kernels;
 mod methods;
 mod mismatch;
@@ -22,7 +23,7 @@ use crate::page::Page;
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
 /// The parts that need nothing but the renderer.
-pub const RENDERED: [Part; 11] = [
+pub const RENDERED: [Part; 12] = [
     ("planes", planes::measure),
     ("shapes", shapes::measure),
     ("mismatch", mismatch::measure),
@@ -34,6 +35,7 @@ pub const RENDERED: [Part; 11] = [
     ("calibration", calibration::measure),
     ("coded", coded::measure),
     ("corrections", corrections::measure),
+    ("focus", focus::measure),
 ];
 
 /// What a reader must know before the first figure.

@@ -11,13 +11,15 @@ use farnear_depth::{
 use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, Renderer, Scene, truth};
 use ndarray::Array2;
 
+/// Focal length of the lens.
+pub const FOCAL_LENGTH_MM: f64 = 50.0;
 /// Li 2014, section 4.3: 50 mm lens at 933 mm, 2.703 px of blur at most, near focus at 886.81 mm.
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
                       [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
 /// (width, height) in px.
 const SIZE: (usize, usize) = (640, 480);
 /// Rim that is not compared: there windows and operators see reflections.
-const BORDER_PX: usize = 16;
+pub const BORDER_PX: usize = 16;
 /// Pixels at most this far from a depth step are not compared on a staircase.
 const AWAY_FROM_EDGES_PX: usize = 8;
 
@@ -98,6 +100,25 @@ pub fn render(scene: &Scene, lens: &Lens, psf: &str, exposure: Exposure, seed: u
         near: expose(lens.sensor_near_mm, 1)?,
         truth: truth(scene, lens, &camera),
     })
+}
+
+/// Renders a stack with the sensor at each of these distances, 8 bit, values from 0 to 1, and its truth.
+pub fn stack(
+    scene: &Scene,
+    lens: &Lens,
+    psf: &str,
+    sensors_mm: &[f64],
+    seed: u64,
+) -> Result<(Vec<Array2<f32>>, Array2<f32>)> {
+    let noise = Exposure::EightBit.noise();
+    let camera = Camera::new(SIZE.0, SIZE.1, noise);
+    let renderer = Renderer::new(scene, lens, &psf.parse()?, &camera, seed)?;
+    let white = f32::from(noise.max_code());
+    let expose = |(number, sensor_mm): (usize, &f64)| -> Result<Array2<f32>> {
+        Ok(renderer.expose(*sensor_mm, number as u32)?.mapv(|code| f32::from(code) / white))
+    };
+    let images = sensors_mm.iter().enumerate().map(expose).collect::<Result<_>>()?;
+    Ok((images, truth(scene, lens, &camera)))
 }
 
 /// Depths from far to near focus: `count` of them, the first and last `margin` of a step inside the range.

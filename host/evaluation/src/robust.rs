@@ -3,6 +3,7 @@
 pub mod disturb;
 mod planes;
 mod random;
+mod registration;
 mod table;
 
 use anyhow::Result;
@@ -13,8 +14,12 @@ use crate::page::Page;
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
 /// The parts of the page.
-pub const PARTS: [Part; 3] =
-    [("disturbances", table::measure), ("outside", planes::measure), ("random", random::measure)];
+pub const PARTS: [Part; 4] = [
+    ("disturbances", table::measure),
+    ("outside", planes::measure),
+    ("random", random::measure),
+    ("registration", registration::measure),
+];
 
 /// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Robustness
