@@ -36,7 +36,7 @@ pub mod gige;
 pub mod imager;
 pub mod judge;
 pub mod kept_memory;
-pub mod link_rates;
+mod link_rates;
 pub mod lockstep;
 pub mod memory;
 pub mod pacing;
