@@ -309,11 +309,6 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
 /** The pictures of docs/page.md: where the page stands, and what is waited for. */
 const IMAGES = join(import.meta.dirname, "../../../docs/images");
 const PICTURES = [
-  ["live", "#live", async (page) => {
-    const live = page.getByRole("button", { name: "Live image" });
-    if ((await live.getAttribute("aria-pressed")) === "false") await live.click();
-    await page.waitForFunction(() => Number(document.querySelector("#view-live .viewer canvas").dataset.painted) > 1);
-  }],
   ["depth", "#depth/pair-001", async (page) => page.locator("canvas[data-layer=depth]").waitFor()],
   ["optics", "#optics", async (page) => page.locator(".to-scale").waitFor()],
   ["guide", "#guides/power", async (page) => page.locator(".check-step").first().waitFor()],
@@ -327,7 +322,7 @@ test("the pictures in the page's document are of this page", async () => {
   const stamp = join(IMAGES, "page.sha256");
   if (process.env.PICTURES) {
     for (const [name, place, ready] of PICTURES) {
-      const page = await open(browser, `${server.address}${place}`, { viewport: { width: 1120, height: 720 }, colorScheme: "light" });
+      const page = await open(browser, `${server.address}${place}`, { viewport: { width: 1080, height: 640 }, colorScheme: "light" });
       await ready(page);
       await page.waitForTimeout(1000);
       const picture = await page.screenshot({ path: join(IMAGES, `page-${name}.png`) });
