@@ -17,6 +17,7 @@ use rigless::{
 
 use crate::{
     access::{RigAccess, forget},
+    adapter::Adapter,
     board::{NOTHING, RigBoard},
     chips::{SharedPlant, with_plant},
     command::{CameraOrder, Command, Outlets},
@@ -81,8 +82,7 @@ pub struct Driver {
     looks_at_ns: Option<u64>,
     /// Where the memory's contents are kept at the end, and what they are then.
     memory: Option<(PathBuf, Vec<u8>)>,
-    /// Bytes for the host that its adapter keeps, and until when.
-    kept: (Vec<u8>, u64),
+    adapter: Adapter,
     /// Bytes for the board that came while time passes on request.
     held: Vec<u8>,
     resets: usize,
@@ -121,7 +121,7 @@ impl Driver {
             script: None,
             looks_at_ns: None,
             memory: config.memory.clone().map(|path| (path, Vec::new())),
-            kept: (Vec::new(), 0),
+            adapter: Adapter::default(),
             held: Vec::new(),
             resets: 0,
             powered: true,
@@ -134,19 +134,6 @@ impl Driver {
     fn hand_out(&mut self, bytes: Vec<u8>) {
         if let Some(outlet) = self.outlets.bytes.as_ref().filter(|_| !bytes.is_empty()) {
             let _ = outlet.send(bytes); // whoever listened may have gone
-        }
-    }
-
-    /// Bytes come to the host's adapter, which keeps them for its latency from the first one on.
-    fn adapt(&mut self, bytes: Vec<u8>, now_ns: u64) {
-        let (kept, until_ns) = &mut self.kept;
-        if kept.is_empty() {
-            *until_ns = now_ns + self.lines.latency_ns;
-        }
-        kept.extend(bytes);
-        if now_ns >= *until_ns {
-            let bytes = std::mem::take(kept);
-            self.hand_out(bytes);
         }
     }
 
@@ -215,7 +202,8 @@ impl Driver {
         }
         self.rates.carry(&mut bytes);
         self.lines.to_host.carry(&mut bytes);
-        self.adapt(bytes, now_ns);
+        let bytes = self.adapter.pass(bytes, now_ns, self.lines.latency_ns);
+        self.hand_out(bytes);
         if self.scenario.unplug_after_ms.is_some_and(|ms| now_ns >= ms.saturating_mul(1_000_000)) {
             self.outlets.bytes = None;
         }
@@ -400,7 +388,7 @@ impl Driver {
             self.send_held(now_ns);
             // Its time goes on until what it was sent has arrived and what moves has come to rest, also when its host has gone.
             let at_work = self.line.is_sending()
-                || !self.kept.0.is_empty()
+                || !self.adapter.is_empty()
                 || self.wiring.is_stepping(now_ns)
                 || self.pacing.is_realtime() && self.is_awaited();
             let waiting = self.pacing.take_waiting(now_ns, at_work);

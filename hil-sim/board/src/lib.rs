@@ -20,6 +20,7 @@
 //! machine, as long as the host asks while time stands (a request sent during a move arrives when it arrives).
 
 pub mod access;
+mod adapter;
 pub mod board;
 pub mod camera;
 pub mod campaign;

@@ -1,0 +1,24 @@
+//! The host's adapter: it keeps what the board says for its latency, from the first byte on.
+
+/// See the module.
+#[derive(Debug, Default)]
+pub struct Adapter {
+    kept: Vec<u8>,
+    until_ns: u64,
+}
+
+impl Adapter {
+    /// Takes bytes; gives what it hands on now.
+    pub fn pass(&mut self, bytes: Vec<u8>, now_ns: u64, latency_ns: u64) -> Vec<u8> {
+        if self.kept.is_empty() {
+            self.until_ns = now_ns + latency_ns;
+        }
+        self.kept.extend(bytes);
+        if now_ns >= self.until_ns { std::mem::take(&mut self.kept) } else { Vec::new() }
+    }
+
+    /// Whether it keeps nothing.
+    pub fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+}
