@@ -3,7 +3,7 @@ import { notice } from "./ui.js";
 
 /**
  * What is known: the state as it was told last, and the own seat.
- * @type {{ state: import("./state.js").State | null, seat: import("./state.js").Hello | null, connected: boolean }}
+ * @type {{ state: import("./state").State | null, seat: import("./state").Hello | null, connected: boolean }}
  */
 export const store = { state: null, seat: null, connected: false };
 

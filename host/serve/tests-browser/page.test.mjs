@@ -1,9 +1,9 @@
 // The page in a real browser, on the emulated rig: `npm ci && npm test`, or `cargo xtask test`.
-// SCREENSHOTS=folder keeps pictures of every view; PICTURES=1 makes those of docs/page.md anew.
+// SCREENSHOTS=folder keeps pictures of every view; docs/images has two of them.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { createHash } from "node:crypto";
-import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
@@ -304,34 +304,6 @@ test("a video that is sent is recognised frame by frame, and its shadow taken of
   await page.locator(".masks img").first().waitFor();
   assert.ok(await page.locator(".masks img").first().evaluate((image) => image.decode().then(() => image.naturalWidth === 160)));
   assert.deepEqual(page.complaints, []);
-});
-
-/** The pictures of docs/page.md: where the page stands, and what is waited for. */
-const IMAGES = join(import.meta.dirname, "../../../docs/images");
-const PICTURES = [
-  ["depth", "#depth/pair-001", async (page) => page.locator("canvas[data-layer=depth]").waitFor()],
-  ["optics", "#optics", async (page) => page.locator(".to-scale").waitFor()],
-  ["guide", "#guides/power", async (page) => page.locator(".check-step").first().waitFor()],
-];
-
-test("the pictures in the page's document are of this page", async () => {
-  const folder = join(import.meta.dirname, "../page");
-  const hash = createHash("sha256");
-  for (const name of readdirSync(folder).filter((name) => /\.(js|css|html)$/.test(name)).sort()) hash.update(readFileSync(join(folder, name)));
-  const made = `${hash.digest("hex")}\n`;
-  const stamp = join(IMAGES, "page.sha256");
-  if (process.env.PICTURES) {
-    for (const [name, place, ready] of PICTURES) {
-      const page = await open(browser, `${server.address}${place}`, { viewport: { width: 1080, height: 640 }, colorScheme: "light" });
-      await ready(page);
-      await page.waitForTimeout(1000);
-      const picture = await page.screenshot({ path: join(IMAGES, `page-${name}.png`) });
-      assert.ok(picture.length <= 150 * 1024, `page-${name}.png has ${picture.length} bytes`);
-      await page.context().close();
-    }
-    writeFileSync(stamp, made);
-  }
-  assert.equal(readFileSync(stamp, "utf8"), made, "the page has changed since: PICTURES=1 npm test in host/serve/tests-browser makes them anew");
 });
 
 for (const [width, height] of SIZES) {
