@@ -2,7 +2,7 @@
 //!
 //! The command line: parses, shows and asks; what is done lies in `farnear-workflows`. One file per command in [`commands`];
 //! [`terminal`] shows progress, asks, and hears Ctrl-C; [`report`] prints figures as text or JSON; [`hints`] says what to type
-//! after an error; [`scene`] reads scenes and [`render`] draws them, because a simulated lens is no part of the workflows.
+//! after an error; [`render`] draws scenes, because a simulated lens is no part of the workflows.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
 
