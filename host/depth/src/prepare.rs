@@ -2,7 +2,7 @@
 //!
 //! 1. The camera's dark and flat frames are taken off ([`CameraFrames`]).
 //! 2. Saturated, black, bad and missing pixels are mended where they stand alone, and left out where they do not.
-//! 3. Lens distortion is taken out of both, where the optics name one ([`straight`]).
+//! 3. Lens distortion is taken out of both, where the optics name one.
 //! 4. The near image is laid on the far one ([`align`]): by the magnification that follows from the optics of a lens that is
 //!    not telecentric, and by what is measured.
 //! 5. Both are brought to one brightness ([`balance`]).
