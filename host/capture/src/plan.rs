@@ -33,7 +33,7 @@ pub enum PlanError {
     /// The stage does not go there.
     #[error(
         "the optics ask for a sensor distance of {sensor_mm:.4} mm, the stage reaches {min_mm:.4} to {max_mm:.4} mm; \
-         check focal length and focus distances"
+         check focal length, focus distances and where the lens stage stands"
     )]
     Reach {
         /// Asked for.
