@@ -50,12 +50,17 @@ export function activity() {
   const strip = h("canvas", { class: "strip", role: "img", "aria-label": "Answers over the last frames", width: LAST, height: 24 });
   const known = h("p", { class: "dim" });
   const past = [];
+  // The answer for the whole stays: pictures that were on the way may come after it.
+  let answered = false;
   const start = async (wish, lane) => {
     past.length = 0;
+    answered = false;
     const begun = await act("/api/people/recognise", wish);
     if (!begun) return;
     const job = await ended(lane, begun.job);
-    if (job.phase === "done" && job.result) tell(job.result, `of all ${job.result.frames} frames`);
+    if (job.phase !== "done" || !job.result) return;
+    answered = true;
+    tell(job.result, `of all ${job.result.frames} frames`);
   };
   const tell = (found, of) => {
     answer.replaceChildren(found.activity ?? "unknown", h("small", {}, ` ${number(100 * found.confidence, 0)} % ${of}`));
@@ -64,7 +69,7 @@ export function activity() {
   };
   on("person", ({ width, height, answer: found }, pixels) => {
     show(canvas, pixels, width, height);
-    tell(found, `at frame ${found.frame}`);
+    if (!answered) tell(found, `at frame ${found.frame}`);
     past.push(found.activity);
     if (past.length > LAST) past.shift();
     stripes(strip, past);
