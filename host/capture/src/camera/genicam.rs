@@ -10,8 +10,8 @@ use std::{
 };
 
 use aravis::{
-    AcquisitionMode, Aravis, Auto, Buffer, BufferStatus, GvDevice, GvStream, PixelFormat, Stream,
-    glib::object::Cast, prelude::*,
+    AcquisitionMode, Aravis, Auto, Buffer, BufferStatus, DeviceError, GvDevice, GvStream, PixelFormat,
+    Stream, glib::object::Cast, prelude::*,
 };
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
@@ -150,7 +150,7 @@ impl GenicamCamera {
     }
 
     fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
-        |error| match self.lost.load(Ordering::Relaxed) {
+        |error| match self.lost.load(Ordering::Relaxed) || error.matches(DeviceError::Timeout) {
             true => self.gone(),
             false => unusable(&self.id, error.to_string()),
         }
