@@ -135,7 +135,8 @@ def depth(
     method: Literal["ro", "whitened", "subbarao", "subbarao-fourier", "favaro"] = "ro",
     window: Union[int, Literal["adaptive", "safe"], None] = None,
     median_px: int = 3,
-    fill: bool = False,
+    fill: Union[bool, Literal["surface", "thesis"]] = False,
+    low_texture: str = "energy",
     align: Literal["auto", "none", "optics", "shift", "similarity", "affine"] = "auto",
     balance: Literal["auto", "none", "gain", "local"] = "auto",
     min_confidence: float = 0.0,
@@ -145,11 +146,16 @@ def depth(
 
     `far` and `near` are grey, (height, width), at least 16x16 px, of one size and one kind: `uint8` and `uint16` (full scale is where
     the camera clips) or floating point of any common scale (`float32` is not copied). `window` is the side in px (odd, to 63)
-    over which evidence is summed, else adaptive for `whitened` and 7 for the others. `threads=0` takes all cores. Ctrl-C is
+    over which evidence is summed, else adaptive for `whitened` and 7 for the others. `fill` gives regions of low texture a surface, as
+    `"surface"` or in the thesis' order as `"thesis"`; `low_texture` is what counts as one, `"energy"` or the thesis' `"variance:T"`. `threads=0` takes all cores. Ctrl-C is
     heard when the map is done: 0.2 s for 640x480. Other threads of Python run meanwhile.
 
     Raises `FarnearError`: images of two sizes, kinds or scenes, a constant image, operators for another blur, windows that cannot be.
     """
+
+def points_mm(depth_mm: NDArray[np.float32], optics: Optics) -> NDArray[np.float32]:
+    """The point of the object that each pixel of a whole depth map sees, (height, width, 3) in mm as in the mesh of `farnear depth`: x to the
+    right, y up, z towards the viewer, the lens at the origin; NaN where there is no depth."""
 
 class Processor:
     """Depth of pair after pair by the bare run time: no alignment, no judging; some ms for 640x480."""
@@ -161,7 +167,8 @@ class Processor:
         operators: Optional[Operators] = None,
         smoothing_px: int = 7,
         median_px: int = 3,
-        fill: bool = False,
+        fill: Union[bool, Literal["surface", "thesis"]] = False,
+        low_texture: str = "energy",
         threads: int = 1,
     ) -> None: ...
     def run(

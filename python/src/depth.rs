@@ -1,6 +1,7 @@
 //! Depth of pairs.
 
 use farnear_depth::{
+    fill::{FillBy, LowTexture},
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
@@ -9,13 +10,50 @@ use farnear_depth::{
     windowed::Window,
 };
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
-use pyo3::prelude::*;
+use pyo3::{exceptions::PyTypeError, prelude::*};
 
 use crate::{
     arrays::Image,
     errors::{FarnearError, wrong},
     optics::{Operators, Optics},
 };
+
+/// How regions of low texture are filled: not, as `farnear depth` does by itself, or by name.
+pub struct Fill(Option<FillBy>);
+
+impl<'py> FromPyObject<'_, 'py> for Fill {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(wanted) = object.extract::<bool>() {
+            return Ok(Self(wanted.then(FillBy::default)));
+        }
+        let name = object.extract::<String>().map_err(|_| {
+            PyTypeError::new_err(format!(
+                "fill must be True, False, \"surface\" or \"thesis\", not {}",
+                object.get_type()
+            ))
+        })?;
+        name.parse().map(|by| Self(Some(by))).map_err(wrong)
+    }
+}
+
+/// The run time's settings for what is to be filled, and by what it is told.
+fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
+    let criterion: LowTexture = low_texture.parse().map_err(wrong)?;
+    if fill.0.is_none() && criterion != LowTexture::default() {
+        return Err(FarnearError::new_err(format!(
+            "low_texture={low_texture:?} says what is filled: give fill=True or fill=\"thesis\" too"
+        )));
+    }
+    let usual = Settings::default();
+    Ok(Settings {
+        fill: fill.0.is_some(),
+        fill_by: fill.0.unwrap_or_default(),
+        low_texture: criterion,
+        ..usual
+    })
+}
 
 /// A depth map with all that is known of it.
 #[pyclass(frozen, get_all, module = "farnear")]
@@ -44,7 +82,7 @@ impl DepthMap {
 }
 
 #[pyfunction]
-#[pyo3(signature = (far, near, optics, *, operators=None, method="ro", window=None, median_px=3, fill=false, align="auto",
+#[pyo3(signature = (far, near, optics, *, operators=None, method="ro", window=None, median_px=3, fill=Fill(None), low_texture="energy", align="auto",
                     balance="auto", min_confidence=0.0, threads=1))]
 #[allow(clippy::too_many_arguments)] // keywords in Python
 pub fn depth(
@@ -56,7 +94,8 @@ pub fn depth(
     method: &str,
     window: Option<&Bound<'_, PyAny>>,
     median_px: usize,
-    fill: bool,
+    fill: Fill,
+    low_texture: &str,
     align: &str,
     balance: &str,
     min_confidence: f32,
@@ -95,7 +134,7 @@ pub fn depth(
             ..PrepareSettings::default()
         },
         window,
-        run: Settings { smoothing_px, median_px, fill, threads, ..Settings::default() },
+        run: Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? },
         least_confidence: min_confidence,
     };
     let (far, near) = (far.view(), near.view());
@@ -119,17 +158,19 @@ pub struct Processor(pipeline::Processor);
 #[pymethods]
 impl Processor {
     #[new]
-    #[pyo3(signature = (optics, *, operators=None, smoothing_px=7, median_px=3, fill=false, threads=1))]
+    #[pyo3(signature = (optics, *, operators=None, smoothing_px=7, median_px=3, fill=Fill(None), low_texture="energy", threads=1))]
+    #[allow(clippy::too_many_arguments)] // keywords in Python
     fn new(
         py: Python<'_>,
         optics: &Optics,
         operators: Option<&Operators>,
         smoothing_px: usize,
         median_px: usize,
-        fill: bool,
+        fill: Fill,
+        low_texture: &str,
         threads: usize,
     ) -> PyResult<Self> {
-        let settings = Settings { smoothing_px, median_px, fill, threads, ..Settings::default() };
+        let settings = Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? };
         let make = |operators: &operators::Operators| {
             pipeline::Processor::new(operators, &optics.0, &settings).map(Self).map_err(wrong)
         };

@@ -11,6 +11,7 @@ mod errors;
 mod measure;
 mod optics;
 mod people;
+mod points;
 mod recogniser;
 mod render;
 mod rig;
@@ -36,6 +37,8 @@ mod _farnear {
     use super::optics::{Operators, Optics};
     #[pymodule_export]
     use super::people::{centroid_distance, remove_shadow, sun_position};
+    #[pymodule_export]
+    use super::points::points_mm;
     #[pymodule_export]
     use super::recogniser::Recogniser;
     #[pymodule_export]

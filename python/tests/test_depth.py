@@ -37,6 +37,34 @@ def test_methods_agree(optics, slant):
     assert spread[1] < spread[0]
 
 
+def test_what_has_no_texture_is_filled_as_is_asked(optics, slant):
+    far, near, _ = (image.copy() for image in slant)
+    for image in (far, near):
+        image[90:150, 130:190] = 128
+    hole = (slice(105, 135), slice(145, 175))
+    maps = {}
+    for fill, low_texture in [(False, "energy"), (True, "energy"), ("surface", "energy"), ("thesis", "variance:0.00001")]:
+        maps[fill] = farnear.depth(far, near, optics, fill=fill, low_texture=low_texture).depth_mm
+    assert np.isnan(maps[False][hole]).all() and np.isfinite(maps[True][hole]).all()
+    assert np.array_equal(maps[True], maps["surface"], equal_nan=True)
+    assert np.isfinite(maps["thesis"][hole]).all()
+    assert not np.array_equal(maps["thesis"], maps["surface"], equal_nan=True)
+    # The bare run time takes the same words.
+    far, near = (image.astype(np.float32) for image in (far, near))
+    ways = [farnear.Processor(optics, fill=fill).run(far, near)[0] for fill in ("surface", "thesis")]
+    assert not np.array_equal(*ways, equal_nan=True)
+    for settings, error, match in [
+        ({"fill": "magic"}, farnear.FarnearError, "magic"),
+        ({"fill": 0.5}, TypeError, "surface"),
+        ({"fill": True, "low_texture": "dull"}, farnear.FarnearError, "dull.*variance:T"),
+        ({"low_texture": "variance"}, farnear.FarnearError, "fill=True"),
+    ]:
+        with pytest.raises(error, match=match):
+            farnear.depth(far, near, optics, **settings)
+        with pytest.raises(error, match=match):
+            farnear.Processor(optics, **settings)
+
+
 def test_kinds_of_images_give_one_map(optics, slant):
     far, near, _ = slant
     bytes_ = farnear.depth(far, near, optics).depth_mm

@@ -1,15 +1,11 @@
 //! The run time's vectors on 64-bit ARM (NEON): their tests under qemu, where it, a linker and the target are there.
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Stdio},
-};
+use std::{fs, path::Path, process::Command};
 
 use anyhow::{Context, Result};
 
 use crate::{
-    run::{ROOT, cargo},
+    run::{ROOT, cargo, has, has_target},
     test_programs::{self, Total},
 };
 
@@ -44,11 +40,11 @@ pub fn run(total: &mut Total) -> Result<()> {
 
 /// What there is not, and what brings it.
 pub fn missing() -> Option<&'static str> {
-    if !starts(QEMU, "--version") {
+    if !has(QEMU) {
         Some("there is no qemu-aarch64; Debian's package is qemu-user")
     } else if !links() {
         Some("nothing links for it; Debian's packages are gcc-aarch64-linux-gnu and libc6-dev-arm64-cross")
-    } else if !target_installed() {
+    } else if !has_target(TARGET) {
         Some("the target is missing; `rustup target add aarch64-unknown-linux-gnu`")
     } else {
         None
@@ -71,16 +67,6 @@ pub fn emulator() -> [&'static str; 3] {
 fn links() -> bool {
     let found = Command::new(LINKER).arg("-print-file-name=crti.o").output();
     found.is_ok_and(|found| Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_absolute())
-}
-
-fn starts(program: &str, argument: &str) -> bool {
-    let status = Command::new(program).arg(argument).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    status.is_ok_and(|status| status.success())
-}
-
-fn target_installed() -> bool {
-    let folder = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    folder.is_ok_and(|found| Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_dir())
 }
 
 /// How many tests a module of host/depth has, those below it included.

@@ -7,7 +7,10 @@ use std::{
 
 use anyhow::{Context, Result};
 
-use crate::run::{ROOT, target_folder};
+use crate::{
+    limited,
+    run::{ROOT, target_folder},
+};
 
 /// Where a Chromium may lie beside the one that `CHROMIUM` names.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
@@ -37,21 +40,18 @@ pub fn run() -> Result<Counts> {
         eprintln!("skipped: the page in a browser ({missing})");
         return Ok(Counts { skipped: written(&text), ended_well: true, ..Counts::default() });
     }
-    let output = Command::new("node")
-        .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs"])
-        .current_dir(folder)
-        .env("FARNEAR", target_folder().join("debug/farnear"))
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cannot start node")?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    print!("{text}");
-    let count = |name| number(&text, name);
+    let said = limited::run(
+        Command::new("node")
+            .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs"])
+            .current_dir(folder)
+            .env("FARNEAR", target_folder().join("debug/farnear")),
+    )?;
+    let count = |name| number(&said.text, name);
     Ok(Counts {
         passed: count("pass"),
         failed: count("fail"),
         skipped: count("skipped"),
-        ended_well: output.status.success(),
+        ended_well: said.well,
     })
 }
 

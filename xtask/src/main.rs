@@ -14,6 +14,7 @@ mod fuzz;
 mod host;
 mod install;
 mod instructions;
+mod limited;
 mod python;
 mod release;
 mod run;

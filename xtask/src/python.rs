@@ -4,14 +4,15 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::Command,
 };
 
 use anyhow::{Context, Result};
 
 use crate::{
     browser::Counts,
-    run::{ROOT, cargo, finish, target_folder},
+    limited,
+    run::{ROOT, cargo, finish, succeeds, target_folder},
 };
 
 /// The package that only those compile who have Python.
@@ -38,27 +39,26 @@ pub fn run(elf: &Path) -> Result<Counts> {
     };
     let built = build()?;
     lay_out(&folder.join("package/farnear"), &built)?;
-    let output = Command::new(python)
-        .args(["-m", "pytest", "-q", "-p", "farnear.pytest_plugin", "-p", "no:cacheprovider"])
-        .arg("--rootdir")
-        .arg(&tests)
-        .arg(&tests)
-        // Not the repository's: its folder of the package has no module in it.
-        .current_dir(&folder)
-        .env("PYTHONPATH", folder.join("package"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .env("FARNEAR_SIM", built.join("farnear-sim"))
-        .env("FARNEAR_FIRMWARE", elf)
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cannot start Python")?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    print!("{text}");
+    let said = limited::run(
+        Command::new(python)
+            .args(["-m", "pytest", "-q", "-p", "farnear.pytest_plugin", "-p", "no:cacheprovider"])
+            // Where a test hangs is said.
+            .args(["-o", "faulthandler_timeout=300", "--rootdir"])
+            .arg(&tests)
+            .arg(&tests)
+            // Not the repository's: its folder of the package has no module in it.
+            .current_dir(&folder)
+            .env("PYTHONPATH", folder.join("package"))
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .env("FARNEAR_SIM", built.join("farnear-sim"))
+            .env("FARNEAR_FIRMWARE", elf),
+    )?;
+    let text = said.text;
     Ok(Counts {
         passed: count(&text, "passed"),
         failed: count(&text, "failed") + count(&text, "error") + count(&text, "errors"),
         skipped: count(&text, "skipped"),
-        ended_well: output.status.success(),
+        ended_well: said.well,
     })
 }
 
@@ -67,35 +67,25 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     let venv = folder.join("venv");
     let (python, whole) = (venv.join("bin/python"), folder.join("needs"));
     if fs::read_to_string(&whole).is_ok_and(|made| made == needs.join("\n"))
-        && quiet(Command::new(&python).arg("-V"))
+        && succeeds(Command::new(&python).arg("-V"))
     {
         return Ok(python);
     }
-    if !quiet(Command::new("python3").args(["-c", ABLE])) {
+    if !succeeds(Command::new("python3").args(["-c", ABLE])) {
         return Err(
             "no python3 of at least 3.9 with venv; Debian's packages are python3 and python3-venv".into()
         );
     }
-    if !quiet(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
+    if !succeeds(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
         return Err("python3 -m venv makes no environment; Debian's package is python3-venv".into());
     }
     eprintln!("fetching {}", needs.join(", "));
     let fetch = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:"];
-    if !quiet(Command::new(&python).args(fetch).args(needs)) {
+    if !succeeds(Command::new(&python).args(fetch).args(needs)) {
         return Err(format!("pip cannot fetch {}", needs.join(", ")));
     }
     fs::write(&whole, needs.join("\n")).map_err(|error| format!("{}: {error}", whole.display()))?;
     Ok(python)
-}
-
-/// Whether a program can be started and ends well.
-fn quiet(command: &mut Command) -> bool {
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|s| s.success())
 }
 
 /// The module and the programs that its tests run, in one call, so that all share what is compiled already; gives their folder.

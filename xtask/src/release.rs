@@ -153,15 +153,17 @@ fn copy(file: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether a program can be started and ends well.
-fn has(program: &str) -> bool {
-    use std::process::Stdio;
-    Command::new(program)
-        .arg("--version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
+/// Copies both programs and the boards' firmware, which the emulated board looks for beside itself, into a folder.
+fn lay_programs(programs: &Path, elves: &[PathBuf], folder: &Path) -> Result<()> {
+    let both = [programs.join("farnear"), programs.join("farnear-sim")];
+    both.iter().chain(elves).try_for_each(|file| copy(file, folder))
+}
+
+/// Copies what a first user reads, and the optics of a rig to begin with.
+fn lay_documents(folder: &Path) -> Result<()> {
+    ["README.md", "CHANGELOG.md"].iter().try_for_each(|page| copy(&ROOT.join(page), folder))?;
+    fs::copy(ROOT.join("examples/rig.toml"), folder.join("optics.toml")).context("cannot copy the optics")?;
+    Ok(())
 }
 
 /// `SHA256SUMS`, which `sha256sum --check` reads; prints it with sizes.

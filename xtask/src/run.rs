@@ -3,7 +3,7 @@
 use std::{
     ffi::OsStr,
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
     sync::LazyLock,
     time::Instant,
 };
@@ -67,7 +67,7 @@ pub fn finish(command: &mut Command) -> Result<()> {
 
 /// Runs a program to its end and gives what it printed; fails unless it succeeds.
 pub fn output(command: &mut Command) -> Result<String> {
-    command.stderr(std::process::Stdio::inherit());
+    command.stderr(Stdio::inherit());
     let output = command.output().with_context(|| format!("cannot start {}", describe(command)))?;
     if !output.status.success() {
         bail!("failed ({}): {}", output.status, describe(command));
@@ -75,7 +75,31 @@ pub fn output(command: &mut Command) -> Result<String> {
     String::from_utf8(output.stdout).with_context(|| format!("{} printed no text", describe(command)))
 }
 
-fn describe(command: &Command) -> String {
+/// Whether a program can be started and ends well; it prints nothing.
+pub fn succeeds(command: &mut Command) -> bool {
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// Whether there is a program of that name.
+pub fn has(program: &str) -> bool {
+    succeeds(Command::new(program).arg("--version"))
+}
+
+/// Whether Rust's toolchain on the PATH has the libraries of a target.
+pub fn has_target(triple: &str) -> bool {
+    let folder = Command::new("rustc").args(["--print", "target-libdir", "--target", triple]).output();
+    folder.is_ok_and(|found| {
+        found.status.success() && Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_dir()
+    })
+}
+
+/// The words of a call.
+pub fn describe(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
 }

@@ -1,21 +1,21 @@
-//! The workspace's test programs: built by one call of cargo, run one after the other, and not run again while nothing they
+//! The workspace's test programs: built by one call of cargo, run one after another, and not run again while nothing they
 //! depend on has changed since they passed. The emulated board's tests take minutes, and most changes do not reach them.
 
 use std::{
     collections::hash_map::DefaultHasher,
     fs,
     hash::{Hash, Hasher},
-    io::{BufRead, BufReader, Read},
+    io::Read,
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::Command,
 };
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::{
-    python,
-    run::{ROOT, cargo, output, step, target_folder},
+    limited, python,
+    run::{ROOT, cargo, output, target_folder},
 };
 
 /// Packages whose tests run the programs or the firmware; those of the others depend on their own code and files alone.
@@ -46,38 +46,82 @@ struct Program {
     folder: PathBuf,
 }
 
-/// Builds and runs them, those that are unchanged since they passed only where `all` are wanted.
-pub fn run(elf: &Path, all: bool) -> Result<Total> {
-    let (tests, programs) = build(elf)?;
-    let mut total = Total { well: true, ..Total::default() };
-    let passed = target_folder().join("passed-tests");
-    fs::create_dir_all(&passed).with_context(|| format!("cannot create {}", passed.display()))?;
-    for test in &tests {
-        let stamp = passed.join(test.executable.file_name().unwrap_or(test.name.as_ref()));
-        // Without git nobody knows which files there are: then every program runs.
-        let depends_on = dependencies(test, &programs, elf).ok().filter(|_| test.package != SEES_EVERYTHING);
-        let before = fs::read_to_string(&stamp).ok().filter(|_| !all);
-        if let (Some(depends_on), Some(before)) = (&depends_on, before)
-            && let Some(result) = before.strip_prefix(depends_on)
-        {
-            println!("\n{} ({}): unchanged since it passed", test.package, test.name);
-            total.add(result);
-            total.unchanged += count(result, "passed");
-            continue;
+/// All of them, compiled.
+pub struct Programs {
+    tests: Vec<Program>,
+    /// Programs that some of them run.
+    others: Vec<PathBuf>,
+}
+
+impl Programs {
+    /// Runs them, those that are unchanged since they passed only where `all` are wanted.
+    ///
+    /// # Errors
+    /// Programs that cannot be started, results that cannot be kept.
+    pub fn run(&self, elf: &Path, all: bool) -> Result<Total> {
+        let mut total = Total { well: true, ..Total::default() };
+        let passed = target_folder().join("passed-tests");
+        fs::create_dir_all(&passed).with_context(|| format!("cannot create {}", passed.display()))?;
+        for test in &self.tests {
+            let stamp = passed.join(test.executable.file_name().unwrap_or(test.name.as_ref()));
+            // Without git nobody knows which files there are: then every program runs.
+            let depends_on =
+                dependencies(test, &self.others, elf).ok().filter(|_| test.package != SEES_EVERYTHING);
+            let before = fs::read_to_string(&stamp).ok().filter(|_| !all);
+            if let (Some(depends_on), Some(before)) = (&depends_on, before)
+                && let Some(result) = before.strip_prefix(depends_on)
+            {
+                println!("\n{} ({}): unchanged since it passed", test.package, test.name);
+                total.count(result);
+                total.unchanged += count(result, "passed");
+                continue;
+            }
+            eprintln!("running {} ({})", test.package, test.name);
+            let mut command = Command::new(&test.executable);
+            command.current_dir(&test.folder).env("CARGO_MANIFEST_DIR", &test.folder);
+            let result = watch(environment(&mut command, elf), &mut total)?;
+            if let (Some(depends_on), Some(result)) = (depends_on, result) {
+                fs::write(&stamp, depends_on + &result)
+                    .with_context(|| format!("cannot write {}", stamp.display()))?;
+            }
         }
-        println!("\n{} ({})", test.package, test.name);
-        let mut command = Command::new(&test.executable);
-        command.current_dir(&test.folder).env("CARGO_MANIFEST_DIR", &test.folder);
-        let result = watch(environment(&mut command, elf), &mut total)?;
-        if let (Some(depends_on), Some(result)) = (depends_on, result) {
-            fs::write(&stamp, depends_on + &result)
-                .with_context(|| format!("cannot write {}", stamp.display()))?;
-        }
+        eprintln!("running the examples in the documentation");
+        let mut examples = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--doc"]);
+        watch(environment(&mut examples, elf), &mut total)?;
+        Ok(total)
     }
-    println!("\nexamples in the documentation");
-    let mut examples = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--doc"]);
-    watch(environment(&mut examples, elf), &mut total)?;
-    Ok(total)
+
+    /// Compiles everything.
+    ///
+    /// # Errors
+    /// What does not compile.
+    pub fn build(elf: &Path) -> Result<Self> {
+        let mut command = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked"]);
+        command.args(["--no-run", "--message-format", "json-render-diagnostics"]);
+        let text = output(environment(&mut command, elf))?;
+        let (mut tests, mut others) = (Vec::new(), Vec::new());
+        for line in text.lines() {
+            let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
+            let Some(executable) = message["executable"].as_str().map(PathBuf::from) else { continue };
+            if message["profile"]["test"] == true {
+                let manifest = Path::new(message["manifest_path"].as_str().unwrap_or_default());
+                let folder = manifest.parent().context("a test program without a package")?.to_owned();
+                let package = fs::read_to_string(manifest)?
+                    .lines()
+                    .find_map(|line| Some(line.strip_prefix("name = \"")?.trim_end_matches('"').to_owned()))
+                    .context("a package without a name")?;
+                let name = message["target"]["name"].as_str().unwrap_or_default().to_owned();
+                tests.push(Program { package, name, executable, folder });
+            } else {
+                others.push(executable);
+            }
+        }
+        if tests.is_empty() {
+            bail!("cargo built no test program");
+        }
+        tests.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
+        Ok(Self { tests, others })
+    }
 }
 
 fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
@@ -85,36 +129,6 @@ fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
         .env("FARNEAR_FIRMWARE", elf)
         .env("FARNEAR_REQUIRE_SIM", "1")
         .env("CARGO_TARGET_DIR", target_folder())
-}
-
-/// Compiles everything; gives the test programs, and the programs that some of them run.
-fn build(elf: &Path) -> Result<(Vec<Program>, Vec<PathBuf>)> {
-    let mut command = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked"]);
-    command.args(["--no-run", "--message-format", "json-render-diagnostics"]);
-    let text = output(environment(&mut command, elf))?;
-    step("running them");
-    let (mut tests, mut programs) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
-        let Some(executable) = message["executable"].as_str().map(PathBuf::from) else { continue };
-        if message["profile"]["test"] == true {
-            let manifest = Path::new(message["manifest_path"].as_str().unwrap_or_default());
-            let folder = manifest.parent().context("a test program without a package")?.to_owned();
-            let package = fs::read_to_string(manifest)?
-                .lines()
-                .find_map(|line| Some(line.strip_prefix("name = \"")?.trim_end_matches('"').to_owned()))
-                .context("a package without a name")?;
-            let name = message["target"]["name"].as_str().unwrap_or_default().to_owned();
-            tests.push(Program { package, name, executable, folder });
-        } else {
-            programs.push(executable);
-        }
-    }
-    if tests.is_empty() {
-        bail!("cargo built no test program");
-    }
-    tests.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
-    Ok((tests, programs))
 }
 
 /// A text that changes with anything the program's result can depend on.
@@ -174,26 +188,31 @@ fn listing(folder: &Path, hasher: &mut DefaultHasher) {
     }
 }
 
-/// Runs tests to their end, shows and adds what they say; gives the summary if all passed.
+/// Runs tests to their end and adds what they said; gives the summary if all passed.
 pub fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>> {
-    let mut child = command.stdout(Stdio::piped()).spawn().context("cannot start a test program")?;
-    let stdout = child.stdout.take().context("a test program has no output")?;
+    let said = limited::run(command)?;
     let mut result = None;
-    for line in BufReader::new(stdout).lines() {
-        let line = line.context("a test program's output is no text")?;
-        println!("{line}");
-        if let Some(counts) = line.strip_prefix("test result: ") {
-            total.add(counts);
-            result = Some(counts.to_owned());
-        }
+    for counts in said.text.lines().filter_map(|line| line.strip_prefix("test result: ")) {
+        total.count(counts);
+        result = Some(counts.to_owned());
     }
-    let well = child.wait().context("a test program was lost")?.success();
-    total.well &= well;
-    Ok(result.filter(|_| well))
+    // What was killed has counted nothing.
+    total.failed += u32::from(!said.well && result.is_none());
+    total.well &= said.well;
+    Ok(result.filter(|_| said.well))
 }
 
 impl Total {
-    fn add(&mut self, counts: &str) {
+    /// Adds those of another lane.
+    pub fn add(&mut self, other: &Self) {
+        self.passed += other.passed;
+        self.failed += other.failed;
+        self.ignored += other.ignored;
+        self.unchanged += other.unchanged;
+        self.well &= other.well;
+    }
+
+    fn count(&mut self, counts: &str) {
         self.passed += count(counts, "passed");
         self.failed += count(counts, "failed");
         self.ignored += count(counts, "ignored");

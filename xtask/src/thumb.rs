@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::{Result, bail};
 
-use crate::run::{finish, output, step};
+use crate::run::{finish, has, has_target, output, step, succeeds};
 
 /// The board's target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -50,7 +50,7 @@ impl Way {
     }
 
     fn find_quietly() -> Result<Self> {
-        if target_installed() || rustup_adds_target() {
+        if has_target(TARGET) || rustup_adds_target() {
             return Ok(Self::Installed);
         }
         if debian_ready() || (apt_installs() && debian_ready()) {
@@ -100,16 +100,9 @@ impl Way {
     }
 }
 
-fn target_installed() -> bool {
-    let folder = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    folder.is_ok_and(|found| {
-        found.status.success() && Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_dir()
-    })
-}
-
 /// `rustup target add`, given up after two minutes: a closed network may hang instead of refusing.
 fn rustup_adds_target() -> bool {
-    if !succeeds(Command::new("rustup").arg("--version")) {
+    if !has("rustup") {
         return false;
     }
     step(&format!("rustup target add {TARGET}"));
@@ -119,7 +112,7 @@ fn rustup_adds_target() -> bool {
     let deadline = Instant::now() + Duration::from_secs(120);
     while Instant::now() < deadline {
         match child.try_wait() {
-            Ok(Some(status)) if status.success() => return target_installed(),
+            Ok(Some(status)) if status.success() => return has_target(TARGET),
             Ok(None) => std::thread::sleep(Duration::from_millis(100)),
             _ => break,
         }
@@ -143,7 +136,7 @@ fn debian_ready() -> bool {
 
 /// Installs Debian's packages as root, or with a sudo that asks nothing.
 fn apt_installs() -> bool {
-    if !succeeds(Command::new("apt-get").arg("--version")) {
+    if !has("apt-get") {
         return false;
     }
     let root = output(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0");
@@ -184,8 +177,4 @@ fn path_with_debian_first() -> std::ffi::OsString {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders = std::iter::once(PathBuf::from("/usr/bin")).chain(std::env::split_paths(&path));
     std::env::join_paths(folders).unwrap_or(path)
-}
-
-fn succeeds(command: &mut Command) -> bool {
-    command.stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success())
 }

@@ -1,8 +1,8 @@
 //! What a running rig can be asked from other threads, and where it puts what comes out of it.
 
-use std::sync::{Arc, atomic::AtomicUsize, mpsc::Sender};
+use std::sync::{Arc, mpsc::Sender};
 
-use crate::{access::RigAccess, report::Report, wiring::Shot, witness::Sight};
+use crate::{access::RigAccess, pictures::Pictures, report::Report, wiring::Shot, witness::Sight};
 
 /// Work to be done on a rig between two instructions.
 pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
@@ -75,6 +75,6 @@ pub struct Outlets {
     pub bytes: Option<Sender<Vec<u8>>>,
     /// Exposures, when they end.
     pub shots: Sender<Shot>,
-    /// How many of them still wait for their picture to be rendered and fetched, where that is done beside the board.
-    pub pictures: Option<Arc<AtomicUsize>>,
+    /// What becomes of their pictures, where these are rendered beside the board.
+    pub pictures: Option<Arc<Pictures>>,
 }

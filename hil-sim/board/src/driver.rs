@@ -29,7 +29,7 @@ use crate::{
     memory::MemoryChip,
     pacing::Pacing,
     parts::Parts,
-    pictures::Pictures,
+    pictures::Patience,
     plant::StageName,
     replay::Script,
     report::{Report, StageReport},
@@ -65,7 +65,7 @@ pub struct Driver {
     line: Line,
     wiring: Wiring,
     pacing: Pacing,
-    pictures: Pictures,
+    patience: Patience,
     lines: Lines,
     rates: LinkRates,
     scenario: Scenario,
@@ -101,7 +101,7 @@ impl Driver {
         wiring: Wiring,
         trace: Option<Trace>,
     ) -> Self {
-        let pictures = Pictures::new(outlets.pictures.clone());
+        let patience = Patience::new(outlets.pictures.clone());
         let mut driver = Self {
             commands,
             outlets,
@@ -109,7 +109,7 @@ impl Driver {
             line,
             wiring,
             pacing: Pacing::new(config.pace),
-            pictures,
+            patience,
             lines: Lines::new(config.scenario.bit_error_rate, config.seed),
             rates: LinkRates::new(),
             scenario: config.scenario.clone(),
@@ -217,7 +217,7 @@ impl Driver {
         for shot in shots {
             self.schedule.notice(Moment::ExposureEnds, now_ns);
             self.witness.note(shot.end_ns, Seen::Exposed(shot));
-            self.pictures.add();
+            self.patience.expose();
             let _ = self.outlets.shots.send(shot); // whoever looked may have gone
         }
     }
@@ -373,7 +373,7 @@ impl Driver {
 
     /// Whether the board has taken more pictures than are fetched. A host that asks something is answered all the same.
     fn stands_for_pictures(&mut self, now_ns: u64) -> bool {
-        !self.pacing.is_told(now_ns) && !self.pacing.lockstep.is_asked() && self.pictures.are_awaited()
+        !self.pacing.is_told(now_ns) && !self.pacing.lockstep.is_asked() && self.patience.is_asked()
     }
 
     /// Carries out what is asked until time may pass; `false` ends the run.

@@ -1,7 +1,8 @@
 //! The camera endpoint: loopback TCP that hands out frames and takes control messages.
 //!
 //! One client at a time; a second one is told so ([`IN_USE`]) and sent away. Frames without a client wait, the newest 32
-//! of them; with one that fetches slowly the frames behind them wait, too. Each frame is handed out once.
+//! of them; with one that fetches slowly two wait, and those behind them, too. Each frame is handed out once, and what a client has left
+//! behind is not the next one's.
 
 use std::{
     collections::VecDeque,
@@ -16,8 +17,10 @@ use farnear_protocol::camera::{Control, IN_USE};
 
 use crate::error::SimError;
 
-/// Frames that wait for a client.
+/// Frames that wait until a client comes.
 const WAITING: usize = 32;
+/// Frames that wait for one that is there.
+const AHEAD: usize = 2;
 /// Longest control message: far more than any has.
 const CONTROL_MAX: u32 = 64;
 /// A client that has just gone may still look as if it were there, to the one that follows it.
@@ -30,19 +33,26 @@ struct State {
     client: Option<(u64, TcpStream)>,
 }
 
-type Shared = Arc<(Mutex<State>, Condvar)>;
-
-fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, State> {
-    shared.0.lock().unwrap_or_else(PoisonError::into_inner)
+struct Endpoint {
+    state: Mutex<State>,
+    changed: Condvar,
+    left: Box<dyn Fn() + Send + Sync>,
 }
 
-/// Opens the endpoint on a free port: `frames` go to the client, its control messages to `control`.
+type Shared = Arc<Endpoint>;
+
+fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, State> {
+    shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Opens the endpoint on a free port: `frames` go to the client, its control messages to `control`; `left` is told when one has gone.
 ///
 /// # Errors
 /// [`SimError::Io`] where loopback has no port or no thread can be started.
 pub fn open(
     frames: Receiver<Vec<u8>>,
     control: impl Fn(Control) + Send + Clone + 'static,
+    left: impl Fn() + Send + Sync + 'static,
 ) -> Result<SocketAddr, SimError> {
     let io = |what: &str| {
         let what = what.to_string();
@@ -51,7 +61,8 @@ pub fn open(
     let listener =
         TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(io("cannot open the camera endpoint"))?;
     let address = listener.local_addr().map_err(io("cannot open the camera endpoint"))?;
-    let shared = Shared::default();
+    let shared: Shared =
+        Arc::new(Endpoint { state: Mutex::default(), changed: Condvar::new(), left: Box::new(left) });
     let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
         thread::Builder::new().name(name.into()).spawn(work).map_err(io("cannot start a thread"))
     };
@@ -68,7 +79,7 @@ fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) +
         let Ok(stream) = stream else { continue };
         let (Ok(reader), Ok(())) = (stream.try_clone(), stream.set_nodelay(true)) else { continue };
         let taken = |state: &mut State| state.client.is_some();
-        let waited = shared.1.wait_timeout_while(lock(shared), FAREWELL, taken);
+        let waited = shared.changed.wait_timeout_while(lock(shared), FAREWELL, taken);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
         if state.client.is_some() {
             drop(state);
@@ -77,7 +88,7 @@ fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) +
         }
         state.client = Some((number, stream));
         drop(state);
-        shared.1.notify_all();
+        shared.changed.notify_all();
         let (control, shared) = (control.clone(), shared.clone());
         // Without a thread to listen to it, the client still gets its frames.
         let _ = thread::Builder::new().name("camera control".into()).spawn(move || {
@@ -96,9 +107,11 @@ fn refuse(mut stream: TcpStream) {
 /// A client has gone, unless the present one is another.
 fn forget(shared: &Shared, gone: u64) {
     let mut state = lock(shared);
-    if state.client.as_ref().is_some_and(|(number, _)| *number == gone) {
-        state.client = None;
-        shared.1.notify_all();
+    if let Some((_, stream)) = state.client.take_if(|(number, _)| *number == gone) {
+        state.frames.clear();
+        (shared.left)();
+        let _ = stream.shutdown(Shutdown::Both); // it may wait for this, to know that it is forgotten
+        shared.changed.notify_all();
     }
 }
 
@@ -127,13 +140,13 @@ fn listen(mut reader: TcpStream, control: &impl Fn(Control)) {
 
 fn keep(frames: Receiver<Vec<u8>>, shared: &Shared) {
     for frame in frames {
-        let full = |state: &mut State| state.frames.len() >= WAITING && state.client.is_some();
-        let mut state = shared.1.wait_while(lock(shared), full).unwrap_or_else(PoisonError::into_inner);
+        let full = |state: &mut State| state.frames.len() >= AHEAD && state.client.is_some();
+        let mut state = shared.changed.wait_while(lock(shared), full).unwrap_or_else(PoisonError::into_inner);
         if state.frames.len() >= WAITING {
             state.frames.pop_front();
         }
         state.frames.push_back(frame);
-        shared.1.notify_all();
+        shared.changed.notify_all();
     }
 }
 
@@ -141,16 +154,14 @@ fn send(shared: &Shared) {
     loop {
         let mut state = lock(shared);
         while state.frames.is_empty() || state.client.is_none() {
-            state = shared.1.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state = shared.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         let frame = state.frames.pop_front();
-        shared.1.notify_all();
+        shared.changed.notify_all();
         let client = state.client.as_ref().map(|(number, client)| (*number, client.try_clone()));
         drop(state);
         let (Some(frame), Some((number, Ok(mut client)))) = (frame, client) else { continue };
         if client.write_all(&frame).is_err() {
-            // That client has gone; the frame waits for the next, unless that one is here already.
-            lock(shared).frames.push_front(frame);
             forget(shared, number);
         }
     }
@@ -162,13 +173,27 @@ mod tests {
 
     use super::*;
 
+    /// What has not come by then does not come.
+    const LONG: Duration = Duration::from_secs(20);
+
+    fn connect(address: SocketAddr) -> TcpStream {
+        let client = TcpStream::connect(address).expect("loopback");
+        client.set_read_timeout(Some(LONG)).expect("a socket");
+        client
+    }
+
     #[test]
     fn frames_wait_for_a_client_and_control_comes_back() {
         let (frames, receiver) = mpsc::channel();
         let (heard, hear) = mpsc::channel();
-        let address = open(receiver, move |message| heard.send(message).expect("heard")).expect("loopback");
+        let (gone, goes) = mpsc::channel();
+        let left = move || {
+            let _ = gone.send(()); // nobody listens at the end
+        };
+        let address =
+            open(receiver, move |message| heard.send(message).expect("heard"), left).expect("loopback");
         frames.send(vec![1, 2, 3]).expect("open");
-        let mut client = TcpStream::connect(address).expect("loopback");
+        let mut client = connect(address);
         frames.send(vec![4]).expect("open");
         let mut bytes = [0; 4];
         client.read_exact(&mut bytes).expect("both frames");
@@ -178,10 +203,10 @@ mod tests {
         let body = postcard::to_slice(&Control::AdvanceMicros(1234), &mut body).expect("fits");
         client.write_all(&(body.len() as u32).to_le_bytes()).expect("open");
         client.write_all(body).expect("open");
-        assert_eq!(hear.recv(), Ok(Control::AdvanceMicros(1234)));
+        assert_eq!(hear.recv_timeout(LONG), Ok(Control::AdvanceMicros(1234)));
 
         // A second client is told that it is one, and the first goes on.
-        let mut second = TcpStream::connect(address).expect("loopback");
+        let mut second = connect(address);
         second.read_exact(&mut bytes).expect("a refusal");
         assert_eq!(u32::from_le_bytes(bytes), IN_USE);
         assert_eq!(second.read(&mut bytes).expect("closed in order"), 0);
@@ -189,8 +214,10 @@ mod tests {
         client.read_exact(&mut bytes[..1]).expect("the frame");
         assert_eq!(bytes[0], 9);
         // Once it has gone the next may come.
-        drop(client);
-        let mut third = TcpStream::connect(address).expect("loopback");
+        client.shutdown(Shutdown::Write).expect("open");
+        goes.recv_timeout(LONG).expect("told");
+        assert_eq!(client.read(&mut bytes).expect("closed in order"), 0);
+        let mut third = connect(address);
         frames.send(vec![7]).expect("open");
         third.read_exact(&mut bytes[..1]).expect("the frame");
         assert_eq!(bytes[0], 7);

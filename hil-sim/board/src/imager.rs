@@ -4,7 +4,6 @@
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicUsize, Ordering},
         mpsc::{Receiver, SyncSender},
     },
     thread::JoinHandle,
@@ -16,7 +15,7 @@ use farnear_protocol::{
 };
 use farnear_scene::{Camera, Lens, Psf, Renderer, Scene, View};
 
-use crate::{error::SimError, wiring::Shot};
+use crate::{error::SimError, parts::HalfMirrorParts, pictures::Pictures, wiring::Shot};
 
 /// A picture with when it was taken, for a camera that stamps its frames by a clock of its own.
 #[derive(Clone, PartialEq, Debug)]
@@ -45,12 +44,21 @@ impl Picture {
     }
 }
 
+/// Sets the second camera's noise apart from the first's, and from that of the rigs of the seeds beside.
+const OF_THE_SECOND: u64 = 0x5ec0_0d00_0000_0000;
+
 /// Renders exposures.
 pub struct Imager {
     renderer: Renderer,
     camera: Camera,
+    /// How the camera stands to the lens.
+    view: View,
     /// How fast the scene moves, px/s right and down.
     speed_px_per_s: [f64; 2],
+    /// How much further from the lens the sensor stands than the stage says.
+    further_mm: f64,
+    /// Left is right.
+    mirrored: bool,
     exposures: u32,
 }
 
@@ -68,7 +76,17 @@ impl Imager {
                 camera.width_px, camera.height_px
             )));
         }
-        Ok(Self { renderer, camera, speed_px_per_s: [0.0; 2], exposures: 0 })
+        let (view, speed_px_per_s) = (View::default(), [0.0; 2]);
+        Ok(Self { renderer, camera, view, speed_px_per_s, further_mm: 0.0, mirrored: false, exposures: 0 })
+    }
+
+    /// The second camera behind a half mirror, before the same scene: its sensor stands further from the lens, and has noise and hot
+    /// pixels of its own.
+    #[must_use]
+    pub fn as_second(self, further_mm: f64, mirror: &HalfMirrorParts, seed: u64) -> Self {
+        let view = mirror.second_view();
+        let renderer = self.renderer.with_noise_of(seed ^ OF_THE_SECOND).seen_by(view);
+        Self { renderer, view, further_mm, mirrored: mirror.second_mirrored, ..self }
     }
 
     /// The same before a scene that moves across the image, from where it was at power-on. What moves less than a pixel during an
@@ -91,14 +109,14 @@ impl Imager {
         self.exposures += 1;
         if self.speed_px_per_s != [0.0; 2] {
             let middle_s = 0.5e-9 * (shot.begin_ns + shot.end_ns) as f64;
-            self.renderer.look(View {
-                shift_px: self.speed_px_per_s.map(|speed| speed * middle_s),
-                ..View::default()
-            });
+            let [right, down] = self.view.shift_px;
+            let [right_px_per_s, down_px_per_s] = self.speed_px_per_s;
+            let shift_px = [right + right_px_per_s * middle_s, down + down_px_per_s * middle_s];
+            self.renderer.look(View { shift_px, ..self.view });
         }
         let image = self
             .renderer
-            .expose(shot.truth.sensor_mm, number)
+            .expose(shot.truth.sensor_mm + self.further_mm, number)
             .map_err(|error| SimError::Scene(error.to_string()))?;
         let header = FrameHeader {
             shot_id: shot.id,
@@ -107,40 +125,51 @@ impl Imager {
             height: self.camera.height_px as u16,
             bits: self.camera.noise.bits(),
         };
-        let pixels: Vec<u16> = image.iter().copied().collect();
+        let pixels: Vec<u16> = match self.mirrored {
+            true => image.rows().into_iter().flat_map(|row| row.into_iter().rev()).copied().collect(),
+            false => image.iter().copied().collect(),
+        };
         Ok(Picture::new(shot.begin_ns, header, &pixels))
     }
+}
 
-    /// Renders what comes until nothing can come any more; counts `waiting` down with each. `second` gets all of it, too.
-    ///
-    /// # Errors
-    /// [`SimError::Io`] where no thread can be started.
-    pub fn watch(
-        mut self,
-        shots: Receiver<Shot>,
-        frames: SyncSender<Vec<u8>>,
-        mut second: Option<SyncSender<Picture>>,
-        waiting: Arc<AtomicUsize>,
-    ) -> Result<JoinHandle<()>, SimError> {
-        std::thread::Builder::new()
-            .name("camera".into())
-            .spawn(move || {
-                for shot in shots {
-                    match self.picture(&shot) {
+/// Renders what comes and is wanted until nothing can come any more, each exposure by every camera for its own client. `gige` gets all of
+/// the first one's, too.
+///
+/// # Errors
+/// [`SimError::Io`] where no thread can be started.
+pub fn watch(
+    mut cameras: Vec<(Imager, SyncSender<Vec<u8>>)>,
+    shots: Receiver<Shot>,
+    mut gige: Option<SyncSender<Picture>>,
+    pictures: Arc<Pictures>,
+) -> Result<JoinHandle<()>, SimError> {
+    std::thread::Builder::new()
+        .name("camera".into())
+        .spawn(move || {
+            for (number, shot) in shots.into_iter().enumerate() {
+                for (at, (imager, frames)) in cameras.iter_mut().enumerate() {
+                    if !pictures.wants(at, number) {
+                        imager.exposures += 1; // the noise of those after it stays what it would be
+                        continue;
+                    }
+                    match imager.picture(&shot) {
                         Ok(picture) => {
-                            // A second camera that has ended is missed by nobody.
-                            second = second.take().filter(|second| second.send(picture.clone()).is_ok());
+                            if at == 0 {
+                                // A client that has ended is missed by nobody.
+                                gige = gige.take().filter(|gige| gige.send(picture.clone()).is_ok());
+                            }
                             if frames.send(picture.frame).is_err() {
                                 return;
                             }
                         }
                         Err(error) => eprintln!("exposure {}: {error}", shot.id),
                     }
-                    waiting.fetch_sub(1, Ordering::Relaxed);
                 }
-            })
-            .map_err(|source| SimError::Io { what: "cannot start the camera's thread".into(), source })
-    }
+                pictures.finish();
+            }
+        })
+        .map_err(|source| SimError::Io { what: "cannot start the camera's thread".into(), source })
 }
 
 #[cfg(test)]
@@ -169,10 +198,14 @@ mod tests {
     }
 
     fn imager(parts: &str) -> (Imager, f64) {
+        imager_with(parts, Noise::None)
+    }
+
+    fn imager_with(parts: &str, noise: Noise) -> (Imager, f64) {
         let imaging = Parts::parse(parts).expect("good parts").imaging;
         let optics = OpticsFile::parse(standard::OPTICS).expect("optics");
         let lens = imaging.lens(Lens::from_optics(&optics).expect("a lens"));
-        let camera = Camera { defects: imaging.defects(), ..Camera::new(64, 48, Noise::None) };
+        let camera = Camera { defects: imaging.defects(), ..Camera::new(64, 48, noise) };
         let scene: Scene = "plane:900".parse().expect("a scene");
         let far_mm = lens.sensor_far_mm;
         let imager = Imager::new(&scene, &lens, &standard::PSF, camera, 3).expect("an imager");
@@ -193,6 +226,38 @@ mod tests {
             }
         }
         assert_ne!(before, after);
+    }
+
+    #[test]
+    fn the_second_camera_stands_further_and_has_noise_of_its_own() {
+        let parts = Parts::parse("[half_mirror]\nsecond_shift_px = [3.0, -2.0]").expect("good parts");
+        let (moved, plain) = (parts.half_mirror, Parts::default().half_mirror);
+        let ((mut near, far_mm), (behind, _), (aside, _)) = (imager(""), imager(""), imager(""));
+        let further_mm = 0.156;
+        let near = codes(&mut near, &shot(0, far_mm + further_mm));
+        let far = shot(0, far_mm);
+        assert_eq!(codes(&mut behind.as_second(further_mm, &plain, 3), &far), near);
+        let aside = codes(&mut aside.as_second(further_mm, &moved, 3), &far);
+        for row in 10..38 {
+            for column in 10..54 {
+                let (was, is) = (near[row * 64 + column - 3], aside[(row - 2) * 64 + column]);
+                // Whole pixels need no interpolation; rounding of the sum in f32, of 65,535.
+                assert!((was - is).abs() <= 2, "{was} {is} at row {row}, column {column}");
+            }
+        }
+
+        let noisy = || imager_with("", Noise::EightBit).0;
+        let first = codes(&mut noisy(), &far);
+        let second = codes(&mut noisy().as_second(0.0, &plain, 3), &far);
+        let differ = first.iter().zip(&second).filter(|(first, second)| first != second).count();
+        // Shot noise of 9000 of 20,000 electrons is 1.2 codes of 255: some 80 % of two draws differ.
+        assert!(differ > first.len() / 2, "{differ} of {}", first.len());
+        let mirrored = HalfMirrorParts { second_mirrored: true, ..plain };
+        let turned = codes(&mut noisy().as_second(0.0, &mirrored, 3), &far);
+        let rows = |codes: &[i32]| codes.chunks(64).map(<[i32]>::to_vec).collect::<Vec<_>>();
+        let back: Vec<Vec<i32>> =
+            rows(&turned).iter().map(|row| row.iter().rev().copied().collect()).collect();
+        assert_eq!(rows(&second), back);
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //!   it can be asked and what it answers.
 //! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client; the same camera as one of [`gige`] Vision.
 //! - [`board`], [`chips`], [`memory`], [`kept_memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
-//! - [`camera`], [`imager`]: when the camera exposes, and its images.
+//! - [`camera`], [`imager`], [`half_mirror`]: when the camera exposes, its images, and a second camera.
 //! - [`driver`]: what happens whenever the emulator stops; [`pacing`], [`lockstep`]: when virtual time passes.
 //! - [`mod@count`]: instructions of the on-board routines.
 //! - [`faults`]: what can be broken, from a file; [`access`]: the same from a test; [`trace`]: what can be watched.
@@ -34,6 +34,7 @@ pub mod error;
 pub mod faults;
 pub mod firmware;
 pub mod gige;
+pub mod half_mirror;
 pub mod imager;
 pub mod judge;
 pub mod kept_memory;

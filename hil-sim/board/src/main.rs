@@ -6,15 +6,17 @@ use std::{
     os::{fd::AsFd, unix::fs::FileTypeExt},
     path::{Path, PathBuf},
     process::ExitCode,
+    str::FromStr,
 };
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
-use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, SceneArgument, standard};
+use farnear_scene::{Camera, Lens, Noise, OpticsFile, PackedScene, Psf, Scene, SceneError, standard};
 use farnear_sim::{
     Pace, Parts, RigConfig, Scenario,
     campaign::{self, Campaign, Shard, cpu_time},
     gige::{self, GigeConfig},
+    half_mirror::Further,
     imager::Imager,
     player,
     run::ServedRig,
@@ -87,9 +89,10 @@ struct Seeds {
 
 #[derive(Args)]
 struct Run {
-    /// What stands before the camera: plane:MM, staircase, slant, cone or sphere; or a scene file, as `farnear render` reads it.
+    /// What stands before the camera: plane:MM, staircase, slant, cone or sphere; or -, a scene file with its maps, packed on the
+    /// standard input by `farnear rig ... --port sim` or `farnear serve --rig sim`.
     #[arg(long, default_value = standard::SCENE)]
-    scene: SceneArgument,
+    scene: SceneSource,
     /// The lens' blur: pillbox, gaussian:k=K or generalised:p=P,k=K.
     #[arg(long, default_value_t = standard::PSF)]
     psf: Psf,
@@ -132,9 +135,36 @@ struct Run {
     /// the line of JSON; `farnear camera list` finds it.
     #[arg(long, value_name = "INTERFACE", value_parser = gige::interface)]
     gige: Option<std::net::Ipv4Addr>,
+    /// Set a half mirror behind the lens and a second camera in its other path, whose sensor stands so many micrometres further from
+    /// the lens; without a number as far as near focus lies behind far focus. Each exposure gives a picture of both cameras, each with
+    /// half of the light (`[half_mirror]` of the parts says otherwise). The second one's address stands in the line of JSON.
+    #[arg(long, value_name = "UM", num_args = 0..=1, require_equals = true, default_missing_value = "near")]
+    half_mirror: Option<Further>,
     /// So many of 1000 packets of the GigE Vision camera are lost.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "gige", value_parser = clap::value_parser!(u32).range(0..=1000))]
     gige_lost: u32,
+}
+
+/// Where the scene comes from.
+#[derive(Clone)]
+enum SceneSource {
+    Named(Box<Scene>),
+    /// A [`PackedScene`]; what follows it is of no interest, its end is.
+    StandardInput,
+}
+
+impl FromStr for SceneSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "-" {
+            return Ok(Self::StandardInput);
+        }
+        if Path::new(text).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+            return Err("scene files are read by `farnear rig ... --port sim --scene FILE` and `farnear serve --rig sim --scene FILE`".into());
+        }
+        text.parse().map(|scene| Self::Named(Box::new(scene))).map_err(|error: SceneError| error.to_string())
+    }
 }
 
 fn main() -> ExitCode {
@@ -286,8 +316,24 @@ fn serve(run: &Run) -> Result<()> {
     let lens = imaging.lens(Lens::from_optics(&optics)?);
     let defects = imaging.defects();
     let camera = Camera { defects, ..Camera::new(standard::SIZE_PX.0, standard::SIZE_PX.1, run.noise) };
-    let scene = run.scene.clone().read()?;
-    let imager = Imager::new(&scene, &lens, &run.psf, camera, config.seed)?.moving(imaging.scene_px_per_s);
+    let scene = match &run.scene {
+        SceneSource::Named(scene) => (**scene).clone(),
+        SceneSource::StandardInput => PackedScene::read(&mut std::io::stdin().lock())?.into_scene()?,
+    };
+    let imager = |light: f64| -> Result<Imager> {
+        let camera = Camera { exposure_level: camera.exposure_level * light, ..camera.clone() };
+        let imager = Imager::new(&scene, &lens, &run.psf, camera, config.seed)?;
+        Ok(imager.moving(imaging.scene_px_per_s))
+    };
+    let mirror = &config.parts.half_mirror;
+    let (first, second) = match run.half_mirror {
+        None => (imager(1.0)?, None),
+        Some(further) => {
+            let [first, second] = mirror.light;
+            let second = imager(second)?.as_second(further.mm(&lens), mirror, config.seed);
+            (imager(first)?, Some(second))
+        }
+    };
     let gige = run.gige.map(|address| GigeConfig {
         address,
         seed: config.seed,
@@ -295,7 +341,7 @@ fn serve(run: &Run) -> Result<()> {
         sensor_px: (standard::SIZE_PX.0 as u16, standard::SIZE_PX.1 as u16),
         bits: run.noise.bits(),
     });
-    let rig = ServedRig::start(&config, imager, gige.as_ref())?;
+    let rig = ServedRig::start(&config, first, second, gige.as_ref())?;
     let link = run.link.as_deref().map(|path| Link::new(path, &rig.port)).transpose()?;
     let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());
     ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
@@ -309,7 +355,9 @@ fn serve(run: &Run) -> Result<()> {
     }
     let mut stdout = std::io::stdout();
     let gige = rig.gige.as_ref().map_or_else(String::new, |id| format!(", \"gige\": \"{id}\""));
-    writeln!(stdout, "{{\"port\": \"{port}\", \"camera\": \"{}\"{gige}}}", rig.camera)?;
+    let second =
+        rig.second_camera.map_or_else(String::new, |address| format!(", \"second_camera\": \"{address}\""));
+    writeln!(stdout, "{{\"port\": \"{port}\", \"camera\": \"{}\"{second}{gige}}}", rig.camera)?;
     stdout.flush()?;
     rig.wait()?;
     Ok(())

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use farnear_scene::{Defects, EllipticalDistortion, Lens};
+use farnear_scene::{Defects, EllipticalDistortion, Lens, View};
 use rigless::chip::fram::DEVICE_ID;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +33,29 @@ pub struct Parts {
     pub driver: DriverParts,
     /// Lens, light and sensor besides blur and noise.
     pub imaging: ImagingParts,
+    /// The half mirror and the second camera, where there are some.
+    pub half_mirror: HalfMirrorParts,
+}
+
+/// The half mirror behind the lens, and the second camera.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HalfMirrorParts {
+    /// Share of the light that each camera gets, the first and the second.
+    pub light: [f64; 2],
+    /// How far the second camera's picture lies beside the first's, right and down.
+    pub second_shift_px: [f64; 2],
+    /// How far it is turned against the first's, from x towards y.
+    pub second_rotation_deg: f64,
+    /// Whether left is right in the second camera's picture.
+    pub second_mirrored: bool,
+}
+
+impl HalfMirrorParts {
+    /// How the second camera sees what the first one sees.
+    pub fn second_view(&self) -> View {
+        View { shift_px: self.second_shift_px, rotation_deg: self.second_rotation_deg, ..View::default() }
+    }
 }
 
 /// Lens, light and sensor besides blur and noise.
@@ -301,6 +324,11 @@ impl Parts {
             ("imaging.field_radius, y", self.imaging.field_radius[1], 0.1, 100.0),
             ("imaging.scene_px_per_s, x", self.imaging.scene_px_per_s[0], -1e5, 1e5),
             ("imaging.scene_px_per_s, y", self.imaging.scene_px_per_s[1], -1e5, 1e5),
+            ("half_mirror.light, first", self.half_mirror.light[0], 0.01, 10.0),
+            ("half_mirror.light, second", self.half_mirror.light[1], 0.01, 10.0),
+            ("half_mirror.second_shift_px, x", self.half_mirror.second_shift_px[0], -1e3, 1e3),
+            ("half_mirror.second_shift_px, y", self.half_mirror.second_shift_px[1], -1e3, 1e3),
+            ("half_mirror.second_rotation_deg", self.half_mirror.second_rotation_deg, -10.0, 10.0),
         ];
         for (name, value, min, max) in ranges {
             if !(min..=max).contains(&value) {

@@ -14,31 +14,72 @@ const WAITING_MAX: usize = 8;
 /// So long by the wall clock time stands without a picture being fetched; then nobody is taken to want them.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// See the module.
+/// Cameras that a rig may have: two behind a half mirror.
+pub const CAMERAS_MAX: usize = 2;
+
+/// What was exposed, and of how much of it there is a picture: shared by the board, who renders and who fetches.
+#[derive(Default)]
 pub struct Pictures {
-    waiting: Option<Arc<AtomicUsize>>,
+    exposed: AtomicUsize,
+    done: AtomicUsize,
+    /// Nobody wants those that were exposed before this one, of each camera.
+    wanted_from: [AtomicUsize; CAMERAS_MAX],
+}
+
+impl Pictures {
+    fn expose(&self) {
+        self.exposed.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// One was fetched, or is not wanted.
+    pub fn finish(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Whoever fetched this camera's has gone: what was exposed until now nobody wants of it.
+    pub fn forget(&self, camera: usize) {
+        if let Some(wanted_from) = self.wanted_from.get(camera) {
+            wanted_from.store(self.exposed.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+    }
+
+    /// Whether anybody wants this camera's picture of this exposure, both counted from 0.
+    pub fn wants(&self, camera: usize, number: usize) -> bool {
+        self.wanted_from.get(camera).is_none_or(|wanted_from| number >= wanted_from.load(Ordering::Relaxed))
+    }
+
+    fn waiting(&self) -> usize {
+        // The first is looked at first: it grows, and the other never beyond it.
+        let done = self.done.load(Ordering::Relaxed);
+        self.exposed.load(Ordering::Relaxed).saturating_sub(done)
+    }
+}
+
+/// See the module.
+pub struct Patience {
+    pictures: Option<Arc<Pictures>>,
     last: usize,
     /// When the last one was fetched, or the first was too many.
     since: Option<Instant>,
 }
 
-impl Pictures {
-    /// `waiting` counts those that wait; without it nobody renders any.
-    pub fn new(waiting: Option<Arc<AtomicUsize>>) -> Self {
-        Self { waiting, last: 0, since: None }
+impl Patience {
+    /// Without pictures nobody renders any.
+    pub fn new(pictures: Option<Arc<Pictures>>) -> Self {
+        Self { pictures, last: 0, since: None }
     }
 
     /// An exposure was taken.
-    pub fn add(&self) {
-        if let Some(waiting) = &self.waiting {
-            waiting.fetch_add(1, Ordering::Relaxed);
+    pub fn expose(&self) {
+        if let Some(pictures) = &self.pictures {
+            pictures.expose();
         }
     }
 
     /// Whether time is to stand.
-    pub fn are_awaited(&mut self) -> bool {
-        let Some(waiting) = &self.waiting else { return false };
-        let count = waiting.load(Ordering::Relaxed);
+    pub fn is_asked(&mut self) -> bool {
+        let Some(pictures) = &self.pictures else { return false };
+        let count = pictures.waiting();
         if count < WAITING_MAX || count < self.last {
             self.since = None;
         }
@@ -53,15 +94,27 @@ mod tests {
 
     #[test]
     fn time_stands_until_a_picture_is_fetched() {
-        let waiting = Arc::new(AtomicUsize::new(0));
-        let mut pictures = Pictures::new(Some(Arc::clone(&waiting)));
+        let pictures = Arc::new(Pictures::default());
+        let mut patience = Patience::new(Some(Arc::clone(&pictures)));
         for _ in 1..WAITING_MAX {
-            pictures.add();
-            assert!(!pictures.are_awaited());
+            patience.expose();
+            assert!(!patience.is_asked());
         }
-        pictures.add();
-        assert!(pictures.are_awaited());
-        waiting.fetch_sub(1, Ordering::Relaxed);
-        assert!(!pictures.are_awaited());
+        patience.expose();
+        assert!(patience.is_asked());
+        pictures.finish();
+        assert!(!patience.is_asked());
+    }
+
+    #[test]
+    fn what_was_exposed_before_its_host_left_is_not_wanted() {
+        let pictures = Pictures::default();
+        pictures.expose();
+        pictures.expose();
+        assert!(pictures.wants(0, 0));
+        pictures.forget(0);
+        pictures.expose();
+        assert_eq!([0, 1, 2].map(|number| pictures.wants(0, number)), [false, false, true]);
+        assert_eq!([0, 1, 2].map(|number| pictures.wants(1, number)), [true; 3], "the other camera's");
     }
 }

@@ -1,10 +1,9 @@
-//! The program: an emulated rig behind a pty and a camera endpoint, or two.
+//! The program: an emulated rig behind a pty and a camera endpoint, or several.
 
 use std::{
     net::SocketAddr,
     sync::{
         Arc,
-        atomic::AtomicUsize,
         mpsc::{self, Sender},
     },
     thread::JoinHandle,
@@ -19,7 +18,8 @@ use crate::{
     endpoint,
     error::SimError,
     gige::{self, GigeConfig},
-    imager::Imager,
+    imager::{self, Imager},
+    pictures::Pictures,
     port,
     rig::launch,
 };
@@ -33,6 +33,8 @@ pub struct ServedRig {
     pub port: String,
     /// Address of the camera endpoint.
     pub camera: SocketAddr,
+    /// Address of the second camera's endpoint, where there is a half mirror.
+    pub second_camera: Option<SocketAddr>,
     /// Identification of its GigE Vision camera, where it has one.
     pub gige: Option<String>,
     commands: Sender<Command>,
@@ -40,32 +42,48 @@ pub struct ServedRig {
 }
 
 impl ServedRig {
-    /// Starts the rig and opens its two doors; with `gige` a third one, by which the same pictures come.
+    /// Starts the rig and opens its two doors; behind a half mirror a `second` camera has a door of its own, and with `gige` the first
+    /// camera has another one.
     ///
     /// # Errors
     /// [`SimError`].
-    pub fn start(config: &RigConfig, imager: Imager, gige: Option<&GigeConfig>) -> Result<Self, SimError> {
+    pub fn start(
+        config: &RigConfig,
+        first: Imager,
+        second: Option<Imager>,
+        gige: Option<&GigeConfig>,
+    ) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
-        let pictures = Arc::new(AtomicUsize::new(0));
+        let pictures = Arc::new(Pictures::default());
         let outlets =
             Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: Some(Arc::clone(&pictures)) };
         let (commands, thread) = launch(config, outlets, None)?;
-        // One picture at a time is handed on: what is not fetched holds the imager up, and the imager the board.
-        let (frames_out, frames) = mpsc::sync_channel(1);
         let ask = asker(&commands);
-        let (gige, second) = match gige {
+        let (gige, frames_to_gige) = match gige {
             Some(gige) => {
-                let (second, pictures) = mpsc::sync_channel(1);
-                (Some(gige::open(gige, pictures, ask.clone(), clock(&commands))?), Some(second))
+                let (frames, pictures) = mpsc::sync_channel(1);
+                (Some(gige::open(gige, pictures, ask.clone(), clock(&commands))?), Some(frames))
             }
             None => (None, None),
         };
-        imager.watch(shots, frames_out, second, pictures)?;
-        let camera = endpoint::open(frames, ask)?;
+        let mut cameras = Vec::new();
+        let mut door = |imager: Imager| {
+            // One picture at a time is handed on: what is not fetched holds the imager up, and the imager the board.
+            let (frames_out, frames) = mpsc::sync_channel(1);
+            let at = cameras.len();
+            cameras.push((imager, frames_out));
+            // Of a camera with two doors nobody knows whether both clients have left.
+            let alone = (at > 0 || frames_to_gige.is_none()).then(|| Arc::clone(&pictures));
+            let left = move || alone.iter().for_each(|pictures| pictures.forget(at));
+            endpoint::open(frames, ask.clone(), left)
+        };
+        let camera = door(first)?;
+        let second_camera = second.map(door).transpose()?;
+        imager::watch(cameras, shots, frames_to_gige, pictures)?;
         let to_board = commands.clone();
         let port = port::open(bytes, move |command| to_board.send(command).is_ok())?;
-        Ok(Self { port, camera, gige, commands, thread })
+        Ok(Self { port, camera, second_camera, gige, commands, thread })
     }
 
     /// A way to end the rig from elsewhere.

@@ -42,12 +42,11 @@ pub mod kernel;
 pub mod lens;
 pub mod maps;
 pub mod optics;
+mod packed;
 pub mod psf;
 mod quadrature;
 mod render;
 pub mod scene;
-#[cfg(feature = "files")]
-mod scene_argument;
 mod scene_error;
 mod scene_file;
 mod scene_text;
@@ -61,11 +60,10 @@ pub use defects::Defects;
 pub use lens::{EllipticalDistortion, Lens, LensError};
 pub use maps::{HeightMap, Picture};
 pub use optics::{OpticsError, OpticsFile};
+pub use packed::{PackedScene, PackedSceneError};
 pub use psf::{Psf, PsfError};
 pub use render::{RenderError, Renderer, render, render_f32, truth};
 pub use scene::{Scene, Shape};
-#[cfg(feature = "files")]
-pub use scene_argument::{SceneArgument, SceneFileError};
 pub use scene_error::SceneError;
 pub use scene_file::SceneFile;
 pub use texture::Texture;

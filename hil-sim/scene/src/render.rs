@@ -103,6 +103,7 @@ pub struct Renderer {
     lens: Lens,
     psf: Psf,
     camera: Camera,
+    /// Decides noise and hot pixels.
     seed: u64,
     texture: Paint,
     surface: Surface,
@@ -167,6 +168,13 @@ impl Renderer {
     #[must_use]
     pub fn seen_by(mut self, view: View) -> Self {
         self.view = view;
+        self
+    }
+
+    /// The same scene before another sensor: with noise and hot pixels of its own, and the scene's texture.
+    #[must_use]
+    pub fn with_noise_of(mut self, seed: u64) -> Self {
+        self.seed = seed;
         self
     }
 

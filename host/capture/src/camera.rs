@@ -44,6 +44,21 @@ impl Image {
         self.pixels.mapv(|code| f32::from(code) / largest)
     }
 
+    /// The codes as they came, as floats.
+    pub fn codes(&self) -> Array2<f32> {
+        self.pixels.mapv(f32::from)
+    }
+
+    /// How many pixels have each code, from 0 to the largest that the bits carry; codes above it count as it.
+    pub fn counts(&self) -> Vec<u32> {
+        let largest = (1usize << self.bits.clamp(1, 16)) - 1;
+        let mut counts = vec![0; largest + 1];
+        for code in &self.pixels {
+            counts[usize::from(*code).min(largest)] += 1;
+        }
+        counts
+    }
+
     /// The upper eight bits of each pixel, row by row.
     pub fn eight_bits(&self) -> Vec<u8> {
         let (bits, pixels) = (self.bits, self.pixels.iter());
@@ -250,5 +265,13 @@ mod tests {
         assert_eq!(image(12, 0xabc).eight_bits(), [0xab]);
         assert_eq!(image(4, 0xf).eight_bits(), [0xf0]);
         assert_eq!(image(12, 4095).grey(), array![[1.0]]);
+        assert_eq!(image(12, 4095).codes(), array![[4095.0]]);
+    }
+
+    #[test]
+    fn pixels_are_counted_by_code() {
+        let counts = Image { pixels: array![[0, 3], [3, 4000]], bits: 8 }.counts();
+        assert_eq!(counts.len(), 256);
+        assert_eq!([counts[0], counts[1], counts[3], counts[255]], [1, 0, 2, 1]);
     }
 }

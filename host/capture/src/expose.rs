@@ -29,6 +29,16 @@ pub enum CaptureError {
     /// The camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// One of several cameras that expose together.
+    #[error("camera {number} of {cameras}: {source}")]
+    OneCamera {
+        /// Which, from 1.
+        number: usize,
+        /// How many there are.
+        cameras: usize,
+        /// What it did.
+        source: CameraError,
+    },
     /// The two images do not belong together.
     #[error(
         "the far image has {far_width}x{far_height} pixels of {far_bits} bits, the near one {near_width}x{near_height} of {near_bits}"
@@ -81,26 +91,61 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     image_wait: Duration,
     mut on_image: impl FnMut(ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
+    expose_together(client, &mut [camera], shots, image_wait, |_, shot, image| on_image(shot, image))
+}
+
+/// As [`expose`], with several cameras that hang on one trigger: `on_image` is given the image of each, with the camera's place in
+/// `cameras`, camera after camera.
+///
+/// # Errors
+/// As [`expose`]; [`CaptureError::OneCamera`] says which of several did not deliver.
+pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
+    client: &Client,
+    cameras: &mut [&mut dyn Camera],
+    shots: &[Shot],
+    image_wait: Duration,
+    mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
+) -> Result<(), E> {
     let (mode, exposure) = one_trigger(shots)?;
-    let camera_failed = |error: CameraError| CaptureError::Camera(error);
-    camera.arm(mode, exposure).map_err(camera_failed)?;
+    let count = cameras.len();
+    let of = |at: usize| {
+        move |source: CameraError| match count {
+            1 => CaptureError::Camera(source),
+            cameras => CaptureError::OneCamera { number: at + 1, cameras, source },
+        }
+    };
+    for (at, camera) in cameras.iter_mut().enumerate() {
+        camera.arm(mode, exposure).map_err(of(at))?;
+    }
     let mut told = 0;
     let run = client.run_program(shots, |kind| -> Result<(), E> {
         match kind {
             EventKind::ShotReady { trigger_number, exposure, .. } => {
-                camera.trigger(*trigger_number, *exposure).map_err(camera_failed)?;
+                for (at, camera) in cameras.iter_mut().enumerate() {
+                    camera.trigger(*trigger_number, *exposure).map_err(of(at))?;
+                }
             }
             EventKind::ShotDone { shot, .. } => {
                 told += 1;
-                on_image(*shot, wait_for_image(client, camera, shot, image_wait)?)?;
+                for (at, camera) in cameras.iter_mut().enumerate() {
+                    let image = wait_for_image(client, &mut **camera, shot, image_wait);
+                    let image = image.map_err(|error| match error {
+                        CaptureError::Camera(source) => of(at)(source),
+                        other => other,
+                    })?;
+                    on_image(at, *shot, image)?;
+                }
             }
             _ => {}
         }
         Ok(())
     });
     if mode == TriggerMode::FreeRunning {
-        // Whatever happened, the camera is to heed its trigger line again.
-        let disarmed = camera.arm(TriggerMode::Hardware, exposure).map_err(camera_failed);
+        // Whatever happened, the cameras are to heed their trigger line again.
+        let disarm = |(at, camera): (usize, &mut &mut dyn Camera)| {
+            camera.arm(TriggerMode::Hardware, exposure).map_err(of(at))
+        };
+        let disarmed = cameras.iter_mut().enumerate().try_for_each(disarm);
         run?;
         disarmed?;
     } else {
@@ -110,7 +155,10 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     if told != asked {
         return Err(CaptureError::Count { told, asked }.into());
     }
-    Ok(camera.finish().map_err(camera_failed)?)
+    for (at, camera) in cameras.iter_mut().enumerate() {
+        camera.finish().map_err(of(at))?;
+    }
+    Ok(())
 }
 
 /// How the exposures of a program come about, and the length of the first.

@@ -6,6 +6,7 @@
 //!   its end, and the board's log.
 //! - [`camera`]: where images come from.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, where the axes go for a pair, taking it, and the folder it is kept in.
+//! - [`half_mirror`]: a pair of one exposure, by two cameras.
 //! - [`expose`], [`focus`], [`sequence`]: programs with a camera: finding the focus, focus stacks, programs from a file.
 //! - [`continuous`]: a cycle of shots without an end, for live depth: a stream of exposures with their images.
 //! - [`board_correction`]: depth correction by the board's own mathematics.
@@ -45,6 +46,7 @@ mod events;
 pub mod expose;
 pub mod find;
 pub mod focus;
+pub mod half_mirror;
 mod handshake;
 mod link;
 mod link_rate;

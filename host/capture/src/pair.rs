@@ -67,15 +67,19 @@ pub struct Pair {
     pub near: Taken,
     /// The coarse stage during both.
     pub coarse: Moved,
+    /// How much further from the lens the near image's sensor stands, where it is a second camera's behind a half mirror and both images
+    /// are of one exposure ([`crate::half_mirror`]); `None`: one camera, two exposures.
+    pub further_mm: Option<f64>,
 }
 
 impl Pair {
-    /// Board time from the start of the far move to the end of the near exposure, less the two exposures, in us.
+    /// Board time from the start of the far move to the end of the near exposure, less the exposures, in us.
     pub fn moving_us(&self) -> u64 {
         let (far, near) = (&self.far.record, &self.near.record);
         let begin = far.trigger.0.saturating_sub(u64::from(far.settle.0));
         let whole = near.strobe_end.0.saturating_sub(begin);
-        whole.saturating_sub(u64::from(far.exposure.0) + u64::from(near.exposure.0))
+        let second_us = if self.further_mm.is_some() { 0 } else { near.exposure.0 };
+        whole.saturating_sub(u64::from(far.exposure.0) + u64::from(second_us))
     }
 }
 
@@ -166,7 +170,7 @@ pub fn pair_of(
     };
     let (far, near) = (taken(far, sensor.far_mm), taken(near, sensor.near_mm));
     alike(&far.image, &near.image)?;
-    Ok(Pair { far, near, coarse })
+    Ok(Pair { far, near, coarse, further_mm: None })
 }
 
 /// Refuses two images of different size or depth of bits.

@@ -43,6 +43,9 @@ pub struct CaptureRecord {
     pub exposure: Vec<ExposureRecord>,
     /// The camera.
     pub camera: CameraRecord,
+    /// The second camera, where both images are of one exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_mirror: Option<HalfMirrorRecord>,
     /// The board.
     pub board: BoardRecord,
     /// What was simulated, if it was.
@@ -134,6 +137,18 @@ pub struct CameraRecord {
     /// What was set on the camera for this.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub settings: BTreeMap<String, String>,
+}
+
+/// The second camera behind a half mirror, which took the near image.
+#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
+pub struct HalfMirrorRecord {
+    /// Its kind.
+    pub second_camera: String,
+    /// How much further from the lens its sensor stands than the first one's, as it was said.
+    pub second_further_um: f64,
+    /// Whether its picture was turned round, left to right.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub second_mirrored: bool,
 }
 
 /// The board.
@@ -268,6 +283,7 @@ fn record(
             corrected: false,
             settings: BTreeMap::new(),
         },
+        half_mirror: None,
         board: BoardRecord {
             name: hello.board.as_str().into(),
             firmware: hello.firmware.as_str().into(),

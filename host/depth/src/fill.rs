@@ -13,16 +13,25 @@
 //! what lies next to the region (`surface`). The fit is robust (Huber's weights, times the texture energy, to which the variance of
 //! the depth is inverse) and has no more terms than the margin supports.
 //!
+//! For comparison there is the thesis' own way, criterion ([`LowTexture`]) and order ([`FillBy`]) each for itself ([`Filling`]).
+//!
 //! A filled pixel gets [`FILLED_CONFIDENCE`]; a region without a usable margin keeps NaN. Cost: O(pixels of the regions and
 //! their margins), 3 to 8 ms for 640x480.
 
 mod boundary;
+mod criterion;
 mod region;
 mod surface;
+mod thesis;
 
-use ndarray::ArrayView2;
+use std::fmt;
+use std::str::FromStr;
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
 
 pub use boundary::trace_boundary;
+pub use criterion::{LowTexture, UnknownCriterion};
 
 use crate::depth_map::DepthMap;
 use region::Regions;
@@ -45,20 +54,129 @@ pub struct Filled {
     pub left_empty: usize,
 }
 
+/// In which order regions are filled, and from what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FillBy {
+    /// `surface`: each grown as far as kernels reach, from a wide margin, none from another one's filling.
+    #[default]
+    Surface,
+    /// `thesis`: one after the other, each from the rectangle around it, what was filled before included.
+    Thesis,
+}
+
+impl FillBy {
+    /// The name as the command line writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Surface => "surface",
+            Self::Thesis => "thesis",
+        }
+    }
+}
+
+impl fmt::Display for FillBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A text that belongs to no way of filling.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a way to fill: use surface or thesis")]
+pub struct UnknownFilling(String);
+
+impl FromStr for FillBy {
+    type Err = UnknownFilling;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFilling> {
+        let known = [Self::Surface, Self::Thesis].into_iter().find(|by| by.name() == text.trim());
+        known.ok_or_else(|| UnknownFilling(text.to_owned()))
+    }
+}
+
+/// What is filled, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Filling {
+    /// What counts as low texture.
+    pub low_texture: LowTexture,
+    /// In which order it is filled, and from what.
+    pub by: FillBy,
+    /// Side of the window of criteria that take one, px; odd, at least 3 is used.
+    pub window_px: usize,
+}
+
 /// Replaces the depth where there is too little texture. `texture` is the energy of each pixel, (height, width) like the map,
-/// NaN for pixels that shall stay as they are; `reach_px` is how far kernels and windows reach.
+/// NaN for pixels that shall stay as they are; `pair` are the far- and the near-focused image; `reach_px` is how far kernels and
+/// windows reach.
+///
+/// # Panics
+/// If energy, images and map differ in size.
+pub fn fill(
+    map: &mut DepthMap,
+    texture: ArrayView2<f32>,
+    pair: [ArrayView2<f32>; 2],
+    reach_px: usize,
+    how: Filling,
+) -> Filled {
+    let low = how.low_texture.mask(texture, pair, how.window_px.max(3));
+    match how.by {
+        FillBy::Surface => fill_by_surfaces(map, texture, low, reach_px),
+        FillBy::Thesis => fill_as_thesis(map, low),
+    }
+}
+
+/// [`fill`] by the energy and by surfaces, which need no images.
 ///
 /// # Panics
 /// If energy and map differ in size.
 pub fn fill_low_texture(map: &mut DepthMap, texture: ArrayView2<f32>, reach_px: usize) -> Filled {
-    assert_eq!(texture.dim(), map.depth_mm.dim(), "energy and map must have one size");
-    let regions = Regions::find(texture, reach_px);
+    let low = LowTexture::Energy.mask(texture, [texture; 2], 1);
+    fill_by_surfaces(map, texture, low, reach_px)
+}
+
+/// Fills anew what was filled in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
+/// last.
+pub fn refill_as_thesis(map: &mut DepthMap) -> Filled {
+    let filled = map.confidence.mapv(|confidence| confidence == FILLED_CONFIDENCE);
+    fill_as_thesis(map, filled)
+}
+
+fn fill_as_thesis(map: &mut DepthMap, low: Array2<bool>) -> Filled {
+    let regions = Regions::of(low, 0.0);
+    empty(map, &regions);
     let mut filled = Filled::default();
-    // The measured depths of all regions are gone before any margin is looked at.
+    for index in 0..regions.count() {
+        let region = regions.region(index);
+        if thesis::fill_region(&mut map.depth_mm, region) {
+            filled.regions += 1;
+            filled.pixels += region.len();
+            region.iter().for_each(|at| map.confidence[*at] = FILLED_CONFIDENCE);
+        } else {
+            filled.left_empty += region.len();
+        }
+    }
+    filled
+}
+
+/// The measured depths of all regions are gone before any surroundings are looked at.
+fn empty(map: &mut DepthMap, regions: &Regions) {
     for at in regions.pixels() {
         map.depth_mm[at] = f32::NAN;
         map.confidence[at] = 0.0;
     }
+}
+
+fn fill_by_surfaces(
+    map: &mut DepthMap,
+    texture: ArrayView2<f32>,
+    low: Array2<bool>,
+    reach_px: usize,
+) -> Filled {
+    assert_eq!(texture.dim(), map.depth_mm.dim(), "energy and map must have one size");
+    let regions = Regions::find(low, texture, reach_px);
+    let mut filled = Filled::default();
+    empty(map, &regions);
     let mut results = Vec::new();
     for index in 0..regions.count() {
         let margin = regions.margin(index, map, texture);
@@ -197,6 +315,42 @@ mod tests {
         assert_eq!(filled.pixels, ring.iter().filter(|energy| **energy == 0.0).count() - 1);
         assert_eq!((map.depth_mm[(30, 30)], map.confidence[(30, 30)]), (950.0, 0.9));
         assert_eq!(map.confidence[(2, 30)], 0.9, "little texture alone is no region");
+    }
+
+    /// Two discs that touch each other's rectangles: in the thesis' order the second sees the first one's filling.
+    #[test]
+    fn the_thesis_order_fills_one_after_the_other_and_again_after_a_change() {
+        let size = (60, 90);
+        let surface = |y: f32, x: f32| 900.0 + 0.05 * x - 0.1 * y + 1e-4 * x * x;
+        let mut map = map_of(surface, size);
+        let texture = disc(size, (30.0, 30.0), 9.0) * disc(size, (34.0, 48.0), 7.0);
+        for (at, _) in texture.indexed_iter().filter(|(_, energy)| **energy == 0.0) {
+            map.depth_mm[at] = 500.0;
+        }
+        let how = Filling { by: FillBy::Thesis, ..Filling::default() };
+        let filled = fill(&mut map, texture.view(), [texture.view(); 2], 9, how);
+        assert_eq!((filled.regions, filled.left_empty), (2, 0));
+        assert_eq!(filled.pixels, texture.iter().filter(|energy| **energy == 0.0).count(), "nothing grows");
+        let worst = |map: &DepthMap, by: f32| {
+            let error =
+                |((y, x), depth): ((usize, usize), &f32)| (depth - by - surface(y as f32, x as f32)).abs();
+            map.depth_mm.indexed_iter().map(error).fold(0.0, f32::max)
+        };
+        assert!(worst(&map, 0.0) < 2e-3, "{}", worst(&map, 0.0));
+        // A correction moves what was measured; what was filled follows.
+        ndarray::Zip::from(&mut map.depth_mm).and(&texture).for_each(|depth, energy| {
+            *depth += if *energy == 0.0 { -77.0 } else { 3.0 };
+        });
+        assert_eq!(refill_as_thesis(&mut map), filled);
+        assert!(worst(&map, 3.0) < 2e-3, "{}", worst(&map, 3.0));
+    }
+
+    #[test]
+    fn ways_of_filling_are_named() {
+        for by in [FillBy::Surface, FillBy::Thesis] {
+            assert_eq!(by.to_string().parse(), Ok(by));
+        }
+        assert!("cubic".parse::<FillBy>().unwrap_err().to_string().contains("`cubic`"));
     }
 
     #[test]

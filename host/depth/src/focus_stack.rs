@@ -12,6 +12,7 @@
 //! Cost: the focus measure for each image, and about 40 operations per pixel and image; memory: the stack, and as much again
 //! for the rows at work (a fraction).
 
+mod guided;
 mod sharpness;
 
 use std::ops::Range;
@@ -20,6 +21,7 @@ use ndarray::{Array2, ArrayView2, Axis, Zip, s};
 use rayon::prelude::*;
 
 use crate::prepare::band::box_mean;
+use guided::{Guide, mended};
 pub use sharpness::{Sharpness, UnknownSharpness};
 use sharpness::{blur_reach_px, blurred};
 
@@ -29,6 +31,8 @@ pub const LEAST_IMAGES: usize = 3;
 const BAND: usize = 48;
 /// Most that images are blurred by first, px.
 pub const MOST_SMOOTHING_PX: f32 = 10.0;
+/// Most that places are mended over, px.
+pub const MOST_GUIDED_PX: f32 = 100.0;
 /// Reliability below which a place has no depth, where nothing else is asked for.
 pub const USUAL_RELIABILITY: f32 = 0.1;
 
@@ -46,13 +50,15 @@ pub struct StackSettings {
     pub fit_points: usize,
     /// Side of the median over the places found, odd; 1 = none.
     pub median_px: usize,
+    /// Standard deviation of the window over which places are mended along the edges of the sharp image, px; 0 = not at all.
+    pub guided_px: f32,
     /// Places below this reliability have no value.
     pub min_reliability: f32,
 }
 
 impl Default for StackSettings {
     /// The modified Laplacian, which the survey finds best on the whole, over 9 pixels of images blurred by 1; 11 points; a median
-    /// of 9x9.
+    /// of 9x9, mended along the sharp image's edges within 10 px.
     fn default() -> Self {
         Self {
             measure: Sharpness::ModifiedLaplacian,
@@ -60,6 +66,7 @@ impl Default for StackSettings {
             window_px: 9,
             fit_points: 11,
             median_px: 9,
+            guided_px: 10.0,
             min_reliability: USUAL_RELIABILITY,
         }
     }
@@ -113,6 +120,9 @@ pub enum StackError {
     /// A blur that is none.
     #[error("the images are to be blurred by {0} px: 0 to {MOST_SMOOTHING_PX} is possible")]
     Smoothing(f32),
+    /// A reach that is none.
+    #[error("places are to be mended within {0} px: 0 (not at all) or 1 to {MOST_GUIDED_PX} is possible")]
+    Guided(f32),
     /// A pixel without a value.
     #[error("image {number}: the pixel in column {column}, row {row} is not finite")]
     NotFinite {
@@ -148,24 +158,33 @@ pub fn depth_from_stack(
     check(images, settings)?;
     let (height, width) = images[0].dim();
     let tops: Vec<usize> = (0..height).step_by(BAND).collect();
-    let bands: Vec<Vec<[f32; 2]>> =
+    let bands: Vec<Vec<Tip>> =
         tops.into_par_iter().map(|top| band(images, settings, top..(top + BAND).min(height))).collect();
-    let map = |of: fn(&[f32; 2]) -> f32| {
+    let map = |of: fn(&Tip) -> f32| {
         let values = bands.iter().flatten().map(of).collect();
         Array2::from_shape_vec((height, width), values)
             .unwrap_or_else(|_| unreachable!("every row is in a band"))
     };
-    let (place, reliability) = (map(|[place, _]| *place), map(|[_, reliability]| *reliability));
-    let mut place = median(&place, settings.median_px);
-    let mut all_in_focus = Array2::zeros((height, width));
-    Zip::indexed(&mut all_in_focus).and(&mut place).and(&reliability).for_each(
-        |at, sharp, place, reliability| {
-            *sharp = between(images, *place, at);
-            if *reliability < settings.min_reliability {
-                *place = f32::NAN;
-            }
-        },
-    );
+    let reliability = map(|tip| tip.reliability);
+    let mut place = median(&map(|tip| tip.place), settings.median_px);
+    let mut all_in_focus = sharp_everywhere(images, &place);
+    if settings.guided_px > 0.0 {
+        let (sharpness, rise) = (map(|tip| tip.sharpness), map(|tip| tip.rise));
+        let guide = Guide {
+            sharp: all_in_focus.view(),
+            sharpness: sharpness.view(),
+            rise: rise.view(),
+            reach_px: settings.guided_px,
+            images: images.len(),
+        };
+        place = mended(place.view(), &guide);
+        all_in_focus = sharp_everywhere(images, &place);
+    }
+    place.zip_mut_with(&reliability, |place, reliability| {
+        if *reliability < settings.min_reliability {
+            *place = f32::NAN;
+        }
+    });
     Ok(StackMap { place, reliability, all_in_focus })
 }
 
@@ -201,6 +220,9 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
     if !(0.0..=MOST_SMOOTHING_PX).contains(&settings.smoothing_px) {
         return Err(StackError::Smoothing(settings.smoothing_px));
     }
+    if settings.guided_px != 0.0 && !(1.0..=MOST_GUIDED_PX).contains(&settings.guided_px) {
+        return Err(StackError::Guided(settings.guided_px));
+    }
     if images.len() < LEAST_IMAGES {
         return Err(StackError::TooFew { count: images.len() });
     }
@@ -221,7 +243,7 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
 }
 
 /// Place and reliability of each pixel of some rows.
-fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>) -> Vec<[f32; 2]> {
+fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>) -> Vec<Tip> {
     let (height, width) = images[0].dim();
     // Rows beyond the band that its values depend on; at the picture's own border there are none.
     let reach = 2 * (settings.window_px / 2) + Sharpness::REACH_PX + blur_reach_px(settings.smoothing_px);
@@ -239,8 +261,7 @@ fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>
     pixels
         .map(|(y, x)| {
             curve.iter_mut().zip(&measured).for_each(|(value, map)| *value = map[(y - from, x)]);
-            let Tip { place, reliability } = tip(&curve, settings.fit_points);
-            [place, reliability]
+            tip(&curve, settings.fit_points)
         })
         .collect()
 }
@@ -257,6 +278,13 @@ fn measured_over_windows(image: ArrayView2<f32>, settings: &StackSettings) -> Ar
     box_mean(measured.view(), side)
 }
 
+/// Each pixel as at its place in the stack.
+fn sharp_everywhere(images: &[ArrayView2<f32>], place: &Array2<f32>) -> Array2<f32> {
+    let mut sharp = Array2::zeros(place.dim());
+    Zip::indexed(&mut sharp).and(place).par_for_each(|at, sharp, place| *sharp = between(images, *place, at));
+    sharp
+}
+
 /// A pixel between two images of the stack.
 fn between(images: &[ArrayView2<f32>], place: f32, at: (usize, usize)) -> f32 {
     let below = (place as usize).min(images.len() - 2);
@@ -269,17 +297,22 @@ fn between(images: &[ArrayView2<f32>], place: f32, at: (usize, usize)) -> f32 {
 struct Tip {
     place: f32,
     reliability: f32,
+    /// The curve's largest value.
+    sharpness: f32,
+    /// How far that is above the curve's mean, as a part of it.
+    rise: f32,
 }
 
 /// The tip of a curve of sharpness over the stack.
 fn tip(curve: &[f32], fit_points: usize) -> Tip {
     let largest = (0..curve.len()).max_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
-    let unreliable = Tip { place: largest as f32, reliability: 0.0 };
     let most = curve[largest];
+    let mean = curve.iter().sum::<f32>() / curve.len() as f32;
+    let rise = if most > 0.0 { (1.0 - mean / most).clamp(0.0, 1.0) } else { 0.0 };
+    let unreliable = Tip { place: largest as f32, reliability: 0.0, sharpness: most, rise };
     if largest == 0 || largest + 1 == curve.len() || most <= 0.0 {
         return unreliable;
     }
-    let mean = curve.iter().sum::<f32>() / curve.len() as f32;
     let half = fit_points / 2;
     let window = largest.saturating_sub(half)..(largest + half + 1).min(curve.len());
     let mut fit = Parabola::default();
@@ -291,10 +324,11 @@ fn tip(curve: &[f32], fit_points: usize) -> Tip {
         // A tip beyond the neighbours is none of this curve's: of two peaks, or of noise.
         Some((tip, determination)) if tip.abs() <= 1.5 => {
             let end = (curve.len() - 1) as f32;
-            let rise = (1.0 - mean / most).clamp(0.0, 1.0);
             Tip {
                 place: (largest as f32 + tip as f32).clamp(0.0, end),
                 reliability: rise * determination.clamp(0.0, 1.0) as f32,
+                sharpness: most,
+                rise,
             }
         }
         _ => unreliable,
@@ -361,7 +395,8 @@ mod tests {
     #[test]
     fn what_rises_to_an_end_or_nowhere_is_unreliable() {
         let rising: Vec<f32> = (1..12).map(|i| i as f32).collect();
-        assert_eq!(tip(&rising, 11), Tip { place: 10.0, reliability: 0.0 });
+        let at_the_end = tip(&rising, 11);
+        assert_eq!((at_the_end.place, at_the_end.reliability), (10.0, 0.0));
         assert_eq!(tip(&[0.0; 9], 11).reliability, 0.0);
         assert!(tip(&[1.0, 1.01, 0.99, 1.02, 1.0, 1.01, 0.98], 7).reliability < 0.05);
     }
@@ -441,6 +476,8 @@ mod tests {
         assert!(of(&[&image, &image, &image], &even).contains("the window is 8: an odd number from 3"));
         let blurred = StackSettings { smoothing_px: f32::NAN, ..usual };
         assert!(of(&[&image, &image, &image], &blurred).contains("blurred by NaN px: 0 to 10"));
+        let narrow = StackSettings { guided_px: 0.5, ..usual };
+        assert!(of(&[&image, &image, &image], &narrow).contains("within 0.5 px: 0 (not at all) or 1 to 100"));
         let wide = StackSettings { window_px: 33, ..usual };
         assert!(of(&[&image, &image, &image], &wide).contains("smaller than the window of 33"));
     }

@@ -102,7 +102,7 @@ pub fn judge(
     let lost = lost_pixels(&reasons);
     let valid = map.depth_mm.iter().filter(|depth| depth.is_finite()).count();
     map.low_texture_fraction =
-        lost.iter().filter(|l| l.reason == Reason::NoTexture).map(|l| l.fraction).sum();
+        lost.iter().find(|lost| lost.reason == Reason::NoTexture).map_or(0.0, |lost| lost.fraction);
     Judgement { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
 }
 

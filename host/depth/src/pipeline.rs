@@ -22,6 +22,7 @@ mod rim;
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
+use crate::fill::{FillBy, Filling, LowTexture};
 use crate::operators::Operators;
 use crate::optics::Optics;
 
@@ -100,7 +101,7 @@ pub enum RunError {
 }
 
 /// How a pair is processed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
     /// Side of the window over which the cubic's coefficients are summed, odd; 1 = none.
@@ -109,6 +110,12 @@ pub struct Settings {
     pub median_px: usize,
     /// Whether regions of low texture are filled from what surrounds them ([`crate::fill`]).
     pub fill: bool,
+    /// What is filled.
+    #[serde(skip_serializing_if = "is_usual")]
+    pub low_texture: LowTexture,
+    /// In which order it is filled, and from what.
+    #[serde(skip_serializing_if = "is_usual")]
+    pub fill_by: FillBy,
     /// Number of threads; 0 = as many as the machine has.
     pub threads: usize,
     /// Vector unit; the fastest that the processor has if none is named.
@@ -118,11 +125,29 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { smoothing_px: 7, median_px: 3, fill: false, threads: 1, backend: None }
+        Self {
+            smoothing_px: 7,
+            median_px: 3,
+            fill: false,
+            low_texture: LowTexture::default(),
+            fill_by: FillBy::default(),
+            threads: 1,
+            backend: None,
+        }
     }
 }
 
+/// Whether a setting need not be written.
+fn is_usual<T: Default + PartialEq>(setting: &T) -> bool {
+    *setting == T::default()
+}
+
 impl Settings {
+    /// As [`crate::fill::fill`] takes it.
+    pub(crate) fn filling(&self) -> Filling {
+        Filling { low_texture: self.low_texture, by: self.fill_by, window_px: self.smoothing_px }
+    }
+
     /// Number of threads that are used.
     pub(crate) fn thread_count(&self) -> usize {
         match self.threads {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::baselines::{self, BaselineError};
 use crate::depth_map::{DepthMap, Warning};
-use crate::fill::fill_low_texture;
+use crate::fill;
 use crate::judge::{JudgeSettings, Judgement, Lost, judge};
 use crate::operators::{DesignError, Operators};
 use crate::optics::Optics;
@@ -239,7 +239,7 @@ fn measure(
         (RealMethod::Whitened, _) => {
             let mut judging = estimate(far, near, &white, optics, &of_windows)?;
             let depth_mm = std::mem::take(&mut judging.depth_mm);
-            (of_estimate(depth_mm, &judging.deviation_mm, &white, optics, settings), judging)
+            (of_estimate(depth_mm, &judging.deviation_mm, prepared, &white, optics, settings), judging)
         }
         (method, window) => {
             let map = match (method, window) {
@@ -250,7 +250,7 @@ fn measure(
                     let bank = Bank::rational(operators);
                     let Estimate { depth_mm, deviation_mm, .. } =
                         estimate(far, near, &bank, optics, &of_windows)?;
-                    of_estimate(depth_mm, &deviation_mm, &bank, optics, settings)
+                    of_estimate(depth_mm, &deviation_mm, prepared, &bank, optics, settings)
                 }
                 (RealMethod::Baseline(method), window) => {
                     let side = if let Window::Fixed(side) = window { side } else { 7 };
@@ -301,6 +301,7 @@ fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Opt
 fn of_estimate(
     depth_mm: Array2<f32>,
     deviation_mm: &Array2<f32>,
+    prepared: &Prepared,
     bank: &Bank,
     optics: &Optics,
     settings: &RealSettings,
@@ -313,7 +314,8 @@ fn of_estimate(
     let mut map = DepthMap { depth_mm, confidence, low_texture_fraction: 0.0, warnings: Vec::new() };
     fill_rim(&mut map, bank.reach_px() + 1);
     if let Some(evidence) = evidence {
-        fill_low_texture(&mut map, evidence.view(), bank.reach_px() + 3);
+        let pair = [prepared.far.view(), prepared.near.view()];
+        fill::fill(&mut map, evidence.view(), pair, bank.reach_px() + 3, settings.run.filling());
     }
     map.warnings.extend(warnings_after(&map, optics));
     map

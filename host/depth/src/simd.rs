@@ -1,6 +1,6 @@
 //! The inner loops of the run time for whatever vector unit the processor has.
 //!
-//! Each loop is written once over [`Lanes`] and compiled for each unit: AVX-512, AVX2 with FMA, NEON on 64-bit ARM, and
+//! Each loop is written once over [`Lanes`](lanes::Lanes) and compiled for each unit: AVX-512, AVX2 with FMA, NEON on 64-bit ARM, and
 //! portable code of four lanes that any compiler turns into what it can. Which one runs is decided at run time
 //! ([`Backend::best`]).
 //! All rows are *valid* convolutions: output column `x` comes from the input columns `x..x + 2r`, so every load of an

@@ -10,6 +10,7 @@ mod commands;
 mod hints;
 mod render;
 mod report;
+mod scene;
 mod terminal;
 
 use std::process::ExitCode;

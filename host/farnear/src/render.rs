@@ -5,9 +5,11 @@ use std::{fs, path::PathBuf};
 use anyhow::{Context as _, Result};
 use farnear_depth::psf::Psf as OpticsPsf;
 use farnear_files::{image_file::encode_png, npy, staging::Staging};
-use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, Renderer, SceneArgument, truth};
+use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, Renderer, truth};
 use farnear_workflows::{Context, optics};
 use serde::Serialize;
+
+use crate::scene::SceneArgument;
 
 /// What is rendered, and where it goes.
 pub struct RenderSettings {

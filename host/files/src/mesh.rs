@@ -27,6 +27,13 @@ impl Projection {
     pub fn axis_in(&self, (height, width): (usize, usize)) -> [f64; 2] {
         self.axis_px.unwrap_or([width, height].map(|n| 0.5 * (n as f64 - 1.0)))
     }
+
+    /// Where a pixel of a map of size `dim` sees the object `z` mm from the lens, beside the optical axis: to the right and up, mm.
+    pub fn beside_axis_mm(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
+        let axis = self.axis_in(dim);
+        let scale = self.pixel_um * 1e-3 * (z / self.focal_length_mm - 1.0);
+        [(column as f64 - axis[0]) * scale, (axis[1] - row as f64) * scale]
+    }
 }
 
 /// Number of a place without a vertex.
@@ -49,7 +56,6 @@ pub fn write(
     let step = (high - low) * STEP;
     let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
 
-    let axis = projection.axis_in((height, width));
     let vertices = finite().count();
     let mut faces = 0_usize;
     for row in 1..height {
@@ -66,9 +72,7 @@ pub fn write(
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
     for ((row, column), &z) in depth_mm.indexed_iter().filter(|(_, z)| z.is_finite()) {
-        let scale = projection.pixel_um * 1e-3 * (f64::from(z) / projection.focal_length_mm - 1.0);
-        let x = (column as f64 - axis[0]) * scale;
-        let y = (axis[1] - row as f64) * scale;
+        let [x, y] = projection.beside_axis_mm((height, width), column, row, f64::from(z));
         let shade = (255.0 * (grey[[row, column]] / brightest).clamp(0.0, 1.0)).round() as u8;
         let mut vertex = [shade; 15];
         for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {

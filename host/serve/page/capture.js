@@ -5,12 +5,19 @@ import { key } from "./keys.js";
 
 /** @type {HTMLElement | null} */
 let warnings = null;
-/** @type {(name: string) => void} */
-let go = () => {};
+/** @type {{ open: (name: string) => void, again: (name: string) => void }} */
+let depths = { open: () => {}, again: () => {} };
+/** The capture whose depth is wished as soon as there is any. @type {string | null} */
+let awaited = null;
 
-/** Told by the page: opens the depth of a capture. */
-export function whenCaptured(open) {
-  go = open;
+/** Told by the page: what opens the depth of a capture, what shows it before it is in any file, and what does so again when it is. */
+export function whenCaptured(open, again, show) {
+  depths = { open, again };
+  on("fresh", (header, pixels) => {
+    if (header.capture !== awaited) return;
+    awaited = null;
+    show(header, pixels);
+  });
 }
 
 /** What makes the image that is seen now unfit for depth. */
@@ -53,6 +60,7 @@ export function make() {
 async function take(wish, depth) {
   const begun = await act("/api/captures", wish);
   if (!begun) return;
+  awaited = depth ? begun.names[0] : null;
   const job = await ended("job", begun.job);
   performance.mark("captured");
   if (job.phase !== "done" || !depth) return;
@@ -60,7 +68,9 @@ async function take(wish, depth) {
   const computing = await act(`/api/captures/${name}/depth`, {});
   if (!computing) return;
   const computed = await ended("computation", computing.job);
-  if (computed.phase === "done") go(name);
+  if (computed.phase !== "done") return;
+  if (awaited === name) depths.open(name);
+  else depths.again(name);
 }
 
 /** Whether a job is under way. */

@@ -50,6 +50,10 @@ export function make(host, remember) {
   use("pan");
 
   let turning = null;
+  /** The mesh that turns: what is loaded after it must not begin it anew. */
+  let turned = null;
+  /** Told once of the next picture that is painted. @type {(() => void) | undefined} */
+  let aged;
   const pick = (layer) => {
     show.layer = layer;
     refresh();
@@ -95,12 +99,24 @@ export function make(host, remember) {
     }
   }
 
+  /** Depth of a pair that was just taken; what is measured and kept is computed from its files, and follows. */
+  function fresh(header, pixels) {
+    show.loading++; // whatever is on its way is of another capture
+    show.name = header.capture;
+    show.capture = null;
+    [show.layer, show.mesh, viewer.shape] = ["depth", null, null];
+    show.maps = decoded(header, pixels);
+    // As in live.js: both have one clock where the program runs on this computer.
+    aged = () => { viewer.canvas.dataset.ageMs = String(Math.round(performance.timeOrigin + performance.now() - header.arrived_ms)); };
+    refresh();
+  }
+
   async function refresh() {
     const { layer, maps } = show;
     empty.hidden = Boolean(maps.far || maps.depth);
     for (const control of layers.children) {
       control.setAttribute("aria-pressed", control.dataset.layer === layer);
-      control.disabled = control.dataset.layer === "surface" ? !maps.depth : !maps[control.dataset.layer];
+      control.disabled = control.dataset.layer === "surface" ? !maps.depth || !show.capture?.has_depth : !maps[control.dataset.layer];
     }
     const solid = layer === "surface" && maps.depth;
     surface.hidden = !solid;
@@ -113,7 +129,7 @@ export function make(host, remember) {
     const ends = limits(layer, map);
     const picture = paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
     viewer.wipe = wipe.value / 100;
-    viewer.onpainted = () => { performance.mark("depth-shown"); viewer.onpainted = undefined; };
+    viewer.onpainted = () => { performance.mark("depth-shown"); aged?.(); [viewer.onpainted, aged] = [undefined, undefined]; };
     viewer.show(picture, await beside(ends));
     viewer.canvas.dataset.layer = layer;
     bar(legend, colours(layer), ends, UNITS[layer]);
@@ -154,8 +170,9 @@ export function make(host, remember) {
     const { show: begin, sorry } = await import("./mesh.js");
     try {
       show.mesh ??= await bytes(`/api/captures/${show.name}/mesh.ply`);
-      if (show.layer !== "surface" || !show.mesh) return;
+      if (show.layer !== "surface" || !show.mesh || (turning && turned === show.mesh)) return;
       turning?.();
+      turned = show.mesh;
       turning = begin(surface, show.mesh);
     } catch (error) {
       sorry(surface, error);
@@ -170,11 +187,31 @@ export function make(host, remember) {
   });
   return {
     open,
+    fresh,
+    /** Its files are there: what is shown of it is shown from them. */
+    again: (name) => name === show.name && open(name, true),
     shown: (name) => {
       seen = store.state?.captures ?? -1;
       list().then(() => name && open(name)).catch(() => {});
       viewer.draw();
     },
+  };
+}
+
+/** Depth, confidence and the far image of a picture from the socket, as numbers. @param {any} header @param {Uint8Array} pixels */
+function decoded({ width, height, low_mm, high_mm }, pixels) {
+  const count = width * height;
+  const codes = new Uint16Array(pixels.buffer, pixels.byteOffset, count);
+  const map = (value) => {
+    const data = new Float32Array(count);
+    for (let at = 0; at < count; at++) data[at] = value(at);
+    return { width, height, data };
+  };
+  const step = (high_mm - low_mm) / 65534;
+  return {
+    depth: map((at) => (codes[at] ? low_mm + (codes[at] - 1) * step : NaN)),
+    confidence: map((at) => pixels[2 * count + at] / 255),
+    far: map((at) => pixels[3 * count + at]),
   };
 }
 

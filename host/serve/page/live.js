@@ -12,6 +12,9 @@ const MEASURES = [["modified-laplacian", "Modified Laplacian"], ["tenengrad", "T
 const REMEMBERED = 300;
 /** Difference of neighbours, of 255, from which an edge counts as sharp. */
 const SHARP = 26;
+/** From one change of the curves, figures and words beside the image to the next, ms: the page is laid out anew for each, which takes
+ * longer than to paint the image, and nobody reads faster. */
+const READ = 200;
 
 /** Makes the view; gives what is called when it is shown. */
 export function make(host) {
@@ -28,6 +31,13 @@ export function make(host) {
   const resting = h("p", { class: "empty", hidden: true }, "The live image is off: L begins it.");
   const values = [];
   let best = 0;
+  let read = -READ;
+  /** Whether it is time for what is read. */
+  const due = () => {
+    const is = performance.now() - read >= READ;
+    if (is) read = performance.now();
+    return is;
+  };
   let shown = false;
   const off = button("Live image", () => mode("image"), { "aria-pressed": "false", title: "L" });
   const deep = button("Live depth", () => mode("depth"), { "aria-pressed": "false", title: "Pair after pair by the piezo" });
@@ -82,13 +92,13 @@ export function make(host) {
     depth.element.hidden = live.mode !== "depth" && !playing;
     record.disabled = !drives() || live.mode !== "depth";
     record.setAttribute("aria-pressed", Boolean(live.recording));
-    record.textContent = live.recording ? "Stop recording" : "Record";
+    write(record, live.recording ? "Stop recording" : "Record");
     if (before?.live.recording !== live.recording) listed();
     const moving = state.job?.phase === "running";
-    if (!seen) status.textContent = "";
-    else if (live.error) status.textContent = live.error;
-    else if (live.mode === "off") status.textContent = "live is off";
-    else if (moving) status.textContent = "held while the rig works";
+    if (!seen) write(status, "");
+    else if (live.error) write(status, live.error);
+    else if (live.mode === "off" && !playing) write(status, "live is off");
+    else if (moving && live.mode !== "off") write(status, "held while the rig works");
   });
 
   on("image", (header, pixels) => {
@@ -97,10 +107,11 @@ export function make(host) {
     shown = true;
     image.show(shade(blank(found, reused.image), pixels, saturation.box.checked, peaking.box.checked));
     time(image, header);
-    status.textContent = `${number(header.rate_hz, 1)} frames/s`;
     values.push(found.focus ?? null);
     if (values.length > REMEMBERED) values.shift();
     best = Math.max(best, found.focus ?? 0);
+    if (!due()) return;
+    status.textContent = `${number(header.rate_hz, 1)} frames/s`;
     focus.replaceChildren(found.focus == null ? "–" : `${found.focus.toPrecision(4)}`, h("small", {}, best ? ` ${number((100 * (found.focus ?? 0)) / best, 0)} % of the largest` : ""));
     plot.set([values.map((_, at) => at - values.length + 1), values]);
     bars(histogram, found.histogram, (at) => at === 255);
@@ -118,9 +129,14 @@ export function make(host) {
     depth.show(paintCodes(blank(header, reused.depth), codes, pixels.subarray(2 * count, 3 * count), "viridis"));
     image.show(shade(blank(header, reused.image), pixels.subarray(3 * count, 4 * count), false, false));
     time(depth, header);
-    status.textContent = `${number(header.rate_hz, 1)} maps/s · ${number(header.latency_ms, 0)} ms from image to map · ${number(low_mm, 0)} to ${number(high_mm, 0)} mm`;
+    if (due()) status.textContent = `${number(header.rate_hz, 1)} maps/s · ${number(header.latency_ms, 0)} ms from image to map · ${number(low_mm, 0)} to ${number(high_mm, 0)} mm`;
   });
   return { shown: () => { image.draw(); plot.size(); } };
+}
+
+/** Words that are there already cost nothing. @param {HTMLElement} place @param {string} text */
+function write(place, text) {
+  if (place.textContent !== text) place.textContent = text;
 }
 
 function check(text, checked) {

@@ -122,8 +122,11 @@ function showJob(state, before) {
   running.forEach((job, at) => {
     const [, said, progress] = place.children[at].children;
     const bar = /** @type {HTMLProgressElement} */ (progress);
-    said.textContent = job.said ?? "";
-    if (job.progress?.total) bar.value = job.progress.done / job.progress.total;
+    const { total, done, unit } = job.progress ?? {};
+    // A bar without an end is moved by the browser all the time, which costs it more than what is counted; a count says that it goes on.
+    bar.hidden = done != null && !total;
+    said.textContent = bar.hidden ? `${done} ${unit}` : job.said ?? "";
+    if (total) bar.value = done / total;
     else bar.removeAttribute("value");
   });
   for (const lane of ["job", "computation"]) ended(state[lane], before?.[lane]);
@@ -148,6 +151,7 @@ async function showQuestion(state) {
 
 function begin() {
   theme();
+  $("waiting").remove(); // what an old browser keeps, which gets no further than the page's text
   rig.mount($("rig"));
   addView("live", "Live", live.make);
   addView("depth", "Depth", (host) => depth.make(host, (name) => current === "depth" && history.replaceState(null, "", `#depth/${name}`)));
@@ -160,7 +164,12 @@ function begin() {
   $("stop").addEventListener("click", stop);
   $("theme").addEventListener("click", turnTheme);
   key("t", "Light or dark", turnTheme);
-  whenCaptured((name) => { go("depth", name); views.get("depth").parts.open(name, true); });
+  const { parts } = views.get("depth");
+  whenCaptured(
+    (name) => { go("depth", name); parts.open(name, true); },
+    parts.again,
+    (header, pixels) => { parts.fresh(header, pixels); go("depth", header.capture); },
+  );
   on("link", () => { showLink(); if (store.state) showSeats(store.state); });
   on("state", (state, before) => {
     showLink();

@@ -52,15 +52,29 @@ export function paint({ width, height, data }, [low, high], name, fade) {
   return image;
 }
 
+/** Words of 256 colours and 256 opacities. Little-endian, as every computer with a browser is: red, green, blue, alpha from the lowest byte on.
+ * @type {Map<string, { colour: Uint32Array, alpha: Uint32Array }>} */
+const words = new Map();
+
+/** @param {string} name */
+function wordsOf(name) {
+  const known = words.get(name);
+  if (known) return known;
+  const colours = table(name);
+  const made = {
+    colour: Uint32Array.from({ length: 256 }, (_, at) => colours[3 * at] | (colours[3 * at + 1] << 8) | (colours[3 * at + 2] << 16)),
+    alpha: Uint32Array.from({ length: 256 }, (_, at) => Math.round(40 + 215 * Math.min(1, (2 * at) / 255)) << 24),
+  };
+  words.set(name, made);
+  return made;
+}
+
 /** Depths as codes of 16 bits (0 = none) as a picture; what is unsure (confidence of 255) is paler.
  * @param {ImageData} image @param {Uint16Array} codes @param {Uint8Array} confidence @param {string} name */
 export function paintCodes(image, codes, confidence, name) {
-  const colours = table(name);
-  // Little-endian, as every computer with a browser is: red, green, blue, alpha from the lowest byte on.
-  const colour = Uint32Array.from({ length: 256 }, (_, at) => colours[3 * at] | (colours[3 * at + 1] << 8) | (colours[3 * at + 2] << 16));
-  const alpha = Uint32Array.from({ length: 256 }, (_, at) => Math.round(40 + 215 * Math.min(1, (2 * at) / 255)) << 24);
-  const words = new Uint32Array(image.data.buffer);
-  for (let at = 0; at < words.length; at++) words[at] = codes[at] ? colour[codes[at] >> 8] | alpha[confidence[at]] : 0;
+  const { colour, alpha } = wordsOf(name);
+  const pixels = new Uint32Array(image.data.buffer);
+  for (let at = 0; at < pixels.length; at++) pixels[at] = codes[at] ? colour[codes[at] >> 8] | alpha[confidence[at]] : 0;
   return image;
 }
 

@@ -32,6 +32,7 @@ use crate::{
     lane::{Lane, Task},
     seats::Seats,
     server::ServeSettings,
+    stopping::{Stop, Stops},
     view::{LiveMode, LiveState, Phase, RigState, SeatsState, State},
 };
 
@@ -69,6 +70,8 @@ pub struct App {
     ending: watch::Sender<bool>,
     /// Whether the rig is to be connected to.
     reconnect: AtomicBool,
+    /// Stops on their way to the board.
+    pub stops: Arc<Stops>,
 }
 
 /// What is to be seen live.
@@ -131,6 +134,7 @@ impl App {
             answer: Mutex::default(),
             recorder: Mutex::default(),
             ending: watch::Sender::new(false),
+            stops: Arc::default(),
         }))
     }
 
@@ -273,11 +277,9 @@ impl App {
         self.change(|state| state.live.recording = None);
     }
 
-    /// Ends jobs and live depth, and stops the rig; does not wait for any of them.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Client`] where the board does not answer: what the jobs hold is ended all the same.
-    pub fn stop(&self) -> Result<(), WorkflowError> {
+    /// Ends jobs and live depth; what this gives tells the board, which may take a while, and nothing begins meanwhile.
+    pub fn begin_stop(&self) -> Stop {
+        let stop = self.stops.begin(self.rig());
         self.rig_lane.cancel();
         // Depth moves the piezo; an image does not.
         self.set_live(|live| {
@@ -285,10 +287,15 @@ impl App {
                 live.mode = LiveMode::Off;
             }
         });
-        match self.rig() {
-            Some(rig) => rig.stop(),
-            None => Ok(()),
-        }
+        stop
+    }
+
+    /// Ends jobs and live depth, and stops the rig; does not wait for any of them.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Client`] where the board does not answer: what the jobs hold is ended all the same.
+    pub fn stop(&self) -> Result<(), WorkflowError> {
+        self.begin_stop().tell()
     }
 
     /// At the end of the program: nothing moves, nothing is computed.

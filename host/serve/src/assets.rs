@@ -69,6 +69,8 @@ fn of(path: &str, status: StatusCode) -> Response {
 
 #[cfg(test)]
 mod tests {
+    use sha2::{Digest, Sha256};
+
     use super::*;
 
     /// What a browser loads in all stays below what a slow line bears.
@@ -76,6 +78,18 @@ mod tests {
     fn the_page_is_small() {
         let bytes: usize = ASSETS.iter().map(|asset| asset.bytes.len()).sum();
         assert!(bytes <= 1_500_000, "{bytes} bytes");
+    }
+
+    /// No picture in the documents is older than the page: `npm run pictures` in `tests-browser` takes them anew, and writes these sums.
+    #[test]
+    fn the_pictures_of_the_documents_are_of_this_page() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/images/page.sha256");
+        let sums = std::fs::read_to_string(file).unwrap();
+        for asset in ASSETS.iter().filter(|asset| asset.media != TEXT) {
+            let line = format!("{:x}  {}", Sha256::digest(asset.bytes), asset.path);
+            let known = sums.lines().any(|known| known == line);
+            assert!(known, "{} has changed: run `npm run pictures` in host/serve/tests-browser", asset.path);
+        }
     }
 
     /// All that is needed at once is asked for at once; only the surface in 3-D comes when somebody wants it.

@@ -1,6 +1,9 @@
 //! The page as the face of a workflow: what it says goes into the state, what it asks waits there for an answer.
 
-use std::time::Duration;
+use std::{
+    sync::Mutex,
+    time::{Duration, Instant},
+};
 
 use farnear_workflows::{Cancel, Progress, Questions, WorkflowError};
 
@@ -14,6 +17,8 @@ use crate::{
 const LOOK: Duration = Duration::from_millis(50);
 /// Warnings that are kept of one job.
 const WARNINGS: usize = 20;
+/// From one count that is told to the next, except the last: the whole state is told with it, and nobody reads faster.
+const COUNT: Duration = Duration::from_millis(100);
 
 /// The face of one lane's job.
 pub struct Face<'a> {
@@ -21,6 +26,8 @@ pub struct Face<'a> {
     pub app: &'a App,
     /// Where the job stands in it.
     pub place: Place,
+    /// When a count was told last.
+    pub counted: Mutex<Option<Instant>>,
 }
 
 impl Progress for Face<'_> {
@@ -43,6 +50,12 @@ impl Progress for Face<'_> {
     }
 
     fn advance(&self, unit: &'static str, done: usize, total: Option<usize>) {
+        let mut counted = lock(&self.counted);
+        if total != Some(done) && counted.is_some_and(|counted| counted.elapsed() < COUNT) {
+            return;
+        }
+        *counted = Some(Instant::now());
+        drop(counted);
         self.app.change(|state| {
             if let Some(job) = (self.place)(state) {
                 job.progress = Some(JobProgress { unit: unit.into(), done, total });

@@ -162,6 +162,7 @@ fn run_rig(app: &App, jobs: &Receiver<Begun>) {
             }
         };
         if let Some(begun) = begun {
+            app.stops.wait();
             run(app, begun, &app.rig_lane, |state| &mut state.job);
         }
     }
@@ -183,7 +184,7 @@ pub type Place = fn(&mut State) -> &mut Option<Job>;
 fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
     let Begun { job, cancel, work } = begun;
     app.note(job.title.clone());
-    let face = Face { app, place };
+    let face = Face { app, place, counted: Mutex::default() };
     let context = Context { progress: &face, questions: &face, cancel };
     let ended = work(app, &context);
     // The rig may have told of the stop before the work saw the wish.

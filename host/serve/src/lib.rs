@@ -15,6 +15,7 @@
 pub mod api;
 pub mod app;
 pub mod assets;
+pub mod depth_message;
 pub mod face;
 pub mod failure;
 pub mod guard;
@@ -26,6 +27,7 @@ pub mod routes;
 pub mod seats;
 pub mod server;
 pub mod socket;
+pub mod stopping;
 pub mod view;
 
 pub use guard::{Listen, Token, TokenError};

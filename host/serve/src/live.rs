@@ -1,13 +1,8 @@
 //! Images and depth as they come, between jobs.
 
-use std::{
-    cell::RefCell,
-    path::Path,
-    time::{Instant, SystemTime, UNIX_EPOCH},
-};
+use std::{cell::RefCell, path::Path, time::Instant};
 
 use farnear_capture::camera::Image;
-use farnear_depth::{optics::Optics, pipeline::Settings};
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
     Context, Nobody, Result, WorkflowError,
@@ -25,21 +20,19 @@ use serde_json::json;
 
 use crate::{
     app::{App, Live, lock},
-    picture_message::{depth_codes, message},
+    depth_message::{self, computation, ends, unix_ms},
+    picture_message::message,
     view::LiveMode,
 };
 
 /// Weight of the newest frame in the shown rate.
 const NEWEST: f64 = 0.15;
 
-/// How live depth is computed: on all cores, so that the map is there soon.
-fn computation() -> Settings {
-    Settings { threads: 0, ..Settings::default() }
-}
-
 /// Looks until something else is wanted. What goes wrong is told, and nothing is looked at until somebody wants it again.
 pub fn look(app: &App) {
     let live = app.live();
+    // After that was read: a stop that is wished from now on ends what is seen.
+    app.stops.wait();
     let rig = app.rig();
     if rig.is_none() && !app.has_camera_alone() {
         return;
@@ -58,8 +51,10 @@ pub fn look(app: &App) {
         }
         (LiveMode::Depth, Some(rig)) => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
     };
+    // Something else may be wanted already: then the rig's word of the stop is no news, and must not end what comes next.
+    let wished = context.cancel.is_cancelled() || app.is_ending();
     match ended {
-        Err(error) if !error.is_cancelled() && !app.is_ending() => {
+        Err(error) if !error.is_cancelled() && !wished => {
             app.note(format!("live: {error}"));
             app.set_live(|live| live.mode = LiveMode::Off);
             app.change(|state| state.live.error = Some(error.to_string()));
@@ -85,12 +80,6 @@ fn look_through_camera(app: &App, live: &Live, context: &Context<'_>, rate: &Rat
     })
 }
 
-/// Milliseconds since 1970 by this computer's clock, which a browser on it has, too.
-fn unix_ms() -> f64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0.0, |since| since.as_secs_f64() * 1e3)
-}
-
 fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_hz: f64) -> axum::body::Bytes {
     let arrived_ms = unix_ms();
     let figures = picture::figures(image, live.measure);
@@ -104,7 +93,7 @@ fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_h
         "fine_um": record.map(|record| f64::from(record.fine.0) / 1e3),
         "coarse_um": record.map(|record| f64::from(record.coarse.0) / 1e3),
     });
-    message(&header, &image.eight_bits())
+    message(&header, &[&image.eight_bits()])
 }
 
 fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate) -> Result<()> {
@@ -117,7 +106,7 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
     };
     let ended = live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
         record(app, &depth);
-        app.pictures.send_replace(depth_message(&depth, ends, rate.next()));
+        app.pictures.send_replace(depth_message::live(&depth, ends, rate.next()));
         enough(app)
     });
     app.finish_recording();
@@ -137,39 +126,11 @@ fn record(app: &App, depth: &LiveDepth<'_>) {
     }
 }
 
-/// Depth, confidence and the far image, with what the page shows beside them.
-fn depth_message(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> axum::body::Bytes {
-    let (height, width) = depth.map.depth_mm.dim();
-    let header = json!({
-        "type": "depth",
-        "width": width,
-        "height": height,
-        "low_mm": ends[0],
-        "high_mm": ends[1],
-        "rate_hz": rate_hz,
-        "pair_ms": depth.pair_ms,
-        "latency_ms": depth.latency_ms,
-        "arrived_ms": unix_ms() - depth.latency_ms,
-        "low_texture_fraction": depth.map.low_texture_fraction,
-    });
-    let mut pixels = depth_codes(&depth.map.depth_mm, ends);
-    pixels.extend(depth.map.confidence.iter().map(|value| (value * 255.0) as u8));
-    pixels.extend(depth.far.eight_bits());
-    message(&header, &pixels)
-}
-
-/// A little beyond the range on both sides: what lies just outside is still told apart.
-fn ends(optics: &Optics) -> [f32; 2] {
-    let range = optics.working_range();
-    let margin = 0.25 * (range.far_mm - range.near_mm);
-    [(range.near_mm - margin) as f32, (range.far_mm + margin) as f32]
-}
-
 /// Shows a recording as it was recorded, or as fast as depth is computed.
 pub fn play(app: &App, path: &Path, fast: bool, context: &Context<'_>) -> Result<PlayFigures> {
     let rate = Rate::default();
     recording::play(path, &computation(), fast, context, |depth, optics| {
-        app.pictures.send_replace(depth_message(&depth, ends(optics), rate.next()));
+        app.pictures.send_replace(depth_message::live(&depth, ends(optics), rate.next()));
         Ok(())
     })
 }

@@ -53,9 +53,11 @@ async fn run(mut socket: WebSocket, app: Arc<App>) {
     if send(&mut socket, Message::text(hello)).await {
         talk(&mut socket, &app).await;
     }
-    if app.with_seats(|seats| seats.leave(seat.number)) {
+    // Before anybody else can sit down and begin something.
+    let stop = app.with_seats(|seats| seats.leave(seat.number).then(|| app.begin_stop()));
+    if let Some(stop) = stop {
         app.note("the browser that drove has gone: stopping");
-        let _ = tokio::task::spawn_blocking(move || app.stop()).await; // the board has its deadline
+        let _ = tokio::task::spawn_blocking(move || stop.tell()).await; // the board has its deadline
     }
 }
 
@@ -121,9 +123,9 @@ fn hear(said: Message, app: &Arc<App>) -> Heard {
         Message::Text(text) => match serde_json::from_str(&text) {
             Ok(Said::Stop) => {
                 app.note("stop");
-                let app = Arc::clone(app);
+                let (app, stop) = (Arc::clone(app), app.begin_stop());
                 drop(tokio::task::spawn_blocking(move || {
-                    if let Err(error) = app.stop() {
+                    if let Err(error) = stop.tell() {
                         app.note(format!("stop: {error}"));
                     }
                 }));

@@ -1,8 +1,8 @@
 // `farnear serve` on the emulated rig, and a browser that looks at it.
-import { spawn } from "node:child_process";
+import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { chromium } from "playwright-core";
 
 const FARNEAR = process.env.FARNEAR ?? join(import.meta.dirname, "../../../target/debug/farnear");
@@ -21,13 +21,69 @@ export async function serve(what = ["--rig", "sim"]) {
     child.once("exit", (code) => { rmSync(session, { recursive: true, force: true }); done(code); });
     child.kill("SIGINT");
   });
-  return { address, session, close, ask: async (path) => (await fetch(new URL(path, address))).json() };
+  return { address, session, pid: child.pid, close, ask: async (path) => (await fetch(new URL(path, address))).json() };
 }
 
-/** A browser; without a graphics card, so that it runs anywhere. */
+/** Whether the program was built with this kind of camera. */
+export function knows(kind) {
+  const { stdout } = spawnSync(FARNEAR, ["camera", "list", "--json"], { encoding: "utf8" });
+  return JSON.parse(stdout).kinds.some((known) => known.kind === kind && known.built_in);
+}
+
+/** The emulated rig as a program of its own, until `close`; where it is, in `said`. */
+export async function simulator(options) {
+  const child = spawn(join(dirname(FARNEAR), "farnear-sim"), ["run", ...options], { stdio: ["pipe", "pipe", "inherit"] });
+  const said = await new Promise((done, failed) => {
+    child.stdout.once("data", (data) => done(JSON.parse(data)));
+    child.once("exit", (code) => failed(new Error(`farnear-sim ended with ${code}`)));
+  });
+  child.removeAllListeners("exit");
+  return { said, close: () => new Promise((done) => { child.once("exit", done); child.kill(); }) };
+}
+
+const FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader"];
+const found = () => BROWSERS.find((path) => path && existsSync(path));
+
+/** A browser without a graphics card, so that it runs anywhere, as one is that finds none: it puts pages together by the processor, and
+ * SwiftShader is for WebGL alone. (With SwiftShader for everything, pages come a few times a second.) */
 export function browser() {
-  const executablePath = BROWSERS.find((path) => path && existsSync(path));
-  return chromium.launch({ executablePath, args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  return chromium.launch({ executablePath: found(), args: FLAGS });
+}
+
+/** The same browser without Playwright, asked by its own protocol. `open` loads a page and gives what runs scripts in it. */
+export function plain() {
+  const profile = mkdtempSync(join(tmpdir(), "farnear-browser-"));
+  const options = [...FLAGS, "--headless", "--remote-debugging-pipe", `--user-data-dir=${profile}`, "--window-size=1440,900"];
+  const child = spawn(found(), options, { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
+  const [, , , to, from] = child.stdio;
+  const waiting = new Map();
+  let [last, text] = [0, ""];
+  from.on("data", (data) => {
+    const messages = (text + data).split("\0");
+    text = messages.pop();
+    for (const { id, result, error } of messages.map((message) => JSON.parse(message))) {
+      waiting.get(id)?.(result ?? { exceptionDetails: error });
+      waiting.delete(id);
+    }
+  });
+  const ask = (method, params, sessionId) => new Promise((done) => {
+    waiting.set(++last, done);
+    to.write(`${JSON.stringify({ id: last, method, params, sessionId })}\0`);
+  });
+  const open = async (url) => {
+    const { targetId } = await ask("Target.createTarget", { url });
+    const { sessionId } = await ask("Target.attachToTarget", { targetId, flatten: true });
+    return async (expression) => {
+      const { result, exceptionDetails } = await ask("Runtime.evaluate", { expression, returnByValue: true, awaitPromise: true }, sessionId);
+      if (exceptionDetails) throw new Error(`${expression}: ${JSON.stringify(exceptionDetails)}`);
+      return result.value;
+    };
+  };
+  const close = () => new Promise((done) => {
+    child.once("exit", () => { rmSync(profile, { recursive: true, force: true, maxRetries: 5 }); done(); });
+    child.kill();
+  });
+  return { open, close };
 }
 
 /** A page; what its console says of errors is kept in `page.complaints`. */

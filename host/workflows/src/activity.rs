@@ -14,5 +14,6 @@ pub mod running;
 pub mod samples;
 pub mod shipped;
 pub mod training;
+pub mod verdict;
 pub mod views;
 mod watched;

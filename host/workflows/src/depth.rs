@@ -12,6 +12,7 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use farnear_depth::{
     corrections::Correction,
+    fill::{FillBy, refill_as_thesis},
     judge::{Judgement, Lost, lost_pixels},
     optics::Optics,
     pipeline::{DepthMap, Settings},
@@ -286,6 +287,9 @@ impl Inputs {
         }
         if let Some(correction) = &self.correction {
             correct(&mut map, &mut reasons, correction)?;
+            if real.run.fill && real.run.fill_by == FillBy::Thesis {
+                refill_as_thesis(&mut map);
+            }
         }
         let said = found.findings.iter().map(ToString::to_string);
         let findings = self.doubts.iter().cloned().chain(said).collect();

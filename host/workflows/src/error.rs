@@ -282,12 +282,21 @@ pub enum WorkflowError {
     Toml(#[from] toml::ser::Error),
 }
 
+impl From<PrepareError> for WorkflowError {
+    fn from(error: PrepareError) -> Self {
+        match error {
+            PrepareError::Pair(error) => Self::Depth(error),
+            PrepareError::Camera(error) => Self::CameraFrames(error),
+            error @ PrepareError::Unrelated { .. } => Self::Unpaired(error),
+        }
+    }
+}
+
 impl From<RealError> for WorkflowError {
     fn from(error: RealError) -> Self {
         match error {
-            RealError::Run(error) | RealError::Prepare(PrepareError::Pair(error)) => Self::Depth(error),
-            RealError::Prepare(PrepareError::Camera(error)) => Self::CameraFrames(error),
-            RealError::Prepare(error) => Self::Unpaired(error),
+            RealError::Run(error) => Self::Depth(error),
+            RealError::Prepare(error) => error.into(),
             RealError::Baseline(error) => Self::Baseline(error),
             RealError::Design(error) => Self::Design(error),
         }

@@ -6,8 +6,10 @@ use std::path::PathBuf;
 
 use farnear_depth::{
     focus_stack::{self, StackMap, StackSettings},
+    optics::{Distortion, DistortionSection},
     prepare::{
         align::{self, Model},
+        straightened,
         warp::{Warp, resample},
     },
 };
@@ -66,10 +68,13 @@ struct Record<'a> {
     measure: &'static str,
     smoothing_px: f32,
     median_px: usize,
+    guided_px: f32,
     window_px: usize,
     fit_points: usize,
     min_reliability: f32,
     align: Option<Model>,
+    /// The distortion that was taken out.
+    distortion: Option<DistortionSection>,
     images: &'a [String],
     /// Object distances in mm at which the images are sharp.
     focused_at_mm: Option<&'a [f64]>,
@@ -87,6 +92,7 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
     let staging = Staging::new_folder(&settings.out)?;
     let listed = places::of(settings)?;
     let mut images = read(&listed.images, context)?;
+    let unseen = listed.distortion.map(|distortion| straighten(&mut images, &distortion));
     let moved_px = match settings.align {
         Some(model) => aligned(&mut images, model, context)?,
         None => 0.0,
@@ -94,7 +100,12 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
     context.cancel.check("measuring the stack")?;
     context.say(&format!("measuring {} images by {}", images.len(), settings.computation.measure));
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
-    let map = focus_stack::depth_from_stack(&views, &settings.computation)?;
+    let mut map = focus_stack::depth_from_stack(&views, &settings.computation)?;
+    if let Some(unseen) = &unseen {
+        for (at, _) in unseen.indexed_iter().filter(|(_, unseen)| **unseen) {
+            (map.place[at], map.reliability[at]) = (f32::NAN, 0.0);
+        }
+    }
     context.cancel.check("writing the results")?;
     let depth = listed.depth(&map.place);
     let figures = figures(&depth, &listed, &map, moved_px);
@@ -106,7 +117,7 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
         .iter()
         .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
         .collect();
-    let StackSettings { measure, smoothing_px, window_px, fit_points, median_px, min_reliability } =
+    let StackSettings { measure, smoothing_px, window_px, fit_points, median_px, guided_px, min_reliability } =
         settings.computation;
     let record = Record {
         made_by: MADE_BY,
@@ -114,10 +125,12 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
         measure: measure.name(),
         smoothing_px,
         median_px,
+        guided_px,
         window_px,
         fit_points,
         min_reliability,
         align: settings.align,
+        distortion: listed.distortion.map(DistortionSection::from),
         images: &names,
         focused_at_mm: listed.focused_at_mm.as_deref(),
     };
@@ -140,6 +153,23 @@ fn read(images: &[PathBuf], context: &Context<'_>) -> Result<Vec<Array2<f32>>> {
         context.progress.advance("images", index + 1, Some(images.len()));
     }
     Ok(all)
+}
+
+/// Takes the lens' distortion out of all images; where it showed nothing of what would lie there, they keep their own pixels, and
+/// the mask says so.
+fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<bool> {
+    let mut unseen = Array2::from_elem((0, 0), false);
+    for image in images {
+        let straight = straightened(image.view(), distortion);
+        unseen = straight.mapv(|value| !value.is_finite());
+        let own = std::mem::replace(image, straight);
+        image.zip_mut_with(&own, |straight, own| {
+            if !straight.is_finite() {
+                *straight = *own;
+            }
+        });
+    }
+    unseen
 }
 
 /// Lays each image on the one in the middle, by way of its neighbours, which differ least; gives the farthest way of a pixel.

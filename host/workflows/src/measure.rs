@@ -13,7 +13,7 @@ use std::{fs, path::Path};
 
 use farnear_depth::optics::Optics;
 use farnear_files::{map, mesh::Projection};
-use ndarray::Array2;
+use ndarray::{Array2, Array3, ArrayView2, s};
 use serde::{Deserialize, Serialize};
 
 pub use difference::{DifferenceFigures, difference};
@@ -117,15 +117,29 @@ impl Measured {
     /// Where the pixel sees the object, mm: to the right, up, away from the lens. `None` where there is no depth.
     pub fn point_mm(&self, column: usize, row: usize) -> Option<[f64; 3]> {
         let z = f64::from(*self.depth_mm.get((row, column))?);
-        let [axis_x, axis_y] = self.projection.axis_in(self.depth_mm.dim());
-        let scale = self.projection.pixel_um * 1e-3 * (z / self.projection.focal_length_mm - 1.0);
-        let beside = |at: usize, axis: f64| (at as f64 - axis) * scale;
-        z.is_finite().then(|| [beside(column, axis_x), -beside(row, axis_y), z])
+        let [x, y] = self.projection.beside_axis_mm(self.depth_mm.dim(), column, row, z);
+        z.is_finite().then_some([x, y, z])
     }
 
     fn check(&self, at: &Rectangle) -> Result<()> {
         at.check_within(self.depth_mm.dim())
     }
+}
+
+/// The point of the object that each pixel of a whole depth map (mm) sees, (height, width, 3) in mm as in the mesh: to the right, up, towards
+/// the viewer, from the lens; NaN where there is no depth.
+pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
+    let dim = depth_mm.dim();
+    let projection =
+        Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um(), axis_px: None };
+    let mut points = Array3::zeros((dim.0, dim.1, 3));
+    for ((row, column), &z) in depth_mm.indexed_iter() {
+        let [x, y] = projection.beside_axis_mm(dim, column, row, f64::from(z));
+        for (place, value) in points.slice_mut(s![row, column, ..]).iter_mut().zip([x as f32, y as f32, -z]) {
+            *place = if z.is_finite() { value } else { f32::NAN };
+        }
+    }
+    points
 }
 
 impl Rectangle {

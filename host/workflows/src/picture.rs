@@ -42,34 +42,31 @@ pub struct PictureFigures {
 /// Looks at an image. One pass for the brightness; the focus measure costs what it says.
 pub fn figures(image: &Image, measure: FocusMeasure) -> PictureFigures {
     let (height, width) = image.pixels.dim();
-    let bits = image.bits.clamp(1, 16);
-    let largest = ((1u32 << bits) - 1) as f64;
+    let counts = image.counts();
+    let (bits, largest) = (image.bits.clamp(1, 16), counts.len() - 1);
     let mut histogram = vec![0u32; BINS];
-    let (mut sum, mut squares, mut saturated) = (0.0f64, 0.0f64, 0usize);
-    for &code in &image.pixels {
-        let value = f64::from(code);
-        let bin = if bits >= 8 { usize::from(code) >> (bits - 8) } else { usize::from(code) << (8 - bits) };
-        histogram[bin.min(BINS - 1)] += 1;
-        sum += value;
-        squares += value * value;
-        saturated += usize::from(value >= largest);
+    let (mut sum, mut squares) = (0.0f64, 0.0f64);
+    for (code, pixels) in counts.iter().enumerate().filter(|(_, pixels)| **pixels > 0) {
+        histogram[if bits >= 8 { code >> (bits - 8) } else { code << (8 - bits) }] += pixels;
+        sum += code as f64 * f64::from(*pixels);
+        squares += (code * code) as f64 * f64::from(*pixels);
     }
-    let count = image.pixels.len().max(1) as f64;
+    let (count, full) = (image.pixels.len().max(1) as f64, largest as f64);
     let mean = sum / count;
     let deviation = (squares / count - mean * mean).max(0.0).sqrt();
     let contrast = if mean > 0.0 { deviation / mean } else { 0.0 };
-    let saturated_fraction = saturated as f64 / count;
-    let focus = measure.of(image.pixels.mapv(f32::from).view()).ok();
+    let saturated_fraction = f64::from(counts[largest]) / count;
+    let focus = measure.of(image.codes().view()).ok();
     PictureFigures {
         width,
         height,
         bits: image.bits,
-        mean: rounded(mean / largest, 4),
+        mean: rounded(mean / full, 4),
         contrast: rounded(contrast, 4),
         saturated_fraction: rounded(saturated_fraction, 6),
         histogram,
         focus,
-        warnings: warnings(saturated_fraction, mean / largest, contrast),
+        warnings: warnings(saturated_fraction, mean / full, contrast),
     }
 }
 

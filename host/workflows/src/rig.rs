@@ -1,7 +1,7 @@
 //! A rig, real or emulated: connecting to it, and what it can be made to do. One file per job.
 //!
 //! - [`info`], [`motion`], [`alarms`], [`settings`], [`board`], [`log`]: what the board is asked and told.
-//! - [`camera`]: a rig with its camera; [`pair`], [`sequence`], [`focus`], [`targets`]: what is done with both.
+//! - [`camera`]: a rig with its camera; [`pair`], [`half_mirror`], [`sequence`], [`focus`], [`targets`]: what is done with both.
 //! - [`mechanics`], [`correction_fit`], [`correct`], [`sun`]: what the board measures and calculates.
 //! - [`check`]: the bring-up checklist.
 //! - [`open`]: a rig that is held open between jobs; [`live`], [`live_depth`]: images and depth as they come; [`series`]: pair after pair; [`continuous`]: at a pace that
@@ -17,6 +17,7 @@ pub mod correct;
 pub mod correction_fit;
 pub mod focus;
 pub mod goto;
+pub mod half_mirror;
 pub mod info;
 pub mod live;
 pub mod live_depth;

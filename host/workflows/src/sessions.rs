@@ -137,6 +137,9 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
 /// [`WorkflowError::Record`], [`WorkflowError::Read`] where it is none.
 pub fn read(folder: &Path) -> Result<Capture> {
     let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
+    if !folder.is_dir() {
+        return Err(missing());
+    }
     let record: CaptureRecord = read_record(folder)?.ok_or_else(missing)?;
     let (mut files, mut variants) = (Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).map_err(WorkflowError::read("the capture", folder))? {

@@ -1,10 +1,13 @@
 //! Starting `farnear-sim` beside this program, and ending it again.
 
 use std::{
-    io::{BufRead, BufReader, Read},
+    io::{BufRead, BufReader, ErrorKind, Read, Write},
     path::{Path, PathBuf},
     process::{Child, ChildStdin, Command, Stdio},
-    sync::mpsc::{RecvTimeoutError, channel},
+    sync::{
+        Arc,
+        mpsc::{RecvTimeoutError, channel},
+    },
     time::{Duration, Instant},
 };
 
@@ -36,8 +39,11 @@ pub const USUAL_PSF: Psf = Psf::Gaussian { k: 0.4578 };
 /// simulator.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Scenery {
-    /// Scene before the emulated camera: `plane:MM`, `staircase`, `slant`, `cone` or `sphere`.
+    /// Scene before the emulated camera: `plane:MM`, `staircase`, `slant`, `cone`, `sphere`, or the name of the scene file that
+    /// is packed in `packed_scene`.
     pub scene: Option<String>,
+    /// A scene file with its maps, as the simulator reads them from its standard input.
+    pub packed_scene: Option<Arc<[u8]>>,
     /// Point spread function of the emulated lens; without it the one of the optics.
     pub psf: Option<String>,
     /// Noise of the emulated camera: `none`, `8bit` or `12bit`.
@@ -52,6 +58,8 @@ pub struct Scenery {
     pub trace: Option<PathBuf>,
     /// Whether the emulated rig's time follows the clock on the wall; runs do not repeat then.
     pub paced: bool,
+    /// A half mirror behind the lens, and how much further from it the second camera's sensor stands.
+    pub half_mirror_um: Option<f64>,
 }
 
 /// The simulator could not be started.
@@ -96,7 +104,7 @@ pub enum SimulatorError {
 impl Scenery {
     /// The same before another scene.
     pub fn with_scene(&self, scene: String) -> Self {
-        Self { scene: Some(scene), ..self.clone() }
+        Self { scene: Some(scene), packed_scene: None, ..self.clone() }
     }
 
     /// Everything that was left open, decided; as it stands in a capture's record.
@@ -123,6 +131,7 @@ pub struct Simulator {
 struct Address {
     port: String,
     camera: String,
+    second_camera: Option<String>,
 }
 
 impl Simulator {
@@ -135,7 +144,8 @@ impl Simulator {
         context.say(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
         let mut command = Command::new(&program);
         let record = scenery.decided(optics.map_or(USUAL_PSF, |(_, psf)| psf));
-        command.args(["run", "--scene", &record.scene, "--psf", &record.psf, "--noise", &record.noise]);
+        let scene = if scenery.packed_scene.is_some() { "-" } else { record.scene.as_str() };
+        command.args(["run", "--scene", scene, "--psf", &record.psf, "--noise", &record.noise]);
         command.args(["--seed", &record.seed.to_string()]);
         for (flag, file) in [
             ("--optics", optics.map(|(file, _)| file)),
@@ -146,6 +156,9 @@ impl Simulator {
             if let Some(file) = file {
                 command.arg(flag).arg(file);
             }
+        }
+        if let Some(further_um) = scenery.half_mirror_um {
+            command.arg(format!("--half-mirror={further_um}"));
         }
         if scenery.paced {
             command.arg("--paced");
@@ -158,7 +171,13 @@ impl Simulator {
             .stdout(Stdio::piped())
             .spawn()
             .map_err(|source| SimulatorError::Start { program, source })?;
-        let stdin = child.stdin.take();
+        let mut stdin = child.stdin.take();
+        if let (Some(stdin), Some(packed)) = (&mut stdin, &scenery.packed_scene)
+            && let Err(error) = stdin.write_all(packed)
+            && error.kind() != ErrorKind::BrokenPipe
+        {
+            return Err(SimulatorError::Lost { reason: error.to_string() }.into());
+        }
         let stdout = child.stdout.take();
         let mut simulator = Self { child, stdin, address: Address::default() };
         let lost = |reason: String| SimulatorError::Lost { reason };
@@ -180,6 +199,11 @@ impl Simulator {
     /// Address of the emulated camera.
     pub fn camera(&self) -> &str {
         &self.address.camera
+    }
+
+    /// Address of the second emulated camera, where there is a half mirror.
+    pub fn second_camera(&self) -> Option<&str> {
+        self.address.second_camera.as_deref()
     }
 }
 

@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::{Context, Result};
 
-use super::{Extras, Release, copy, programs::Target};
+use super::{Extras, Release, copy, lay_documents, lay_programs, programs::Target};
 use crate::run::{ROOT, finish, step};
 
 /// Writes the archive beside the other files.
@@ -22,10 +22,9 @@ pub fn write(
     let name = name(release, target);
     step(&format!("{name}.tar.gz"));
     let folder = release.work.join(&name);
-    for file in [programs.join("farnear"), programs.join("farnear-sim")].iter().chain(elves) {
-        copy(file, &folder)?;
-    }
-    for page in ["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+    lay_programs(programs, elves, &folder)?;
+    lay_documents(&folder)?;
+    for page in ["LICENSE-MIT", "LICENSE-APACHE"] {
         copy(&ROOT.join(page), &folder)?;
     }
     copy(&extras.notices, &folder)?;

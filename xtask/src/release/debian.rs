@@ -13,10 +13,10 @@ use std::{
 use anyhow::{Context, Result};
 
 use super::{
-    Extras, Release, copy, has,
+    Extras, Release, copy, lay_documents, lay_programs,
     programs::{Target, without_paths},
 };
-use crate::run::{ROOT, cargo, finish, output, step, target_folder};
+use crate::run::{ROOT, cargo, finish, has, output, step, target_folder};
 
 /// Where the programs lie; `/usr/bin` points there, since the emulated board looks for its firmware beside itself.
 const PROGRAMS: &str = "usr/lib/farnear";
@@ -39,9 +39,7 @@ pub fn write(
     let name = format!("farnear_{}_{}.deb", release.version, target.debian);
     step(&name);
     let root = release.work.join(format!("deb-{}", target.debian));
-    for file in [programs.join("farnear"), programs.join("farnear-sim")].iter().chain(elves) {
-        copy(file, &root.join(PROGRAMS))?;
-    }
+    lay_programs(&programs, elves, &root.join(PROGRAMS))?;
     fs::create_dir_all(root.join("usr/bin")).context("cannot create usr/bin")?;
     for program in ["farnear", "farnear-sim"] {
         symlink(format!("../lib/farnear/{program}"), root.join("usr/bin").join(program))
@@ -49,9 +47,7 @@ pub fn write(
     }
     copy(&ROOT.join("packaging/60-farnear.rules"), &root.join("usr/lib/udev/rules.d"))?;
     let documents = root.join("usr/share/doc/farnear");
-    for page in ["README.md", "CHANGELOG.md"] {
-        copy(&ROOT.join(page), &documents)?;
-    }
+    lay_documents(&documents)?;
     let notices = fs::read_to_string(&extras.notices).context("cannot read the licences")?;
     let own = ["LICENSE-MIT", "LICENSE-APACHE"].map(|name| fs::read_to_string(ROOT.join(name)));
     let mut copyright = String::from("farnear is under MIT or Apache-2.0, as you choose.\n\n");

@@ -1,14 +1,11 @@
 //! Programs that need no library: linked with musl by the linker that comes with Rust, so that no cross compiler is needed.
 
-use std::{
-    path::PathBuf,
-    process::{Command, Stdio},
-};
+use std::{path::PathBuf, process::Command};
 
 use anyhow::Result;
 
 use super::Release;
-use crate::run::{ROOT, cargo, finish, step, target_folder};
+use crate::run::{ROOT, cargo, finish, has, has_target, step, target_folder};
 
 /// What programs are built for.
 pub struct Target {
@@ -38,7 +35,7 @@ impl Target {
             return Ok(None);
         }
         let names = [format!("qemu-{}", self.processor), format!("qemu-{}-static", self.processor)];
-        names.iter().find(|name| super::has(name)).cloned().map(Some).ok_or_else(|| {
+        names.iter().find(|name| has(name)).cloned().map(Some).ok_or_else(|| {
             format!("nothing here runs {} programs; Debian's package is qemu-user", self.processor)
         })
     }
@@ -47,7 +44,7 @@ impl Target {
 /// Builds both programs; gives their folder, or what is missing.
 pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, String>> {
     step(&format!("programs for {}", target.triple));
-    if !(installed(target.triple) || rustup_adds(target.triple)) {
+    if !(has_target(target.triple) || rustup_adds(target.triple)) {
         return Ok(Err(format!("the target is missing: rustup target add {}", target.triple)));
     }
     let variable = format!("CARGO_TARGET_{}_LINKER", target.triple.to_uppercase().replace('-', "_"));
@@ -72,14 +69,6 @@ pub fn without_paths() -> Vec<String> {
         .filter_map(|(folder, name)| folder.map(|folder| (folder, name)))
         .map(|(folder, name)| format!("--remap-path-prefix={}={name}", folder.display()))
         .collect()
-}
-
-fn installed(triple: &str) -> bool {
-    Command::new("rustc")
-        .args(["--print", "target-libdir", "--target", triple])
-        .stderr(Stdio::null())
-        .output()
-        .is_ok_and(|output| PathBuf::from(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
 fn rustup_adds(triple: &str) -> bool {

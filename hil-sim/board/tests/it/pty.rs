@@ -25,6 +25,7 @@ pub struct Program {
     child: Child,
     pub port: String,
     camera: String,
+    second_camera: Option<String>,
     pub gige: Option<String>,
 }
 
@@ -46,7 +47,8 @@ impl Program {
         };
         let (port, camera) = (value("port"), value("camera"));
         let gige = line.contains("\"gige\"").then(|| value("gige"));
-        Self { child, port, camera, gige }
+        let second_camera = line.contains("\"second_camera\"").then(|| value("second_camera"));
+        Self { child, port, camera, second_camera, gige }
     }
 
     /// Closes its standard input and waits for its end.
@@ -168,7 +170,12 @@ pub fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
     let done = client.carry_out(&Request::RunProgram { silence: SILENCE });
     assert!(matches!(done, EventKind::ProgramDone { exposures: 2, .. }), "{done:?}");
     // The frames have waited for us.
-    let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
+    frames_at(&program.camera)
+}
+
+/// The two frames that have waited at an endpoint.
+fn frames_at(address: &str) -> Vec<(FrameHeader, Vec<u8>)> {
+    let mut camera = TcpStream::connect(address).expect("the endpoint is open");
     camera.set_read_timeout(Some(PATIENCE)).expect("a timeout");
     (0..2).map(|_| receive_frame(&mut camera)).collect()
 }
@@ -186,6 +193,33 @@ fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
     let second = capture(&program);
     assert!(program.end().success());
     assert!(first == second, "two programs with one seed differ");
+}
+
+#[test]
+fn behind_a_half_mirror_each_trigger_gives_both_cameras_a_picture() {
+    let program = Program::start(&["--noise", "8bit", "--seed", "3", "--half-mirror"]);
+    let first = capture(&program);
+    let second = frames_at(program.second_camera.as_ref().expect("a second address"));
+    assert!(program.end().success());
+    for (first, second) in first.iter().zip(&second) {
+        assert_eq!(first.0, second.0, "trigger, moment, size and bits");
+        assert_ne!(first.1, second.1, "both sensors stand at one place");
+    }
+    assert_eq!([second[0].0.shot_id, second[1].0.shot_id], [0, 1]);
+    // Half of 45 % of the full well, on average; 3 codes are far less than the other half, and more than what the texture's mean is off.
+    for (_, pixels) in first.iter().chain(&second) {
+        let mean = pixels.chunks(2).map(|code| f64::from(code[0])).sum::<f64>() / (640.0 * 480.0);
+        assert!((mean - 0.225 * 255.0).abs() < 3.0, "{mean}");
+    }
+    // Like the near one of a single camera is the first exposure's at the sensor that stands further: more so than its own far one.
+    let program = Program::start(&["--noise", "8bit", "--seed", "3"]);
+    let single = capture(&program);
+    assert!(program.end().success());
+    let unlike = |pixels: &[u8]| {
+        let bright = second[0].1.chunks(2).map(|code| 2.0 * f64::from(code[0]));
+        bright.zip(pixels.chunks(2)).map(|(a, b)| (a - f64::from(b[0])).powi(2)).sum::<f64>()
+    };
+    assert!(unlike(&single[1].1) < unlike(&single[0].1));
 }
 
 #[test]

@@ -14,6 +14,7 @@
 //! [subject]                  # optional, these are the defaults
 //! height_m = 1.75
 //! head_width_m = 0.17
+//! distance_m = 6.0           # optional, has no default: where it is known; else the head tells it
 //!
 //! [standard_deviations]      # optional, these are the defaults
 //! day = 0.3
@@ -72,11 +73,14 @@ pub struct SubjectPrior {
     pub height_m: f64,
     /// Mean width of a head w.
     pub head_width_m: f64,
+    /// Distance from the lens along the ground, where it is known; else the head's width and row tell it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_m: Option<f64>,
 }
 
 impl Default for SubjectPrior {
     fn default() -> Self {
-        Self { height_m: 1.75, head_width_m: 0.17 }
+        Self { height_m: 1.75, head_width_m: 0.17, distance_m: None }
     }
 }
 
@@ -188,6 +192,9 @@ impl CameraFile {
         within("camera.height_px", c.height_px as f64, 0.0, 1e5, "an image height in pixels")?;
         within("subject.height_m", self.subject.height_m, 0.2, 3.0, "a stature in metres")?;
         within("subject.head_width_m", self.subject.head_width_m, 0.02, 1.0, "a head's width in metres")?;
+        if let Some(distance_m) = self.subject.distance_m {
+            within("subject.distance_m", distance_m, 0.2, 1000.0, "a distance of 0.2 to 1000 m")?;
+        }
         let s = &self.standard_deviations;
         for (name, value) in [
             ("standard_deviations.day", s.day),

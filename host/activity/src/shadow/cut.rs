@@ -11,9 +11,9 @@
 
 use super::camera::CameraFile;
 use super::envelope::{Outline, clear_left_of, row_extent};
+use super::light::Light;
 use super::projection::{self, ImageShadow, ShadowError, Subject};
 use crate::mask::Mask;
-use crate::sun::SunPosition;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use std::str::FromStr;
@@ -80,24 +80,24 @@ fn checked_outline(mask: &Mask, file: &CameraFile) -> Result<Outline, ShadowErro
     Outline::new(mask).ok_or(ShadowError::EmptyMask)
 }
 
-/// Removes the shadow of the one subject in `mask`, with the sun's position and the camera known.
+/// Removes the shadow of the one subject in `mask`, with the camera and the light known, mostly the sun's position.
 ///
 /// `beta_sd_rad` is the standard deviation of the cutting angle ([`super::uncertainty`]); only `thesis` uses it.
 ///
 /// # Errors
-/// Empty masks, a mask of another shape than the camera's, a sun below [`projection::LOWEST_SUN_DEG`].
+/// Empty masks, a mask of another shape than the camera's, a sun below [`projection::LOWEST_SUN_DEG`], a lamp below the head.
 pub fn remove(
     mask: &Mask,
     file: &CameraFile,
-    sun: SunPosition,
+    light: impl Into<Light>,
     beta_sd_rad: f64,
     method: Method,
 ) -> Result<(Mask, CutReport), ShadowError> {
     let camera = &file.camera;
     let outline = checked_outline(mask, file)?;
     let subject = estimate_subject(mask, &outline, file);
-    let ground = projection::on_ground(sun, subject.height_m, camera)?;
-    let shadow = projection::in_image(ground, subject, camera)?;
+    let reach_px = |foot_px, eta_rad| reach_px(mask, &outline, foot_px, eta_rad);
+    let shadow = light.into().shadow_of(subject, camera, reach_px)?;
     let mut out = mask.clone();
     let (beta_rad, half_plane) = match method {
         Method::Thesis => thesis(mask, &mut out, &outline, &shadow, beta_sd_rad),
@@ -117,6 +117,14 @@ pub fn remove(
             trustworthy: removed_fraction <= 0.6 && !away && !shadow.shortened,
         },
     ))
+}
+
+/// How far the silhouette reaches from the feet in the direction that was measured, pixels: so long is the shadow at most.
+fn reach_px(mask: &Mask, outline: &Outline, foot_px: [f64; 2], eta_rad: f64) -> f64 {
+    let (sin, cos) = eta_rad.sin_cos();
+    let (top, bottom, left, right) = outline.bounds;
+    let set = (top..=bottom).flat_map(|y| (left..=right).map(move |x| [y, x])).filter(|place| mask[*place]);
+    set.map(|[y, x]| (x as f64 - foot_px[0]) * cos + (y as f64 - foot_px[1]) * sin).fold(0.0, f64::max)
 }
 
 /// Distance and offset of the subject from its silhouette: the head's width (8.17) and the head's row, weighted by how sure each is.
@@ -146,7 +154,7 @@ fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subjec
         sum += weight / by_row;
         weights += weight;
     }
-    let distance_m = weights / sum;
+    let distance_m = file.subject.distance_m.unwrap_or(weights / sum);
     let slope = (centre - file.camera.principal_point()[0]) / file.camera.focal_px();
     Subject { distance_m, offset_m: slope * distance_m, height_m: file.subject.height_m }
 }

@@ -23,6 +23,16 @@ pub enum ShadowError {
         /// The sun's elevation, degrees.
         elevation_deg: f64,
     },
+    /// A lamp at the height of the head or below.
+    #[error(
+        "the lamp hangs {up_m} m above the ground: no usable shadow below {least_m:.2} m, a tenth above the subject's head"
+    )]
+    LampTooLow {
+        /// Its height, metres.
+        up_m: f64,
+        /// The least that would do, metres.
+        least_m: f64,
+    },
     /// The mask holds nothing.
     #[error("the mask is empty: there is no subject to remove a shadow from")]
     EmptyMask,
@@ -111,10 +121,7 @@ pub fn on_ground(sun: SunPosition, height_m: f64, camera: &Camera) -> Result<Gro
 /// # Errors
 /// A subject that is not in front of the lens.
 pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Result<ImageShadow, ShadowError> {
-    let out_of_sight = ShadowError::Distance { distance_m: subject.distance_m };
-    let foot = [subject.offset_m, subject.distance_m, 0.0];
-    let foot_px = camera.project(foot).ok_or(out_of_sight.clone())?;
-    let head_px = camera.project([foot[0], foot[1], subject.height_m]).ok_or(out_of_sight)?;
+    let (foot_px, height_px) = foot_and_height(subject, camera)?;
     // The lowest row of the image shows the ground at the near limit; a tip beyond it is drawn in along the shadow, which
     // keeps its direction on the ground (8.19).
     let near_m = camera
@@ -125,20 +132,52 @@ pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Resu
         fraction = (near_m - subject.distance_m) / shadow.ry_m;
         shortened = true;
     }
-    let tip = [foot[0] + fraction * shadow.rx_m, foot[1] + fraction * shadow.ry_m, 0.0];
+    let tip = [subject.offset_m + fraction * shadow.rx_m, subject.distance_m + fraction * shadow.ry_m, 0.0];
     let tip_px = camera.project(tip).ok_or(ShadowError::Distance { distance_m: tip[1] })?;
     let m_px = [tip_px[0] - foot_px[0], tip_px[1] - foot_px[1]];
-    let mirrored = m_px[0] <= 0.0;
-    Ok(ImageShadow {
-        foot_px,
-        tip_px,
-        m_px,
-        eta_rad: m_px[1].atan2(m_px[0]),
-        beta_rad: rotation_angle(m_px),
-        mirrored,
-        height_px: foot_px[1] - head_px[1],
-        shortened,
-    })
+    Ok(ImageShadow::new(foot_px, m_px, height_px, shortened))
+}
+
+/// A shadow of which the direction in the image is known, radians from right towards down; `length_px` says how long it is, given the foot.
+///
+/// # Errors
+/// A subject that is not in front of the lens.
+pub fn of_direction(
+    eta_rad: f64,
+    subject: Subject,
+    camera: &Camera,
+    length_px: impl FnOnce([f64; 2]) -> f64,
+) -> Result<ImageShadow, ShadowError> {
+    let (foot_px, height_px) = foot_and_height(subject, camera)?;
+    let (sin, cos) = eta_rad.sin_cos();
+    // Not nothing: a shadow without length has no direction.
+    let length = length_px(foot_px).max(1.0);
+    Ok(ImageShadow::new(foot_px, [length * cos, length * sin], height_px, false))
+}
+
+/// Where the feet stand in the image, and how tall the subject is there.
+fn foot_and_height(subject: Subject, camera: &Camera) -> Result<([f64; 2], f64), ShadowError> {
+    let seen = |up_m| {
+        let point = [subject.offset_m, subject.distance_m, up_m];
+        camera.project(point).ok_or(ShadowError::Distance { distance_m: subject.distance_m })
+    };
+    let (foot_px, head_px) = (seen(0.0)?, seen(subject.height_m)?);
+    Ok((foot_px, foot_px[1] - head_px[1]))
+}
+
+impl ImageShadow {
+    fn new(foot_px: [f64; 2], m_px: [f64; 2], height_px: f64, shortened: bool) -> Self {
+        Self {
+            foot_px,
+            tip_px: [foot_px[0] + m_px[0], foot_px[1] + m_px[1]],
+            m_px,
+            eta_rad: m_px[1].atan2(m_px[0]),
+            beta_rad: rotation_angle(m_px),
+            mirrored: m_px[0] <= 0.0,
+            height_px,
+            shortened,
+        }
+    }
 }
 
 /// The thesis' rotation angle beta (8.20) of a shadow (m_x, m_y), mirrored to the right first: in [pi/2, pi].

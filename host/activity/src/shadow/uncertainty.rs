@@ -103,7 +103,9 @@ pub fn propagate(
             + (d[2] * sd.latitude_deg.to_radians()).powi(2)
     };
     let (azimuth, elevation) = (variance(partial.azimuth), variance(partial.elevation));
-    let distance = distance_variance(file, subject.distance_m);
+    // What was measured is as sure as nothing else here.
+    let known = file.subject.distance_m.is_some();
+    let distance = if known { 0.0 } else { distance_variance(file, subject.distance_m) };
     let tip = tip_variance(file, position.elevation_deg.to_radians(), shadow, azimuth, elevation) + distance;
     let beta = beta_variance(file, shadow, subject, azimuth, distance);
     let tip_m = subject.distance_m + shadow.ry_m;

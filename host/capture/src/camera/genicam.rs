@@ -150,7 +150,9 @@ impl GenicamCamera {
     }
 
     fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
-        |error| match self.lost.load(Ordering::Relaxed) || error.matches(DeviceError::Timeout) {
+        // Aravis takes the number of channels, where nobody tells it, for none.
+        let silent = [DeviceError::Timeout, DeviceError::NoStreamChannel];
+        move |error| match self.lost.load(Ordering::Relaxed) || silent.iter().any(|of| error.matches(*of)) {
             true => self.gone(),
             false => unusable(&self.id, error.to_string()),
         }

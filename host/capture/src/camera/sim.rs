@@ -4,7 +4,10 @@ use std::{
     collections::VecDeque,
     io::{self, Read, Write},
     net::{Shutdown, TcpStream, ToSocketAddrs},
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        mpsc::{Receiver, channel},
+    },
     thread::JoinHandle,
     time::{Duration, Instant},
 };
@@ -19,6 +22,8 @@ use ndarray::Array2;
 use super::{Camera, CameraError, Frame as Picture, Image, Stamp};
 
 const CONNECT: Duration = Duration::from_secs(5);
+/// How long the simulator may take to end the stream of a client that goes.
+const FAREWELL: Duration = Duration::from_secs(1);
 /// Images that wait to be fetched; a full queue holds the sender back, and memory stays bounded.
 const QUEUE: usize = 8;
 /// What a camera that runs freely needs beside its exposures: its read-out, and some time to spare.
@@ -35,9 +40,13 @@ pub struct SimCamera {
     queue: Arc<Queue>,
     // Reads all the time, so that the simulator is not held up while the host waits for the board's events.
     reader: Option<JoinHandle<()>>,
+    /// Nothing comes of it but its end, with the reader's.
+    ended: Receiver<()>,
     runs_freely: bool,
     /// An image that came where an earlier one was due.
     early: Option<Frame>,
+    /// Whose image was passed over last since the camera was armed: that of an earlier exposure than the one that was due.
+    passed: Option<u32>,
 }
 
 struct Frame {
@@ -118,17 +127,31 @@ impl SimCamera {
         let mut input = stream.try_clone().map_err(|error| failed(error.to_string()))?;
         let queue = Arc::new(Queue::default());
         let (filled, name) = (Arc::clone(&queue), address.to_string());
+        let (reading, ended) = channel();
         let reader = std::thread::spawn(move || {
             loop {
                 let frame = read_frame(&mut input, &name);
                 let last = frame.is_err();
                 if !filled.push(frame) || last {
-                    return filled.close();
+                    break;
                 }
             }
+            filled.close();
+            // What still comes is nobody's; the end comes when the simulator knows that this client has gone.
+            let _ = io::copy(&mut input, &mut io::sink());
+            drop(reading);
         });
         let reader = Some(reader);
-        Ok(Self { address: address.into(), stream, queue, reader, runs_freely: false, early: None })
+        Ok(Self {
+            address: address.into(),
+            stream,
+            queue,
+            reader,
+            ended,
+            runs_freely: false,
+            early: None,
+            passed: None,
+        })
     }
 
     /// Lets virtual time pass in the simulator though nothing is under way there.
@@ -165,6 +188,7 @@ impl Camera for SimCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
+        self.passed = None;
         // An older image is told by its trigger number, or by its time, when it comes up.
         let free = mode == TriggerMode::FreeRunning;
         if free {
@@ -189,8 +213,11 @@ impl Camera for SimCamera {
                 match self.early.take().map_or_else(|| self.queue.pop(until), |frame| Ok(Some(Ok(frame)))) {
                     Ok(Some(frame)) => frame?,
                     Ok(None) => {
+                        let passed = self.passed.map_or_else(String::new, |number| {
+                            format!(", whose last image was that of exposure {number}")
+                        });
                         return Err(CameraError::Late {
-                            camera: format!("simulator at {}", self.address),
+                            camera: format!("simulator at {}{passed}", self.address),
                             trigger_number: wanted,
                             waited: wait,
                         });
@@ -205,7 +232,7 @@ impl Camera for SimCamera {
                 shot_id.wrapping_sub(wanted) as i32
             };
             match later {
-                ..0 => {}
+                ..0 => self.passed = (shot_id != FREE_RUNNING).then_some(shot_id),
                 0 => return self.image_of(frame),
                 _ => {
                     self.early = Some(frame);
@@ -234,9 +261,11 @@ impl Camera for SimCamera {
 
 impl Drop for SimCamera {
     fn drop(&mut self) {
-        let _ = self.stream.shutdown(Shutdown::Both);
-        // A reader that waits with a full queue sees that nobody fetches any more.
+        let _ = self.stream.shutdown(Shutdown::Write);
+        // A reader that waits with a full queue sees that nobody fetches any more, one that waits for a frame that the stream ends.
         self.queue.close();
+        let _ = self.ended.recv_timeout(FAREWELL);
+        let _ = self.stream.shutdown(Shutdown::Both);
         if let Some(reader) = self.reader.take() {
             let _ = reader.join();
         }

@@ -4,6 +4,10 @@ use std::{
     fs,
     io::{Read, Write},
     net::TcpListener,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::Duration,
 };
@@ -94,6 +98,24 @@ fn the_simulators_images_are_matched_to_their_exposures() {
     assert!(matches!(skipped, CameraError::Skipped { wanted: 6, came: 7 }), "{skipped:?}");
     let late = camera.image(&shot(8), Duration::from_millis(30)).unwrap_err();
     assert!(matches!(late, CameraError::Late { .. }), "{late:?}");
+}
+
+#[test]
+fn the_simulator_knows_that_a_client_has_gone_before_the_next_one_comes() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let knows = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&knows);
+    let simulator = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        assert_eq!(stream.read(&mut [0]).unwrap(), 0, "it hangs up");
+        // A busy computer: until it knows, it would give a picture to whoever has gone.
+        thread::sleep(Duration::from_millis(200));
+        told.store(true, Ordering::Relaxed);
+    });
+    drop(SimCamera::connect(&address).unwrap());
+    assert!(knows.load(Ordering::Relaxed));
+    simulator.join().unwrap();
 }
 
 #[test]

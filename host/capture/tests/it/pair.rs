@@ -5,6 +5,7 @@ use std::{fs, path::Path, time::Duration};
 use farnear_capture::{
     Client, ClientError,
     camera::{Camera, CameraError, FolderCamera, Image},
+    half_mirror::capture_behind_mirror,
     pair::{CaptureError, Exposures, capture_pair},
     plan::SensorPair,
     record::{Circumstances, begin_folder, finish_folder, read_record, record_of},
@@ -18,12 +19,12 @@ use ndarray::Array2;
 
 const SENSOR: SensorPair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
 
-/// Gives each exposure a picture that tells its trigger number.
-struct Numbered;
+/// A camera that answers for each exposure so.
+struct Answering(fn(&ShotRecord) -> Result<Image, CameraError>);
 
-impl Camera for Numbered {
+impl Camera for Answering {
     fn kind(&self) -> &'static str {
-        "numbered"
+        "answering"
     }
     fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
         Ok(())
@@ -32,8 +33,18 @@ impl Camera for Numbered {
         Ok(())
     }
     fn image(&mut self, shot: &ShotRecord, _: Duration) -> Result<Image, CameraError> {
-        Ok(Image { pixels: Array2::from_elem((3, 4), shot.trigger_number as u16), bits: 8 })
+        self.0(shot)
     }
+}
+
+/// Gives each exposure a picture that tells its trigger number.
+fn numbered() -> Answering {
+    Answering(|shot| Ok(Image { pixels: Array2::from_elem((3, 4), shot.trigger_number as u16), bits: 8 }))
+}
+
+/// Gives the picture of the trigger after the one that was asked for.
+fn one_ahead() -> Answering {
+    Answering(|shot| Err(CameraError::Skipped { wanted: shot.trigger_number, came: shot.trigger_number + 1 }))
 }
 
 fn client() -> (Client, Peer) {
@@ -68,9 +79,10 @@ fn names(folder: &Path) -> Vec<String> {
 fn a_pair_is_homed_moved_exposed_and_written() {
     let (client, peer) = client();
     let mut said = Vec::new();
-    let pair =
-        capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
-            .unwrap();
+    let pair = capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| {
+        said.push(text.to_string())
+    })
+    .unwrap();
     assert!(said[0].contains("homing the sensor's coarse axis (its position is unknown)"), "{said:?}");
     assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 1));
     // The piezo makes up for the 375 nm that the scripted coarse stage is off; its own 2 nm remain.
@@ -90,10 +102,60 @@ fn a_pair_is_homed_moved_exposed_and_written() {
     // The second time it is homed already, and needs no homing.
     let acts = peer.board().acts;
     let mut said = Vec::new();
-    capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
+    capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
         .unwrap();
     assert!(!said.iter().any(|text| text.contains("homing")), "{said:?}");
     assert_eq!(peer.board().acts - acts, 2);
+}
+
+#[test]
+fn behind_a_half_mirror_one_trigger_gives_both_images() {
+    let (client, peer) = client();
+    let take = |exposures: &Exposures| {
+        let cameras: [&mut dyn Camera; 2] = [&mut numbered(), &mut numbered()];
+        capture_behind_mirror(&client, cameras, &SENSOR, 0.15, exposures, &mut |_| {}).unwrap()
+    };
+    let pair = take(&exposures());
+    assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 0));
+    assert_eq!(pair.far.record, pair.near.record);
+    // The second sensor's place is what was said of it, whatever the optics ask for.
+    let apart_mm = pair.near.sensor_measured_mm - pair.far.sensor_measured_mm;
+    assert!((apart_mm - 0.15).abs() < 1e-9 && pair.further_mm == Some(0.15), "{apart_mm}");
+    assert_eq!(pair.near.sensor_asked_mm, SENSOR.near_mm);
+    let acts = peer.board().acts;
+    // One exposure was taken, and it is not counted as motion.
+    let record = &pair.far.record;
+    let until_end = record.strobe_end.0 - record.trigger.0 + u64::from(record.settle.0);
+    assert_eq!(pair.moving_us(), until_end - u64::from(record.exposure.0));
+
+    let averaged = take(&Exposures { averaged: 3, ..exposures() });
+    let more = peer.board().acts - acts;
+    assert_eq!(more, 2, "the coarse stage moved, one program ran");
+    // The triggers 1 to 3 in two bits more: 2 of 255 are 8 of 1023.
+    for taken in [&averaged.far, &averaged.near] {
+        assert_eq!((taken.image.bits, taken.image.pixels[[0, 0]]), (10, 8));
+    }
+}
+
+#[test]
+fn a_picture_of_another_trigger_by_either_camera_is_an_error_with_both_numbers() {
+    for which in [1, 2] {
+        let (client, peer) = client();
+        let (mut good, mut bad) = (numbered(), one_ahead());
+        let cameras: [&mut dyn Camera; 2] =
+            if which == 1 { [&mut bad, &mut good] } else { [&mut good, &mut bad] };
+        let taken = capture_behind_mirror(&client, cameras, &SENSOR, 0.15, &exposures(), &mut |_| {});
+        let error = taken.unwrap_err();
+        assert!(
+            matches!(error, CaptureError::OneCamera { number, cameras: 2, .. } if number == which),
+            "{error:?}"
+        );
+        let said = error.to_string();
+        let expected =
+            format!("camera {which} of 2: the camera skipped exposure 0: it sent the image of exposure 1");
+        assert_eq!(said, expected);
+        assert_eq!(peer.board().stops, 1);
+    }
 }
 
 #[test]
@@ -102,7 +164,7 @@ fn a_port_that_goes_away_leaves_no_folder() {
     peer.board().faults.gone_at_program = true;
     let root = tempfile::tempdir().unwrap();
     let staging = begin_folder(&root.path().join("pair")).unwrap();
-    let error = capture_pair(&client, &mut Numbered, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
+    let error = capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
     drop(staging);
     assert!(matches!(error, CaptureError::Board(ClientError::Gone { .. })), "{error:?}");
     assert_eq!(names(root.path()), Vec::<String>::new());
@@ -122,7 +184,7 @@ impl Camera for OneTooMany {
         Ok(())
     }
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
-        Numbered.image(shot, wait)
+        numbered().image(shot, wait)
     }
     fn finish(&mut self) -> Result<(), CameraError> {
         Err(CameraError::Surplus { camera: self.kind().into() })
@@ -150,7 +212,7 @@ fn a_camera_that_gives_nothing_stops_the_rig() {
 fn optics_out_of_reach_move_nothing() {
     let (client, peer) = client();
     let far_away = SensorPair { far_mm: 90.0, near_mm: 90.1 };
-    let error = capture_pair(&client, &mut Numbered, &far_away, &exposures(), &mut |_| {}).unwrap_err();
+    let error = capture_pair(&client, &mut numbered(), &far_away, &exposures(), &mut |_| {}).unwrap_err();
     assert!(matches!(error, CaptureError::Plan(_)), "{error:?}");
     assert_eq!(peer.board().acts, 0);
 }

@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 
 use crate::border::reflect;
 use crate::confidence;
-use crate::fill::fill_low_texture;
+use crate::fill;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::pipeline::{
@@ -99,7 +99,10 @@ impl Pair {
         let warnings = self.warnings.clone();
         let mut map = DepthMap { depth_mm, confidence: values, low_texture_fraction, warnings };
         if let Some(energy) = energy {
-            fill_low_texture(&mut map, energy.view(), reach_px);
+            // The mean back on: ratios are of light.
+            let pair = [&self.far, &self.near].map(|image| image.mapv(|value| 1.0 + value));
+            let pair = pair.each_ref().map(|image| image.view());
+            fill::fill(&mut map, energy.view(), pair, reach_px, settings.filling());
         }
         // A baseline's own bias may carry much of a scene beyond the near focus.
         let beyond =

@@ -18,7 +18,7 @@ const FIRST_P: f64 = 1.0;
 const P_RATIO: f64 = 1.06;
 
 /// A pair's rings and the blur radii of its images in px.
-type Observation = (Bins, [f64; 2]);
+pub(super) type Observation = (Bins, [f64; 2]);
 
 /// `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`; `scale` multiplies the blur radii.
 fn cost(observations: &[Observation], otf: &Otf, scale: f64) -> f64 {
@@ -69,12 +69,12 @@ fn golden([low, high]: [f64; 2], f: impl Fn(f64) -> f64) -> (f64, f64) {
 }
 
 /// `k` of a Gaussian, and the cost.
-pub(super) fn gaussian(observations: &[Observation]) -> Result<(Psf, f64), CalibrationError> {
+pub(super) fn gaussian(observations: &[Observation]) -> Result<(f64, f64), CalibrationError> {
     let (k, value, at_end) = minimise(K, TRIALS, |k| cost(observations, &Otf::Gaussian { k }, 1.0));
     if at_end {
         return Err(CalibrationError::AtSearchEnd { parameter: "k", value: k });
     }
-    Ok((Psf::Gaussian { k }, value))
+    Ok((k, value))
 }
 
 /// `p` and `k` of a generalised Gaussian, and the cost.

@@ -80,6 +80,8 @@ pub(super) struct Ring {
     pub near: f64,
     /// `Re(I1 conj(I2))`.
     pub cross: f64,
+    /// Number of coefficients that were summed.
+    pub count: f64,
 }
 
 /// The rings of a pair.
@@ -109,15 +111,20 @@ impl Bins {
             }
         }
         for (ring, count) in rings.iter_mut().zip(&counts) {
-            ring.frequency /= count;
+            (ring.frequency, ring.count) = (ring.frequency / count, *count);
         }
-        let rings = rings.into_iter().zip(counts).filter(|(_, count)| *count > 0.0).map(|(ring, _)| ring);
-        Self { rings: rings.collect() }
+        rings.retain(|ring| ring.count > 0.0);
+        Self { rings }
     }
 
     /// Energy of the far image over that of the near one.
     pub(super) fn energy_ratio(&self) -> f64 {
         self.rings.iter().map(|r| r.far).sum::<f64>() / self.rings.iter().map(|r| r.near).sum::<f64>()
+    }
+
+    /// Number of coefficients of an image.
+    pub(super) fn coefficients(&self) -> f64 {
+        self.rings.iter().map(|ring| ring.count).sum()
     }
 
     /// Energy of both.

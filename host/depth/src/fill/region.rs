@@ -3,7 +3,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use super::{GROWN_TEXTURE, Sample, trace_boundary};
-use crate::confidence::{LOW_TEXTURE, texture_scale};
+use crate::confidence::texture_scale;
 use crate::depth_map::DepthMap;
 
 /// Least and greatest width of a margin, px.
@@ -34,12 +34,12 @@ pub(super) struct Regions {
 }
 
 impl Regions {
-    /// The regions of `texture` (NaN: belongs to none), grown by at most `reach_px`; two that meet are one.
-    pub fn find(texture: ArrayView2<f32>, reach_px: usize) -> Self {
+    /// The regions of `low`, grown by at most `reach_px` where there is little `texture` (NaN: belongs to none); two that meet
+    /// are one.
+    pub fn find(low: Array2<bool>, texture: ArrayView2<f32>, reach_px: usize) -> Self {
         let scale = texture_scale(texture);
-        // Without any texture at all everything is one region; the comparison must hold for 0, too.
-        let [low, grown] = [LOW_TEXTURE, GROWN_TEXTURE].map(|part| (part * scale).max(f32::MIN_POSITIVE));
-        let mut mask = texture.mapv(|energy| energy < low);
+        let grown = (GROWN_TEXTURE * scale).max(f32::MIN_POSITIVE);
+        let mut mask = low;
         let mut rim: Vec<(usize, usize)> =
             mask.indexed_iter().filter(|(_, low)| **low).map(|(at, _)| at).collect();
         for _ in 0..reach_px {
@@ -54,6 +54,11 @@ impl Regions {
             }
             rim = next;
         }
+        Self::of(mask, scale)
+    }
+
+    /// The regions of a mask as they are, in reading order of their first pixels.
+    pub fn of(mask: Array2<bool>, scale: f32) -> Self {
         let mut taken = Array2::from_elem(mask.dim(), false);
         let mut regions = Vec::new();
         for (start, _) in mask.indexed_iter().filter(|(_, set)| **set) {

@@ -7,7 +7,7 @@ use super::fast::{Job, Maps, Tile};
 use super::{Backend, DepthMap, RunError, Settings, check, rim};
 use crate::confidence;
 use crate::depth_of_alpha::DepthOfAlpha;
-use crate::fill::fill_low_texture;
+use crate::fill;
 use crate::operators::Operators;
 use crate::optics::Optics;
 use crate::simd;
@@ -101,7 +101,8 @@ impl Processor {
         rim::fill(&mut self.map, self.operators.kernel_size());
         if let Some(texture) = texture {
             let reach_px = check::reach_px(&self.operators, &self.settings);
-            fill_low_texture(&mut self.map, texture.view(), reach_px);
+            let pair = [far.view(), near.view()];
+            fill::fill(&mut self.map, texture.view(), pair, reach_px, self.settings.filling());
         }
         self.map.warnings = input.warnings(&self.operators, &self.optics);
         self.map.warnings.extend(check::after(&self.map, &self.optics));

@@ -11,7 +11,7 @@ use farnear_depth::psf::Psf;
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rustfft::{FftDirection, FftPlanner, num_complex::Complex64};
+use rustfft::{FftDirection, FftPlannerScalar, num_complex::Complex64};
 
 /// Rig of Li 2014: 50 mm, aperture 12.8 mm, 7.4 um pixels, 933 mm far focus, largest blur 2.703 px.
 pub fn rig(psf: &str) -> Optics {
@@ -38,7 +38,7 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
 
 /// Two-dimensional transform in place of a square of side `n`, unscaled.
 fn transform(data: &mut [Complex64], n: usize, direction: FftDirection) {
-    let fft = FftPlanner::new().plan_fft(n, direction);
+    let fft = FftPlannerScalar::new().plan_fft(n, direction);
     for _ in 0..2 {
         fft.process(data);
         for y in 0..n {

@@ -11,4 +11,5 @@ mod input;
 mod optics_files;
 mod planes;
 mod real;
+mod stack;
 mod uncertainty;

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use farnear_depth::{
+    fill::{FILLED_CONFIDENCE, FillBy, LowTexture},
     metrics::{CompareSettings, compare},
     operators::Operators,
     pipeline::{Settings, depth_from_pair},
@@ -22,6 +23,11 @@ const TEXTURE: (usize, usize) = (1280, 960);
 const CENTRE: (f64, f64) = (190.0, 420.0);
 const RADIUS_PX: f64 = 40.0;
 const SCENES: [&str; 4] = ["plane:905", "slant", "cone", "sphere"];
+/// Ways of filling, and without.
+const COLUMNS: usize = 5;
+/// A threshold of the variance of the ratio that lies between that of the disc and of the texture, and the thesis' own.
+const SUITED: f32 = 1e-4;
+const OF_THESIS: f32 = 0.0144;
 /// Textures and noises.
 const REPEATS: u64 = 3;
 
@@ -29,7 +35,10 @@ pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("Filling where there is no texture");
     page.paragraph(&format!(
         "A disc of {RADIUS_PX:.0} px radius without any texture, 110 px beside the image's middle; `--fill` fits a surface to a margin around it. RMSE inside the \
-         disc as measured and filled, over {REPEATS} textures with their noise."
+         disc as measured and filled, over {REPEATS} textures with their noise. Beside it, for comparison, Li 2014's section 6.5 (`--fill=thesis`): regions one after the other, each by seven terms from the \
+         rectangle around it with a pixel to spare; and its criterion with a threshold that suits these scenes (`--low-texture variance:{SUITED}`) and its own of {OF_THESIS} \
+         (in brackets the part of the map that was filled; its inequality is put right). By its own threshold everything is low texture, and nothing is left to fill from; by any threshold the middle of the \
+         range is, where both images are alike, however much texture there is."
     ));
     let sands = (0..REPEATS).map(sand_with_disc).collect::<Result<Vec<_>>>()?;
     let jobs: Vec<_> = PSFS
@@ -40,16 +49,34 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let rows = jobs
         .par_iter()
         .map(|&((name, psf), scene, exposure)| {
-            let mut squares = [0.0; 2];
+            let mut squares = [0.0; COLUMNS];
+            let mut taken = [0.0; COLUMNS];
             for (seed, sand) in (SEED..).zip(&sands) {
-                let errors = one(psf, scene, exposure, sand, seed)?;
-                squares.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error * error);
+                let found = one(psf, scene, exposure, sand, seed)?;
+                for (at, (error, part)) in found.into_iter().enumerate() {
+                    squares[at] += error * error / REPEATS as f64;
+                    taken[at] += 100.0 * part / REPEATS as f64;
+                }
             }
-            let [measured, filled] = squares.map(|sum| (sum / REPEATS as f64).sqrt());
-            Ok(vec![name.into(), scene.into(), exposure.name().into(), mm(measured), mm(filled)])
+            let [measured, filled, thesis, suited, own] = squares.map(f64::sqrt);
+            let [.., of_suited, of_own] = taken;
+            Ok(vec![
+                name.into(),
+                scene.into(),
+                exposure.name().into(),
+                mm(measured),
+                mm(filled),
+                mm(thesis),
+                format!("{} ({of_suited:.0} %)", mm(suited)),
+                format!("{} ({of_own:.0} %)", mm(own)),
+            ])
         })
         .collect::<Result<Vec<Vec<String>>>>()?;
-    page.table(3, &["PSF = operators", "scene", "images", "not filled", "filled"], &rows);
+    let own = format!("variance:{OF_THESIS}");
+    let suited = format!("variance:{SUITED}");
+    let columns =
+        ["PSF = operators", "scene", "images", "not filled", "filled", "as the thesis", &suited, &own];
+    page.table(3, &columns, &rows);
     Ok(())
 }
 
@@ -73,8 +100,15 @@ fn distance_px(row: f64, column: f64) -> f64 {
     (row - CENTRE.0).hypot(column - CENTRE.1)
 }
 
-/// RMSE inside the disc without and with filling, mm.
-fn one(psf: &str, scene: &str, exposure: Exposure, sand: &Picture, seed: u64) -> Result<[f64; 2]> {
+/// RMSE inside the disc in mm and the part of the map that was filled: without filling, filled, as the thesis by the energy, by its
+/// criterion with either threshold.
+fn one(
+    psf: &str,
+    scene: &str,
+    exposure: Exposure,
+    sand: &Picture,
+    seed: u64,
+) -> Result<[(f64, f64); COLUMNS]> {
     let optics = rig::optics(psf)?;
     let operators = Operators::for_optics(&optics)?;
     let scene = Scene { texture: Texture::Picture(sand.clone()), ..scene.parse()? };
@@ -82,13 +116,21 @@ fn one(psf: &str, scene: &str, exposure: Exposure, sand: &Picture, seed: u64) ->
     let disc = Array2::from_shape_fn(pair.truth.dim(), |(row, column)| {
         distance_px(row as f64 + 0.5, column as f64 + 0.5) < RADIUS_PX
     });
-    let rmse = |fill: bool| -> Result<f64> {
-        let settings = Settings { fill, ..Settings::default() };
+    let judged = |fill: bool, low_texture: LowTexture, fill_by: FillBy| -> Result<(f64, f64)> {
+        let settings = Settings { fill, low_texture, fill_by, ..Settings::default() };
         let map = depth_from_pair(pair.far.view(), pair.near.view(), &operators, &optics, &settings)?;
+        let filled = map.confidence.iter().filter(|confidence| **confidence == FILLED_CONFIDENCE).count();
         let settings = CompareSettings::default();
         let error = compare(map.depth_mm.view(), pair.truth.view(), Some(disc.view()), &settings);
         // Nothing inside has a depth: there is no error to state.
-        Ok(error.map_or(f64::NAN, |error| error.rmse_mm))
+        Ok((error.map_or(f64::NAN, |error| error.rmse_mm), filled as f64 / disc.len() as f64))
     };
-    Ok([rmse(false)?, rmse(true)?])
+    let (energy, surface, thesis) = (LowTexture::Energy, FillBy::Surface, FillBy::Thesis);
+    Ok([
+        judged(false, energy, surface)?,
+        judged(true, energy, surface)?,
+        judged(true, energy, thesis)?,
+        judged(true, LowTexture::Variance { below: SUITED }, thesis)?,
+        judged(true, LowTexture::Variance { below: OF_THESIS }, thesis)?,
+    ])
 }

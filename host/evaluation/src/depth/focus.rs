@@ -30,24 +30,30 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let usual = StackSettings::default();
     page.paragraph(&format!(
         "The staircase, Gaussian PSF, 8-bit: {IMAGES} images {:.0} um of sensor travel apart about the middle of the pair's, by `farnear focus-stack` as it is by itself \
-         (`{}`, images blurred by {} px, median {}x{}, up to {} points, reliability {}) but for the window. Beside it the pair, by `ro` with a window of 7. Away from \
+         (`{}`, images blurred by {} px, median {}x{}, guided within {} px, up to {} points, reliability {}) but for what is said. Beside it the pair, by `ro` with a window of 7. Away from \
          steps: more than 8 px. *No value*: too little reliability, or sharpest in the first or last image.",
         1e3 * STEP_MM,
         usual.measure,
         usual.smoothing_px,
         usual.median_px,
         usual.median_px,
+        usual.guided_px,
         usual.fit_points,
         usual.min_reliability
     ));
     let mut rows = Vec::new();
     let views: Vec<_> = images.iter().map(|image| image.view()).collect();
-    for window_px in WINDOWS_PX {
-        let map = depth_from_stack(&views, &StackSettings { window_px, ..usual })?;
+    let windows = WINDOWS_PX.map(|window_px| StackSettings { window_px, ..usual });
+    for settings in windows.into_iter().chain([StackSettings { guided_px: 0.0, ..usual }]) {
+        let map = depth_from_stack(&views, &settings)?;
         let depth =
             map.place.mapv(|place| depth_mm(f64::from(place), places[0], rig::FOCAL_LENGTH_MM) as f32);
-        let ours = if window_px == usual.window_px { " (as it is by itself)" } else { "" };
-        rows.push(row(&format!("stack, window {window_px}{ours}"), &depth, &truth)?);
+        let how = match settings {
+            settings if settings == usual => " (as it is by itself)",
+            settings if settings.guided_px == 0.0 => ", not guided",
+            _ => "",
+        };
+        rows.push(row(&format!("stack, window {}{how}", settings.window_px), &depth, &truth)?);
     }
     let optics = rig::optics(PSF)?;
     let pair = rig::render(&scene, &lens, PSF, Exposure::EightBit, SEED)?;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use farnear_activity::readers::matlab::{self, Array};
 use farnear_depth::{
-    focus_stack::{StackMap, StackSettings, depth_from_stack},
+    fill::{FillBy, LowTexture},
+    focus_stack::{StackMap, StackSettings, USUAL_RELIABILITY, depth_from_stack},
     operators::Operators,
     pipeline::{Settings, depth_from_pair},
 };
@@ -21,8 +22,15 @@ const SLICES: [usize; 2] = [23, 8];
 /// Pixels are judged whose confidence is at least this.
 const LEAST_CONFIDENCE: f32 = 0.5;
 /// Optics are unknown; wide windows bridge their mismatch.
-const SETTINGS: Settings =
-    Settings { smoothing_px: 15, median_px: 7, fill: false, threads: 1, backend: None };
+const SETTINGS: Settings = Settings {
+    smoothing_px: 15,
+    median_px: 7,
+    fill: false,
+    low_texture: LowTexture::Energy,
+    fill_by: FillBy::Surface,
+    threads: 1,
+    backend: None,
+};
 
 pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     let folder = data.join("hci14");
@@ -43,8 +51,8 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
          slices {} and {} are taken as a pair. Their optics and PSF are not known and the pair's blur is far beyond what the operators are made for, so \
          only the order of depths is judged: Spearman's rank correlation with the given depth over pixels of confidence {LEAST_CONFIDENCE} or \
          more. Pill-box, smoothing 15, median 7. Early slices are focused near, as the pictures show, and given values rise with distance. Beside them depth from \
-         focus over all {STACK} slices (`farnear focus-stack --window 9`): over the same pixels, over all pixels, and over those whose reliability is at least \
-         {LEAST_CONFIDENCE}. A wall without texture, as behind Antinous and Greek, has no depth in any stack; over all pixels it is counted with whatever noise says.",
+         focus over all {STACK} slices (`farnear focus-stack` as it is by itself): over the same pixels, over all pixels, with `--guided 0` over all pixels, and over those whose reliability is at least \
+         {USUAL_RELIABILITY}, which are those that the command gives a depth. A wall without texture, as behind Antinous and Greek, has no depth in any stack; over all pixels it is counted with whatever noise says.",
         SLICES[0], SLICES[1]
     ));
     let mut names: Vec<PathBuf> = std::fs::read_dir(folder)?
@@ -60,8 +68,11 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
             let depth = matlab_depth(&scene.join(format!("{name}D.mat")))?;
             let about = || format!("the stack {name}");
             let judged = judge(&slice(SLICES[0]), &slice(SLICES[1]), &depth).with_context(about)?;
-            let stack = from_focus((1..=STACK).map(slice)).with_context(about)?;
-            let reliable = stack.reliability.mapv(|reliability| reliability >= LEAST_CONFIDENCE);
+            let usual = StackSettings::default();
+            let stack = from_focus((1..=STACK).map(slice), &usual).with_context(about)?;
+            let unguided = StackSettings { guided_px: 0.0, ..usual };
+            let unguided = from_focus((1..=STACK).map(slice), &unguided).with_context(about)?;
+            let reliable = stack.reliability.mapv(|reliability| reliability >= USUAL_RELIABILITY);
             let everywhere = Array2::from_elem(depth.dim(), true);
             Ok(Scene {
                 name,
@@ -70,6 +81,7 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
                     100.0 * judged.part,
                     rank_over(&judged.confident, &stack.place, &depth),
                     rank_over(&everywhere, &stack.place, &depth),
+                    rank_over(&everywhere, &unguided.place, &depth),
                     rank_over(&reliable, &stack.place, &depth),
                     100.0 * reliable.iter().filter(|reliable| **reliable).count() as f64 / depth.len() as f64,
                 ],
@@ -95,6 +107,7 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
             "judged, %",
             "stack, same pixels",
             "stack, all pixels",
+            "not guided, all pixels",
             "stack, reliable",
             "reliable, %",
         ],
@@ -106,20 +119,20 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
 /// A scene and its figures, in the table's order.
 struct Scene {
     name: String,
-    figures: [f64; 6],
+    figures: [f64; 7],
 }
 
-fn row(name: &str, figures: [f64; 6]) -> Vec<String> {
-    let decimals = [3, 1, 3, 3, 3, 1];
+fn row(name: &str, figures: [f64; 7]) -> Vec<String> {
+    let decimals = [3, 1, 3, 3, 3, 3, 1];
     let texts = figures.iter().zip(decimals).map(|(figure, decimals)| format!("{figure:.decimals$}"));
     std::iter::once(name.to_owned()).chain(texts).collect()
 }
 
-/// Depth from focus with the usual settings, every pixel with a value.
-fn from_focus(slices: impl Iterator<Item = PathBuf>) -> Result<StackMap> {
+/// Depth from focus, every pixel with a value.
+fn from_focus(slices: impl Iterator<Item = PathBuf>, settings: &StackSettings) -> Result<StackMap> {
     let images: Vec<Array2<f32>> = slices.map(|path| Ok(read_grey(&path)?.pixels)).collect::<Result<_>>()?;
     let views: Vec<_> = images.iter().map(|image| image.view()).collect();
-    let settings = StackSettings { min_reliability: 0.0, ..StackSettings::default() };
+    let settings = StackSettings { min_reliability: 0.0, ..*settings };
     Ok(depth_from_stack(&views, &settings)?)
 }
 
@@ -128,7 +141,7 @@ fn measure_phone(page: &mut Page, folder: &Path) -> Result<()> {
     const PHONE_SLICES: [usize; 2] = [16, 10];
     page.heading("Phone focal stack");
     let slice = |number: usize| folder.join(format!("{number}.jpg"));
-    let reference = from_focus((1..=PHONE_STACK).map(slice))?.place;
+    let reference = from_focus((1..=PHONE_STACK).map(slice), &StackSettings::default())?.place;
     let Judged { rank, part, .. } = judge(&slice(PHONE_SLICES[0]), &slice(PHONE_SLICES[1]), &reference)?;
     page.paragraph(&format!(
         "{PHONE_STACK} slices of a hand-held phone (github.com/iSarmad/Depth-From-Defocus-Matlab), neither telecentric nor aligned and without a given depth. \

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use farnear_depth::{
+    fill::{FillBy, LowTexture},
     pipeline::{MAX_SMOOTHING_PX, Settings},
     prepare::{Align, Balance},
     windowed::Window,
@@ -71,9 +72,14 @@ pub struct Arguments {
     /// Correction saved by `farnear calibrate correction`, applied to the map.
     #[arg(long, value_name = "FILE")]
     correction: Option<PathBuf>,
-    /// Fill regions without texture with the surface of what surrounds them.
-    #[arg(long)]
-    fill: bool,
+    /// Fill regions without texture: with the surface of what surrounds them (surface), or for comparison as the thesis does
+    /// (thesis: one after the other and after any --correction, each with a polynomial fitted to the rectangle around it).
+    #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "surface")]
+    fill: Option<FillBy>,
+    /// What --fill takes for a region without texture: energy (less than a twentieth of the median), or for comparison the
+    /// thesis' variance:T (the variance of (far - near) / (far + near) over the window is below T; without :T 0.0144).
+    #[arg(long, value_name = "CRITERION", requires = "fill", default_value_t)]
+    low_texture: LowTexture,
     /// Write uncertainty.npy too: the standard deviation of each depth in mm, for noise that is estimated from the pair
     /// or follows from the camera, --uncertainty=camera:full_well_e=20000,read_noise_e=12 (and bits=12 where the file has
     /// more); ro and whitened only.
@@ -114,7 +120,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let computation = Settings {
         smoothing_px: arguments.smooth,
         median_px: arguments.median,
-        fill: arguments.fill,
+        fill: arguments.fill.is_some(),
+        low_texture: arguments.low_texture,
+        fill_by: arguments.fill.unwrap_or_default(),
         threads: arguments.threads,
         ..Settings::default()
     };

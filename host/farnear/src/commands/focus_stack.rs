@@ -42,6 +42,10 @@ pub struct Arguments {
     /// Side of the median over the depths found, in pixels: odd, 1 (none) to 31.
     #[arg(long, value_name = "PX", default_value_t = 9)]
     median: usize,
+    /// Mend the depths along the edges of the sharp image, so that things do not grow over what is dull behind them: standard deviation
+    /// of the window in pixels, 1 to 100; 0 = do not.
+    #[arg(long, value_name = "PX", default_value_t = 10.0)]
+    guided: f32,
     /// Side of the window over which sharpness is measured, in pixels: odd, 3 to 101.
     #[arg(long, value_name = "PX", default_value_t = 9)]
     window: usize,
@@ -84,6 +88,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         measure,
         smooth,
         median,
+        guided,
         window,
         points,
         align,
@@ -100,6 +105,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             window_px: window,
             fit_points: points,
             median_px: median,
+            guided_px: guided,
             min_reliability,
         },
         align: align.0,

@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_scene::{Camera, Noise, SceneArgument};
+use farnear_scene::{Camera, Noise};
 
 use crate::{
     render::{self, RenderSettings},
-    report, terminal,
+    report,
+    scene::SceneArgument,
+    terminal,
 };
 
 /// Render a far- and a near-focused image of a known scene, with its true depth.

@@ -11,7 +11,11 @@ use farnear_workflows::{
     simulator::Scenery,
 };
 
-use crate::{report::Usage, terminal};
+use crate::{
+    report::Usage,
+    scene::{SceneArgument, packed},
+    terminal,
+};
 
 /// The port that is tried where none is named.
 const PORT: u16 = 8080;
@@ -57,7 +61,7 @@ pub struct Arguments {
 }
 
 fn scene(text: &str) -> Result<String, farnear_scene::SceneError> {
-    text.parse::<farnear_scene::SceneArgument>().map(|_| text.to_owned())
+    text.parse::<SceneArgument>().map(|_| text.to_owned())
 }
 
 /// Runs the command, until Ctrl-C.
@@ -65,7 +69,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let rig = match arguments.rig.as_deref() {
         // People watch it, so it keeps their time.
         Some("sim") => {
-            Some(RigAddress::Emulated(Scenery { scene: arguments.scene, paced: true, ..Scenery::default() }))
+            let packed_scene = packed(arguments.scene.as_deref())?;
+            let scene = arguments.scene;
+            Some(RigAddress::Emulated(Scenery { scene, packed_scene, paced: true, ..Scenery::default() }))
         }
         _ if arguments.scene.is_some() => bail!(Usage("--scene goes with --rig sim only".into())),
         Some(port) => Some(RigAddress::Port(port.into())),

@@ -52,12 +52,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     report::print(&position(&arguments.moment.moment(), arguments.model)?, arguments.json)
 }
 
-fn latitude(text: &str) -> Result<f64, String> {
+/// Degrees that are a latitude.
+pub fn latitude(text: &str) -> Result<f64, String> {
     let degrees = number(text)?;
     Place::new(degrees, 0.0).map(|place| place.latitude_deg).map_err(|error| error.to_string())
 }
 
-fn longitude(text: &str) -> Result<f64, String> {
+/// Degrees that are a longitude.
+pub fn longitude(text: &str) -> Result<f64, String> {
     let degrees = number(text)?;
     Place::new(0.0, degrees).map(|place| place.longitude_deg).map_err(|error| error.to_string())
 }

@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path};
 
-use farnear_files::{map, npy};
+use farnear_files::{image_file, map, npy};
 use ndarray::Array2;
 use tempfile::TempDir;
 
@@ -86,6 +86,83 @@ fn the_blur_constant_of_a_rendered_pair_is_found() {
     bench.fails(2, &[&["calibrate", "psf"], &pair[..], &["--model", "pillbox"]].concat(), "gaussian");
     let inside = [&find[..], &["--depth", "20"]].concat();
     bench.fails(2, &inside, "no image");
+}
+
+/// A free profile goes through the optics file like any other PSF, and depth by it is as by the model that made the pair.
+#[test]
+fn a_free_profile_is_found_and_used() {
+    let bench = Bench::new();
+    bench.render("plane:933", "8bit", "far");
+    bench.render("plane:905", "8bit", "middle");
+    let pair = ["far/far.png", "far/near.png", "--optics", "optics.toml", "--model", "free"];
+    let found = bench.figures(&[&["calibrate", "psf"], &pair[..], &["--out", "found.toml"]].concat());
+    // Three standard errors of what one pair of a quarter of the usual pixels leaves open.
+    assert!((found["k"].as_f64().unwrap() - 0.4578).abs() < 0.01, "{found}");
+    assert_eq!((found["verdict"].as_str(), found["otf"].as_array().unwrap().len()), (Some("good"), 10));
+    assert!(found["residual"].as_f64() >= found["noise_residual"].as_f64(), "{found}");
+    let written = fs::read_to_string(bench.0.path().join("found.toml")).unwrap();
+    assert!(written.contains("model = \"radial\""), "{written}");
+    let depth = ["depth", "middle/far.png", "middle/near.png", "--out", "out", "--optics"];
+    for optics in ["optics.toml", "found.toml"] {
+        let median = bench.figures(&[&depth[..], &[optics]].concat())["median_mm"].as_f64().unwrap();
+        assert!((median - 905.0).abs() < 0.15, "{optics}: {median}");
+    }
+}
+
+/// What a shift takes from both images is no blur: it is taken off first, and told where it is left.
+#[test]
+fn a_shifted_pair_is_aligned_or_told() {
+    let bench = Bench::new();
+    bench.render("plane:933", "8bit", "far");
+    let near = image_file::read_grey(&bench.0.path().join("far/near.png")).unwrap().pixels;
+    let moved =
+        Array2::from_shape_fn(near.dim(), |(y, x)| (255.0 * near[(y, x.saturating_sub(1))]).round() as u16);
+    fs::write(bench.0.path().join("moved.png"), image_file::encode_png(moved.view(), 8).unwrap()).unwrap();
+    let find =
+        ["calibrate", "psf", "far/far.png", "moved.png", "--optics", "optics.toml", "--model", "gaussian"];
+    let found = bench.figures(&find);
+    assert!((found["k"].as_f64().unwrap() - 0.4578).abs() < 0.004, "{found}");
+    assert!((found["moved_px"][0].as_f64().unwrap() - 1.0).abs() < 0.05, "{found}");
+    let left = bench.figures(&[&find[..], &["--align", "none"]].concat());
+    assert_eq!(left["verdict"], "unexplained", "{left}");
+    let said = bench.output(&[&find[..], &["--align", "none"]].concat());
+    assert!(
+        String::from_utf8_lossy(&said.stderr).contains("warning: the gaussian point spread function leaves")
+    );
+}
+
+/// The thesis' criterion and order of filling, after a correction too.
+#[test]
+fn filling_as_in_the_thesis_is_selectable() {
+    let bench = Bench::new();
+    bench.render("plane:905", "none", "plane");
+    for name in ["far.png", "near.png"] {
+        let path = bench.0.path().join("plane").join(name);
+        let pixels = image_file::read_grey(&path).unwrap().pixels;
+        let blank = Array2::from_shape_fn(pixels.dim(), |(y, x)| {
+            let inside = (y as f32 - 120.0).hypot(x as f32 - 160.0) < 25.0;
+            if inside { 30_000 } else { (65_535.0 * pixels[(y, x)]).round() as u16 }
+        });
+        fs::write(path, image_file::encode_png(blank.view(), 16).unwrap()).unwrap();
+    }
+    let depth = ["depth", "plane/far.png", "plane/near.png", "--optics", "optics.toml", "--out", "out"];
+    let record = || fs::read_to_string(bench.0.path().join("out/depth.toml")).unwrap();
+    let known = |arguments: &[&str]| {
+        let found = bench.figures(&[&depth[..], arguments].concat());
+        found["valid_fraction"].as_f64().unwrap()
+    };
+    let hole = 1.0 - known(&[]);
+    assert!(hole > 0.015, "{hole}");
+    assert!(!record().contains("fill_by") && !record().contains("low_texture ="), "{}", record());
+    let filled = known(&["--fill"]);
+    assert!(filled > 0.999 && !record().contains("fill_by"), "{filled}");
+    let thesis = known(&["--fill=thesis"]);
+    assert!(thesis > 1.0 - 0.7 * hole && record().contains("fill_by = \"thesis\""), "{thesis}: {}", record());
+    known(&["--fill=thesis", "--low-texture", "variance:0.00001"]);
+    assert!(record().contains("low_texture = \"variance:0.00001\""), "{}", record());
+    bench.fails(2, &[&depth[..], &["--fill=cubic"]].concat(), "surface or thesis");
+    bench.fails(2, &[&depth[..], &["--fill", "--low-texture", "entropy"]].concat(), "variance:T");
+    bench.fails(2, &[&depth[..], &["--low-texture", "variance"]].concat(), "--fill");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! What the board does at length, on the emulated rig: focusing, programs, calibration, mathematics, the checklist.
 
-use std::fs;
+use std::{fs, path::Path};
 
-use farnear_files::{map, npy};
+use farnear_files::{image_file::read_grey, map, npy};
 use ndarray::Array2;
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
@@ -77,6 +77,32 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     let run = ["sequence", "--program", &bad, "--out", &folder.text("bad")];
     fails(&mut on_the_rig(&run), 1, &["refused", "300.000 um", "195.000 um"]);
     assert!(!folder.path("bad").exists());
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_map_before_the_emulated_camera_is_seen_as_the_plane_that_it_is() {
+    let folder = Folder::new();
+    folder.file("wall.npy", npy::write(Array2::from_elem((3, 4), 905_f32).view()));
+    let file = folder.file("wall.toml", "depth = \"wall.npy\"\ntexture = \"fractal\"\n");
+    let images = |out: &str, scene: &str| {
+        let out = folder.text(out);
+        let capture =
+            ["capture", "--optics", rig_optics(), "--noise", "none", "--scene", scene, "--out", &out];
+        succeeds(&mut on_the_rig(&capture));
+        ["far.png", "near.png"].map(|name| read_grey(&Path::new(&out).join(name)).expect("an image").pixels)
+    };
+    let (of_map, of_plane) = (images("map", &file), images("plane", "plane:905,texture=fractal"));
+    // Sixteen bits of a plane, which is drawn by another way than a map: at most one code off.
+    for (map, plane) in of_map.iter().zip(&of_plane) {
+        let off = (map - plane).fold(0.0_f32, |most, off| most.max(off.abs()));
+        assert!(off <= 1.01 / 65_535.0, "{off}");
+    }
+    // Refused before the simulator starts.
+    let missing = folder.file("missing.toml", "depth = \"missing.npy\"");
+    let capture =
+        ["capture", "--optics", rig_optics(), "--scene", &missing, "--out", &folder.text("missing")];
+    fails(&mut on_the_rig(&capture), 1, &["missing.toml", "missing.npy"]);
 }
 
 #[test]

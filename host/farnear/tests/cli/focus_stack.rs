@@ -41,6 +41,8 @@ fn each_half_lies_where_it_is_sharpest() {
     for file in ["depth.npy", "confidence.npy", "all-in-focus.png", "view.png", "stack.toml"] {
         assert!(folder.listing().contains(&format!("out/{file}")), "{file}");
     }
+    let record = fs::read_to_string(format!("{out}/stack.toml")).expect("a record");
+    assert!(record.contains("guided_px = 10.0"), "{record}");
     // Numbers of images count from 1.
     for (half, expected) in halves(&read(&out)).iter().zip(SHARPEST) {
         assert!((half - expected - 1.0).abs() < 0.1, "{half}");
@@ -49,6 +51,29 @@ fn each_half_lies_where_it_is_sharpest() {
     let contrast = |half| sharp.slice(half).std(0.0);
     // As in the sharpest images: 200 levels of 255 over a uniform texture; half-way between two images a little less.
     assert!(contrast(s![8..52, 8..32]) > 0.2 && contrast(s![8..52, 48..72]) > 0.2);
+}
+
+/// What a barrel-shaped lens showed nothing of has no depth; everything else keeps its place.
+#[test]
+fn a_lens_that_bends_lines_is_straightened() {
+    let folder = Folder::new();
+    let (stack, out, optics) = (folder.text("stack"), folder.text("out"), folder.text("bent.toml"));
+    self::stack(&folder);
+    let text = "[lens]\nfocal_length_mm = 50.0\nf_number = 4.0\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.7\n\
+                [distortion]\ncamera_matrix = [[100.0, 0, 39.5], [0, 100.0, 29.5], [0, 0, 1]]\ncoefficients = [0.4, 0.0, 0.0, 0.0]\n";
+    fs::write(&optics, text).expect("a file");
+    let arguments = ["focus-stack", &stack, "--out", &out, "--optics", &optics, "--json"];
+    figures(&mut farnear(&arguments));
+    let depth = read(&out);
+    assert!(
+        depth[(0, 0)].is_nan() && depth[(59, 79)].is_nan(),
+        "the corners lie beyond what the lens showed"
+    );
+    for (half, expected) in halves(&depth).iter().zip(SHARPEST) {
+        assert!((half - expected - 1.0).abs() < 0.1, "{half}");
+    }
+    let record = fs::read_to_string(format!("{out}/stack.toml")).expect("a record");
+    assert!(record.contains("[distortion]") && record.contains("0.4"), "{record}");
 }
 
 fn read(out: &str) -> Array2<f32> {
@@ -105,6 +130,7 @@ fn what_is_no_stack_is_refused_and_nothing_is_written() {
         "`sharp` is no focus measure: expected one of modified-laplacian",
     );
     refuse(&[&stack, "--window", "8"], 1, "the window is 8: an odd number from 3");
+    refuse(&[&stack, "--guided", "0.5"], 1, "mended within 0.5 px: 0 (not at all) or 1 to 100 is possible");
     refuse(&["/absent"], 1, "/absent: no such picture or folder");
     fs::write(
         format!("{stack}/5.png"),

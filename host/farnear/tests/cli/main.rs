@@ -18,6 +18,7 @@ mod documents;
 mod emulated_rig;
 mod emulated_work;
 mod focus_stack;
+mod half_mirror;
 mod maps;
 mod markers;
 mod outputs;

@@ -77,6 +77,55 @@ fn shadows_of_seeded_scenes_go_and_people_stay() {
     assert!(mean(&removed) > 70.0 && mean(&wrongly) < 4.0, "{removed:?} {wrongly:?}");
 }
 
+#[test]
+fn a_direction_measured_in_the_picture_does_what_the_sun_does() {
+    let folder = Folder::new();
+    let drawn = scene(Kind::Standard, 2);
+    save_mask(&folder, "masks/frame1.png", &drawn.silhouette);
+    let (camera, time) = camera_and_time(&drawn);
+    let camera = folder.file("camera.toml", camera);
+    let [masks, by_sun, by_hand] = ["masks", "sun", "hand"].map(|name| folder.text(name));
+    let remove = ["shadow", "remove", &masks, "--camera", &camera, "--json", "--out"];
+    let place = ["--lat", "10", "--lon", "0", "--time", &time];
+    let sun = figures(farnear(&remove).arg(&by_sun).args(place));
+    let told = std::fs::read_to_string(folder.path("sun/shadow.toml")).expect("an index");
+    let told: toml::Table = told.parse().expect("TOML");
+    let direction = told["frame"][0]["shadow_direction_deg"].to_string();
+    let hand = figures(farnear(&remove).arg(&by_hand).args(["--shadow-direction", &direction]));
+    let [sun_percent, hand_percent] = [&sun, &hand].map(|found| number(found, "removed_percent"));
+    // The direction has two decimals, and cuts go by whole pixels.
+    assert!((sun_percent - hand_percent).abs() < 1.0, "{sun} {hand}");
+    assert!(sun.get("sun_in_view").is_some() && hand.get("sun_in_view").is_none(), "{hand}");
+}
+
+#[test]
+fn a_lamp_throws_shadows_where_it_hangs_high_enough() {
+    let folder = Folder::new();
+    // A person whose shadow lies to the right, as a lamp to the left throws it; 6 m away by the file.
+    let shadow = |y: usize, x: usize| (355..365).contains(&y) && (320..460).contains(&x);
+    save(&folder, "masks/a1.png", |y, x| if person(y, x) || shadow(y, x) { 255 } else { 0 });
+    let camera = folder.file("camera.toml", format!("{CAMERA}[subject]\ndistance_m = 6.0\n"));
+    let [masks, out] = ["masks", "out"].map(|name| folder.text(name));
+    let remove = ["shadow", "remove", &masks, "--camera", &camera, "--out", &out, "--json"];
+    fails(&mut farnear(&remove), 2, &["--lat", "required"]);
+    fails(farnear(&remove).args(["--lamp", "-3,6"]), 2, &["RIGHT,AHEAD,UP"]);
+    fails(farnear(&remove).args(["--lamp", "-3,6,1.8"]), 1, &["the lamp hangs 1.8 m above the ground"]);
+    fails(
+        farnear(&remove).args(["--lamp", "-3,6,3", "--shadow-direction", "10"]),
+        2,
+        &["--lamp", "cannot be used"],
+    );
+    fails(farnear(&remove).args(["--shadow-direction", "200"]), 2, &["200", "-180"]);
+    let found = figures(farnear(&remove).args(["--lamp", "-3,6,3"]));
+    // The shadow is 1,250 pixels of 12,050: most of them go.
+    assert!(number(&found, "removed_percent") > 5.0, "{found}");
+    let told = std::fs::read_to_string(folder.path("out/shadow.toml")).expect("an index");
+    let told: toml::Table = told.parse().expect("TOML");
+    assert_eq!(told["frame"][0]["distance_m"].as_float(), Some(6.0));
+    // The lamp is as far away as the person: the shadow lies across the picture.
+    assert_eq!(told["frame"][0]["shadow_direction_deg"].as_float().map(f64::abs), Some(0.0));
+}
+
 const CAMERA: &str = "[camera]\nheight_m = 1.5\nazimuth_deg = 0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
 
 /// A person of 60 x 180 pixels, standing.

@@ -10,6 +10,7 @@ use axum::{
 use farnear_depth::{
     calibrate::Model,
     corrections::{CdcSettings, Method},
+    prepare::Align,
 };
 use farnear_workflows::{
     Context, WorkflowError,
@@ -172,7 +173,8 @@ async fn find_psf(
     if pairs.is_empty() {
         return Err(bad("no pair was chosen: capture a flat, textured target first".into()));
     }
-    let settings = PsfSettings { pairs, optics: app.optics_file(), model, out: None };
+    let align = Align::default();
+    let settings = PsfSettings { pairs, optics: app.optics_file(), model, align, out: None };
     let work = move |_: &App, context: &Context<'_>| figures(psf::fit(&settings, context)?);
     compute(&app, Task { kind: "psf", title: "Find the point spread function".into(), work: Box::new(work) })
 }

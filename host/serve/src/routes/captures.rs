@@ -24,6 +24,7 @@ use super::{Body, Shared, aside, driver, seated};
 use crate::{
     api::{Api, For},
     app::App,
+    depth_message::show_fresh,
     failure::Failure,
     lane::Task,
     routes::rig::{begin, connected, figures},
@@ -176,8 +177,12 @@ async fn capture(
                 None => free("pair", 1)?.remove(0),
             };
             let settings = PairSettings { rig, camera, optics, averaged, frames: None, out: out.clone() };
+            let capture = name_of(&out);
             let work = move |app: &App, context: &Context<'_>| {
-                kept(app, figures(pair::capture(&settings, context)?))
+                let captured = pair::capture_seen(&settings, context, |pair| {
+                    show_fresh(app, &capture, &pair.far.image, &pair.near.image);
+                });
+                kept(app, figures(captured?))
             };
             (Task { kind: "pair", title: "Capture a pair".into(), work: Box::new(work) }, vec![out])
         }
@@ -233,11 +238,13 @@ async fn capture(
             )
         }
     };
-    let names =
-        out.iter().map(|folder| folder.file_name().unwrap_or_default().to_string_lossy().into_owned());
-    let names = names.collect();
+    let names = out.iter().map(|folder| name_of(folder)).collect();
     let Json(Begun { job }) = begin(&app, task)?;
     Ok(Json(Capturing { job, names }))
+}
+
+fn name_of(folder: &std::path::Path) -> String {
+    folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// A capture has come.

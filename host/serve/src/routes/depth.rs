@@ -7,6 +7,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use farnear_depth::{
+    fill::{FillBy, LowTexture, UnknownCriterion, UnknownFilling},
     pipeline::Settings,
     prepare::{Align, Balance},
 };
@@ -48,6 +49,10 @@ pub struct DepthWish {
     pub median_px: usize,
     /// Whether regions of low texture are filled.
     pub fill: bool,
+    /// How: `surface`, or in the thesis' order as `thesis`; only with `fill`.
+    pub fill_by: Option<String>,
+    /// What counts as low texture: `energy`, or the thesis' `variance:T`; only with `fill`.
+    pub low_texture: Option<String>,
     /// Whether the correction that the session has learned is applied.
     pub corrected: bool,
     /// Name of the capture's folder within which another map is kept; without it the capture's own.
@@ -63,6 +68,8 @@ impl Default for DepthWish {
             smooth_px: smoothing_px,
             median_px,
             fill,
+            fill_by: None,
+            low_texture: None,
             corrected: false,
             variant: None,
         }
@@ -134,6 +141,20 @@ pub fn routes(api: Api) -> Api {
     )
 }
 
+/// The way of filling, and by what it is told what to fill.
+fn filling(wish: &DepthWish) -> Result<(FillBy, LowTexture), Failure> {
+    let refused = |message: String| Failure::new(StatusCode::BAD_REQUEST, message);
+    if !wish.fill && (wish.fill_by.is_some() || wish.low_texture.is_some()) {
+        return Err(refused("fill_by and low_texture say how to fill: give fill = true too".into()));
+    }
+    let by = wish.fill_by.as_deref().map(str::parse).transpose();
+    let low = wish.low_texture.as_deref().map(str::parse).transpose();
+    Ok((
+        by.map_err(|error: UnknownFilling| refused(error.to_string()))?.unwrap_or_default(),
+        low.map_err(|error: UnknownCriterion| refused(error.to_string()))?.unwrap_or_default(),
+    ))
+}
+
 async fn compute(
     State(app): Shared,
     Path(name): Path<String>,
@@ -145,6 +166,7 @@ async fn compute(
     let method: Method = wish.method.parse().map_err(|error: depth::method::UnknownMethod| {
         Failure::new(StatusCode::BAD_REQUEST, format!("method {:?}: {error}", wish.method))
     })?;
+    let (fill_by, low_texture) = filling(&wish)?;
     // A path would let the page read any file as operators.
     let named = |text: &String| text.chars().all(|c| c.is_ascii_alphanumeric() || ":-".contains(c));
     if let Some(operators) = wish.operators.as_ref().filter(|text| !named(text)) {
@@ -168,6 +190,8 @@ async fn compute(
             smoothing_px: wish.smooth_px,
             median_px: wish.median_px,
             fill: wish.fill,
+            fill_by,
+            low_texture,
             threads: 0,
             ..Settings::default()
         },
@@ -250,4 +274,35 @@ async fn mesh(State(app): Shared, Path(name): Path<String>) -> Result<Response, 
     let folder = sessions::folder_of(&app.session, &name)?;
     let bytes = aside(move || Ok(measure::mesh(&folder, MESH_PIXELS)?)).await?;
     Ok(bytes.into_response())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(json: &str) -> Result<(FillBy, LowTexture), String> {
+        let wish: DepthWish = serde_json::from_str(json).expect("a wish");
+        filling(&wish).map_err(|failure| failure.error)
+    }
+
+    #[test]
+    fn filling_is_asked_for_in_the_command_line_s_words() {
+        assert_eq!(asked("{}"), Ok((FillBy::Surface, LowTexture::Energy)));
+        assert_eq!(asked(r#"{"fill": true}"#), Ok((FillBy::Surface, LowTexture::Energy)));
+        assert_eq!(
+            asked(r#"{"fill": true, "fill_by": "thesis", "low_texture": "variance:0.02"}"#),
+            Ok((FillBy::Thesis, LowTexture::Variance { below: 0.02 }))
+        );
+    }
+
+    #[test]
+    fn words_that_nobody_knows_and_words_without_filling_are_refused() {
+        for (json, phrase) in [
+            (r#"{"fill": true, "fill_by": "magic"}"#, "magic"),
+            (r#"{"fill": true, "low_texture": "dull"}"#, "dull"),
+            (r#"{"low_texture": "variance"}"#, "fill = true"),
+        ] {
+            assert!(asked(json).is_err_and(|said| said.contains(phrase)), "{json}");
+        }
+    }
 }

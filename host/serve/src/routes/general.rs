@@ -56,7 +56,7 @@ pub fn routes(api: Api) -> Api {
         .get_bytes(
             "/api/socket",
             "A WebSocket: first a Hello with a seat, then the State at every change, and live pictures (u32 length of a JSON \
-             header, header, pixels). {\"type\":\"stop\"} stops the rig; {\"type\":\"seen\"} after each picture lets the next one come at once, \
+             header, header, pixels), among them the depth of a pair that was just taken (type fresh). {\"type\":\"stop\"} stops the rig; {\"type\":\"seen\"} after each picture lets the next one come at once, \
              without it they come once a second.",
             "application/json",
             socket::open,

@@ -1,6 +1,6 @@
 //! What was captured, and what is measured in it.
 
-use std::fs;
+use std::{fs, path::Path, process::Command};
 
 use farnear_files::image_file::encode_png;
 use ndarray::Array2;
@@ -126,4 +126,76 @@ fn optics_are_checked_before_they_are_kept() {
         json!({ "optics": served.get("/api/optics").json()["optics"], "readings": { "far_mm": 5.17 } });
     let found = served.post("/api/optics/calculate", "", &typed.to_string()).json();
     assert!((found["figures"]["reading_near"]["mm"].as_f64().unwrap() - 5.3263).abs() < 1e-3, "{found:#}");
+}
+
+/// The files of a capture, with those that are not whole.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// The system lets this process write files of 8 to 16 kB and no larger, whatever the disk holds: far and near images are smaller, maps of
+/// them are not.
+#[test]
+fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
+    const WITHIN: &str = "FARNEAR_TEST_SMALL_FILES";
+    if std::env::var_os(WITHIN).is_none() {
+        let script = r#"trap "" XFSZ; ulimit -f 16; exec "$0" --exact captures::a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written"#;
+        let program = std::env::current_exe().unwrap();
+        let ended = Command::new("sh").args(["-c", script]).arg(program).env(WITHIN, "1").output().unwrap();
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stdout));
+        return;
+    }
+    let served = Served::captures_only();
+    let socket = Socket::open(&served);
+    put(&served, "pair-001", 0);
+    let folder = served.session.join("pair-001");
+    let before = names(&folder);
+    let job = computed(&served, &socket.secret, "pair-001", &json!({}));
+    assert_eq!(job["phase"], "failed", "{job:#}");
+    assert!(job["error"].as_str().is_some_and(|error| error.contains("cannot write")), "{job:#}");
+    assert_eq!(names(&folder), before);
+    // Nothing else suffers: what is there is shown, and a note is small enough.
+    assert_eq!(served.get("/api/captures/pair-001/files/far.png").status, 200);
+    let note = json!({ "rating": 1, "text": "the disk is full" }).to_string();
+    let seat = [("x-farnear-seat", socket.secret.as_str())];
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &seat, &note).status, 200);
+}
+
+#[test]
+fn what_another_program_does_to_the_session_is_seen_and_said() {
+    let served = Served::captures_only();
+    let socket = Socket::open(&served);
+    let listed = || served.get("/api/captures").json()["captures"].as_array().unwrap().len();
+    put(&served, "pair-001", 0);
+    put(&served, "pair-002", 1);
+    assert_eq!(listed(), 2);
+    // A capture goes, comes under another name, loses an image, or is no folder any more.
+    fs::rename(served.session.join("pair-001"), served.session.join("moved")).unwrap();
+    assert_eq!((listed(), served.get("/api/captures/pair-001").status), (2, 404));
+    assert_eq!(served.get("/api/captures/moved").status, 200);
+    fs::remove_file(served.session.join("moved/near.png")).unwrap();
+    let job = computed(&served, &socket.secret, "moved", &json!({}));
+    assert!(job["error"].as_str().is_some_and(|error| error.contains("near.png")), "{job:#}");
+    fs::write(served.session.join("pair-002/far.png"), b"no picture").unwrap();
+    let job = computed(&served, &socket.secret, "pair-002", &json!({}));
+    assert!(job["error"].as_str().is_some_and(|error| error.contains("far.png")), "{job:#}");
+    fs::remove_dir_all(served.session.join("pair-002")).unwrap();
+    fs::write(served.session.join("pair-002"), b"a file").unwrap();
+    let refused = served.get("/api/captures/pair-002");
+    assert!(refused.status == 404 && refused.error().contains("pair-002"), "{refused:?}");
+    // The optics are spoiled, then mended.
+    let whole = fs::read(served.session.join("optics.toml")).unwrap();
+    fs::write(served.session.join("optics.toml"), "[lens]\nfocal_length_mm = \"?\"\n").unwrap();
+    let spoiled = served.get("/api/optics");
+    assert!(spoiled.status >= 400 && spoiled.error().contains("optics.toml"), "{spoiled:?}");
+    fs::write(served.session.join("optics.toml"), whole).unwrap();
+    assert_eq!(served.get("/api/optics").status, 200);
+    // The whole folder goes.
+    fs::remove_dir_all(&served.session).unwrap();
+    assert_eq!(served.get("/api/state").status, 200);
+    assert!(served.get("/api/captures/moved").status >= 400);
 }

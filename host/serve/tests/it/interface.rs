@@ -138,6 +138,9 @@ fn the_page_and_its_files_are_there_with_a_policy() {
         assert!(answer.headers.contains(&format!("content-type: {media}")), "{}", answer.headers);
         assert!(answer.headers.contains("content-security-policy: default-src 'self'"), "{}", answer.headers);
     }
+    // What a browser keeps that gets no further than the page's text.
+    let page = String::from_utf8(served.get("/").body).unwrap();
+    assert!(page.contains("it needs JavaScript, and a browser not older than"), "{page}");
     assert_eq!(served.get("/../Cargo.toml").status, 404);
     assert_eq!(served.get("/nothing").error(), "there is no such page");
     assert_eq!(served.ask("DELETE", "/api/state", &[], "").status, 405);

@@ -19,7 +19,8 @@ use serde::Serialize;
 
 use super::{
     film::{Film, Shown},
-    recognition::{Model, Part, Share, outlier_score, restricted, rounded_share, shares, unknown_because},
+    recognition::Model,
+    verdict::{Part, Verdict, of_segments, outlier_score, parts, restricted, rounded_share},
     views::{Frames, View},
 };
 use crate::{
@@ -103,17 +104,9 @@ pub struct PersonFigures {
     pub crossing_frames: usize,
     /// Those with whom this one may have been swapped.
     pub perhaps_swapped_with: Vec<usize>,
-    /// The activity; `None` is unknown.
-    pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
-    pub confidence: f64,
-    /// Outlier score.
-    pub strangeness: Option<f64>,
-    /// Why the activity is unknown.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reason: Option<String>,
-    /// Probability of every activity.
-    pub shares: Vec<Share>,
+    /// For all that was seen.
+    #[serde(flatten)]
+    pub verdict: Verdict,
     /// Stretches of one activity each, by a hidden semi-Markov model.
     pub segments: Vec<Part>,
 }
@@ -334,20 +327,8 @@ fn figures(
         silhouettes: numbers.len(),
         crossing_frames: somebody.crossing_frames,
         perhaps_swapped_with: somebody.perhaps_swapped_with.clone(),
-        confidence: rounded_share(answer.confidence),
-        strangeness: outlier_score(&answer),
-        reason: unknown_because(&answer, numbers.len()),
-        activity: answer.activity.clone(),
-        shares: shares(answer),
-        segments: found
-            .iter()
-            .map(|segment| Part {
-                from: at(segment.from),
-                to: at(segment.to.saturating_sub(1)),
-                activity: segment.activity.clone(),
-                confidence: rounded_share(segment.confidence),
-            })
-            .collect(),
+        verdict: Verdict::new(answer, numbers.len()),
+        segments: parts(of_segments(&found), &numbers, at(numbers.len().saturating_sub(1))),
     })
 }
 

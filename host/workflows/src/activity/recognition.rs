@@ -11,7 +11,7 @@ use farnear_activity::{
     recognition::{
         clip::Track,
         live::{Live, joined, windows},
-        model::{Answer, Recogniser},
+        model::Recogniser,
         segmentation::{Worth, segmented},
         self_training::ROUNDS,
     },
@@ -23,6 +23,7 @@ use super::{
     film::Film,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
+    verdict::{Part, Verdict, of_segments, outlier_score, parts, restricted, rounded_share},
     views::{Frames, Seen, View},
 };
 use crate::{
@@ -170,17 +171,9 @@ pub struct FrameAnswer {
 /// The answer for the whole recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecognitionFigures {
-    /// The activity; `None` is unknown.
-    pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
-    pub confidence: f64,
-    /// Outlier score, as in [`FrameAnswer`].
-    pub strangeness: Option<f64>,
-    /// Why the activity is unknown.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reason: Option<String>,
-    /// Probability of every activity.
-    pub shares: Vec<Share>,
+    /// For all of it.
+    #[serde(flatten)]
+    pub verdict: Verdict,
     /// Frames of a view.
     pub frames: usize,
     /// Masks of all views without anybody.
@@ -195,28 +188,6 @@ pub struct RecognitionFigures {
     pub segments: Vec<Part>,
     /// From a file to its part of a running answer.
     pub seconds_per_frame: f64,
-}
-
-/// Probability of an activity.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Share {
-    /// The activity.
-    pub activity: String,
-    /// 0 to 1; all add up to 1.
-    pub share: f64,
-}
-
-/// A stretch of the recording; frames from 1, both ends included.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Part {
-    /// First frame.
-    pub from: usize,
-    /// Last frame.
-    pub to: usize,
-    /// The activity; `None` is unknown.
-    pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
-    pub confidence: f64,
 }
 
 /// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
@@ -325,66 +296,18 @@ impl<'m> Recognition<'m> {
         let numbers: Vec<usize> = seen
             .into_iter()
             .flat_map(|frames| (0..).zip(frames).filter(|(_, track)| track.frames() > 0))
-            .map(|(number, _)| number)
+            .map(|(number, _)| number + 1)
             .collect();
-        let part = |from: usize, to: usize, activity: &Option<String>, confidence| Part {
-            from: numbers.get(from).copied().unwrap_or(0) + 1,
-            to: to.checked_sub(1).and_then(|last| numbers.get(last)).map_or(self.frames, |last| last + 1),
-            activity: activity.clone(),
-            confidence: rounded_share(confidence),
-        };
+        let windows = stretches.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
         Ok(RecognitionFigures {
-            confidence: rounded_share(answer.confidence),
-            strangeness: outlier_score(&answer),
-            reason: unknown_because(&answer, self.frames),
-            activity: answer.activity.clone(),
-            shares: shares(answer),
+            verdict: Verdict::new(answer, self.frames),
             frames: self.frames,
             empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
             flagged_frames: self.flagged_frames,
             window: self.window,
-            windows: stretches
-                .iter()
-                .map(|s| part(s.from, s.to, &s.answer.activity, s.answer.confidence))
-                .collect(),
-            segments: found.iter().map(|s| part(s.from, s.to, &s.activity, s.confidence)).collect(),
+            windows: parts(windows, &numbers, self.frames),
+            segments: parts(of_segments(&found), &numbers, self.frames),
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
         })
     }
-}
-
-/// Probability of every activity.
-pub(super) fn shares(answer: Answer) -> Vec<Share> {
-    let share = |(activity, value)| Share { activity, share: rounded_share(value) };
-    answer.probabilities.into_iter().map(share).collect()
-}
-
-/// The answer if only some activities can be; all can where none is named.
-pub(super) fn restricted(answer: Answer, among: &[String]) -> Answer {
-    if among.is_empty() { answer } else { answer.among(among) }
-}
-
-/// Why an answer is unknown, in words; `None` where it is not.
-pub(super) fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
-    if answer.activity.is_some() {
-        return None;
-    }
-    let score = answer.outlier_score;
-    Some(match answer.best() {
-        _ if frames == 0 => "there is no frame".into(),
-        Some(best) if score.is_finite() => {
-            format!("most like `{best}`, but {score:.2} times as far from it as what the model knows")
-        }
-        _ => format!("nobody is seen in any of the {frames} frames"),
-    })
-}
-
-/// A share with four decimals, without the digits that f32 does not have.
-pub(super) fn rounded_share(value: f32) -> f64 {
-    rounded(f64::from(value), 4)
-}
-
-/// JSON has no infinity: nothing was seen.
-pub(super) fn outlier_score(answer: &Answer) -> Option<f64> {
-    answer.outlier_score.is_finite().then(|| rounded_share(answer.outlier_score))
 }

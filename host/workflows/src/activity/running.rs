@@ -20,7 +20,10 @@ use farnear_files::video::{Pixels, Video, VideoFrame};
 use ndarray::{Array2, Axis};
 use serde::Serialize;
 
-use super::recognition::{Model, Share};
+use super::{
+    recognition::Model,
+    verdict::{Share, rounded_share, shares},
+};
 use crate::{
     context::Context,
     error::{About, Result},
@@ -109,7 +112,7 @@ impl<'m> Watcher<'m> {
         self.seconds += start.elapsed().as_secs_f64();
         let told = RunningAnswer {
             frame: self.tracks.len(),
-            confidence: share(answer.confidence),
+            confidence: rounded_share(answer.confidence),
             best: best(&answer),
             activity: answer.activity,
             flags: found.flags.iter().map(Flag::to_string).collect(),
@@ -127,7 +130,7 @@ impl<'m> Watcher<'m> {
         let answer = self.model.recognise(&[whole])?;
         let frames = self.tracks.len();
         Ok(RunningFigures {
-            confidence: share(answer.confidence),
+            confidence: rounded_share(answer.confidence),
             best: best(&answer),
             activity: answer.activity,
             frames,
@@ -194,17 +197,8 @@ fn eight_bits(image: &Image) -> Array2<u8> {
 }
 
 fn best(answer: &Answer) -> Vec<Share> {
-    let mut shares: Vec<Share> = answer
-        .probabilities
-        .iter()
-        .map(|(activity, value)| Share { activity: activity.clone(), share: share(*value) })
-        .collect();
+    let mut shares = shares(answer);
     shares.sort_by(|a, b| b.share.total_cmp(&a.share));
     shares.truncate(BEST);
     shares
-}
-
-/// With four decimals, without the digits that f32 does not have.
-fn share(value: f32) -> f64 {
-    rounded(f64::from(value), 4)
 }

@@ -1,10 +1,12 @@
-//! The point spread function from pairs of a flat, textured target: k of a Gaussian, or p and k of a generalised one.
+//! The point spread function from pairs of a flat, textured target: k of a Gaussian, p and k of a generalised one, or any round
+//! profile.
 
 use std::path::PathBuf;
 
 use farnear_depth::{
-    calibrate::{CapturedPair, Model, fit_psf},
+    calibrate::{CapturedPair, Model, PsfFit, Verdict, fit_psf, made_ready},
     optics::Optics,
+    prepare::Align,
     psf::Psf,
 };
 use farnear_files::{image_file::read_grey, staging};
@@ -12,7 +14,7 @@ use serde::Serialize;
 
 use crate::{
     context::Context,
-    error::{Result, WorkflowError},
+    error::{About, Result, WorkflowError},
     figures::rounded,
     optics,
 };
@@ -40,6 +42,8 @@ pub struct PsfSettings {
     pub optics: PathBuf,
     /// What to find.
     pub model: Model,
+    /// How the near image of each pair is laid on the far one, after the lens' distortion was taken out of both.
+    pub align: Align,
     /// Where the optics with what was found are written to.
     pub out: Option<PathBuf>,
 }
@@ -52,15 +56,31 @@ pub struct PsfFigures {
     /// Exponent of a generalised Gaussian.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
-    /// Width over blur radius.
+    /// Width over blur radius; of a free profile that of a Gaussian with its second moment.
     pub k: f64,
+    /// Standard error of p.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error_p: Option<f64>,
+    /// Standard error of k.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error_k: Option<f64>,
     /// What is left of the images' energy when one is made from the other, 0 to 1.
     pub residual: f64,
+    /// What noise alone leaves.
+    pub noise_residual: f64,
+    /// `good`, `loose` (open by more than a percent) or `unexplained` (more is left than noise).
+    pub verdict: String,
     /// Where the target was taken to stand; the first of several.
     pub target_mm: f64,
     /// Where each of several was.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub targets_mm: Vec<f64>,
+    /// How far pixels of each near image were moved, px, where one was.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub moved_px: Vec<f64>,
+    /// The OTF of a free profile: frequency times blur radius (rad), value, standard error.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub otf: Vec<[f64; 3]>,
 }
 
 /// Finds the point spread function.
@@ -69,17 +89,24 @@ pub struct PsfFigures {
 /// Optics, images, [`WorkflowError::Calibration`]; [`WorkflowError::Parameter`] for a target inside the focal length.
 pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> {
     let optics = optics::read(&settings.optics)?;
-    let mut images = Vec::new();
+    let (mut images, mut moved_px) = (Vec::new(), Vec::new());
     for pair in &settings.pairs {
         let alpha = pair.depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
-        images.push((read_grey(&pair.far)?.pixels, read_grey(&pair.near)?.pixels, alpha));
+        let read = [read_grey(&pair.far)?.pixels, read_grey(&pair.near)?.pixels];
+        let (ready, report) = made_ready(read, &optics, settings.align)
+            .about(|| format!("{} and {}", pair.far.display(), pair.near.display()))?;
+        images.push((ready, alpha));
+        moved_px.push(report.aligned.map_or(0.0, |aligned| rounded(aligned.displacement_px, 3)));
         context.cancel.check("reading the pairs")?;
     }
     let pairs: Vec<CapturedPair<'_>> = images
         .iter()
-        .map(|(far, near, alpha)| CapturedPair { far: far.view(), near: near.view(), alpha: *alpha })
+        .map(|([far, near], alpha)| CapturedPair { far: far.view(), near: near.view(), alpha: *alpha })
         .collect();
     let found = fit_psf(&pairs, &optics, settings.model)?;
+    if let Some(doubt) = doubt(&found, settings.model) {
+        context.progress.warn(&doubt);
+    }
     context.cancel.check("fitting the point spread function")?;
     let psf = rounded_psf(found.psf);
     if let Some(out) = &settings.out {
@@ -89,18 +116,51 @@ pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> 
     let (p, k) = match psf {
         Psf::Gaussian { k } => (None, k),
         Psf::Generalised { p, k } => (Some(p), k),
-        // No model of a calibration.
-        Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => (None, 1.0),
+        Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => (None, rounded(found.width(), DECIMALS[1])),
     };
     let targets_mm: Vec<f64> = found.alphas.iter().map(|alpha| rounded(optics.depth_mm(*alpha), 3)).collect();
     Ok(PsfFigures {
         psf: psf.to_string(),
         p,
         k,
+        standard_error_p: found.standard_error_p.map(|error| rounded(error, DECIMALS[0] + 1)),
+        standard_error_k: found.standard_error_k.map(|error| rounded(error, DECIMALS[1] + 1)),
         residual: rounded(found.residual, 6),
+        noise_residual: rounded(found.noise, 6),
+        verdict: found.verdict().to_string(),
         target_mm: targets_mm.first().copied().unwrap_or(f64::NAN),
         targets_mm: if targets_mm.len() > 1 { targets_mm } else { Vec::new() },
+        moved_px: if moved_px.iter().any(|moved| *moved > 0.0) { moved_px } else { Vec::new() },
+        otf: found
+            .otf
+            .iter()
+            .map(|point| [point.z, rounded(point.value, 5), rounded(point.standard_error, 6)])
+            .collect(),
     })
+}
+
+/// What there is to say against a calibration.
+fn doubt(found: &PsfFit, model: Model) -> Option<String> {
+    let width = found.width();
+    match found.verdict() {
+        Verdict::Good => None,
+        Verdict::Loose => {
+            let error = found
+                .standard_error_k
+                .map_or("unknown".into(), |error| format!("{:.1} % of it", 100.0 * error / width));
+            Some(format!(
+                "the width k = {width:.4} is loose: its standard error is {error}, 1 % is wanted; give more pairs, a target with more \
+                 fine detail, or one that stands at a focus"
+            ))
+        }
+        Verdict::Unexplained => Some(format!(
+            "the {model} point spread function leaves {:.2} % of the images' energy, noise {:.2} %: {}do both images show the same, \
+             does the target stand where it is said to, are far_mm and max_blur_px right?",
+            100.0 * found.residual,
+            100.0 * found.noise,
+            if model == Model::Free { "" } else { "try --model free; else: " }
+        )),
+    }
 }
 
 fn alpha_at(depth_mm: f64, optics: &Optics) -> Result<f64> {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use farnear_capture::record::{CaptureRecord, read_record};
+use farnear_depth::optics::{Distortion, Optics};
 use farnear_files::masks;
 use ndarray::Array2;
 
@@ -26,6 +27,8 @@ pub(super) struct Listed {
     pub images: Vec<PathBuf>,
     /// Distances from lens to object at which they are sharp, mm, rising or falling.
     pub focused_at_mm: Option<Vec<f64>>,
+    /// What the lens bends, where that is known.
+    pub distortion: Option<Distortion>,
 }
 
 /// The images, and what is known of them.
@@ -41,7 +44,10 @@ pub(super) fn of(settings: &FocusStackSettings) -> Result<Listed> {
         (None, Some(record)) => Some(objects(&sensors(record), settings)?),
         (None, None) => None,
     };
-    let Some(focused_at_mm) = focused_at_mm else { return Ok(Listed { images, focused_at_mm: None }) };
+    let distortion = lens(settings)?.and_then(|lens| lens.distortion());
+    let Some(focused_at_mm) = focused_at_mm else {
+        return Ok(Listed { images, focused_at_mm: None, distortion });
+    };
     if focused_at_mm.len() != images.len() {
         let expected = format!("one for each of the {} images is needed", images.len());
         return Err(WorkflowError::parameter(
@@ -58,7 +64,18 @@ pub(super) fn of(settings: &FocusStackSettings) -> Result<Listed> {
         return Err(WorkflowError::parameter("distance", format!("{} mm twice", twice[0].0), expected));
     }
     let (focused_at_mm, images) = order.into_iter().unzip();
-    Ok(Listed { images, focused_at_mm: Some(focused_at_mm) })
+    Ok(Listed { images, focused_at_mm: Some(focused_at_mm), distortion })
+}
+
+/// The lens, where somebody knows it; optics that are named or lie in the folder have to be right.
+fn lens(settings: &FocusStackSettings) -> Result<Option<Optics>> {
+    // A pair's far image names the folder; here any name in it does.
+    let found = optics::of_pair(settings.optics.as_deref(), &settings.stack.join("stack.png"));
+    match found {
+        Ok((lens, _)) => Ok(Some(lens)),
+        Err(error) if settings.optics.is_some() || settings.stack.join("optics.toml").is_file() => Err(error),
+        Err(_) => Ok(None),
+    }
 }
 
 fn sensors(record: &CaptureRecord) -> Vec<f64> {
@@ -117,13 +134,13 @@ mod tests {
 
     #[test]
     fn between_images_the_reciprocal_is_even() {
-        let listed = Listed { images: vec![], focused_at_mm: Some(vec![500.0, 1000.0]) };
+        let listed = Listed { images: vec![], focused_at_mm: Some(vec![500.0, 1000.0]), distortion: None };
         let depth = listed.depth(&array![[0.0, 0.5, 1.0, f32::NAN]]);
         assert_eq!(depth[(0, 0)], 500.0);
         assert!((depth[(0, 1)] - 666.667).abs() < 1e-2);
         assert_eq!(depth[(0, 2)], 1000.0);
         assert!(depth[(0, 3)].is_nan());
-        let unknown = Listed { images: vec![], focused_at_mm: None };
+        let unknown = Listed { images: vec![], focused_at_mm: None, distortion: None };
         assert_eq!(unknown.depth(&array![[2.5_f32]]), array![[3.5_f32]]);
     }
 

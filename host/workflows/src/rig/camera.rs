@@ -200,6 +200,29 @@ impl EarlyCamera {
         };
         Ok(EquippedRig { camera, rig })
     }
+
+    /// The same with a second camera, behind a half mirror; without one of its own, the emulated rig's second.
+    ///
+    /// # Errors
+    /// As [`EarlyCamera::connect`].
+    pub(super) fn connect_both(
+        self,
+        second: Self,
+        address: &RigAddress,
+        optics: Option<(&Path, Psf)>,
+        context: &Context<'_>,
+    ) -> Result<(EquippedRig, Box<dyn Camera>)> {
+        let equipped = self.connect(address, optics, context)?;
+        if let Some(camera) = second.camera {
+            return Ok((equipped, camera));
+        }
+        let simulator = equipped.rig.emulation.as_ref().map(|(simulator, _)| simulator);
+        let address = simulator.and_then(|simulator| simulator.second_camera()).ok_or_else(|| {
+            WorkflowError::parameter("second-camera", "sim", "this emulated rig was started without one")
+        })?;
+        let camera = second.settings.set_up(Box::new(SimCamera::connect(address)?))?;
+        Ok((equipped, camera))
+    }
 }
 
 /// A connected rig with its camera, which goes before the rig does.

@@ -5,7 +5,11 @@
 
 use std::time::{Duration, Instant};
 
-use farnear_capture::{camera::Image, expose::expose, sequence::ShotDefaults};
+use farnear_capture::{
+    camera::{CameraError, Image},
+    expose::{CaptureError, expose},
+    sequence::ShotDefaults,
+};
 use farnear_protocol::message::{Axis, Shot, ShotRecord};
 
 use super::{RigAddress, camera::CameraSettings};
@@ -16,6 +20,8 @@ use crate::{
 
 /// About how long a program lasts.
 const PROGRAM: Duration = Duration::from_millis(250);
+/// Programs in a row that lose their first image, after which none is expected.
+const LOST_MAX: u32 = 8;
 /// Most exposures of a program.
 const REPEATS_MAX: u16 = 100;
 
@@ -39,16 +45,26 @@ pub fn watch(
 ) -> Result<()> {
     let mut equipped = settings.camera.connect(&settings.rig, None, context)?;
     let (client, camera) = (&equipped.rig.client, equipped.camera.as_mut());
-    let mut repeats = 1;
+    let (mut repeats, mut lost) = (1, 0);
     loop {
         context.cancel.check("watching the live image")?;
         let begin = Instant::now();
         let shot = [Shot { repeat: repeats, ..held(client.status()?.fine.asked.0, client, settings) }];
-        expose(client, camera, &shot, settings.camera.image_wait, |record, image| {
+        let exposed = expose(client, camera, &shot, settings.camera.image_wait, |record, image| {
             context.cancel.check("watching the live image")?;
+            lost = 0;
             on_frame(record, image)
-        })
-        .map_err(|error: WorkflowError| error)?;
+        });
+        match exposed {
+            // Known at once, unlike an image that was waited for in vain: the next one may come.
+            Err(WorkflowError::Capture(CaptureError::Camera(
+                error @ (CameraError::Skipped { .. } | CameraError::Incomplete { .. }),
+            ))) if lost + 1 < LOST_MAX => {
+                lost += 1;
+                context.say(&format!("live image: {error}"));
+            }
+            exposed => exposed?,
+        }
         repeats = next(repeats, begin.elapsed());
     }
 }

@@ -45,7 +45,7 @@ pub struct PairFigures {
     pub pair_ms: f64,
     /// From the start of the far move until it was settled.
     pub far_settle_ms: f64,
-    /// The same of the near move.
+    /// The same of the near move; 0 behind a half mirror, where there is none.
     pub near_settle_ms: f64,
     /// Sensor distance by encoder and gauge at the far exposure.
     pub sensor_far_mm: f64,
@@ -64,7 +64,7 @@ impl From<&Pair> for PairFigures {
         Self {
             pair_ms: pair.moving_us() as f64 / 1e3,
             far_settle_ms: ms(pair.far.record.settle.0),
-            near_settle_ms: ms(pair.near.record.settle.0),
+            near_settle_ms: pair.further_mm.map_or(ms(pair.near.record.settle.0), |_| 0.0),
             sensor_far_mm: pair.far.sensor_measured_mm,
             sensor_near_mm: pair.near.sensor_measured_mm,
             width,
@@ -79,6 +79,18 @@ impl From<&Pair> for PairFigures {
 /// # Errors
 /// Optics, folder, camera, rig: in this order, so that nothing moves where the result could not be kept.
 pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFigures> {
+    capture_seen(settings, context, |_| ())
+}
+
+/// The same; `on_pair` sees the pair as soon as it is there, before anything is written.
+///
+/// # Errors
+/// As [`capture`].
+pub fn capture_seen(
+    settings: &PairSettings,
+    context: &Context<'_>,
+    on_pair: impl FnOnce(&Pair),
+) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     within("average", settings.averaged, &(1..=AVERAGED_MAX), "exposures")?;
     let frames = settings.frames.as_deref().map(camera_frames::read).transpose()?;
@@ -93,6 +105,7 @@ pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFig
         record.camera.bits = pair.far.image.bits;
         record.camera.corrected = true;
     }
+    on_pair(&pair);
     finish_folder(folder, &pair, &record)?;
     context.say(&format!("wrote {}", settings.out.display()));
     Ok(PairFigures::from(&pair))
@@ -144,10 +157,22 @@ fn take_averaged(
     let EquippedRig { camera, rig } = equipped;
     let say = &mut |what: &str| context.say(what);
     let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;
+    let record = noted(&pair, equipped, optics, settings, averaged);
+    Ok((pair, record))
+}
+
+/// The record of a pair, with what was set.
+pub(super) fn noted(
+    pair: &Pair,
+    equipped: &EquippedRig,
+    optics: &GivenOptics,
+    settings: &CameraSettings,
+    averaged: u16,
+) -> CaptureRecord {
     let circumstances = equipped.circumstances(optics.optics.psf(), optics.table.clone());
-    let mut record = record_of(&pair, &equipped.rig.client, circumstances);
+    let mut record = record_of(pair, &equipped.rig.client, circumstances);
     record.camera.averaged = (averaged > 1).then_some(averaged);
     record.camera.settings =
         settings.settings.iter().map(|setting| (setting.name().to_owned(), setting.value())).collect();
-    Ok((pair, record))
+    record
 }

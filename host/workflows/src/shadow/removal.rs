@@ -1,4 +1,4 @@
-//! Taking a person's shadow off masks by where the sun stands and how the camera does.
+//! Taking a person's shadow off masks by where the sun or a lamp is, or by the direction that the shadow was seen to have, and by how the camera stands.
 
 use std::{
     fs,
@@ -13,13 +13,10 @@ use farnear_activity::{
         subject::{Flag, SubjectChooser, SubjectSettings},
     },
     shadow::{
-        CameraFile, CutReport, Method,
-        cut::SIDEWAYS,
-        projection::{ShadowError, on_ground},
-        remove, subject_of,
-        uncertainty::propagate,
+        CameraFile, CutReport, Lamp, Light, Method, cut::SIDEWAYS, projection::ShadowError, remove,
+        subject_of, uncertainty::propagate,
     },
-    sun::{Model, SunPosition, position},
+    sun::{Model, position},
 };
 use farnear_files::{masks, staging::Staging};
 use serde::Serialize;
@@ -46,14 +43,31 @@ pub struct RemovalSettings {
     pub masks: PathBuf,
     /// How the camera stands, TOML.
     pub camera: PathBuf,
-    /// Where the camera stands, and the first mask's time.
-    pub moment: Moment,
-    /// Masks per second, 0.001 to a million; without it all have one time.
-    pub rate_hz: Option<f64>,
+    /// What throws it.
+    pub light: LightSource,
     /// How shadow is cut off.
     pub method: Method,
     /// The new folder for the masks without shadow.
     pub out: PathBuf,
+}
+
+/// What throws the shadow.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum LightSource {
+    /// The sun.
+    Sun {
+        /// Where the camera stands, and the first mask's time.
+        moment: Moment,
+        /// Masks per second, 0.001 to a million; without it all have one time.
+        rate_hz: Option<f64>,
+    },
+    /// A lamp at a place.
+    Lamp(Lamp),
+    /// Something whose shadow was measured in the picture, degrees from right towards down.
+    Direction {
+        /// The angle, -180 to 180.
+        degrees: f64,
+    },
 }
 
 /// What was cut.
@@ -67,12 +81,15 @@ pub struct RemovalFigures {
     pub flagged: usize,
     /// Masks without a subject.
     pub empty: usize,
-    /// The sun above the horizon at the first mask.
-    pub sun_elevation_deg: f64,
+    /// The sun above the horizon at the first mask; this and the next two where the sun it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sun_elevation_deg: Option<f64>,
     /// The sun clockwise from north.
-    pub sun_azimuth_deg: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sun_azimuth_deg: Option<f64>,
     /// Whether the camera looks into the sun.
-    pub sun_in_view: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sun_in_view: Option<bool>,
     /// Mean share of the silhouettes that were cut off, of those that were cut.
     pub removed_percent: Option<f64>,
     /// Time for one cut.
@@ -84,11 +101,12 @@ pub struct RemovalFigures {
 /// `shadow.toml`.
 #[derive(Serialize)]
 struct Index {
-    sun: Sun,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sun: Option<Sun>,
     frame: Vec<Entry>,
 }
 
-#[derive(Serialize)]
+#[derive(Clone, Copy, Serialize)]
 struct Sun {
     elevation_deg: f64,
     azimuth_deg: f64,
@@ -123,25 +141,20 @@ struct Cut {
 /// not there.
 pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
-    if let Some(rate_hz) = settings.rate_hz {
-        within("masks per second", rate_hz, &(1e-3..=1e6), "")?;
-    }
+    settings.light.check()?;
     let camera = camera(&settings.camera)?;
-    let sun = position(settings.moment.time, settings.moment.place, Model::Psa)?;
-    // Before any mask is read: without a usable sun there is nothing to do.
-    on_ground(sun, camera.subject.height_m, &camera.camera)?;
-    let in_view = camera.camera.sees_sun(sun);
-    if in_view {
+    let (light, _) = settings.light.at(0)?;
+    // Before any mask is read: without a usable light there is nothing to do.
+    light.check(camera.subject.height_m, &camera.camera)?;
+    let sun = sun_of(light, &camera);
+    if let Some(Sun { elevation_deg, in_view: true, .. }) = sun {
         context.say(&format!(
-            "the camera looks into the sun (elevation {:.1} deg): expect glare in the masks and shadows that come straight at it",
-            sun.elevation_deg
+            "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
         ));
     }
     let all = masks::read_all(&settings.masks)?;
     let out = Staging::new_folder(&settings.out)?;
     let mut work = Work { settings, camera: &camera, chooser: None, cut_seconds: 0.0 };
-    let (elevation_deg, azimuth_deg) = (rounded(sun.elevation_deg, 4), rounded(sun.azimuth_deg, 4));
-    let sun = Sun { elevation_deg, azimuth_deg, in_view };
     let mut index = Index { sun, frame: Vec::with_capacity(all.len()) };
     let counter = Counter::new(context, "masks");
     for (number, named) in all.iter().enumerate() {
@@ -163,13 +176,69 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
         cut: removed.len(),
         flagged: index.frame.iter().filter(|entry| !entry.flags.is_empty()).count(),
         empty: all.len() - removed.len(),
-        sun_elevation_deg: elevation_deg,
-        sun_azimuth_deg: azimuth_deg,
-        sun_in_view: in_view,
+        sun_elevation_deg: index.sun.map(|sun| sun.elevation_deg),
+        sun_azimuth_deg: index.sun.map(|sun| sun.azimuth_deg),
+        sun_in_view: index.sun.map(|sun| sun.in_view),
         removed_percent: (!removed.is_empty()).then(|| rounded(mean, 2)),
         cut_ms_per_frame: rounded(1e3 * work.cut_seconds / removed.len().max(1) as f64, 3),
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
     })
+}
+
+/// A lamp's place, `RIGHT,AHEAD,UP` in metres from the ground below the lens.
+///
+/// # Errors
+/// What was expected.
+pub fn parse_lamp(text: &str) -> Result<Lamp, String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let [right_m, ahead_m, up_m] = numbers[..] else {
+        return Err(
+            "expected RIGHT,AHEAD,UP in metres from the ground below the lens, such as -1.5,6,3".into()
+        );
+    };
+    Ok(Lamp { right_m, ahead_m, up_m })
+}
+
+fn sun_of(light: Light, camera: &CameraFile) -> Option<Sun> {
+    let Light::Sun(sun) = light else { return None };
+    Some(Sun {
+        elevation_deg: rounded(sun.elevation_deg, 4),
+        azimuth_deg: rounded(sun.azimuth_deg, 4),
+        in_view: camera.camera.sees_sun(sun),
+    })
+}
+
+impl LightSource {
+    fn check(&self) -> Result<()> {
+        match self {
+            Self::Sun { rate_hz: Some(rate_hz), .. } => {
+                within("masks per second", *rate_hz, &(1e-3..=1e6), "").map(drop)
+            }
+            Self::Sun { .. } => Ok(()),
+            Self::Lamp(Lamp { right_m, ahead_m, up_m }) => {
+                [("lamp to the right", right_m), ("lamp ahead", ahead_m), ("lamp above the ground", up_m)]
+                    .into_iter()
+                    .try_for_each(|(name, value)| within(name, *value, &(-1e3..=1e3), "m").map(drop))
+            }
+            Self::Direction { degrees } => {
+                within("shadow's direction", *degrees, &(-180.0..=180.0), "deg").map(drop)
+            }
+        }
+    }
+
+    /// The light of a mask, and the sun's place and time where it is the sun.
+    fn at(&self, number: usize) -> Result<(Light, Option<Moment>)> {
+        Ok(match *self {
+            Self::Sun { moment, rate_hz } => {
+                let passed_s = rate_hz.map_or(0.0, |rate| number as f64 / rate);
+                let time = moment.time + TimeDelta::microseconds((1e6 * passed_s) as i64);
+                let sun = position(time, moment.place, Model::Psa)?;
+                (Light::Sun(sun), Some(Moment { time, ..moment }))
+            }
+            Self::Lamp(lamp) => (Light::Lamp(lamp), None),
+            Self::Direction { degrees } => (Light::Direction { eta_rad: degrees.to_radians() }, None),
+        })
+    }
 }
 
 fn camera(path: &Path) -> Result<CameraFile> {
@@ -195,10 +264,7 @@ impl Work<'_> {
         let several = chosen.flags.iter().any(|flag| matches!(flag, Flag::SeveralPeople { .. }));
         // With several people in it, what is cut for one would be cut off the others.
         let mask = if several { &chosen.mask } else { mask };
-        let passed_s = self.settings.rate_hz.map_or(0.0, |rate| number as f64 / rate);
-        let Moment { place, time } = self.settings.moment;
-        let time = time + TimeDelta::microseconds((1e6 * passed_s) as i64);
-        let sun = position(time, place, Model::Psa)?;
+        let (light, moment) = self.settings.light.at(number)?;
         let start = Instant::now();
         let subject = match subject_of(mask, self.camera) {
             Ok(subject) => subject,
@@ -210,17 +276,24 @@ impl Work<'_> {
             }
             Err(error) => return Err(error.into()),
         };
-        let sure = propagate(self.camera, time, place, Model::Psa, subject)?;
-        let (clean, cut) = remove(mask, self.camera, sun, sure.beta_rad, self.settings.method)?;
+        // How sure the angle is follows from the sun's time and place; of a lamp and of a measurement nobody has said it.
+        let sure = match moment {
+            Some(Moment { place, time }) => Some(propagate(self.camera, time, place, Model::Psa, subject)?),
+            None => None,
+        };
+        let sd_rad = sure.map_or(0.0, |sure| sure.beta_rad);
+        let (clean, cut) = remove(mask, self.camera, light, sd_rad, self.settings.method)?;
         self.cut_seconds += start.elapsed().as_secs_f64();
-        flags.extend(doubts(&cut, sun).into_iter().map(str::to_owned));
-        if !sure.first_order_holds {
+        flags.extend(doubts(&cut, light).into_iter().map(str::to_owned));
+        if sure.is_some_and(|sure| !sure.first_order_holds) {
             flags.push("angle-unsure".into());
         }
         let cut = Some(Cut {
             shadow_direction_deg: rounded(cut.shadow.eta_rad.to_degrees(), 2),
             beta_deg: rounded(cut.beta_rad.to_degrees(), 2),
-            beta_sd_deg: sure.first_order_holds.then(|| rounded(sure.beta_rad.to_degrees(), 3)),
+            beta_sd_deg: sure
+                .filter(|sure| sure.first_order_holds)
+                .map(|sure| rounded(sure.beta_rad.to_degrees(), 3)),
             distance_m: rounded(cut.subject.distance_m, 2),
             removed_percent: rounded(100.0 * cut.removed_fraction, 2),
         });
@@ -229,14 +302,14 @@ impl Work<'_> {
 }
 
 /// What is doubtful about a cut.
-fn doubts(cut: &CutReport, sun: SunPosition) -> Vec<&'static str> {
+fn doubts(cut: &CutReport, light: Light) -> Vec<&'static str> {
     /// Below this the shadow is so long that its direction in the picture hangs on small errors.
     const LOW_DEG: f64 = 8.0;
     let found = [
         (cut.shadow.eta_rad.sin() < -SIDEWAYS, "shadow-behind"),
         (cut.shadow.shortened, "shadow-leaves-picture"),
         (cut.removed_fraction > MUCH, "much-removed"),
-        (sun.elevation_deg < LOW_DEG, "low-sun"),
+        (matches!(light, Light::Sun(sun) if sun.elevation_deg < LOW_DEG), "low-sun"),
     ];
     found.into_iter().filter_map(|(holds, name)| holds.then_some(name)).collect()
 }

@@ -13,7 +13,7 @@ use farnear_files::{
 };
 use serde::Serialize;
 
-use super::removal::{self, RemovalFigures, RemovalSettings};
+use super::removal::{self, LightSource, RemovalFigures, RemovalSettings};
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
@@ -95,8 +95,7 @@ pub fn remove_from_video(
         &RemovalSettings {
             masks: with.clone(),
             camera: file,
-            moment: settings.moment,
-            rate_hz: settings.rate_hz,
+            light: LightSource::Sun { moment: settings.moment, rate_hz: settings.rate_hz },
             method: Method::default(),
             out: without,
         },

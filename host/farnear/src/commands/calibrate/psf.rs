@@ -1,10 +1,10 @@
-//! `farnear calibrate psf`: k of a Gaussian, or p and k of a generalised Gaussian, from captured pairs.
+//! `farnear calibrate psf`: k of a Gaussian, p and k of a generalised Gaussian, or any round profile, from captured pairs.
 
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use farnear_depth::calibrate::Model;
+use farnear_depth::{calibrate::Model, prepare::Align};
 use farnear_workflows::calibrate::psf::{self, PsfSettings, TargetPair};
 
 use crate::{
@@ -26,9 +26,14 @@ pub struct Arguments {
     /// The optics file; its own point spread function does not matter.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// What to find: gaussian (k) or generalised (p and k).
+    /// What to find: gaussian (k), generalised (p and k) or free (any round profile, with its OTF over frequency times blur
+    /// radius).
     #[arg(long)]
     model: Model,
+    /// How the near image is laid on the far one: auto (a similarity, where one is found beyond doubt), none, optics, shift,
+    /// similarity or affine.
+    #[arg(long, value_name = "HOW", default_value_t)]
+    align: Align,
     /// Depth at which the target stands, once for each pair; without it it is taken to stand at the focus of the sharper image.
     #[arg(long, value_name = "MM")]
     depth: Vec<f64>,
@@ -42,7 +47,7 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { images, optics, model, depth, out, json } = arguments;
+    let Arguments { images, optics, model, align, depth, out, json } = arguments;
     if images.len() % 2 != 0 {
         bail!(Usage(format!("{} images: expected a far and a near one of each pair", images.len())));
     }
@@ -62,6 +67,6 @@ pub fn run(arguments: Arguments) -> Result<()> {
             depth_mm: depth.get(at).copied(),
         })
         .collect();
-    let settings = PsfSettings { pairs, optics, model, out };
+    let settings = PsfSettings { pairs, optics, model, align, out };
     report::print(&psf::fit(&settings, &terminal::context()?)?, json)
 }

@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_workflows::rig::pair::{self, PairSettings};
+use farnear_workflows::rig::{
+    half_mirror::{self, HalfMirrorSettings},
+    pair::{self, PairSettings},
+};
 
 use super::{CameraArguments, Target};
 use crate::{report, terminal};
@@ -15,7 +18,8 @@ use crate::{report, terminal};
 #[derive(Args)]
 #[command(
     after_help = "Example: farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --optics optics.toml --out pair1/\n\
-                  \x20        farnear rig capture --port /dev/ttyACM0 --camera genicam: --set gain=2 --average 8 --optics optics.toml --out pair2/"
+                  \x20        farnear rig capture --port /dev/ttyACM0 --camera genicam: --set gain=2 --average 8 --optics optics.toml --out pair2/\n\
+                  \x20        farnear rig capture --port /dev/ttyACM0 --camera genicam:A --half-mirror --second-camera genicam:B --optics optics.toml --out pair3/"
 )]
 pub struct Arguments {
     #[command(flatten)]
@@ -32,6 +36,19 @@ pub struct Arguments {
     /// `farnear depth` again.
     #[arg(long, value_name = "DIR")]
     camera_frames: Option<PathBuf>,
+    /// Take both images by one exposure: a half mirror stands behind the lens, and a second camera in its other path takes the near
+    /// image (docs/rig.md). The stage goes to the far place. The emulated rig has one by itself.
+    #[arg(long)]
+    half_mirror: bool,
+    /// The second camera, named as the first; exposure, wait and --set are those of both.
+    #[arg(long, value_name = "CAMERA", requires = "half_mirror")]
+    second_camera: Option<String>,
+    /// How many micrometres further from the lens the second camera's sensor stands [default: what the optics ask for].
+    #[arg(long, value_name = "UM", requires = "half_mirror")]
+    second_further_um: Option<f64>,
+    /// Turn the second camera's picture round, left to right: it stands in the reflected path, and does not do so itself (ReverseX).
+    #[arg(long, requires = "half_mirror")]
+    second_mirrored: bool,
     /// The new capture folder.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -50,5 +67,17 @@ pub fn run(arguments: Arguments) -> Result<()> {
         frames: arguments.camera_frames,
         out: arguments.out,
     };
-    report::print(&pair::capture(&settings, &terminal::context()?)?, arguments.json)
+    let context = terminal::context()?;
+    let figures = match arguments.half_mirror {
+        false => pair::capture(&settings, &context)?,
+        true => {
+            let second = arguments.second_camera.map(|address| address.parse()).transpose()?;
+            let (further_um, mirrored) = (arguments.second_further_um, arguments.second_mirrored);
+            half_mirror::capture(
+                &HalfMirrorSettings { pair: settings, second, further_um, mirrored },
+                &context,
+            )?
+        }
+    };
+    report::print(&figures, arguments.json)
 }

@@ -7,13 +7,16 @@ use clap::Args;
 use farnear_capture::camera::Setting;
 use farnear_depth::psf::Psf;
 use farnear_protocol::Micros;
-use farnear_scene::{Noise, SceneArgument};
+use farnear_scene::Noise;
 use farnear_workflows::{
     rig::{RigAddress, camera::CameraSettings},
     simulator::Scenery,
 };
 
-use crate::report::Usage;
+use crate::{
+    report::Usage,
+    scene::{SceneArgument, packed},
+};
 
 /// Which rig.
 #[derive(Args, Clone)]
@@ -90,7 +93,19 @@ impl Target {
         if port == "sim" {
             let SceneryArguments { scene, psf, noise, seed, firmware, faults, trace, paced } =
                 self.scenery.clone();
-            let scenery = Scenery { scene, psf, noise, seed, firmware, faults, trace, paced };
+            let packed_scene = packed(scene.as_deref())?;
+            let scenery = Scenery {
+                scene,
+                packed_scene,
+                psf,
+                noise,
+                seed,
+                firmware,
+                faults,
+                trace,
+                paced,
+                half_mirror_um: None,
+            };
             return Ok(RigAddress::Emulated(scenery));
         }
         self.without_scenery(port)?;

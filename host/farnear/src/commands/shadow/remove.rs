@@ -1,15 +1,26 @@
-//! `farnear shadow remove`: takes a person's shadow off masks by where the sun stands and how the camera does.
+//! `farnear shadow remove`: takes a person's shadow off masks by where the sun or a lamp is and how the camera stands.
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
+use chrono::{DateTime, Utc};
 use clap::Args;
-use farnear_activity::shadow::Method;
-use farnear_workflows::shadow::removal::{self, RemovalSettings};
+use farnear_activity::{
+    shadow::{Lamp, Method},
+    sun::{Place, parse_time},
+};
+use farnear_workflows::{
+    shadow::removal::{self, LightSource, RemovalSettings},
+    sun::Moment,
+};
 
-use crate::{commands::sun::MomentArguments, report, terminal};
+use crate::{
+    commands::sun,
+    report::{self, Usage},
+    terminal,
+};
 
-/// Takes a person's shadow off masks: the sun's place and the camera's tell where the shadow falls.
+/// Takes a person's shadow off masks: where it falls tell the camera's place and the sun's, or a lamp's, or it was measured in the picture.
 ///
 /// The camera file says how the camera stands:
 ///
@@ -22,7 +33,7 @@ use crate::{commands::sun::MomentArguments, report, terminal};
 ///     width_px = 640
 ///     height_px = 480
 ///
-/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17) and `standard_deviations`, what differs from the usual. Frames whose cut is doubtful (nobody or several people in it, the shadow behind the person or cut off by the picture's
+/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17; distance_m where it is known) and `standard_deviations`, what differs from the usual. Frames whose cut is doubtful (nobody or several people in it, the shadow behind the person or cut off by the picture's
 /// lower edge, much removed, an angle too unsure) are flagged in `shadow.toml` beside the masks.
 #[derive(Args)]
 #[command(
@@ -36,8 +47,22 @@ pub struct Arguments {
     /// How the camera stands, TOML.
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    #[command(flatten)]
-    moment: MomentArguments,
+    /// Latitude in degrees, north positive.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = sun::latitude, requires_all = ["lon", "time"],
+          required_unless_present_any = ["lamp", "shadow_direction"])]
+    lat: Option<f64>,
+    /// Longitude in degrees, east positive.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = sun::longitude, requires = "lat")]
+    lon: Option<f64>,
+    /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
+    #[arg(long, value_name = "RFC3339", value_parser = parse_time, requires = "lat")]
+    time: Option<DateTime<Utc>>,
+    /// A lamp instead of the sun: where it hangs, in metres to the right, ahead and up from the ground below the lens.
+    #[arg(long, value_name = "RIGHT,AHEAD,UP", allow_hyphen_values = true, value_parser = removal::parse_lamp, conflicts_with_all = ["lat", "shadow_direction", "rate_hz"])]
+    lamp: Option<Lamp>,
+    /// The shadow's direction measured in the picture instead, in degrees from right (0) towards down (90).
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["lat", "rate_hz"])]
+    shadow_direction: Option<f64>,
     /// Masks per second: with it `--time` is the first mask's and the sun moves on.
     #[arg(long, value_name = "HZ")]
     rate_hz: Option<f64>,
@@ -58,11 +83,22 @@ pub struct Arguments {
 /// See [`removal::remove_from_masks`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let json = arguments.json;
+    let sun = arguments.lat.zip(arguments.lon).zip(arguments.time);
+    let light = match (sun, arguments.lamp, arguments.shadow_direction) {
+        (Some(((latitude_deg, longitude_deg), time)), ..) => {
+            let moment = Moment { place: Place { latitude_deg, longitude_deg }, time };
+            LightSource::Sun { moment, rate_hz: arguments.rate_hz }
+        }
+        (None, Some(lamp), _) => LightSource::Lamp(lamp),
+        (None, None, Some(degrees)) => LightSource::Direction { degrees },
+        (None, None, None) => {
+            bail!(Usage("expected --lat, --lon and --time, --lamp or --shadow-direction".into()))
+        }
+    };
     let settings = RemovalSettings {
         masks: arguments.masks,
         camera: arguments.camera,
-        moment: arguments.moment.moment(),
-        rate_hz: arguments.rate_hz,
+        light,
         method: arguments.method,
         out: arguments.out,
     };

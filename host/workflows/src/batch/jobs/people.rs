@@ -19,7 +19,7 @@ use crate::{
     },
     context::Context,
     error::Result,
-    shadow::removal::{self, RemovalSettings},
+    shadow::removal::{self, LightSource, RemovalSettings},
     silhouettes::{
         markers::{self, MarkersSettings},
         video::{self, ShadowTreatment, VideoSettings},
@@ -101,15 +101,11 @@ fn up(fields: &mut Fields) -> Result<Option<Up>, BatchError> {
 }
 
 pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Work>> {
-    let degrees = |fields: &mut Fields, name| -> Result<f64> {
-        Ok(fields.optional(name)?.ok_or(BatchError::MissingField { name })?)
-    };
-    let place = Place::new(degrees(fields, "lat")?, degrees(fields, "lon")?)?;
+    let light = light(fields)?;
     let settings = RemovalSettings {
         masks: fields.path("masks")?,
         camera: fields.path("camera")?,
-        moment: Moment { place, time: sun::parse_time(&fields.text("time")?)? },
-        rate_hz: fields.optional("rate_hz")?,
+        light,
         method: fields.or("method", shadow::Method::default())?,
         out: fields.path("out")?,
     };
@@ -123,6 +119,24 @@ pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Work>> {
             )?)
         },
     }))
+}
+
+/// `lamp`, `shadow_direction`, or the sun's `lat`, `lon` and `time`.
+fn light(fields: &mut Fields) -> Result<LightSource> {
+    if let Some(lamp) = fields.optional_text("lamp")? {
+        let lamp =
+            removal::parse_lamp(&lamp).map_err(|expected| BatchError::field("lamp", &lamp, expected))?;
+        return Ok(LightSource::Lamp(lamp));
+    }
+    if let Some(degrees) = fields.optional("shadow_direction")? {
+        return Ok(LightSource::Direction { degrees });
+    }
+    let degrees = |fields: &mut Fields, name| -> Result<f64> {
+        Ok(fields.optional(name)?.ok_or(BatchError::MissingField { name })?)
+    };
+    let place = Place::new(degrees(fields, "lat")?, degrees(fields, "lon")?)?;
+    let moment = Moment { place, time: sun::parse_time(&fields.text("time")?)? };
+    Ok(LightSource::Sun { moment, rate_hz: fields.optional("rate_hz")? })
 }
 
 /// What is recognised by which model.

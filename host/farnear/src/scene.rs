@@ -6,20 +6,17 @@
 //! texture = "bricks.png"  # any picture that `farnear depth` reads; or: "sand" (also without the line), "fractal"
 //! contrast = 0.3          # standard deviation of sand or fractal, whose mean is 1
 //! ```
-//! Only with the feature `files`: the rest of this crate opens none.
 
 use std::{
     fs,
     path::{Path, PathBuf},
     str::FromStr,
+    sync::Arc,
 };
 
+use anyhow::{Context, Result, bail};
 use farnear_files::{image_file::read_grey, map};
-use thiserror::Error;
-
-use crate::scene::Scene;
-use crate::scene_error::SceneError;
-use crate::scene_file::SceneFile;
+use farnear_scene::{PackedScene, Scene, SceneError, SceneFile};
 
 /// A scene as an argument names it.
 #[derive(Clone, Debug)]
@@ -28,16 +25,6 @@ pub enum SceneArgument {
     Named(Box<Scene>),
     /// A scene file.
     File(PathBuf),
-}
-
-/// Why a scene file was refused.
-#[derive(Debug, Error)]
-#[error("the scene {}: {reason}", path.display())]
-pub struct SceneFileError {
-    /// The scene file.
-    pub path: PathBuf,
-    /// Which file cannot be read, or what in it makes no scene.
-    pub reason: String,
 }
 
 impl FromStr for SceneArgument {
@@ -58,33 +45,53 @@ impl SceneArgument {
     /// The scene, with its maps.
     ///
     /// # Errors
-    /// [`SceneFileError`].
-    pub fn read(self) -> Result<Scene, SceneFileError> {
+    /// Which file cannot be read, or what in it makes no scene.
+    pub fn read(self) -> Result<Scene> {
         match self {
             Self::Named(scene) => Ok(*scene),
-            Self::File(path) => read(&path).map_err(|reason| SceneFileError { path, reason }),
+            Self::File(path) => {
+                read(&path).and_then(|file| Ok(file.into_scene()?)).with_context(|| of(&path))
+            }
         }
     }
 }
 
-fn read(path: &Path) -> Result<Scene, String> {
-    let text = fs::read_to_string(path).map_err(|error| format!("cannot read it: {error}"))?;
-    let file = SceneFile::parse(&text).map_err(|error| error.to_string())?;
+/// What the emulated rig has to be given of a scene, beside its name: a scene file with its maps, checked.
+///
+/// # Errors
+/// As [`SceneArgument::read`].
+pub fn packed(scene: Option<&str>) -> Result<Option<Arc<[u8]>>> {
+    let Some(SceneArgument::File(path)) = scene.map(str::parse).transpose()? else { return Ok(None) };
+    let packed = || {
+        let file = read(&path)?;
+        let bytes = file.to_bytes()?;
+        file.into_scene()?;
+        anyhow::Ok(bytes.into())
+    };
+    packed().map(Some).with_context(|| of(&path))
+}
+
+fn of(path: &Path) -> String {
+    format!("the scene {}", path.display())
+}
+
+fn read(path: &Path) -> Result<PackedScene> {
+    let text = fs::read_to_string(path).context("cannot read it")?;
+    let file = SceneFile::parse(&text)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let depth_mm = file.depth.as_ref().map(|name| map::read(&folder.join(name)));
-    let depth_mm = depth_mm.transpose().map_err(|error| error.to_string())?;
+    let depth_mm = file.depth.as_ref().map(|name| map::read(&folder.join(name))).transpose()?;
     let texture = match &file.texture {
         Some(name) => {
             let picture = folder.join(name);
             if !picture.is_file() {
-                return Err(format!(
+                bail!(
                     "texture = \"{name}\" is neither sand nor fractal, and there is no file {}",
                     picture.display()
-                ));
+                );
             }
-            Some(read_grey(&picture).map_err(|error| error.to_string())?.pixels)
+            Some(read_grey(&picture)?.pixels)
         }
         None => None,
     };
-    file.into_scene(depth_mm, texture).map_err(|error| error.to_string())
+    Ok(PackedScene { text, depth_mm, texture })
 }

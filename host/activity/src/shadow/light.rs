@@ -1,0 +1,150 @@
+//! What throws the shadow: the sun, a lamp whose place is known, or something unknown whose shadow's direction was measured in the
+//! picture (as Li 2014 does for the KTH clips, section 9.2).
+
+use super::{
+    camera::Camera,
+    projection::{GroundShadow, ImageShadow, ShadowError, Subject, in_image, of_direction, on_ground},
+};
+use crate::sun::SunPosition;
+
+/// What throws the shadow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// The sun.
+    Sun(SunPosition),
+    /// A lamp, small beside its distance, in the camera's frame on the ground below the lens.
+    Lamp(Lamp),
+    /// The shadow's direction in the picture, radians from right towards down.
+    Direction {
+        /// The angle eta of eq. 8.20.
+        eta_rad: f64,
+    },
+}
+
+/// Where a lamp is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lamp {
+    /// To the camera's right, metres.
+    pub right_m: f64,
+    /// Along the viewing direction, metres.
+    pub ahead_m: f64,
+    /// Above the ground, metres.
+    pub up_m: f64,
+}
+
+impl From<SunPosition> for Light {
+    fn from(sun: SunPosition) -> Self {
+        Self::Sun(sun)
+    }
+}
+
+impl Light {
+    /// Whether anybody of that stature has a shadow that can be used.
+    ///
+    /// # Errors
+    /// [`ShadowError::SunTooLow`], [`ShadowError::LampTooLow`].
+    pub fn check(&self, height_m: f64, camera: &Camera) -> Result<(), ShadowError> {
+        match self {
+            Self::Sun(sun) => on_ground(*sun, height_m, camera).map(drop),
+            Self::Lamp(lamp) => lamp.check(height_m),
+            Self::Direction { .. } => Ok(()),
+        }
+    }
+
+    /// The subject's shadow in the image. Of a shadow whose direction alone is known, `length_px` says how long it is, given the foot and that direction.
+    ///
+    /// # Errors
+    /// As [`Light::check`]; a subject that is not in front of the lens.
+    pub fn shadow_of(
+        &self,
+        subject: Subject,
+        camera: &Camera,
+        length_px: impl FnOnce([f64; 2], f64) -> f64,
+    ) -> Result<ImageShadow, ShadowError> {
+        match self {
+            Self::Sun(sun) => in_image(on_ground(*sun, subject.height_m, camera)?, subject, camera),
+            Self::Lamp(lamp) => in_image(lamp.on_ground(subject)?, subject, camera),
+            Self::Direction { eta_rad } => {
+                of_direction(*eta_rad, subject, camera, |foot_px| length_px(foot_px, *eta_rad))
+            }
+        }
+    }
+}
+
+impl Lamp {
+    fn check(&self, height_m: f64) -> Result<(), ShadowError> {
+        /// A lamp at the height of the head throws its shadow to infinity.
+        const ABOVE_HEAD: f64 = 1.1;
+        if self.up_m >= ABOVE_HEAD * height_m {
+            return Ok(());
+        }
+        Err(ShadowError::LampTooLow { up_m: self.up_m, least_m: ABOVE_HEAD * height_m })
+    }
+
+    /// The ray from the lamp over the top of the head goes on to the ground: as far beyond the feet as the feet are from below the lamp, times
+    /// `H / (up - H)`.
+    fn on_ground(&self, subject: Subject) -> Result<GroundShadow, ShadowError> {
+        self.check(subject.height_m)?;
+        let stretch = subject.height_m / (self.up_m - subject.height_m);
+        let rx_m = stretch * (subject.offset_m - self.right_m);
+        let ry_m = stretch * (subject.distance_m - self.ahead_m);
+        Ok(GroundShadow { rx_m, ry_m, length_m: rx_m.hypot(ry_m) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::camera::CameraFile;
+    use super::*;
+
+    fn camera() -> Camera {
+        let text = "[camera]\nheight_m = 1.2\nazimuth_deg = 30.0\npitch_deg = 4.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        CameraFile::parse(text).expect("valid").camera
+    }
+
+    const SUBJECT: Subject = Subject { distance_m: 6.0, offset_m: -0.4, height_m: 1.75 };
+
+    #[test]
+    fn a_lamp_far_away_is_a_sun() {
+        let camera = camera();
+        let sun = SunPosition { elevation_deg: 35.0, azimuth_deg: 200.0 };
+        // Towards the sun in the camera's frame: against the shadow.
+        let ground = on_ground(sun, 1.0, &camera).expect("sun is up");
+        let far_m = 1e7;
+        let lamp = Light::Lamp(Lamp {
+            right_m: SUBJECT.offset_m - far_m * ground.rx_m,
+            ahead_m: SUBJECT.distance_m - far_m * ground.ry_m,
+            up_m: far_m,
+        });
+        let [by_sun, by_lamp] = [Light::Sun(sun), lamp]
+            .map(|light| light.shadow_of(SUBJECT, &camera, |_, _| 0.0).expect("visible"));
+        // A lamp at 10,000 km is off by the stature over that distance.
+        assert!((by_sun.tip_px[0] - by_lamp.tip_px[0]).abs() < 1e-3, "{by_sun:?} {by_lamp:?}");
+        assert!((by_sun.tip_px[1] - by_lamp.tip_px[1]).abs() < 1e-3, "{by_sun:?} {by_lamp:?}");
+    }
+
+    #[test]
+    fn lamp_head_and_tip_are_in_line() {
+        let lamp = Lamp { right_m: 1.5, ahead_m: 8.0, up_m: 3.0 };
+        let shadow = lamp.on_ground(SUBJECT).expect("above the head");
+        // At the height of the head the ray from the lamp to the tip is over the feet.
+        let part = (3.0 - SUBJECT.height_m) / 3.0;
+        let tip = [SUBJECT.offset_m + shadow.rx_m, SUBJECT.distance_m + shadow.ry_m];
+        assert!((1.5 + part * (tip[0] - 1.5) - SUBJECT.offset_m).abs() < 1e-12);
+        assert!((8.0 + part * (tip[1] - 8.0) - SUBJECT.distance_m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_lamp_below_the_head_is_refused() {
+        let error = Light::Lamp(Lamp { right_m: 0.0, ahead_m: 3.0, up_m: 1.8 }).check(1.75, &camera());
+        assert_eq!(error, Err(ShadowError::LampTooLow { up_m: 1.8, least_m: 1.1 * 1.75 }));
+    }
+
+    #[test]
+    fn a_measured_direction_is_taken_as_it_is() {
+        let shadow =
+            Light::Direction { eta_rad: 0.3 }.shadow_of(SUBJECT, &camera(), |_, _| 80.0).expect("visible");
+        assert!((shadow.eta_rad - 0.3).abs() < 1e-12 && !shadow.mirrored && !shadow.shortened);
+        assert!((shadow.m_px[0].hypot(shadow.m_px[1]) - 80.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,58 @@
+//! A pair behind a half mirror: the mirror stands behind the lens, each of its two paths has a camera, and the second one's sensor stands
+//! further from the lens. One trigger gives both images, and nothing moves between them (Li 2014, sections 5.5 and 10.2).
+
+use farnear_protocol::message::{Shot, ShotRecord};
+
+use crate::{
+    average::Average,
+    camera::Camera,
+    client::Client,
+    describe::um,
+    expose::{CaptureError, expose_together},
+    pair::{Exposures, Pair, pair_of, reach},
+    plan::SensorPair,
+};
+
+/// Takes a pair with one exposure (or so many as are averaged), with the stage at the far place: the far image by the first camera, the
+/// near one by the second, whose sensor stands `further_mm` further from the lens. `say` is told in words what is being done.
+///
+/// # Errors
+/// [`CaptureError`]; a picture of another trigger, by either camera, is [`CaptureError::OneCamera`].
+pub fn capture_behind_mirror(
+    client: &Client,
+    cameras: [&mut dyn Camera; 2],
+    sensor: &SensorPair,
+    further_mm: f64,
+    exposures: &Exposures,
+    say: &mut dyn FnMut(&str),
+) -> Result<Pair, CaptureError> {
+    // The piezo has one place to reach: the far one, in the middle of its range.
+    let only_far = SensorPair { far_mm: sensor.far_mm, near_mm: sensor.far_mm };
+    let reach = reach(client, &only_far, exposures, say)?;
+    let [far, _] = reach.shots;
+    say(&format!("exposing both cameras (piezo at {:.3} um)", um(far.target)));
+    let repeat = exposures.averaged.max(1);
+    let shots = [Shot { repeat, ..far }];
+    let mut cameras = cameras;
+    let mut taken: [Option<(ShotRecord, Average)>; 2] = [None, None];
+    let mut told = 0;
+    let asked = 2 * usize::from(repeat);
+    let images = expose_together(client, &mut cameras, &shots, exposures.image_wait, |at, record, image| {
+        told += 1;
+        match taken.get_mut(at) {
+            Some(Some((_, average))) => average.add(&image),
+            Some(none) => {
+                *none = Some((record, Average::of(image)));
+                Ok(())
+            }
+            None => Err(CaptureError::Count { told, asked }),
+        }
+    });
+    images?;
+    let [Some(far), Some(near)] = taken else { return Err(CaptureError::Count { told, asked }) };
+    let both = [far, near].map(|(record, average)| (record, average.finish()));
+    let mut pair = pair_of(both, sensor, reach.coarse, &client.hello().limits)?;
+    pair.near.sensor_measured_mm += further_mm;
+    pair.further_mm = Some(further_mm);
+    Ok(pair)
+}

@@ -1,0 +1,80 @@
+//! Depth as the page sees it before it is in any file: live, played, and of a pair that was just taken.
+
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use axum::body::Bytes;
+use farnear_capture::camera::Image;
+use farnear_depth::{
+    optics::Optics,
+    pipeline::{DepthMap, Processor, Settings},
+};
+use farnear_workflows::{Result, operators, optics, rig::live_depth::LiveDepth};
+use serde_json::{Value, json};
+
+use crate::{
+    app::App,
+    picture_message::{depth_codes, message},
+};
+
+/// How it is computed: on all cores, so that the map is there soon.
+pub fn computation() -> Settings {
+    Settings { threads: 0, ..Settings::default() }
+}
+
+/// Milliseconds since 1970 by this computer's clock, which a browser on it has, too.
+pub fn unix_ms() -> f64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0.0, |since| since.as_secs_f64() * 1e3)
+}
+
+/// Depths between which the page's colours lie: a little beyond the range on both sides, so that what lies just outside is still told apart.
+pub fn ends(optics: &Optics) -> [f32; 2] {
+    let range = optics.working_range();
+    let margin = 0.25 * (range.far_mm - range.near_mm);
+    [(range.near_mm - margin) as f32, (range.far_mm + margin) as f32]
+}
+
+/// A pair of the live view or of a recording, with its depth.
+pub fn live(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> Bytes {
+    let header = json!({
+        "type": "depth",
+        "rate_hz": rate_hz,
+        "pair_ms": depth.pair_ms,
+        "latency_ms": depth.latency_ms,
+        "arrived_ms": unix_ms() - depth.latency_ms,
+    });
+    picture(header, depth.map, depth.far, ends)
+}
+
+/// Shows depth of a pair that was just taken, before anything of it is written: that takes longer than computing. What is shown is looked
+/// at; what is kept and measured in is computed from the files, with its standard deviation. Depth that cannot be computed is said with those.
+pub fn show_fresh(app: &App, capture: &str, far: &Image, near: &Image) {
+    let (arrived, arrived_ms) = (Instant::now(), unix_ms());
+    let shown = || -> Result<Bytes> {
+        let optics = optics::read(&app.optics_file())?;
+        let designed = operators::find(None, &optics)?;
+        let mut processor = Processor::new(&designed, &optics, &computation())?;
+        let map = processor.run(far.grey().view(), near.grey().view())?;
+        let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+        let header = json!({
+            "type": "fresh", "capture": capture, "latency_ms": latency_ms, "arrived_ms": arrived_ms,
+        });
+        Ok(picture(header, map, far, ends(&optics)))
+    };
+    if let Ok(picture) = shown() {
+        app.pictures.send_replace(picture);
+    }
+}
+
+/// Depth, confidence and the far image, with what the page shows beside them.
+fn picture(mut header: Value, map: &DepthMap, far: &Image, ends: [f32; 2]) -> Bytes {
+    let (height, width) = map.depth_mm.dim();
+    header["width"] = width.into();
+    header["height"] = height.into();
+    header["low_mm"] = ends[0].into();
+    header["high_mm"] = ends[1].into();
+    header["low_texture_fraction"] = map.low_texture_fraction.into();
+    let codes = depth_codes(&map.depth_mm, ends);
+    let confidence: Vec<u8> = map.confidence.iter().map(|value| (value * 255.0) as u8).collect();
+    message(&header, &[&codes, &confidence, &far.eight_bits()])
+}

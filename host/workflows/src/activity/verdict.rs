@@ -1,0 +1,119 @@
+//! What is said of a recording or of one of the people in it, in the form in which all faces give it.
+
+use farnear_activity::recognition::{live::Segment, model::Answer};
+use serde::Serialize;
+
+use crate::figures::rounded;
+
+/// The answer for all that was seen of one person.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Verdict {
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
+    pub strangeness: Option<f64>,
+    /// Why the activity is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Probability of every activity.
+    pub shares: Vec<Share>,
+}
+
+/// Probability of an activity.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Share {
+    /// The activity.
+    pub activity: String,
+    /// 0 to 1; all add up to 1.
+    pub share: f64,
+}
+
+/// A stretch of the recording; frames from 1, both ends included.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Part {
+    /// First frame.
+    pub from: usize,
+    /// Last frame.
+    pub to: usize,
+    /// The activity; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+}
+
+impl Verdict {
+    /// Of that many frames.
+    pub(super) fn new(answer: Answer, frames: usize) -> Self {
+        Self {
+            confidence: rounded_share(answer.confidence),
+            strangeness: outlier_score(&answer),
+            reason: unknown_because(&answer, frames),
+            shares: shares(&answer),
+            activity: answer.activity,
+        }
+    }
+}
+
+/// Stretches of what was seen as stretches of the recording, whose `frames` frames have been counted from 1; `numbers` are those
+/// with somebody in them.
+pub(super) fn parts<'a>(
+    stretches: impl IntoIterator<Item = (usize, usize, &'a Option<String>, f32)>,
+    numbers: &[usize],
+    frames: usize,
+) -> Vec<Part> {
+    let part = |(from, to, activity, confidence): (usize, usize, &Option<String>, f32)| Part {
+        from: numbers.get(from).copied().unwrap_or(1),
+        to: to.checked_sub(1).and_then(|last| numbers.get(last)).copied().unwrap_or(frames),
+        activity: activity.clone(),
+        confidence: rounded_share(confidence),
+    };
+    stretches.into_iter().map(part).collect()
+}
+
+/// The segments as [`parts`] takes them.
+pub(super) fn of_segments(
+    segments: &[Segment],
+) -> impl Iterator<Item = (usize, usize, &Option<String>, f32)> {
+    segments.iter().map(|s| (s.from, s.to, &s.activity, s.confidence))
+}
+
+/// Probability of every activity.
+pub(super) fn shares(answer: &Answer) -> Vec<Share> {
+    let share = |(activity, value): &(String, f32)| Share {
+        activity: activity.clone(),
+        share: rounded_share(*value),
+    };
+    answer.probabilities.iter().map(share).collect()
+}
+
+/// The answer if only some activities can be; all can where none is named.
+pub(super) fn restricted(answer: Answer, among: &[String]) -> Answer {
+    if among.is_empty() { answer } else { answer.among(among) }
+}
+
+/// Why an answer is unknown, in words; `None` where it is not.
+fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
+    if answer.activity.is_some() {
+        return None;
+    }
+    let score = answer.outlier_score;
+    Some(match answer.best() {
+        _ if frames == 0 => "there is no frame".into(),
+        Some(best) if score.is_finite() => {
+            format!("most like `{best}`, but {score:.2} times as far from it as what the model knows")
+        }
+        _ => format!("nobody is seen in any of the {frames} frames"),
+    })
+}
+
+/// A share with four decimals, without the digits that f32 does not have.
+pub(super) fn rounded_share(value: f32) -> f64 {
+    rounded(f64::from(value), 4)
+}
+
+/// JSON has no infinity: nothing was seen.
+pub(super) fn outlier_score(answer: &Answer) -> Option<f64> {
+    answer.outlier_score.is_finite().then(|| rounded_share(answer.outlier_score))
+}

@@ -1,0 +1,165 @@
+//! A far- and a near-focused image of one exposure, by two cameras behind a half mirror, into a capture folder.
+
+use farnear_capture::{
+    camera::Camera,
+    half_mirror::capture_behind_mirror,
+    pair::Exposures,
+    plan::SensorPair,
+    record::{HalfMirrorRecord, begin_folder, finish_folder},
+};
+use farnear_depth::optics::Optics;
+use ndarray::Axis;
+
+use super::{
+    RigAddress,
+    camera::{ADDRESSES, CameraAddress, CameraSettings},
+    pair::{AVERAGED_MAX, PairFigures, PairSettings, noted},
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    optics::GivenOptics,
+    parameters::within,
+};
+
+/// Least and largest distance of both sensors along the light, um: a thousandth of what a piezo moves, and far more than any lens asks for.
+const FURTHER_UM: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
+/// The distance may differ by this share from what the optics ask for before it is said: depth is off by about as much of the working range.
+const UNLIKE: f64 = 0.005;
+
+/// What is captured with, and where to.
+#[derive(Clone, Debug)]
+pub struct HalfMirrorSettings {
+    /// Rig, first camera (which takes the far image), optics, folder. The camera's exposure, wait and settings are both cameras'.
+    pub pair: PairSettings,
+    /// The camera that takes the near image; without it the emulated rig's second.
+    pub second: Option<CameraAddress>,
+    /// How much further from the lens its sensor stands; without it as far as the optics ask for.
+    pub further_um: Option<f64>,
+    /// Whether its picture is to be turned round, left to right: the reflected path shows it mirrored.
+    pub mirrored: bool,
+}
+
+/// Captures a pair of one exposure: homes where needed, brings the stage to the far place, exposes both cameras by one trigger.
+///
+/// # Errors
+/// Optics, parameters, folder, cameras, rig: in this order, so that nothing moves where the result could not be kept.
+pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<PairFigures> {
+    let HalfMirrorSettings { pair: PairSettings { camera, averaged, out, .. }, .. } = settings;
+    let optics = GivenOptics::read(&settings.pair.optics)?;
+    within("average", *averaged, &(1..=AVERAGED_MAX), "exposures")?;
+    let range = optics.optics.working_range();
+    let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
+    let further_um = settings.further_um.unwrap_or((sensor.near_mm - sensor.far_mm) * 1e3);
+    within("second-further-um", further_um, &FURTHER_UM, "um")?;
+    let second = CameraSettings { address: second_address(settings)?, ..camera.clone() };
+    if let Some(doubt) = doubt(&optics.optics, &sensor, further_um) {
+        context.progress.warn(&doubt);
+    }
+    let folder = begin_folder(out)?;
+    let address = match &settings.pair.rig {
+        RigAddress::Emulated(scenery) => {
+            let mut scenery = scenery.clone();
+            scenery.half_mirror_um = Some(further_um);
+            RigAddress::Emulated(scenery)
+        }
+        other => other.clone(),
+    };
+    let (early, early_second) = (camera.open_early(&address)?, second.open_early(&address)?);
+    let (mut equipped, mut second) =
+        early.connect_both(early_second, &address, Some(optics.for_emulation()), context)?;
+    let exposures = Exposures {
+        exposure: camera.exposure,
+        image_wait: camera.image_wait,
+        averaged: *averaged,
+        ..Exposures::default()
+    };
+    let cameras: [&mut dyn Camera; 2] = [equipped.camera.as_mut(), second.as_mut()];
+    let say = &mut |what: &str| context.say(what);
+    let client = &equipped.rig.client;
+    let mut pair = capture_behind_mirror(client, cameras, &sensor, further_um * 1e-3, &exposures, say)?;
+    if settings.mirrored {
+        pair.near.image.pixels.invert_axis(Axis(1));
+    }
+    let mut record = noted(&pair, &equipped, &optics, camera, *averaged);
+    record.half_mirror = Some(HalfMirrorRecord {
+        second_camera: second.kind().into(),
+        second_further_um: further_um,
+        second_mirrored: settings.mirrored,
+    });
+    finish_folder(folder, &pair, &record)?;
+    context.say(&format!("wrote {}", out.display()));
+    Ok(PairFigures::from(&pair))
+}
+
+/// The second camera's address, where the rig has one.
+fn second_address(settings: &HalfMirrorSettings) -> Result<CameraAddress> {
+    let PairSettings { rig, camera, frames, .. } = &settings.pair;
+    let second =
+        |value: &str, expected: String| Err(WorkflowError::parameter("second-camera", value, expected));
+    if let Some(frames) = frames {
+        let expected =
+            "the dark and flat frames of one camera are not the other's: leave them out".to_string();
+        return Err(WorkflowError::parameter("camera-frames", frames.display(), expected));
+    }
+    match &settings.second {
+        Some(CameraAddress::Emulated) | None
+            if camera.address != CameraAddress::Emulated || !rig.is_emulated() =>
+        {
+            second(
+                "none",
+                format!(
+                    "a half mirror needs a second camera, which takes the near image: name one of {ADDRESSES} but sim; the emulated rig \
+                 has two by itself"
+                ),
+            )
+        }
+        Some(address) if *address == camera.address && *address != CameraAddress::Emulated => second(
+            "as the first",
+            "it is the camera that takes the far image already: name another one".into(),
+        ),
+        Some(address) => Ok(address.clone()),
+        None => Ok(CameraAddress::Emulated),
+    }
+}
+
+/// What there is to say of a distance that is not what the optics ask for.
+fn doubt(optics: &Optics, sensor: &SensorPair, further_um: f64) -> Option<String> {
+    let asked_um = (sensor.near_mm - sensor.far_mm) * 1e3;
+    if (further_um / asked_um - 1.0).abs() <= UNLIKE {
+        return None;
+    }
+    let near_mm = sensor.far_mm + further_um * 1e-3;
+    let focal_mm = optics.focal_length_mm();
+    let object_mm = focal_mm * near_mm / (near_mm - focal_mm);
+    Some(format!(
+        "the second sensor stands {further_um:.2} um further from the lens than the first, the optics ask for {asked_um:.2} um, so depth will \
+         be off; with `near_mm = {object_mm:.2}` in [focus], in place of max_blur_px, they agree"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\n";
+
+    #[test]
+    fn a_distance_that_does_not_fit_is_said_with_the_one_that_does() {
+        let read = |focus: &str| {
+            let optics =
+                GivenOptics::parse(&format!("{OPTICS}{focus}"), Path::new("optics.toml")).expect("good");
+            let range = optics.optics.working_range();
+            (optics.optics, SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm })
+        };
+        let (optics, sensor) = read("max_blur_px = 2.703");
+        assert_eq!(doubt(&optics, &sensor, 156.3), None);
+        let said = doubt(&optics, &sensor, 140.0).expect("it does not fit");
+        let (_, near_mm) = said.split_once("near_mm = ").expect("the one that does");
+        let (near_mm, _) = near_mm.split_once('`').expect("a number");
+        let (optics, sensor) = read(&format!("near_mm = {near_mm}"));
+        assert_eq!(doubt(&optics, &sensor, 140.0), None, "{said}");
+    }
+}

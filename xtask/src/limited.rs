@@ -1,0 +1,129 @@
+//! Running a program of tests to its end, but not for ever: a test that hangs must not hide what the others found, nor may a program
+//! that it left behind, which still holds the output.
+
+use std::{
+    io::{self, Read, Write},
+    process::{Child, Command, Stdio},
+    sync::{
+        Arc, Mutex, PoisonError,
+        mpsc::{Receiver, channel},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, Result};
+
+use crate::run::describe;
+
+/// The longest takes seven minutes on two cores with as much again beside it.
+const LIMIT: Duration = Duration::from_secs(20 * 60);
+/// How long the last of an output may take after a program's end.
+const LAST: Duration = Duration::from_secs(5);
+/// From one look to the next.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What a program printed, and how it ended.
+pub struct Said {
+    /// Its standard output.
+    pub text: String,
+    /// Whether it ended by itself, with success.
+    pub well: bool,
+}
+
+/// Runs a program; its errors are shown as they come, its output is printed when it has ended.
+///
+/// # Errors
+/// A program that cannot be started.
+pub fn run(command: &mut Command) -> Result<Said> {
+    let said = run_for(command, LIMIT)?;
+    print!("\n{}\n{}", describe(command), said.text);
+    Ok(said)
+}
+
+fn run_for(command: &mut Command, limit: Duration) -> Result<Said> {
+    let named = describe(command);
+    let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = child.with_context(|| format!("cannot start {named}"))?;
+    let text = Arc::new(Mutex::new(Vec::new()));
+    let mut ends = Vec::new();
+    if let Some(stdout) = child.stdout.take() {
+        let text = Arc::clone(&text);
+        ends.push(read(stdout, move |part| {
+            text.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(part);
+        }));
+    }
+    if let Some(stderr) = child.stderr.take() {
+        ends.push(read(stderr, |part| {
+            let _ = io::stderr().write_all(part); // where nobody reads, nothing is to be shown
+        }));
+    }
+    let well = ends_well(&mut child, limit).with_context(|| format!("cannot wait for {named}"))?;
+    match well {
+        None => eprintln!("not ended within {} s, and killed: {named}", limit.as_secs()),
+        Some(_) if !ends.iter().all(|end| end.recv_timeout(LAST).is_ok()) => {
+            eprintln!("left a program behind that holds its output: {named}");
+        }
+        Some(_) => {}
+    }
+    let text = text.lock().unwrap_or_else(PoisonError::into_inner);
+    Ok(Said { text: String::from_utf8_lossy(&text).into_owned(), well: well == Some(true) })
+}
+
+/// Whether it ended well; `None` where it had to be killed.
+fn ends_well(child: &mut Child, limit: Duration) -> io::Result<Option<bool>> {
+    let begin = Instant::now();
+    while begin.elapsed() < limit {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status.success()));
+        }
+        thread::sleep(LOOK);
+    }
+    child.kill()?;
+    child.wait()?;
+    Ok(None)
+}
+
+/// Gives what comes to `take`; tells of the end.
+fn read(mut from: impl Read + Send + 'static, mut take: impl FnMut(&[u8]) + Send + 'static) -> Receiver<()> {
+    let (end, ended) = channel();
+    thread::spawn(move || {
+        let mut part = [0; 1 << 14];
+        while let Ok(length @ 1..) = from.read(&mut part) {
+            take(&part[..length]);
+        }
+        let _ = end.send(()); // nobody may wait any more
+    });
+    ended
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn shell(script: &str, limit: Duration) -> (String, bool, Duration) {
+        let begin = Instant::now();
+        let Said { text, well } = run_for(Command::new("sh").args(["-c", script]), limit).expect("a shell");
+        (text, well, begin.elapsed())
+    }
+
+    #[test]
+    fn what_hangs_is_killed_and_what_it_said_is_kept() {
+        let (text, well, took) = shell("echo begun; exec sleep 60", Duration::from_millis(300));
+        assert_eq!((text.as_str(), well), ("begun\n", false));
+        assert!(took < Duration::from_secs(30), "{took:?}");
+    }
+
+    #[test]
+    fn what_is_left_behind_is_not_waited_for() {
+        let (text, well, took) = shell("sleep 60 & echo done", Duration::from_secs(50));
+        assert_eq!((text.as_str(), well), ("done\n", true));
+        assert!(took < Duration::from_secs(30), "{took:?}");
+    }
+
+    #[test]
+    fn failures_are_seen() {
+        let (text, well, _) = shell("echo a; exit 3", Duration::from_secs(50));
+        assert_eq!((text.as_str(), well), ("a\n", false));
+    }
+}
