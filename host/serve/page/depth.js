@@ -17,7 +17,7 @@ export function make(host, remember) {
   const viewer = new Viewer("Depth map");
   const surface = h("div", { class: "surface", hidden: true });
   const side = measure.make();
-  /** @type {{ name: string | null, layer: string, colours: string, other: string, maps: any, loading: number, capture: any, mesh?: ArrayBuffer | null }} */
+  /** @type {{ name: string | null, layer: string, colours: string, other: string, maps: any, loading: number, capture: any, mesh?: Promise<ArrayBuffer | null> | null }} */
   const show = { name: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, capture: null };
   const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
   const layers = h("div", { class: "group", role: "group", "aria-label": "What is shown" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
@@ -167,14 +167,18 @@ export function make(host, remember) {
   }
 
   async function turn() {
+    // One request, however often this is asked for while it is on its way.
+    const mesh = (show.mesh ??= bytes(`/api/captures/${show.name}/mesh.ply`));
     const { show: begin, sorry } = await import("./mesh.js");
     try {
-      show.mesh ??= await bytes(`/api/captures/${show.name}/mesh.ply`);
-      if (show.layer !== "surface" || !show.mesh || (turning && turned === show.mesh)) return;
+      const buffer = await mesh;
+      if (!buffer && show.mesh === mesh) show.mesh = null; // not there yet: asked again by the next look
+      if (show.layer !== "surface" || show.mesh !== mesh || !buffer || (turning && turned === mesh)) return;
       turning?.();
-      turned = show.mesh;
-      turning = begin(surface, show.mesh);
+      turned = mesh;
+      turning = begin(surface, buffer);
     } catch (error) {
+      if (show.mesh === mesh) show.mesh = null;
       sorry(surface, error);
     }
   }

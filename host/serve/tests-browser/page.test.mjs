@@ -76,7 +76,9 @@ test("from the open page to a turning surface in two clicks", async () => {
   await page.getByRole("button", { name: "Capture pair" }).click();
   const surface = page.getByRole("button", { name: "3-D" });
   await surface.waitFor();
-  await surface.click();
+  let meshes = 0;
+  page.on("request", (request) => { meshes += request.url().endsWith("/mesh.ply"); });
+  await surface.dblclick();
   const canvas = page.locator(".surface canvas");
   await canvas.waitFor();
   assert.ok(Number(await page.locator(".surface").getAttribute("data-triangles")) > 10_000);
@@ -89,6 +91,7 @@ test("from the open page to a turning surface in two clicks", async () => {
     turned = (await picture()) !== first;
   }
   assert.ok(turned, "it turns");
+  assert.equal(meshes, 1, "a second click does not begin it anew");
   assert.deepEqual(page.complaints, []);
   const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
   const age = await page.locator("#view-depth .viewer canvas").getAttribute("data-age-ms");
