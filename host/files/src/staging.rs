@@ -27,7 +27,8 @@ pub enum StagingError {
 }
 
 impl StagingError {
-    fn at(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
+    /// What the system says of a place.
+    pub fn at(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.into(), source }
     }
 }

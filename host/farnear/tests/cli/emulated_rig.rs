@@ -115,3 +115,19 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
     // The project's promise for the noisy 8-bit staircase.
     assert!(number(&compared, "rmse_mm") <= 0.75, "{compared}");
 }
+
+/// The system lets the program write files of 32 kB (64 kB where a shell counts in KiB) and no larger; an image has some 200 kB.
+#[test]
+#[cfg(target_os = "linux")]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_capture_on_a_full_disk_is_said_and_leaves_nothing() {
+    let folder = Folder::new();
+    let pair = folder.text("pair");
+    let mut command = assert_cmd::Command::new("sh");
+    command.args(["-c", r#"trap "" XFSZ; ulimit -f 64; exec "$0" "$@""#, env!("CARGO_BIN_EXE_farnear")]);
+    command.args(["rig", "capture", "--port", "sim", "--optics", rig_optics(), "--out", &pair]);
+    fails(&mut command, 1, &["cannot write", "far.png"]);
+    assert_eq!(folder.listing(), [""; 0]);
+    // The same name is free for the capture that follows.
+    succeeds(&mut on_the_rig(&["capture", "--optics", rig_optics(), "--out", &pair]));
+}

@@ -9,7 +9,7 @@
 
 use std::{
     fs::{self, File},
-    io::{BufReader, BufWriter, ErrorKind, Read, Write},
+    io::{BufReader, ErrorKind, Read, Write},
     path::{Path, PathBuf},
     sync::mpsc::{self, SyncSender},
     thread,
@@ -21,6 +21,7 @@ use farnear_depth::{
     optics::Optics,
     pipeline::{Processor, Settings},
 };
+use farnear_files::staging::StagingError;
 use ndarray::Array2;
 use serde::Serialize;
 
@@ -71,7 +72,9 @@ pub struct PlayFigures {
 
 /// A recording under way. The file has its name when it is finished; one that is not goes with this value.
 pub struct Recorder {
-    file: BufWriter<File>,
+    file: File,
+    /// Bytes of what is whole: the head and pairs.
+    whole_bytes: u64,
     partial: PathBuf,
     target: PathBuf,
     begin: Option<Instant>,
@@ -87,24 +90,40 @@ impl Recorder {
     /// A folder that cannot be written, optics that cannot be.
     pub fn begin(target: &Path, optics: &GivenOptics) -> Result<Self> {
         let folder = target.parent().unwrap_or(Path::new("."));
-        let failed = |source| WorkflowError::Folder { folder: folder.into(), source };
-        fs::create_dir_all(folder).map_err(failed)?;
+        fs::create_dir_all(folder)
+            .map_err(|source| WorkflowError::Folder { folder: folder.into(), source })?;
         let name = target.file_name().unwrap_or_default().to_string_lossy();
         let partial = folder.join(format!(".{name}.partial"));
-        let mut file = BufWriter::new(File::create(&partial).map_err(failed)?);
         let text = toml::to_string(&optics.table)?;
-        file.write_all(MAGIC)
-            .and_then(|()| file.write_all(&(text.len() as u32).to_le_bytes()))
-            .and_then(|()| file.write_all(text.as_bytes()))
-            .map_err(failed)?;
-        let target = target.into();
-        Ok(Self { file, partial, target, begin: None, last: Duration::ZERO, pairs: 0, finished: false })
+        let head = [MAGIC, &(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
+        let mut recorder = Self {
+            file: File::create(&partial).map_err(StagingError::at(target))?,
+            whole_bytes: 0,
+            partial,
+            target: target.into(),
+            begin: None,
+            last: Duration::ZERO,
+            pairs: 0,
+            finished: false,
+        };
+        recorder.append(&head)?;
+        Ok(recorder)
+    }
+
+    /// Writes all of it, or leaves the file as it was: one that a full disk ends is whole to its last pair.
+    fn append(&mut self, bytes: &[u8]) -> Result<()> {
+        if let Err(error) = self.file.write_all(bytes) {
+            self.file.set_len(self.whole_bytes).map_err(StagingError::at(&self.target))?;
+            return Err(StagingError::at(&self.target)(error).into());
+        }
+        self.whole_bytes += bytes.len() as u64;
+        Ok(())
     }
 
     /// Adds a pair; gives whether there is room for more.
     ///
     /// # Errors
-    /// A disk that is full, images of more than 65,535 pixels along a side.
+    /// A disk that is full: what was added before stays. Images of more than 65,535 pixels along a side.
     pub fn add(&mut self, far: &Image, near: &Image) -> Result<bool> {
         let (height, width) = far.pixels.dim();
         let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
@@ -121,15 +140,15 @@ impl Recorder {
                 "both images have one size and depth of bits",
             ));
         }
-        self.last = self.begin.get_or_insert_with(Instant::now).elapsed();
+        let at = self.begin.get_or_insert_with(Instant::now).elapsed();
         let mut bytes = Vec::with_capacity(13 + 4 * far.pixels.len());
-        bytes.extend((self.last.as_micros() as u64).to_le_bytes());
+        bytes.extend((at.as_micros() as u64).to_le_bytes());
         bytes.extend(width.to_le_bytes());
         bytes.extend(height.to_le_bytes());
         bytes.push(far.bits);
         bytes.extend(far.pixels.iter().chain(&near.pixels).flat_map(|code| code.to_le_bytes()));
-        let folder = self.target.parent().unwrap_or(Path::new(".")).to_path_buf();
-        self.file.write_all(&bytes).map_err(|source| WorkflowError::Folder { folder, source })?;
+        self.append(&bytes)?;
+        self.last = at;
         self.pairs += 1;
         Ok(self.pairs < PAIRS_MAX)
     }
@@ -137,13 +156,9 @@ impl Recorder {
     /// Puts the file in its place.
     ///
     /// # Errors
-    /// A disk that is full.
+    /// A folder that has gone.
     pub fn finish(mut self) -> Result<RecordingFigures> {
-        let folder = self.target.parent().unwrap_or(Path::new(".")).to_path_buf();
-        self.file
-            .flush()
-            .and_then(|()| fs::rename(&self.partial, &self.target))
-            .map_err(|source| WorkflowError::Folder { folder, source })?;
+        fs::rename(&self.partial, &self.target).map_err(StagingError::at(&self.target))?;
         self.finished = true;
         Ok(RecordingFigures { pairs: self.pairs, seconds: rounded(self.last.as_secs_f64(), 3) })
     }
@@ -347,6 +362,49 @@ mod tests {
         assert!(error.contains("pair 2 is cut short"), "{error}");
         fs::write(&path, b"something else").expect("writable");
         assert!(Recording::open(&path).err().expect("refused").to_string().contains("FNPAIRS1"));
+    }
+
+    /// The system lets this process write files of 4 kB (8 kB where a shell counts in KiB) and no larger.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_disk_that_fills_up_ends_a_recording_with_the_last_whole_pair() {
+        const WITHIN: &str = "FARNEAR_TEST_SMALL_FILES";
+        if std::env::var_os(WITHIN).is_none() {
+            let name =
+                "rig::recording::tests::a_disk_that_fills_up_ends_a_recording_with_the_last_whole_pair";
+            let script = r#"trap "" XFSZ; ulimit -f 8; exec "$0" --exact "$1""#;
+            let program = std::env::current_exe().expect("this program");
+            let run = std::process::Command::new("sh")
+                .args(["-c", script])
+                .arg(program)
+                .arg(name)
+                .env(WITHIN, "1")
+                .output();
+            let ended = run.expect("a shell");
+            let said = String::from_utf8_lossy(&ended.stdout);
+            assert!(ended.status.success() && said.contains("1 passed"), "{said}");
+            return;
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.pairs");
+        let mut recorder = Recorder::begin(&path, &optics()).expect("begins");
+        let large = Image { pixels: Array2::from_elem((12, 20), 7), bits: 12 };
+        let mut whole = 0;
+        let error = loop {
+            match recorder.add(&large, &large) {
+                Ok(_) => whole += 1,
+                Err(error) => break error.to_string(),
+            }
+        };
+        assert!(error.contains("cannot write"), "{error}");
+        assert!(whole > 1, "{whole}");
+        assert_eq!(recorder.finish().expect("what was whole").pairs, whole);
+        let mut recording = Recording::open(&path).expect("pairs");
+        for _ in 0..whole {
+            assert_eq!(recording.next_pair().expect("whole").expect("there").near, large);
+        }
+        assert_eq!(recording.next_pair().expect("nothing of the next"), None);
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
     }
 
     #[test]
