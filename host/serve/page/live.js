@@ -1,6 +1,6 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
 import { act, drives, ended, get, on, store } from "./link.js";
-import { h, button, choice, field, number, panel, rows } from "./ui.js";
+import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
 import { paintCodes } from "./maps.js";
@@ -94,6 +94,7 @@ export function make(host) {
     record.setAttribute("aria-pressed", Boolean(live.recording));
     write(record, live.recording ? "Stop recording" : "Record");
     if (before?.live.recording !== live.recording) listed();
+    if (before && live.recording_ended && live.recording_ended !== before.live.recording_ended) notice(live.recording_ended, "warning");
     const moving = state.job?.phase === "running";
     if (!seen) write(status, "");
     else if (live.error) write(status, live.error);

@@ -29,6 +29,7 @@ export interface State {
     measure: string;
     error: string | null;
     recording: string | null;
+    recording_ended: string | null;
     /** A camera without a rig: its image can be seen live. */
     camera_alone: boolean;
   };

@@ -194,9 +194,8 @@ impl App {
         let Live { mode, exposure, measure, .. } = live.clone();
         drop(live);
         self.change(|state| {
-            let LiveState { recording, camera_alone, .. } = state.live.clone();
             state.live =
-                LiveState { mode, exposure_us: exposure.0, measure, error: None, recording, camera_alone };
+                LiveState { mode, exposure_us: exposure.0, measure, error: None, ..state.live.clone() };
         });
     }
 
@@ -275,6 +274,15 @@ impl App {
             Err(error) => self.note(format!("recording {name}: {error}")),
         }
         self.change(|state| state.live.recording = None);
+    }
+
+    /// Ends it for a reason that nobody wished; what was recorded stays.
+    pub fn break_recording(&self, why: &str) {
+        let name = self.state().live.recording.unwrap_or_default();
+        let ended = format!("The recording {name} has ended: {why}; what was recorded before is kept");
+        self.note(ended.clone());
+        self.finish_recording();
+        self.change(|state| state.live.recording_ended = Some(ended));
     }
 
     /// Ends jobs and live depth; what this gives tells the board, which may take a while, and nothing begins meanwhile.
@@ -365,6 +373,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
             measure: live.measure,
             error: None,
             recording: None,
+            recording_ended: None,
             camera_alone: address.is_none() && camera.address != CameraAddress::Emulated,
         },
         seats: SeatsState { driver: None, asking: None, count: 0 },

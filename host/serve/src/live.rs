@@ -118,11 +118,8 @@ fn record(app: &App, depth: &LiveDepth<'_>) {
     let added = lock(&app.recorder).as_mut().map(|recorder| recorder.add(depth.far, depth.near));
     match added {
         None | Some(Ok(true)) => {}
-        Some(Ok(false)) => app.finish_recording(),
-        Some(Err(error)) => {
-            app.note(format!("recording: {error}"));
-            app.finish_recording();
-        }
+        Some(Ok(false)) => app.break_recording(&format!("it has {} pairs", recording::PAIRS_MAX)),
+        Some(Err(error)) => app.break_recording(&error.to_string()),
     }
 }
 

@@ -122,6 +122,8 @@ pub struct LiveState {
     pub error: Option<String>,
     /// Name of the recording that live depth goes into.
     pub recording: Option<String>,
+    /// Why the last recording ended by itself: the disk is full, or it has as many pairs as one may have.
+    pub recording_ended: Option<String>,
     /// Whether there is a camera though no rig: its image can be seen live, nothing else.
     pub camera_alone: bool,
 }

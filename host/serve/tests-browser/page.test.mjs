@@ -238,6 +238,24 @@ async function painted(page, canvas, seconds) {
   return { rate, age: ages.sort((a, b) => a - b)[Math.floor(ages.length / 2)] };
 }
 
+test("a recording that the disk has no more room for says so, and keeps what it has", async () => {
+  // A pair has 1.2 MB.
+  const full = await serve(["--rig", "sim"], 8000);
+  try {
+    const page = await open(browser, full.address);
+    await page.getByRole("button", { name: "Live depth" }).click();
+    await page.locator(".status", { hasText: "ms from image to map" }).waitFor();
+    await page.getByRole("button", { name: "Record", exact: true }).click();
+    await page.getByText(/The recording live-001.* has ended: cannot write .*live-001.*; what was recorded before is kept/).waitFor();
+    await page.getByLabel("Recording", { exact: true }).locator("option", { hasText: "live-001" }).waitFor({ state: "attached" });
+    assert.equal((await full.ask("/api/state")).live.mode, "depth", "live depth goes on");
+    assert.deepEqual(page.complaints, []);
+    await page.context().close();
+  } finally {
+    assert.equal(await full.close(), 0);
+  }
+});
+
 test("a camera without a rig is seen live, and nothing that needs a rig is offered", async () => {
   const alone = await serve(["--camera", `command:640x480:gray:${process.execPath} ${join(import.meta.dirname, "camera.mjs")}`]);
   try {

@@ -8,10 +8,13 @@ import { chromium } from "playwright-core";
 const FARNEAR = process.env.FARNEAR ?? join(import.meta.dirname, "../../../target/debug/farnear");
 const BROWSERS = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome", chromium.executablePath()];
 
-/** Serves until `close`; the emulated rig where nothing else is named. */
-export async function serve(what = ["--rig", "sim"]) {
+/** Serves until `close`; the emulated rig where nothing else is named. With `blocks` it can write no file that is larger than so many
+ * blocks (of 512 bytes, or of 1024: the shell's), as on a disk that is full. */
+export async function serve(what = ["--rig", "sim"], blocks = 0) {
   const session = mkdtempSync(join(tmpdir(), "farnear-page-"));
-  const child = spawn(FARNEAR, ["serve", ...what, "--session", session, "--port", "0"], { stdio: ["ignore", "pipe", "inherit"] });
+  const limited = blocks ? ["sh", "-c", `trap "" XFSZ; ulimit -f ${blocks}; exec "$0" "$@"`] : [];
+  const [program, ...first] = [...limited, FARNEAR];
+  const child = spawn(program, [...first, "serve", ...what, "--session", session, "--port", "0"], { stdio: ["ignore", "pipe", "inherit"] });
   const address = await new Promise((done, failed) => {
     child.stdout.once("data", (data) => done(String(data).trim()));
     child.once("exit", (code) => failed(new Error(`farnear serve ended with ${code}`)));

@@ -124,7 +124,7 @@ async fn record(
     let name = free.unwrap_or_default();
     *recorder = Some(Recorder::begin(&folder.join(&name), &GivenOptics::read(&app.optics_file())?)?);
     drop(recorder);
-    app.change(|state| state.live.recording = Some(name));
+    app.change(|state| (state.live.recording, state.live.recording_ended) = (Some(name), None));
     Ok(Json(DONE))
 }
 
