@@ -10,8 +10,14 @@ use anyhow::Result;
 use crate::run::{cargo, finish, step};
 
 /// Crates whose tests read what others send: frames, requests, files.
-const CRATES: [&str; 5] =
-    ["farnear-protocol", "farnear-rig", "farnear-capture", "farnear-scene", "farnear-activity"];
+const CRATES: [&str; 6] = [
+    "farnear-protocol",
+    "farnear-rig",
+    "farnear-capture",
+    "farnear-scene",
+    "farnear-activity",
+    "farnear-files",
+];
 /// Cases per property and round.
 const CASES: &str = "20000";
 

@@ -154,11 +154,14 @@ impl Problem<'_> {
         if self.watch.is_stopped() {
             return Err(EmbeddingError::Stopped);
         }
-        let space = match &self.experiment.features {
-            Some(space) => space.with_features(self.clips)?,
+        let (space, vectors) = match &self.experiment.features {
+            Some(space) => {
+                let space = space.with_features(self.clips)?;
+                let vectors = vectors_of(&space, self.clips)?;
+                (space, vectors)
+            }
             None => galleries.space(self.clips, settings)?,
         };
-        let vectors = vectors_of(&space, self.clips)?;
         let mut best: Option<Candidate> = None;
         for &sharpness in &self.experiment.sharpness {
             let patterns = patterns_of(&space, &vectors, sharpness);

@@ -142,7 +142,7 @@ impl Space {
     /// # Errors
     /// Too few silhouettes, or a gallery that cannot be laid out.
     pub fn train(clips: &[&Clip], settings: &SpaceSettings) -> Result<Self, EmbeddingError> {
-        Galleries::default().space(clips, settings)
+        Galleries::default().space(clips, settings).map(|(space, _)| space)
     }
 
     /// Embeds the frames of a track: frames x D, over the gallery's spread.
@@ -150,11 +150,7 @@ impl Space {
     /// # Errors
     /// Descriptors of another length.
     pub fn points(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
-        let points = match &self.map {
-            Map::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,
-            Map::Pca(pca) => pca.transform(track.descriptors.view())?,
-        };
-        Ok(points / self.spread)
+        self.map.points(track, self.spread)
     }
 
     /// Frame vectors of a track: what the codebook sees.
@@ -230,57 +226,118 @@ struct Gallery {
     neighbours: usize,
 }
 
-/// Galleries of one set of clips, each laid out once.
+/// Galleries of one set of clips, each laid out once, and the clips' frames in each of their maps, embedded once.
 #[derive(Debug, Default)]
-pub struct Galleries(Vec<Gallery>);
+pub struct Galleries {
+    galleries: Vec<Gallery>,
+    embedded: Vec<Embedded>,
+}
 
 impl Galleries {
-    /// The space of `settings` for the clips, all of their views together; always ask with the same clips.
+    /// The space of `settings` for the clips, all of their views together, and its frame vectors of them, `[clip][view]`; always ask with the same clips.
     ///
     /// # Errors
     /// Too few silhouettes, or a gallery that cannot be laid out.
-    pub fn space(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<Space, EmbeddingError> {
-        let tracks: Vec<&Track> = clips.iter().flat_map(|clip| &clip.views).collect();
-        let key = (settings.layout, settings.dimensions, settings.gallery);
-        let index = match self.0.iter().position(|gallery| gallery.key == key) {
-            Some(index) => index,
-            None => {
-                let all = stacked(tracks.iter().map(|track| track.descriptors.view()));
-                self.0.push(Gallery::new(evenly(all.view(), settings.gallery), settings, key)?);
-                self.0.len() - 1
-            }
-        };
-        let gallery = &self.0[index];
-        let map = gallery.map(settings)?;
-        let first = gallery.coordinates.column(0);
-        let mean = first.sum() / first.len().max(1) as f32;
-        let spread = (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / first.len().max(1) as f32)
-            .sqrt()
-            .max(1e-6);
+    pub fn space(
+        &mut self,
+        clips: &[&Clip],
+        settings: &SpaceSettings,
+    ) -> Result<(Space, Vec<Vec<Array2<f32>>>), EmbeddingError> {
+        let at = self.embedded(clips, settings)?;
+        let embedded = &self.embedded[at];
+        let gallery = &self.galleries[embedded.gallery];
         let mut space = Space {
             settings: settings.clone(),
-            map,
-            spread,
+            map: embedded.map.clone(),
+            spread: embedded.spread,
             pattern: Pattern::Thesis(OccupancyGrid { low: Vec::new(), range: Vec::new(), bins: Vec::new() }),
             neighbours: gallery.neighbours,
             brought: None,
         };
-        space.pattern = match &settings.pattern {
+        let vectors: Vec<Vec<Array2<f32>>> = clips
+            .par_iter()
+            .zip(&embedded.points)
+            .map(|(clip, points)| {
+                let boxes = clip.views.iter().map(|track| track.boxes.as_ref().map(|boxes| boxes.view()));
+                points
+                    .iter()
+                    .zip(boxes)
+                    .map(|(points, boxes)| space.vectors_of(points.view(), boxes))
+                    .collect()
+            })
+            .collect();
+        match &settings.pattern {
             // Learned afterwards, with the activities' names.
-            PatternKind::Network => return Ok(space),
+            PatternKind::Network => {}
             PatternKind::Thesis(bins) => {
-                Pattern::Thesis(OccupancyGrid::new((&gallery.coordinates / spread).view(), bins))
+                let coordinates = &gallery.coordinates / embedded.spread;
+                space.pattern = Pattern::Thesis(OccupancyGrid::new(coordinates.view(), bins));
             }
             PatternKind::Codebook(size) => {
-                let vectors: Result<Vec<Array2<f32>>, EmbeddingError> =
-                    tracks.par_iter().map(|track| space.vectors(track)).collect();
-                let vectors = vectors?;
-                let frames = stacked(vectors.iter().map(|v| v.view()));
+                let frames = stacked(vectors.iter().flatten().map(|v| v.view()));
                 let book = Codebook::train(frames.view(), *size, settings.seed);
-                Pattern::Codebook(book.with_residuals(frames.view(), settings.residuals, settings.seed))
+                let book = book.with_residuals(frames.view(), settings.residuals, settings.seed);
+                space.pattern = Pattern::Codebook(book);
             }
+        }
+        Ok((space, vectors))
+    }
+
+    /// The place of the clips embedded by these settings' map: weights and patterns do not change it.
+    fn embedded(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
+        let gallery = self.gallery(clips, settings)?;
+        let key = match settings.layout {
+            Layout::Isomap(_) => [f64::from(settings.gamma), settings.ridge],
+            Layout::Pca => [0.0; 2],
         };
-        Ok(space)
+        let known = |embedded: &Embedded| embedded.gallery == gallery && embedded.key == key;
+        if let Some(index) = self.embedded.iter().position(known) {
+            return Ok(index);
+        }
+        let laid_out = &self.galleries[gallery];
+        let map = laid_out.map(settings)?;
+        let spread = laid_out.spread();
+        let points: Result<Vec<Vec<Array2<f32>>>, EmbeddingError> = clips
+            .par_iter()
+            .map(|clip| clip.views.iter().map(|track| map.points(track, spread)).collect())
+            .collect();
+        self.embedded.push(Embedded { gallery, key, map, spread, points: points? });
+        Ok(self.embedded.len() - 1)
+    }
+
+    /// The place of the gallery that these settings ask for.
+    fn gallery(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
+        let key = (settings.layout, settings.dimensions, settings.gallery);
+        if let Some(index) = self.galleries.iter().position(|gallery| gallery.key == key) {
+            return Ok(index);
+        }
+        let all = stacked(clips.iter().flat_map(|clip| &clip.views).map(|track| track.descriptors.view()));
+        self.galleries.push(Gallery::new(evenly(all.view(), settings.gallery), settings, key)?);
+        Ok(self.galleries.len() - 1)
+    }
+}
+
+/// Clips in a map.
+#[derive(Debug)]
+struct Embedded {
+    /// Place of the gallery.
+    gallery: usize,
+    /// Coefficient and ridge of an RBF map.
+    key: [f64; 2],
+    map: Map,
+    spread: f32,
+    /// `[clip][view]`, frames x dimensions.
+    points: Vec<Vec<Array2<f32>>>,
+}
+
+impl Map {
+    /// Every frame of a track in the map, in units of the spread.
+    fn points(&self, track: &Track, spread: f32) -> Result<Array2<f32>, EmbeddingError> {
+        let points = match self {
+            Self::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,
+            Self::Pca(pca) => pca.transform(track.descriptors.view())?,
+        };
+        Ok(points / spread)
     }
 }
 
@@ -315,6 +372,14 @@ impl Gallery {
     }
 
     /// The map that embeds new silhouettes.
+    /// Standard deviation of the first dimension.
+    fn spread(&self) -> f32 {
+        let first = self.coordinates.column(0);
+        let count = first.len().max(1) as f32;
+        let mean = first.sum() / count;
+        (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count).sqrt().max(1e-6)
+    }
+
     fn map(&self, settings: &SpaceSettings) -> Result<Map, EmbeddingError> {
         if let Some(pca) = &self.pca {
             return Ok(Map::Pca(pca.clone()));

@@ -1,8 +1,10 @@
 //! Cutting the shadow off a silhouette: `thesis` (Li 2014, section 8.2.4) and `hybrid`, the default.
 //!
-//! - `thesis`: the run-point cut over beta +- its standard deviation in steps, the longest run wins; shadows that point straight
-//!   down are cut by length. It removes much and takes a good part of the person with it when the run is broken by the legs.
-//! - `hybrid`: shadows that lie sideways (|sin eta| < 0.45) get the run-point cut over +-3 degrees, and a half-plane through the
+//! - `thesis`: the run-point cut at angles from beta minus to beta plus its standard deviation, at most 10 degrees apart, the longest run wins; shadows that point
+//!   straight down are cut by length. It removes much and takes a good part of the person with it when the run is broken by the legs.
+//! - `hybrid`: where the light's place is known the silhouette is explained as a body and the shadow that it throws ([`super::cast`]), and what is not the body goes;
+//!   where the shadow lies sideways the run-point cut over +-3 degrees takes off what is left. Where nothing explains the silhouette, and for a
+//!   direction measured in the picture, it is by angles alone: shadows that lie sideways (|sin eta| < 0.45) get the run-point cut over +-3 degrees, and a half-plane through the
 //!   feet where that would take more than 60 % of the silhouette; others get the half-plane at once. The half-plane's edge is the
 //!   bisector of body and shadow; where the shadow points away only a strip of ground as wide as a person is cut. A shadow behind
 //!   the person cannot be told apart without colour: such frames are cut as well as it goes and flagged.
@@ -10,19 +12,20 @@
 //! Angles are tried on the outline ([`super::envelope`]), so a cut on 640 x 480 costs a fraction of a millisecond.
 
 use super::camera::CameraFile;
+use super::cast;
 use super::envelope::{Outline, clear_left_of, row_extent};
 use super::light::Light;
 use super::projection::{self, ImageShadow, ShadowError, Subject};
 use crate::mask::Mask;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::str::FromStr;
 
 /// A way to cut, by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Run-point cut for sideways shadows, half-plane otherwise.
+    /// The body that explains silhouette and shadow, by angles where none does.
     #[default]
     Hybrid,
     /// As printed in Li 2014.
@@ -49,6 +52,8 @@ pub struct CutReport {
     pub removed_fraction: f64,
     /// Whether the half-plane through the feet was used in place of the run point.
     pub half_plane: bool,
+    /// Share of the silhouette that body and shadow together leave unexplained, 0 to 1; `None` where the cut went by angles alone.
+    pub unexplained: Option<f64>,
     /// The shadow found for this silhouette.
     pub shadow: ImageShadow,
     /// The subject as estimated from the silhouette.
@@ -95,13 +100,22 @@ pub fn remove(
 ) -> Result<(Mask, CutReport), ShadowError> {
     let camera = &file.camera;
     let outline = checked_outline(mask, file)?;
-    let subject = estimate_subject(mask, &outline, file);
+    let light = light.into();
+    let explained = match method {
+        Method::Thesis => None,
+        Method::Hybrid => cast::explain(mask, file, light)?,
+    };
+    let subject = match &explained {
+        Some(found) => found.subject,
+        None => estimate_subject(mask, &outline, file),
+    };
     let reach_px = |foot_px, eta_rad| reach_px(mask, &outline, foot_px, eta_rad);
-    let shadow = light.into().shadow_of(subject, camera, reach_px)?;
+    let shadow = light.shadow_of(subject, camera, reach_px)?;
     let mut out = mask.clone();
-    let (beta_rad, half_plane) = match method {
-        Method::Thesis => thesis(mask, &mut out, &outline, &shadow, beta_sd_rad),
-        Method::Hybrid => hybrid(mask, &mut out, &outline, &shadow),
+    let (beta_rad, half_plane) = match (method, &explained) {
+        (Method::Thesis, _) => thesis(mask, &mut out, &outline, &shadow, beta_sd_rad),
+        (Method::Hybrid, None) => hybrid(mask, &mut out, &outline, &shadow),
+        (Method::Hybrid, Some(found)) => (explained_cut(mask, &mut out, &outline, &shadow, found), false),
     };
     let left = crate::mask::area(out.view());
     let removed_fraction = 1.0 - left as f64 / outline.area as f64;
@@ -112,6 +126,7 @@ pub fn remove(
             beta_rad,
             removed_fraction,
             half_plane,
+            unexplained: explained.map(|found| found.unexplained),
             shadow,
             subject,
             trustworthy: removed_fraction <= 0.6 && !away && !shadow.shortened,
@@ -161,10 +176,10 @@ fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subjec
 
 /// The printed method; gives the angle used and whether a half-plane was.
 fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, sd_rad: f64) -> (f64, bool) {
-    /// Step over beta's range (10 degrees).
-    const STEP_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+    /// The largest step over beta's range (10 degrees).
+    const STEP_RAD: f64 = 10.0 * PI / 180.0;
     /// "Close to 90 degrees": the shadow is cut by length.
-    const VERTICAL_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+    const VERTICAL_RAD: f64 = 10.0 * PI / 180.0;
     if (shadow.eta_rad - FRAC_PI_2).abs() < VERTICAL_RAD {
         let bottom = outline.bounds.1 as f64;
         let limit = -(bottom - shadow.m_px[1].max(0.0)) as f32;
@@ -172,26 +187,69 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
         return (FRAC_PI_2, true);
     }
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
-    let steps = (sd_rad.abs().min(FRAC_PI_2) / STEP_RAD).floor() as i32;
-    let angles = (-steps..=steps).map(|i| shadow.beta_rad + f64::from(i) * STEP_RAD);
-    let best = angles
-        .map(|beta| (beta, outline.lower_edge(beta as f32, flip).rotation_point(GRADIENT_WINDOW)))
-        .max_by_key(|(_, (run, _))| *run);
-    let Some((beta, (_, limit))) = best else { return (shadow.beta_rad, false) };
+    let sd_rad = sd_rad.abs().min(FRAC_PI_2);
+    // Also where the step is larger than the range: its middle and both ends.
+    let steps = (sd_rad / STEP_RAD).ceil().max(1.0) as i32;
+    let angles = (-steps..=steps).map(|i| shadow.beta_rad + sd_rad * f64::from(i) / f64::from(steps));
+    let Some((beta, limit)) = longest_run(outline, flip, angles) else { return (shadow.beta_rad, false) };
     clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
     (beta, false)
 }
 
-/// The default method; gives the angle used and whether the half-plane was.
+/// The angle at which the run of negative slope is longest, and where it ends there. Beta lies in [pi/2, pi] (8.20); of equals the angle nearest to the
+/// middle of those tried is taken.
+fn longest_run(
+    outline: &Outline,
+    flip: Option<f32>,
+    angles: impl Iterator<Item = f64>,
+) -> Option<(f64, f32)> {
+    let clamped = angles.map(|beta| beta.clamp(FRAC_PI_2, PI));
+    let found: Vec<(f64, (usize, f32))> = clamped
+        .map(|beta| (beta, outline.lower_edge(beta as f32, flip).rotation_point(GRADIENT_WINDOW)))
+        .collect();
+    let middle = found.len() / 2;
+    let from_middle =
+        found.iter().enumerate().max_by_key(|(i, (_, (run, _)))| (*run, usize::MAX - i.abs_diff(middle)));
+    from_middle.map(|(_, &(beta, (_, limit)))| (beta, limit))
+}
+
+/// The angle and up to 3 degrees beside it.
+fn degrees_about(beta_rad: f64) -> impl Iterator<Item = f64> {
+    (-3..=3).map(move |i| beta_rad + f64::from(i).to_radians())
+}
+
+/// Takes off what is not the body's, and of a shadow that lies sideways also what lies beyond the run point: a body and its shadow look alike near the feet. Gives
+/// the angle used.
+fn explained_cut(
+    mask: &Mask,
+    out: &mut Mask,
+    outline: &Outline,
+    shadow: &ImageShadow,
+    found: &cast::Explanation,
+) -> f64 {
+    let flip = shadow.mirrored.then_some(mask.ncols() as f32);
+    let run = if shadow.eta_rad.sin().abs() < SIDEWAYS {
+        longest_run(outline, flip, degrees_about(shadow.beta_rad))
+    } else {
+        None
+    };
+    let beta_rad = run.map_or(shadow.beta_rad, |(beta, limit)| {
+        let gone = clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
+        if gone as f64 > 0.6 * outline.area as f64 {
+            out.assign(mask);
+        }
+        beta
+    });
+    out.zip_mut_with(&found.body, |left, &body| *left &= body);
+    beta_rad
+}
+
+/// The default method where nothing explains the silhouette; gives the angle used and whether the half-plane was.
 fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> (f64, bool) {
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
     let sideways = shadow.eta_rad.sin().abs() < SIDEWAYS;
     if sideways {
-        let best = (-3..=3)
-            .map(|i| shadow.beta_rad + f64::from(i).to_radians())
-            .map(|beta| (beta, outline.lower_edge(beta as f32, flip).rotation_point(GRADIENT_WINDOW)))
-            .max_by_key(|(_, (run, _))| *run);
-        if let Some((beta, (_, limit))) = best {
+        if let Some((beta, limit)) = longest_run(outline, flip, degrees_about(shadow.beta_rad)) {
             let gone = clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
             if gone as f64 <= 0.6 * outline.area as f64 {
                 return (beta, false);

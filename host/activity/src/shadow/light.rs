@@ -51,6 +51,21 @@ impl Light {
         }
     }
 
+    /// Where the shadow of a point (metres: right, ahead, up) falls on the ground, right and ahead; `None` at or below the ground, where the light is too low
+    /// for that height, and where its place is not known.
+    pub fn thrown_to(&self, [right_m, ahead_m, up_m]: [f64; 3], camera: &Camera) -> Option<[f64; 2]> {
+        if up_m <= 0.0 {
+            return None;
+        }
+        let subject = Subject { distance_m: ahead_m, offset_m: right_m, height_m: up_m };
+        let ground = match self {
+            Self::Sun(sun) => on_ground(*sun, up_m, camera).ok()?,
+            Self::Lamp(lamp) => lamp.on_ground(subject).ok()?,
+            Self::Direction { .. } => return None,
+        };
+        Some([right_m + ground.rx_m, ahead_m + ground.ry_m])
+    }
+
     /// The subject's shadow in the image. Of a shadow whose direction alone is known, `length_px` says how long it is, given the foot and that direction.
     ///
     /// # Errors

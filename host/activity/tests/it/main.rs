@@ -2,6 +2,7 @@
 
 mod background;
 mod bvh;
+mod damaged;
 mod everyday;
 mod highway;
 mod readers;

@@ -4,7 +4,7 @@ use chrono::{DateTime, TimeDelta, Utc};
 use farnear_activity::mask::Mask;
 use farnear_activity::shadow::projection::{ShadowError, Subject, in_image, on_ground};
 use farnear_activity::shadow::uncertainty::propagate;
-use farnear_activity::shadow::{CameraFile, Method, remove};
+use farnear_activity::shadow::{CameraFile, Lamp, Light, Method, remove};
 use farnear_activity::shadow_score::ShadowScore;
 use farnear_activity::sun::{Model, Place, SunPosition, parse_time, position};
 use farnear_activity::synthetic::scene::{Kind, scene};
@@ -47,15 +47,54 @@ fn the_thesis_method_removes_shadows_too_and_harder_scenes_stay_usable() {
         percent(printed.removed_percent()) > 60.0 && percent(printed.wrongly_removed_percent()) < 10.0,
         "{printed:?}"
     );
-    for (kind, iou) in [(Kind::Pitched, 88.0), (Kind::Bending, 78.0), (Kind::Behind, 91.0)] {
+    // Some points under what 50 scenes come to (93.8, 94.7 and 84.0 removed), well over what angles alone did (80, 57 and 83).
+    for (kind, removed, iou) in
+        [(Kind::Pitched, 88.0, 95.0), (Kind::Bending, 88.0, 94.0), (Kind::Behind, 78.0, 92.0)]
+    {
         let total = score(kind, Method::Hybrid, 30);
-        assert!(percent(total.iou_percent()) > iou, "{kind:?} {}", percent(total.iou_percent()));
-        assert!(
-            percent(total.wrongly_removed_percent()) < 10.0,
-            "{kind:?} {}",
-            percent(total.wrongly_removed_percent())
-        );
+        let found =
+            [total.removed_percent(), total.wrongly_removed_percent(), total.iou_percent()].map(percent);
+        assert!(found[0] > removed && found[1] < 5.0 && found[2] > iou, "{kind:?} {found:?}");
     }
+}
+
+#[test]
+fn the_thesis_method_searches_the_range_of_its_angle() {
+    // With a standard deviation below its step of 10 degrees it once tried one angle only. The angle found lies in the range, and not always in its middle.
+    const SD_RAD: f64 = 0.05;
+    let mut moved = 0;
+    for seed in 0..10 {
+        let scene = scene(Kind::Standard, seed);
+        let cut = |sd| {
+            remove(&scene.silhouette, &scene.camera, scene.sun, sd, Method::Thesis)
+                .expect("a result")
+                .1
+                .beta_rad
+        };
+        let (fixed, searched) = (cut(0.0), cut(SD_RAD));
+        assert!((searched - fixed).abs() <= SD_RAD + 1e-12, "{fixed} {searched}");
+        moved += usize::from(searched != fixed);
+    }
+    assert!(moved > 0, "no angle but the middle one was ever taken");
+}
+
+#[test]
+fn a_lamp_far_away_takes_the_same_off_as_the_sun() {
+    let scene = scene(Kind::Bending, 3);
+    let ground = on_ground(scene.sun, 1.0, &scene.camera.camera).expect("sun is up");
+    // At 100 km a person's width and height turn its rays by 1e-5.
+    let lamp = Lamp { right_m: -1e5 * ground.rx_m, ahead_m: -1e5 * ground.ry_m, up_m: 1e5 };
+    let cut = |light: Light| {
+        remove(&scene.silhouette, &scene.camera, light, 0.0, Method::Hybrid).expect("a result")
+    };
+    let ((by_sun, report), (by_lamp, _)) = (cut(scene.sun.into()), cut(Light::Lamp(lamp)));
+    assert!(report.unexplained.is_some_and(|share| share < 0.4), "{report:?}");
+    let differ = by_sun.iter().zip(&by_lamp).filter(|(a, b)| a != b).count();
+    let left = by_sun.iter().filter(|&&set| set).count();
+    assert!(differ * 100 <= left, "{differ} of {left} pixels");
+    // The direction in the picture alone says nothing of where a body's parts throw their shadow.
+    let (_, report) = cut(Light::Direction { eta_rad: report.shadow.eta_rad });
+    assert_eq!(report.unexplained, None);
 }
 
 #[test]

@@ -132,6 +132,9 @@ struct Cut {
     beta_sd_deg: Option<f64>,
     distance_m: f64,
     removed_percent: f64,
+    /// What body and shadow together leave unexplained; not there where the cut went by angles alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unexplained_percent: Option<f64>,
 }
 
 /// Cuts the shadow off all masks and writes them with `shadow.toml`, which flags the doubtful ones.
@@ -296,6 +299,7 @@ impl Work<'_> {
                 .map(|sure| rounded(sure.beta_rad.to_degrees(), 3)),
             distance_m: rounded(cut.subject.distance_m, 2),
             removed_percent: rounded(100.0 * cut.removed_fraction, 2),
+            unexplained_percent: cut.unexplained.map(|share| rounded(100.0 * share, 2)),
         });
         Ok((clean, Entry { file, flags, cut }))
     }
