@@ -371,7 +371,6 @@ impl Gallery {
         Ok(Self { key, samples, coordinates, pca: None, neighbours })
     }
 
-    /// The map that embeds new silhouettes.
     /// Standard deviation of the first dimension.
     fn spread(&self) -> f32 {
         let first = self.coordinates.column(0);
@@ -380,6 +379,7 @@ impl Gallery {
         (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count).sqrt().max(1e-6)
     }
 
+    /// The map that embeds new silhouettes.
     fn map(&self, settings: &SpaceSettings) -> Result<Map, EmbeddingError> {
         if let Some(pca) = &self.pca {
             return Ok(Map::Pca(pca.clone()));
