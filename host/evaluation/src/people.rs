@@ -4,6 +4,7 @@ mod between;
 mod broken;
 pub mod data;
 mod everyday;
+mod figures;
 mod layout;
 mod matrix;
 mod recognition;
