@@ -70,7 +70,7 @@ impl Processor for Noting {
 
 /// A processor for this program, and what those that were made for it have noted.
 fn rig(program: u64) -> (Translated, Arc<Mutex<Vec<String>>>) {
-    let notes = Arc::default();
+    let notes: Arc<Mutex<Vec<String>>> = Arc::default();
     let of_each = Arc::clone(&notes);
     let make = move || {
         of_each.lock().expect("nobody panics").push("made".into());
