@@ -36,6 +36,9 @@ const LOOK_CYCLES: u32 = 12;
 const BUSY_BIT: u32 = 1 << 31;
 /// Clocks after the indicator and the 18 bits.
 const TRAILING_BITS: u32 = 13;
+/// Control ticks (5 ms) after which the DAC is told again what it should hold: it may have missed it, by a loose contact or a dip of
+/// its supply, and a loop that stands at the end of its range would never say anything else.
+const AGAIN_TICKS: u8 = 25;
 /// Turns two's complement into 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
 
@@ -45,6 +48,8 @@ pub struct Piezo {
     dac_select: Output<'static>,
     convert: Output<'static>,
     code: Option<u16>,
+    /// Control ticks since the DAC was told.
+    silent_ticks: u8,
     /// When the gauge was sampled, in cycles.
     sampled: u32,
 }
@@ -68,7 +73,7 @@ impl Piezo {
         let mut spi = Spi::new_blocking(spi, clock, data_out, data_in, config);
         // Nothing is sent, but from now on words have 16 bits. An error has no cause where nothing is sent.
         let _ = spi.blocking_write::<u16>(&[]);
-        Self { _spi: spi, dac_select, convert, code: None, sampled: 0 }
+        Self { _spi: spi, dac_select, convert, code: None, silent_ticks: 0, sampled: 0 }
     }
 
     /// Sends a word and gives the one that comes meanwhile.
@@ -100,11 +105,13 @@ impl Piezo {
         (word & BUSY_BIT == 0).then_some(code ^ SIGN_BIT)
     }
 
-    /// Sets the DAC; what it holds already is not sent again.
+    /// Sets the DAC, once in a control tick; what it should hold already is sent again now and then only.
     pub fn set(&mut self, code: u16) {
-        if self.code == Some(code) {
+        self.silent_ticks += 1; // sent before it could overflow
+        if self.code == Some(code) && self.silent_ticks < AGAIN_TICKS {
             return;
         }
+        self.silent_ticks = 0;
         self.dac_select.set_low();
         self.exchange(code);
         self.dac_select.set_high();

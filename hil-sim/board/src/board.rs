@@ -362,14 +362,16 @@ pub struct RigBoard {
     pub chip: Chip,
     unique_id: [u8; 12],
     costs: Costs,
+    /// Tells its program from another one.
+    program: u64,
 }
 
 impl RigBoard {
-    /// Assembles the board of these parts; the seed makes its unique id.
+    /// Assembles the board of these parts; the seed makes its unique id, `program` tells what it will run from other programs.
     pub fn new(
         plant: &SharedPlant,
         line: Line,
-        seed: u64,
+        (seed, program): (u64, u64),
         parts: &Parts,
         costs: Costs,
     ) -> Result<Self, rigless::soc::Error> {
@@ -387,9 +389,9 @@ impl RigBoard {
             part.spi[SPI4].attach_selected(MemoryChip::new(parts.memory.make), select);
         }
         part.usart[USART3].attach(line);
-        let (program, registers) = part.program();
-        let (options, more) = program.committed_options();
-        program.keep_options(BOR_LEV.set(options, parts.supply.brown_out.bits()), more, registers);
+        let (flash, registers) = part.program();
+        let (options, more) = flash.committed_options();
+        flash.keep_options(BOR_LEV.set(options, parts.supply.brown_out.bits()), more, registers);
         let mut chip = Chip {
             part,
             pins: BTreeMap::new(),
@@ -410,7 +412,7 @@ impl RigBoard {
         let mut noise = Noise::new(seed, "unique id");
         let (low, high) = (noise.bits().to_le_bytes(), noise.bits().to_le_bytes());
         let unique_id = core::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] });
-        Ok(Self { chip, unique_id, costs })
+        Ok(Self { chip, unique_id, costs, program })
     }
 }
 
@@ -446,10 +448,9 @@ impl Board for RigBoard {
             core.factory_images.push(id);
         }
         let (processor, costs) = (core.processor.clone(), self.costs.clone());
-        core.processor = Arc::new(move |endian| {
-            let inner = processor(endian)?;
-            Ok(Box::new(Metered::new(inner, costs.clone())))
-        });
+        let program = self.program;
+        core.processor =
+            Arc::new(move |endian| Ok(Box::new(Metered::new(program, || processor(endian), costs.clone())?)));
         vec![Target::new("stm32f427", &mut self.chip, core)]
     }
 }

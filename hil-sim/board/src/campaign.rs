@@ -233,9 +233,9 @@ mod tests {
             kinds.extend(scenario.happens.iter().map(|happening| happening.what.name));
         }
         assert_ne!(draw(1), draw(2));
-        // All but those that only take another back, and a gauge that drifts, which no board can see.
-        assert!(!kinds.contains("gauge-drifts"));
-        assert_eq!(kinds.len(), crate::faults::KINDS.len() - 6, "{kinds:?}");
+        // All but those that only take another back, a gauge that drifts, which no board can see, and a port's other name.
+        assert!(!kinds.contains("gauge-drifts") && !kinds.contains("link-renamed"));
+        assert_eq!(kinds.len(), crate::faults::KINDS.len() - 7, "{kinds:?}");
     }
 
     #[test]

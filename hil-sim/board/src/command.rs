@@ -69,10 +69,15 @@ pub enum Command {
     End,
 }
 
+/// Opens another port in place of the one that there is, and gives where its bytes go; `None` where it cannot be.
+pub type AnotherPort = Box<dyn FnMut() -> Option<Sender<Vec<u8>>> + Send>;
+
 /// Where bytes and exposures go that come out of the rig.
 pub struct Outlets {
     /// Bytes for the host, as the line delivers them; dropped when the port goes away.
     pub bytes: Option<Sender<Vec<u8>>>,
+    /// For an adapter that comes back under another name; `None` where there is no port.
+    pub another_port: Option<AnotherPort>,
     /// Exposures, when they end.
     pub shots: Sender<Shot>,
     /// What becomes of their pictures, where these are rendered beside the board.

@@ -17,6 +17,7 @@ use crate::{
     board::RigBoard,
     chips::SharedPlant,
     error::SimError,
+    firmware,
     parts::{Parts, ProcessorParts},
     plant::Plant,
     processor::Costs,
@@ -136,7 +137,9 @@ pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
     let plant = SharedPlant::new(Plant::new(1, &parts, None).into());
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
     let costs = Costs::Average(parts.processor);
-    let board = RigBoard::new(&plant, Line::default(), 1, &parts, costs).map_err(|error| emulator(&error))?;
+    let program = firmware::fingerprint(&bytes);
+    let board = RigBoard::new(&plant, Line::default(), (1, program), &parts, costs)
+        .map_err(|error| emulator(&error))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(0)).map_err(|error| emulator(&error))?;
     let counting = Counting { routines, counts, number, result: None };
     let finished = run(session, &Start::new(&[image]), counting).map_err(|error| emulator(&error))?;

@@ -42,7 +42,7 @@ pub struct Kind {
 }
 
 /// All kinds.
-pub const KINDS: [Kind; 39] = [
+pub const KINDS: [Kind; 40] = [
     motion::EMERGENCY_STOP,
     motion::EMERGENCY_STOP_RELEASED,
     power::RESET_BUTTON,
@@ -82,6 +82,7 @@ pub const KINDS: [Kind; 39] = [
     link::LINK_CUT,
     link::LINK_NOISE,
     link::LINK_FRAMING_ERRORS,
+    link::LINK_RENAMED,
 ];
 
 impl PartialEq for Kind {

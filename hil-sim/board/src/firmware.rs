@@ -14,6 +14,12 @@ pub const FILE_NAME: &str = "farnear-nucleo-f429zi.elf";
 pub const VARIABLE: &str = "FARNEAR_FIRMWARE";
 const ELF_MAGIC: [u8; 4] = *b"\x7fELF";
 
+/// Tells a firmware from another one: FNV-1a, 64 bit (Fowler, Noll, Vo).
+pub fn fingerprint(elf: &[u8]) -> u64 {
+    let hash = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+    elf.iter().fold(0xcbf2_9ce4_8422_2325, hash)
+}
+
 /// The ELF: the one named, else the one `FARNEAR_FIRMWARE` names, else the one beside the running program (for a
 /// test, which lies in `deps`, one folder up).
 ///

@@ -341,7 +341,15 @@ fn serve(run: &Run) -> Result<()> {
         sensor_px: (standard::SIZE_PX.0 as u16, standard::SIZE_PX.1 as u16),
         bits: run.noise.bits(),
     });
-    let rig = ServedRig::start(&config, first, second, gige.as_ref())?;
+    let linked = run.link.clone();
+    let renamed = move |port: &str| {
+        if let Some(Err(error)) = linked.as_deref().map(|path| Link::point(path, port)) {
+            eprintln!("farnear-sim: {error:#}");
+        }
+        // Whoever read the first line may be gone.
+        let _ = writeln!(std::io::stdout(), "{{\"port\": \"{port}\"}}");
+    };
+    let rig = ServedRig::start(&config, first, second, gige.as_ref(), renamed)?;
     let link = run.link.as_deref().map(|path| Link::new(path, &rig.port)).transpose()?;
     let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());
     ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
@@ -375,6 +383,15 @@ impl Link {
         std::os::unix::fs::symlink(port, path)
             .with_context(|| format!("cannot make the link {} to {port}", path.display()))?;
         Ok(Self(path.into()))
+    }
+
+    /// Lets the link lead to another port; there is no moment without it.
+    fn point(path: &Path, port: &str) -> Result<()> {
+        let cannot = || format!("cannot let the link {} lead to {port}", path.display());
+        let name = path.file_name().with_context(cannot)?.to_string_lossy();
+        let other = path.with_file_name(format!(".{name}.{}", std::process::id()));
+        std::os::unix::fs::symlink(port, &other).with_context(cannot)?;
+        std::fs::rename(&other, path).with_context(cannot)
     }
 }
 

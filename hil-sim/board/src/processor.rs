@@ -10,6 +10,7 @@
 //!   the processor goes step by step, some hundred times slower, so it is for measuring.
 
 mod flash;
+mod kept;
 mod kinds;
 
 use std::ops::Range;
@@ -26,6 +27,7 @@ use rigless::{
 
 use self::{
     flash::FlashInterface,
+    kept::Translated,
     kinds::{Instruction, bus_cycles},
 };
 use crate::parts::ProcessorParts;
@@ -109,7 +111,7 @@ fn fixed(cycles: f64) -> u64 {
 /// The emulator's processor, counted in cycles.
 #[derive(Debug)]
 pub struct Metered {
-    inner: Box<dyn Processor>,
+    inner: Translated,
     meter: Meter,
     model: Model,
 }
@@ -143,8 +145,16 @@ impl Model {
 }
 
 impl Metered {
-    /// Counts for this processor.
-    pub fn new(inner: Box<dyn Processor>, costs: Costs) -> Self {
+    /// Counts for a processor that `make` makes, or that an earlier rig with the same program has left.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn new(
+        program: u64,
+        make: impl Fn() -> Result<Box<dyn Processor>, Error>,
+        costs: Costs,
+    ) -> Result<Self, Error> {
+        let inner = Translated::new(program, make)?;
         let model = match costs {
             Costs::Average(parts) => Model::Average { parts, acr: 0 },
             Costs::ByKind(program) => {
@@ -153,7 +163,7 @@ impl Metered {
         };
         let meter =
             Meter { counted: inner.retired(), cycles: inner.retired() << FRACTION, each: model.each() };
-        Self { inner, meter, model }
+        Ok(Self { inner, meter, model })
     }
 
     /// Goes step by step.
@@ -294,7 +304,8 @@ impl Processor for Metered {
 
     #[expect(unsafe_code, reason = "passed on as it came")]
     unsafe fn map(&mut self, start: u64, length: u64, host: *mut u8, writable: bool) {
-        // SAFETY: the caller keeps what this method's trait asks for, and the memory goes nowhere else.
+        // SAFETY: the caller keeps what this method's trait asks for as long as this processor lives. What outlives it in `kept`
+        // runs no instruction before the next run has mapped memory of its own at the same places: every board has the same.
         unsafe { self.inner.map(start, length, host, writable) };
     }
 
@@ -329,23 +340,23 @@ impl Processor for Metered {
     }
 
     fn add_breakpoint(&mut self, address: u64) -> bool {
-        self.inner.add_breakpoint(address)
+        self.inner.altered().add_breakpoint(address)
     }
 
     fn remove_breakpoint(&mut self, address: u64) {
-        self.inner.remove_breakpoint(address);
+        self.inner.altered().remove_breakpoint(address);
     }
 
     fn pass_breakpoint(&mut self, address: u64) {
-        self.inner.pass_breakpoint(address);
+        self.inner.altered().pass_breakpoint(address);
     }
 
     fn attach_debugger(&mut self, attached: bool) {
-        self.inner.attach_debugger(attached);
+        self.inner.altered().attach_debugger(attached);
     }
 
     fn hold_interrupts(&mut self, held: bool) {
-        self.inner.hold_interrupts(held);
+        self.inner.altered().hold_interrupts(held);
     }
 
     fn gdb_register(&self, number: usize) -> Option<Vec<u8>> {
@@ -409,11 +420,11 @@ impl Processor for Metered {
     }
 
     fn check_reads(&mut self, every: bool) {
-        self.inner.check_reads(every);
+        self.inner.altered().check_reads(every);
     }
 
     fn check_words(&mut self, words: &[u64]) {
-        self.inner.check_words(words);
+        self.inner.altered().check_words(words);
     }
 
     fn host_call(&self, read: &mut dyn FnMut(u64, Width) -> Option<u64>) -> Option<HostCall> {

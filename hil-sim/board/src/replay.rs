@@ -200,7 +200,7 @@ pub fn replay(path: &Path, firmware: Option<&Path>) -> Result<(u64, Option<Depar
     let config = RigConfig { firmware: firmware.map(Into::into), ..config };
     let (end_ns, comparer) = (script.end_ns, script.comparer.clone());
     let (shots, _) = std::sync::mpsc::channel();
-    let outlets = Outlets { bytes: None, shots, pictures: None };
+    let outlets = Outlets { bytes: None, another_port: None, shots, pictures: None };
     // The bytes of the board go nowhere, as those of an unplugged port.
     let (_commands, thread) = launch(&config, outlets, Some(script))?;
     thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))?;

@@ -55,7 +55,8 @@ impl EmulatedRig {
     pub fn new(config: &RigConfig) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
-        let outlets = Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: None };
+        let outlets =
+            Outlets { bytes: Some(bytes_out), another_port: None, shots: shots_out, pictures: None };
         let (commands, thread) = launch(config, outlets, None)?;
         Ok(Self { commands, thread: Some(thread), bytes, shots, decoder: Decoder::new() })
     }
@@ -177,12 +178,6 @@ impl Drop for EmulatedRig {
 /// A rig's thread and the way to command it.
 type Launched = (Sender<Command>, JoinHandle<Result<(), SimError>>);
 
-/// FNV-1a, 64 bit (Fowler, Noll, Vo): tells two firmwares apart.
-fn fnv(bytes: &[u8]) -> u64 {
-    let hash = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, hash)
-}
-
 /// Starts the rig's thread, with the board started to its first idle moment. With a `script` it does what that says, to its end.
 ///
 /// # Errors
@@ -201,7 +196,8 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
     } else {
         Costs::Average(config.parts.processor)
     };
-    let mut board = RigBoard::new(&plant, line.clone(), config.seed, &config.parts, costs)
+    let fingerprint = firmware::fingerprint(image.bytes());
+    let mut board = RigBoard::new(&plant, line.clone(), (config.seed, fingerprint), &config.parts, costs)
         .map_err(|error| emulator(&error))?;
     if let Some(file) = &config.memory
         && let Some(contents) = kept_memory::read(file)?
@@ -217,7 +213,6 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
     }
     let wiring =
         Wiring::new(plant.clone(), Camera::new(config.seed), &mut board.chip, (config.seed, &config.parts));
-    let fingerprint = fnv(image.bytes());
     let trace = match script {
         Some(_) => None,
         None => config.trace.as_deref().map(|path| Trace::create(path, config, fingerprint)).transpose()?,

@@ -3,7 +3,7 @@
 use std::{
     net::SocketAddr,
     sync::{
-        Arc,
+        Arc, OnceLock,
         mpsc::{self, Sender},
     },
     thread::JoinHandle,
@@ -13,7 +13,7 @@ use std::{
 use farnear_protocol::camera::Control;
 
 use crate::{
-    command::{CameraOrder, Command, Outlets},
+    command::{AnotherPort, CameraOrder, Command, Outlets},
     config::RigConfig,
     endpoint,
     error::SimError,
@@ -45,6 +45,8 @@ impl ServedRig {
     /// Starts the rig and opens its two doors; behind a half mirror a `second` camera has a door of its own, and with `gige` the first
     /// camera has another one.
     ///
+    /// `renamed` hears the new name of a pty that a scenario gives another one.
+    ///
     /// # Errors
     /// [`SimError`].
     pub fn start(
@@ -52,13 +54,21 @@ impl ServedRig {
         first: Imager,
         second: Option<Imager>,
         gige: Option<&GigeConfig>,
+        renamed: impl Fn(&str) + Send + 'static,
     ) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
         let pictures = Arc::new(Pictures::default());
-        let outlets =
-            Outlets { bytes: Some(bytes_out), shots: shots_out, pictures: Some(Arc::clone(&pictures)) };
+        // The way to the board, for the ports to come: there is none before the board.
+        let to_board = Arc::new(OnceLock::new());
+        let outlets = Outlets {
+            bytes: Some(bytes_out),
+            another_port: Some(another_port(Arc::clone(&to_board), renamed)),
+            shots: shots_out,
+            pictures: Some(Arc::clone(&pictures)),
+        };
         let (commands, thread) = launch(config, outlets, None)?;
+        let _ = to_board.set(commands.clone()); // nobody else sets it
         let ask = asker(&commands);
         let (gige, frames_to_gige) = match gige {
             Some(gige) => {
@@ -101,6 +111,20 @@ impl ServedRig {
     pub fn wait(self) -> Result<(), SimError> {
         self.thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))
     }
+}
+
+/// Opens a pty with another name. Without a way to the board, or without a pty, there is none.
+fn another_port(
+    to_board: Arc<OnceLock<Sender<Command>>>,
+    renamed: impl Fn(&str) + Send + 'static,
+) -> AnotherPort {
+    Box::new(move || {
+        let to_board = to_board.get()?.clone();
+        let (bytes_out, bytes) = mpsc::channel();
+        let name = port::open(bytes, move |command| to_board.send(command).is_ok()).ok()?;
+        renamed(&name);
+        Some(bytes_out)
+    })
 }
 
 /// Hands on what the camera's host asks of it.

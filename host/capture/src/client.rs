@@ -198,7 +198,13 @@ impl Client {
         })
     }
 
-    /// Name of the port.
+    /// What is to be said about the port, where the board has come back under another name than it was opened by.
+    pub fn port_note(&self) -> Option<String> {
+        let (named, has) = (self.port(), &*self.session.port);
+        (named != has).then(|| format!("the board that was on {named} has come back on {has}"))
+    }
+
+    /// Name of the port, as it was opened first.
     pub fn port(&self) -> &str {
         &self.port.name
     }

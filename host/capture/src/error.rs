@@ -20,6 +20,18 @@ pub enum PortError {
         /// What the system lists.
         present: Vec<String>,
     },
+    /// The board was there and has not come back under this name.
+    #[error(
+        "the board has not come back as {port}; if it has another name now, start again with that one, or with one that stays: on \
+         Linux its link in /dev/serial/by-id, for farnear-sim that of --link; {}",
+        present_ports(present)
+    )]
+    NotBack {
+        /// The name that it had.
+        port: String,
+        /// What the system lists.
+        present: Vec<String>,
+    },
     /// No port was named, and none belongs to a board.
     #[error("no board was found: no ST-LINK has a serial port; {}", present_ports(present))]
     NoBoard {
@@ -83,6 +95,10 @@ fn present_ports(present: &[String]) -> String {
     }
 }
 
+fn unique_id_text(id: &[u8; 12]) -> String {
+    id.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// A conversation with a board failed.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ClientError {
@@ -112,6 +128,21 @@ pub enum ClientError {
         port: String,
         /// What was being done.
         during: String,
+    },
+    /// The line is there again, and another board is at its end.
+    #[error(
+        "another board is on {port} now (unique id {}) than before ({}): nothing was asked of it; plug the first one in again, or \
+         start this program anew for the other",
+        unique_id_text(now),
+        unique_id_text(was)
+    )]
+    OtherBoard {
+        /// The port.
+        port: String,
+        /// The board that was there.
+        was: [u8; 12],
+        /// The board that is there.
+        now: [u8; 12],
     },
     /// No answer came in time, however often it was asked.
     #[error(

@@ -81,6 +81,9 @@ impl Link {
 
     /// Goes on over another transport, after the first broke; at the rate of a board that was just reset.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
+        if let Some(port) = transport.port() {
+            self.port = port.into();
+        }
         self.transport = Some(transport);
         self.rate = LinkRate::START;
         self.decoder = Decoder::new();

@@ -129,7 +129,13 @@ impl Owner {
             link_rate::change(&mut link, (version, hello.boot), wanted, timing)?;
         }
         let events = Events { boot: hello.boot, ..Events::default() };
-        let session = Session { number: 1, hello: Arc::new(hello), version, rate: link.rate() };
+        let session = Session {
+            number: 1,
+            hello: Arc::new(hello),
+            version,
+            rate: link.rate(),
+            port: link.port().into(),
+        };
         let now = Instant::now();
         let mut owner = Self {
             link,

@@ -28,11 +28,17 @@ pub trait Transport: Send {
     fn set_rate(&mut self, _: LinkRate) -> io::Result<()> {
         Ok(())
     }
+
+    /// Name of the port behind it, where that may be another one than was asked for.
+    fn port(&self) -> Option<&str> {
+        None
+    }
 }
 
 /// A serial port, held exclusively: a second program that opens it gets [`PortError::Busy`].
 pub struct SerialTransport {
     port: Box<dyn SerialPort>,
+    name: String,
 }
 
 impl SerialTransport {
@@ -43,53 +49,75 @@ impl SerialTransport {
             .timeout(Duration::from_millis(50))
             .open()
             .map_err(|error| explain(path, error))?;
-        Ok(Self { port })
+        Ok(Self { port, name: path.into() })
     }
 }
 
-/// Where a board is found again after it was unplugged: by the serial number of its USB adapter, where it has one, for the
-/// system may give the port another name; else by the name.
+/// Where a board is found again after it was unplugged, for the system may give the port another name: by the serial number of its
+/// USB adapter, where it has one; else by the name, and where that is gone by the only adapter of the same make that has no number
+/// either. A link that the system keeps (`/dev/serial/by-id`) is a name that stays. Who asks has to see by the board's own
+/// identity that it is the same.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     name: String,
-    usb_serial: Option<String>,
+    adapter: Option<Adapter>,
+    /// Whether the board was there before.
+    known: bool,
+}
+
+/// A USB adapter.
+#[derive(Clone, PartialEq, Eq, Debug)]
+struct Adapter {
+    maker: u16,
+    product: u16,
+    serial: Option<String>,
+}
+
+impl Adapter {
+    /// Of a port, if it is on USB.
+    fn of(port: &SerialPortInfo) -> Option<Self> {
+        let SerialPortType::UsbPort(usb) = &port.port_type else { return None };
+        let serial = usb.serial_number.clone().filter(|number| !number.is_empty());
+        Some(Self { maker: usb.vid, product: usb.pid, serial })
+    }
 }
 
 impl Place {
     /// A port as the user named it.
     pub(crate) fn new(name: &str) -> Self {
-        Self { name: name.into(), usb_serial: None }
+        Self { name: name.into(), adapter: None, known: false }
     }
 
     /// Opens the port, and remembers whose it is.
     pub(crate) fn open(&mut self) -> Result<SerialTransport, PortError> {
         let present = find::present();
         let name = self.find(&present).unwrap_or(&self.name).to_owned();
-        let opened = SerialTransport::open(&name)?;
-        if self.usb_serial.is_none() {
-            let port = present.iter().find(|port| port.port_name == name);
-            self.usb_serial = port.and_then(usb_serial).map(str::to_owned);
+        let opened = SerialTransport::open(&name).map_err(|error| match error {
+            PortError::Absent { port, present } if self.known => PortError::NotBack { port, present },
+            other => other,
+        })?;
+        self.known = true;
+        if self.adapter.is_none() {
+            self.adapter = present.iter().find(|port| port.port_name == name).and_then(Adapter::of);
         }
         Ok(opened)
     }
 
-    /// The port that the board has now, as far as its serial number tells.
+    /// The port that the board has now, as far as its adapter tells.
     fn find<'a>(&self, present: &'a [SerialPortInfo]) -> Option<&'a str> {
-        let wanted = self.usb_serial.as_deref()?;
-        let mut found = present.iter().filter(|port| usb_serial(port) == Some(wanted));
-        // An adapter with several ports has one number for all of them: then the name decides.
+        let wanted = self.adapter.as_ref()?;
+        let mut found = present.iter().filter(|port| Adapter::of(port).as_ref() == Some(wanted));
         let (first, another) = (found.next()?, found.next());
-        if another.is_some() && present.iter().any(|port| port.port_name == self.name) {
-            return None;
+        let has_name = present.iter().any(|port| port.port_name == self.name);
+        match (&wanted.serial, another) {
+            // An adapter with several ports has one number for all of them: then the name decides.
+            (Some(_), Some(_)) if has_name => None,
+            (Some(_), _) => Some(&first.port_name),
+            // Without a number the name decides as long as it is there, and two of a make are a guess.
+            (None, Some(_)) => None,
+            (None, None) if has_name => None,
+            (None, None) => Some(&first.port_name),
         }
-        Some(&first.port_name)
-    }
-}
-
-fn usb_serial(port: &SerialPortInfo) -> Option<&str> {
-    match &port.port_type {
-        SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().filter(|number| !number.is_empty()),
-        _ => None,
     }
 }
 
@@ -188,6 +216,10 @@ impl Transport for SerialTransport {
     fn set_rate(&mut self, rate: LinkRate) -> io::Result<()> {
         Ok(self.port.set_baud_rate(rate.baud())?)
     }
+
+    fn port(&self) -> Option<&str> {
+        Some(&self.name)
+    }
 }
 
 #[cfg(test)]
@@ -226,14 +258,65 @@ mod tests {
                 })
             }),
         };
-        let board = Place { name: "/dev/ttyACM0".into(), usb_serial: Some("066AFF".into()) };
+        let adapter = |serial: Option<&str>| {
+            Some(Adapter { maker: 0x0483, product: 0x374b, serial: serial.map(str::to_owned) })
+        };
+        let place = |serial| Place { name: "/dev/ttyACM0".into(), adapter: adapter(serial), known: true };
+        let board = place(Some("066AFF"));
         let others = [port("/dev/ttyACM0", Some("077BEE")), port("/dev/ttyS0", None)];
         assert_eq!(board.find(&others), None, "another board has its name now");
         let back = [&others[..], &[port("/dev/ttyACM1", Some("066AFF"))]].concat();
         assert_eq!(board.find(&back), Some("/dev/ttyACM1"));
         let two = [port("/dev/ttyACM0", Some("066AFF")), port("/dev/ttyACM1", Some("066AFF"))];
         assert_eq!(board.find(&two), None, "two ports of one adapter: the name decides");
-        assert_eq!(Place::new("/dev/ttyACM0").find(&back), None, "a board without a number");
+        assert_eq!(Place::new("/dev/ttyACM0").find(&back), None, "a board that was never there");
+    }
+
+    #[test]
+    fn an_adapter_without_a_number_is_found_again_where_no_other_can_be_meant() {
+        let port = |name: &str, serial: Option<&str>| SerialPortInfo {
+            port_name: name.into(),
+            port_type: SerialPortType::UsbPort(serialport::UsbPortInfo {
+                vid: 0x1a86,
+                pid: 0x7523,
+                serial_number: serial.map(str::to_owned),
+                manufacturer: None,
+                product: None,
+            }),
+        };
+        let adapter = Adapter::of(&port("", Some("")));
+        let board = Place { name: "/dev/ttyUSB0".into(), adapter, known: true };
+        let (same, other) = (port("/dev/ttyUSB0", None), port("/dev/ttyUSB1", None));
+        let numbered = port("/dev/ttyUSB2", Some("7"));
+        let find = |present: &[SerialPortInfo]| board.find(present).map(str::to_owned);
+        assert_eq!(find(&[other.clone(), numbered.clone()]).as_deref(), Some("/dev/ttyUSB1"));
+        assert_eq!(find(&[numbered]), None, "another adapter");
+        assert_eq!(find(&[same, other.clone()]), None, "its name is there");
+        assert_eq!(find(&[other, port("/dev/ttyUSB3", None)]), None, "two of a make: a guess");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_to_another_port_is_followed_and_a_name_that_does_not_come_back_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("board");
+        let (first, old) = serialport::TTYPort::pair().unwrap();
+        let (_second, new) = serialport::TTYPort::pair().unwrap();
+        let (old, new) = (old.name().unwrap(), new.name().unwrap());
+        std::os::unix::fs::symlink(&old, &link).unwrap();
+        let mut linked = Place::new(link.to_str().unwrap());
+        let mut named = Place::new(&old);
+        drop(linked.open().unwrap());
+        drop(named.open().unwrap());
+        drop(first); // and with it the port
+        std::fs::remove_file(&link).unwrap();
+        let error = linked.open().err().unwrap();
+        assert!(matches!(error, PortError::NotBack { .. }), "{error:?}");
+        std::os::unix::fs::symlink(&new, &link).unwrap();
+        assert_eq!(linked.open().unwrap().port(), link.to_str(), "the name that stays");
+        let error = named.open().err().unwrap();
+        assert!(error.to_string().contains("has not come back"), "{error}");
+        assert!(error.to_string().contains("/dev/serial/by-id"), "what to do: {error}");
     }
 
     #[cfg(unix)]

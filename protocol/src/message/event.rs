@@ -154,7 +154,7 @@ pub enum Failure {
     Stopped,
     /// The home switch did not close within the whole travel.
     HomeSwitchNotFound,
-    /// The home switch did not open again.
+    /// The home switch did not open again, or not where it closes.
     HomeSwitchStuck,
     /// The far switch closed during a move.
     FarSwitch,

@@ -5,6 +5,9 @@
 //! 3. Approach: a pulse a millisecond until it closes again; that edge, with the screw's backlash and what a piezo on the
 //!    stage carries the switch's tab away, becomes position 0. Only from a switch that is open: one that closed again by
 //!    itself would put position 0 anywhere.
+//!
+//!    The three edges have to lie together: one that closes above where it opened, or either far from the other, is a broken wire or
+//!    a dead contact, and its position 0 would be anywhere.
 //! 4. Return: to position 0 from below, like every move.
 //!
 //! The exact approach always comes from the same side at the same speed, so that the switch's hysteresis and its
@@ -15,6 +18,7 @@ use farnear_protocol::message::{Failure, PositionState};
 
 use crate::motion::axis::{Purpose, Stepper};
 use crate::motion::leg::{Leg, Until};
+use crate::motion::steps;
 use crate::settings::StepperSettings;
 
 /// Where homing is.
@@ -28,11 +32,25 @@ enum Phase {
     Return { shift: Nanometres },
 }
 
+/// What a switch repeats to, with its bounce at the speed of the search: so far it may open below where it closed.
+const REPEATS: i32 = 5_000;
+
+/// Whether a switch that closed and opened at these pulses did so by one and the same edge. Between them lie its hysteresis and the
+/// screw's play, for which the clearance is made.
+fn is_one_edge(closed: i32, opened: i32, settings: &StepperSettings) -> bool {
+    let apart = steps::to_nanometres(opened.saturating_sub(closed)).0;
+    (-REPEATS..=settings.home_clearance.0).contains(&apart)
+}
+
 /// A homing under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Homing {
     phase: Phase,
     leg: Leg,
+    /// The pulse at which the search met the switch, where there was one.
+    closed: Option<i32>,
+    /// The pulse at which it opened.
+    opened: i32,
     /// Whether the position was ever known, so that the shift says something.
     known_before: bool,
 }
@@ -40,7 +58,7 @@ pub(crate) struct Homing {
 impl Homing {
     /// Begins with the next tick, when the switch was read.
     pub(crate) const fn new() -> Self {
-        Self { phase: Phase::Begin, leg: Leg::REST, known_before: false }
+        Self { phase: Phase::Begin, leg: Leg::REST, closed: None, opened: 0, known_before: false }
     }
 
     /// Goes on while the axis has no fault; gives the shift of position 0 at the end. `carried`: how far the piezo on the stage
@@ -64,10 +82,24 @@ impl Homing {
                 }
                 if axis.home_closed() { Phase::Leave } else { Phase::Search }
             }
-            (Phase::Search, Some(_)) => Phase::Leave,
-            (Phase::Leave, Some(_)) => Phase::Clear,
+            (Phase::Search, Some(edge)) => {
+                self.closed = Some(edge.position);
+                Phase::Leave
+            }
+            (Phase::Leave, Some(edge))
+                if self.closed.is_some_and(|closed| !is_one_edge(closed, edge.position, settings)) =>
+            {
+                return Some(Err(Failure::HomeSwitchStuck));
+            }
+            (Phase::Leave, Some(edge)) => {
+                self.opened = edge.position;
+                Phase::Clear
+            }
             (Phase::Clear, _) if axis.home_closed() => return Some(Err(Failure::HomeSwitchStuck)),
             (Phase::Clear, _) => Phase::Approach,
+            (Phase::Approach, Some(zero)) if !is_one_edge(zero.position, self.opened, settings) => {
+                return Some(Err(Failure::HomeSwitchStuck));
+            }
             (Phase::Approach, Some(zero)) => {
                 let shift = axis.set_home(zero.position, carried);
                 Phase::Return { shift: if self.known_before { shift } else { Nanometres(0) } }

@@ -239,6 +239,39 @@ fn switches_that_do_not_work_end_the_homing() {
 }
 
 #[test]
+fn a_switch_whose_edges_do_not_lie_together_is_not_believed() {
+    /// Homes from 300 um. `says` gets where the stage was a millisecond ago and is, and gives what the switch says instead of the truth.
+    fn with(mut says: impl FnMut(f64, f64) -> Option<bool>) -> Failure {
+        let mut bench = Bench::new(300.0);
+        let id = bench.accepted(&HOME);
+        for _ in 0..10_000 {
+            let before = bench.hardware.position_um();
+            bench.run_ms(1);
+            bench.hardware.coarse.faults.home_switch = says(before, bench.hardware.position_um());
+            if bench.events.iter().any(|(_, event)| bench::ends(&event.kind, id)) {
+                return failure(&bench.end_of(id));
+            }
+        }
+        panic!("it does not end");
+    }
+    // Found by campaigns, seeds 100154 and 100195: the wire breaks on the slow way back, 37 um above the edge.
+    let mut broken = false;
+    let end = with(|before, now| {
+        broken |= before > now && before - now < 0.3 && (10.0..37.0).contains(&now);
+        broken.then_some(true)
+    });
+    assert_eq!(end, Failure::HomeSwitchStuck);
+    // Seed 100205: dead on the way off the switch, below the edge, and there again on the way back.
+    let (mut dead, mut highest) = (false, f64::NEG_INFINITY);
+    let end = with(|before, now| {
+        dead |= now > before && (-200.0..-100.0).contains(&now);
+        highest = if dead { highest.max(now) } else { highest };
+        (dead && now > highest - 30.0).then_some(false)
+    });
+    assert_eq!(end, Failure::HomeSwitchStuck);
+}
+
+#[test]
 fn a_push_at_rest_loses_the_position() {
     let mut bench = Bench::homed();
     bench.run_ms(10);

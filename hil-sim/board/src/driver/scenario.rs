@@ -76,6 +76,17 @@ impl Driver {
             self.witness.note(now_ns, Seen::Happened { what, mends: due.mends });
             self.access(|rig| due.happen(rig), session, stop, host);
         }
+        if std::mem::take(&mut self.lines.renamed) {
+            self.rename_port();
+        }
+    }
+
+    /// The port goes away, and there is another one. The new one is opened first, or it would get the name of the old.
+    fn rename_port(&mut self) {
+        if let Some(open) = &mut self.outlets.another_port {
+            self.outlets.bytes = open();
+            self.held.clear();
+        }
     }
 
     /// Looks for the moments of a run that no frame tells of.

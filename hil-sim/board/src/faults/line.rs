@@ -137,6 +137,8 @@ pub struct Lines {
     pub to_host: NoisyLine,
     /// The host's adapter keeps what comes for so long, from the first byte on.
     pub latency_ns: u64,
+    /// The adapter is to come back under another name.
+    pub renamed: bool,
 }
 
 impl Lines {
@@ -146,6 +148,7 @@ impl Lines {
             to_board: NoisyLine::new(rate, seed, "line to the board"),
             to_host: NoisyLine::new(rate, seed, "line to the host"),
             latency_ns: 0,
+            renamed: false,
         }
     }
 

@@ -51,3 +51,10 @@ pub const LINK_FRAMING_ERRORS: Kind = Kind {
     happen: |rig, at| rig.set_framing_errors(at.amount as u32), // the range fits
     mend: Some(|rig, _| rig.set_framing_errors(0)),
 };
+/// The adapter is unplugged and comes back under another name; what was on its way is lost.
+pub const LINK_RENAMED: Kind = Kind {
+    name: "link-renamed",
+    takes: Takes::NOTHING,
+    happen: |rig, _| rig.lines().renamed = true,
+    mend: None,
+};

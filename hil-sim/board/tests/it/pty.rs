@@ -303,3 +303,37 @@ fn a_file_that_is_no_firmware_is_refused() {
         assert!(message.contains("no.elf"), "{message}");
     }
 }
+
+#[test]
+fn an_adapter_that_comes_back_under_another_name_is_behind_the_same_link() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (link, scenario) = (folder.path().join("rig"), folder.path().join("scenario.toml"));
+    std::fs::write(&scenario, "[[happens]]\non = \"answer\"\nnth = 4\nwhat = \"link-renamed\"\n")
+        .expect("writable");
+    let name = |path: &Path| path.to_str().expect("text").to_string();
+    let program = Program::start(&["--link", &name(&link), "--scenario", &name(&scenario)]);
+    let leads_to = || std::fs::read_link(&link).expect("the link is always there");
+    let before = leads_to();
+    let mut client = Client::open(&name(&link));
+    // Hello, the session, and two questions: the fourth answer is the last one through the old port.
+    for _ in 0..2 {
+        assert!(matches!(client.ask(&Request::Status), Ok(Response::Status(_))));
+    }
+    let deadline = Instant::now() + PATIENCE;
+    while leads_to() == before {
+        assert!(Instant::now() < deadline, "the link leads to {} for ever", before.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let mut bytes = [0; 64];
+    while !client.port.read(&mut bytes).is_err_and(|error| error.kind() != std::io::ErrorKind::TimedOut) {
+        assert!(Instant::now() < deadline, "the old port does not go away");
+    }
+    // The board has not noticed: the same boot.
+    let boot = client.boot;
+    let mut client = Client::open(&name(&link));
+    assert_eq!(client.boot, boot);
+    assert!(matches!(client.ask(&Request::Status), Ok(Response::Status(_))));
+    drop(client);
+    assert!(program.end().success());
+    assert!(!link.is_symlink(), "the link goes with the rig");
+}

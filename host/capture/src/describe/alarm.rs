@@ -61,7 +61,7 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
         Failure::HomeSwitchNotFound => {
             "the home switch did not close within the whole travel; check the switch, its cable and that the stage moves".into()
         }
-        Failure::HomeSwitchStuck => "the home switch did not open again; check the switch and its cable".into(),
+        Failure::HomeSwitchStuck => "the home switch did not open again, or not where it closes; check the switch and its cable".into(),
         Failure::FarSwitch => "the far switch closed; the stage ran past its travel, home it again".into(),
         Failure::HomeSwitch => "the home switch closed where it should not; home again".into(),
         Failure::Following { error } => format!(

@@ -28,6 +28,8 @@ pub(crate) struct Session {
     pub version: u8,
     /// The link's rate.
     pub rate: LinkRate,
+    /// Name of the port that the board has in this session.
+    pub port: Arc<str>,
 }
 
 /// What ended a session.
@@ -36,6 +38,11 @@ pub(crate) enum Break {
     Gone(Arc<io::Error>),
     /// Another host has opened a session.
     TakenOver,
+    /// Another board has come back than went.
+    OtherBoard {
+        was: [u8; 12],
+        now: [u8; 12],
+    },
     /// The port is there, and nobody answers: asked so often, for so long.
     Silent {
         attempts: u32,
@@ -49,6 +56,11 @@ pub(crate) enum Break {
 }
 
 impl Break {
+    /// Whether the port is to be opened anew.
+    fn has_no_line(&self) -> bool {
+        matches!(self, Self::Gone(_) | Self::OtherBoard { .. })
+    }
+
     pub(crate) fn error(&self, port: &str, during: &str) -> ClientError {
         let during = during.into();
         match self.clone() {
@@ -57,6 +69,7 @@ impl Break {
                 ClientError::Silent { port: port.into(), during, attempts, waited, bad_frames: 0, bytes: 0 }
             }
             Self::TakenOver => ClientError::TakenOver { port: port.into(), during },
+            Self::OtherBoard { was, now } => ClientError::OtherBoard { port: port.into(), was, now },
             Self::Reset { was, now, cause } => ClientError::Reset { during, was, now, cause },
         }
     }
@@ -80,6 +93,7 @@ impl Owner {
                 Break::Reset { was: *was, now: *now, cause: *cause }
             }
             ClientError::TakenOver { .. } => Break::TakenOver,
+            ClientError::OtherBoard { was, now, .. } => Break::OtherBoard { was: *was, now: *now },
             _ => return,
         };
         self.end_session(broken);
@@ -89,7 +103,7 @@ impl Owner {
         for (_, work) in std::mem::take(&mut self.works) {
             let _ = work.notes.send(Note::Broken(broken.clone()));
         }
-        if matches!(broken, Break::Gone(_)) {
+        if broken.has_no_line() {
             self.link.close();
         }
         self.events.arrived.clear();
@@ -110,7 +124,9 @@ impl Owner {
         let nobodys = gone && self.session.hello.emulated && !named;
         // Whoever has taken the board over keeps it, until somebody here asks for it.
         let taken = matches!(self.broken, Some(Break::TakenOver));
-        if !nobodys && !taken && Instant::now() >= self.next_attempt {
+        // Another board is left alone likewise.
+        let others = matches!(self.broken, Some(Break::OtherBoard { .. }));
+        if !nobodys && !taken && !others && Instant::now() >= self.next_attempt {
             // It is tried again, for as long as anybody holds a handle.
             let _ = self.reconnect();
         }
@@ -126,7 +142,7 @@ impl Owner {
     }
 
     pub(super) fn reconnect(&mut self) -> Result<(), ClientError> {
-        if matches!(self.broken, Some(Break::Gone(_))) {
+        if self.broken.as_ref().is_some_and(Break::has_no_line) {
             let opened = (self.connect)();
             self.next_attempt = Instant::now() + RECONNECT;
             self.link.replace(opened?);
@@ -140,6 +156,12 @@ impl Owner {
         let before = self.session.hello.boot;
         let shaken = shake_hands(&mut self.link, self.session.hello.emulated);
         let (hello, version) = shaken.inspect_err(|error| self.break_off(error))?;
+        let (was, now) = (self.session.hello.unique_id, hello.unique_id);
+        if was != now {
+            let error = ClientError::OtherBoard { port: self.link.port().into(), was, now };
+            self.break_off(&error);
+            return Err(error);
+        }
         let was_broken = self.broken.take().is_some();
         self.session.version = version;
         if hello.boot == before && !was_broken {
@@ -159,6 +181,7 @@ impl Owner {
             changed.inspect_err(|error| self.break_off(error))?;
         }
         self.session.rate = self.link.rate();
+        self.session.port = self.link.port().into();
         self.session.number += 1;
         self.events = Events { boot: hello.boot, ..Events::default() };
         self.next_log = None;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use farnear_capture::{Client, ClientError, Timing};
+use farnear_capture::{Client, ClientError, Timing, Transport};
 use farnear_protocol::{
     message::{Axis, EventKind, ResetCause},
     units::Nanometres,
@@ -56,6 +56,64 @@ fn a_board_that_was_unplugged_is_found_again() {
     client.reopen_within(Duration::from_secs(20)).unwrap();
     assert_eq!(client.hello().boot, 7, "the board went on");
     client.stop().unwrap();
+}
+
+#[test]
+fn a_board_that_comes_back_on_another_port_is_told_and_another_board_is_not_taken_for_it() {
+    struct Named(Box<dyn Transport>, &'static str);
+    impl Transport for Named {
+        fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+            self.0.receive(buffer, wait)
+        }
+
+        fn send(&mut self, bytes: &[u8], wait: Duration) -> std::io::Result<()> {
+            self.0.send(bytes, wait)
+        }
+
+        fn discard_input(&mut self) -> std::io::Result<()> {
+            self.0.discard_input()
+        }
+
+        fn port(&self) -> Option<&str> {
+            Some(self.1)
+        }
+    }
+    let peer = Peer::new(Faults::default());
+    let (mut connect, mut names) = (peer.connect(), ["first", "second"].into_iter());
+    let connect =
+        move || Ok(Box::new(Named(connect()?, names.next().unwrap_or("third"))) as Box<dyn Transport>);
+    let mut client = Client::connect(Box::new(connect), "first").unwrap();
+    client.set_timing(SHORT);
+    assert_eq!(client.port_note(), None);
+    let leave = |client: &Client| {
+        peer.board().gone = true;
+        assert!(matches!(client.status(), Err(ClientError::Gone { .. })));
+        peer.board().gone = false;
+    };
+    leave(&client);
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    let note = client.port_note().unwrap();
+    assert!(note.contains("was on first") && note.contains("back on second"), "{note}");
+
+    let id = peer.board().hello.unique_id;
+    peer.board().hello.unique_id = [0xab; 12];
+    leave(&client);
+    let sessions = peer.board().session;
+    let until = std::time::Instant::now() + Duration::from_secs(20);
+    // The owner looks for the board by itself, and may have found the other one before it is asked.
+    let error = loop {
+        match client.reopen().err().unwrap() {
+            ClientError::Gone { .. } if std::time::Instant::now() < until => {}
+            error => break error,
+        }
+    };
+    assert!(matches!(error, ClientError::OtherBoard { now: [0xab, ..], .. }), "{error:?}");
+    assert!(error.to_string().contains("on third now (unique id abababababababababababab)"), "{error}");
+    assert!(matches!(client.status(), Err(ClientError::OtherBoard { .. })));
+    assert_eq!(peer.board().session, sessions, "no session was opened with it");
+    peer.board().hello.unique_id = id;
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    client.status().unwrap();
 }
 
 #[test]

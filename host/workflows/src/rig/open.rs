@@ -82,6 +82,9 @@ impl OpenRig {
     pub(super) fn connect(&self, context: &Context<'_>) -> Rig {
         let mut client = self.client().clone();
         client.interrupt_by(context.cancel.flag());
+        if let Some(note) = client.port_note() {
+            context.say(&note);
+        }
         Rig { client, emulation: self.0.emulation.clone() }
     }
 
