@@ -238,37 +238,63 @@ fn switches_that_do_not_work_end_the_homing() {
     assert_eq!(bench.status().coarse.state, PositionState::Unknown);
 }
 
+/// How a homing from `start_um` ends. `says` gets where the stage was a millisecond ago and is, and gives what the switch says instead
+/// of the truth.
+fn home_with(start_um: f64, mut says: impl FnMut(f64, f64) -> Option<bool>) -> (EventKind, Bench) {
+    let mut bench = Bench::new(start_um);
+    let id = bench.accepted(&HOME);
+    for _ in 0..10_000 {
+        let before = bench.hardware.position_um();
+        bench.run_ms(1);
+        bench.hardware.coarse.faults.home_switch = says(before, bench.hardware.position_um());
+        if bench.events.iter().any(|(_, event)| bench::ends(&event.kind, id)) {
+            return (bench.end_of(id), bench);
+        }
+    }
+    panic!("it does not end");
+}
+
 #[test]
 fn a_switch_whose_edges_do_not_lie_together_is_not_believed() {
-    /// Homes from 300 um. `says` gets where the stage was a millisecond ago and is, and gives what the switch says instead of the truth.
-    fn with(mut says: impl FnMut(f64, f64) -> Option<bool>) -> Failure {
-        let mut bench = Bench::new(300.0);
-        let id = bench.accepted(&HOME);
-        for _ in 0..10_000 {
-            let before = bench.hardware.position_um();
-            bench.run_ms(1);
-            bench.hardware.coarse.faults.home_switch = says(before, bench.hardware.position_um());
-            if bench.events.iter().any(|(_, event)| bench::ends(&event.kind, id)) {
-                return failure(&bench.end_of(id));
-            }
-        }
-        panic!("it does not end");
-    }
     // Found by campaigns, seeds 100154 and 100195: the wire breaks on the slow way back, 37 um above the edge.
     let mut broken = false;
-    let end = with(|before, now| {
+    let (end, _) = home_with(300.0, |before, now| {
         broken |= before > now && before - now < 0.3 && (10.0..37.0).contains(&now);
         broken.then_some(true)
     });
-    assert_eq!(end, Failure::HomeSwitchStuck);
+    assert_eq!(failure(&end), Failure::HomeSwitchStuck);
     // Seed 100205: dead on the way off the switch, below the edge, and there again on the way back.
     let (mut dead, mut highest) = (false, f64::NEG_INFINITY);
-    let end = with(|before, now| {
+    let (end, _) = home_with(300.0, |before, now| {
         dead |= now > before && (-200.0..-100.0).contains(&now);
         highest = if dead { highest.max(now) } else { highest };
         (dead && now > highest - 30.0).then_some(false)
     });
-    assert_eq!(end, Failure::HomeSwitchStuck);
+    assert_eq!(failure(&end), Failure::HomeSwitchStuck);
+    // Dead for 40 um of the first slow way back only; from above the switch, and from where it is closed.
+    for start_um in [300.0, -50.0] {
+        let (mut clear, mut over) = (false, false);
+        let (end, _) = home_with(start_um, |before, now| {
+            clear |= now > before && now > 20.0;
+            over |= clear && now < -40.0;
+            (clear && !over && now < 5.0).then_some(false)
+        });
+        assert_eq!(failure(&end), Failure::HomeSwitchStuck, "from {start_um} um");
+    }
+}
+
+#[test]
+fn a_switch_that_opens_far_behind_where_it_closes_is_a_good_one() {
+    // A micro-switch: 0.2 mm.
+    for start_um in [300.0, -50.0] {
+        let mut closed = start_um < 0.0;
+        let (end, bench) = home_with(start_um, |_, now| {
+            closed = now < if closed { 200.0 } else { 0.0 };
+            Some(closed)
+        });
+        assert!(matches!(end, EventKind::Homed { .. }), "from {start_um} um: {end:?}");
+        assert!(bench.hardware.position_um().abs() < 1.0, "{} um", bench.hardware.position_um());
+    }
 }
 
 #[test]

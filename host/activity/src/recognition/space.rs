@@ -226,6 +226,9 @@ struct Gallery {
     neighbours: usize,
 }
 
+/// Frame vectors of clips, `[clip][view]`.
+type FrameVectors = Vec<Vec<Array2<f32>>>;
+
 /// Galleries of one set of clips, each laid out once, and the clips' frames in each of their maps, embedded once.
 #[derive(Debug, Default)]
 pub struct Galleries {
@@ -242,7 +245,7 @@ impl Galleries {
         &mut self,
         clips: &[&Clip],
         settings: &SpaceSettings,
-    ) -> Result<(Space, Vec<Vec<Array2<f32>>>), EmbeddingError> {
+    ) -> Result<(Space, FrameVectors), EmbeddingError> {
         let at = self.embedded(clips, settings)?;
         let embedded = &self.embedded[at];
         let gallery = &self.galleries[embedded.gallery];
@@ -254,7 +257,7 @@ impl Galleries {
             neighbours: gallery.neighbours,
             brought: None,
         };
-        let vectors: Vec<Vec<Array2<f32>>> = clips
+        let vectors: FrameVectors = clips
             .par_iter()
             .zip(&embedded.points)
             .map(|(clip, points)| {

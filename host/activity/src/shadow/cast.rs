@@ -201,7 +201,7 @@ impl Scene<'_> {
     fn read(&self, y: usize, row: Row, above: &[Run], split: &mut Split, runs: &mut Vec<Run>) {
         let height = row.up_m / self.stature_m;
         let middle_m = (split.thigh_pixels > 0).then(|| split.thighs_m / split.thigh_pixels as f64);
-        let narrower = usize::from(y % NARROWS == 0);
+        let narrower = usize::from(y.is_multiple_of(NARROWS));
         for x in self.bounds.left..self.bounds.right {
             if !self.mask[[y, x]] {
                 continue;

@@ -9,7 +9,8 @@
 //!   bisector of body and shadow; where the shadow points away only a strip of ground as wide as a person is cut. A shadow behind
 //!   the person cannot be told apart without colour: such frames are cut as well as it goes and flagged.
 //!
-//! Angles are tried on the outline ([`super::envelope`]), so a cut on 640 x 480 costs a fraction of a millisecond.
+//! Angles are tried on the outline ([`super::envelope`]), so that a cut by angles on 640 x 480 costs a fraction of a millisecond; an
+//! explanation some milliseconds.
 
 use super::camera::CameraFile;
 use super::cast;
@@ -218,8 +219,24 @@ fn degrees_about(beta_rad: f64) -> impl Iterator<Item = f64> {
     (-3..=3).map(move |i| beta_rad + f64::from(i).to_radians())
 }
 
-/// Takes off what is not the body's, and of a shadow that lies sideways also what lies beyond the run point: a body and its shadow look alike near the feet. Gives
-/// the angle used.
+/// Clears what lies beyond the run point of a shadow that lies sideways, and gives the angle used; `None` where it lies otherwise, and
+/// where that would take more than 60 % of the silhouette.
+fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Option<f64> {
+    if shadow.eta_rad.sin().abs() >= SIDEWAYS {
+        return None;
+    }
+    let flip = shadow.mirrored.then_some(mask.ncols() as f32);
+    let (beta, limit) = longest_run(outline, flip, degrees_about(shadow.beta_rad))?;
+    let gone = clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
+    if gone as f64 > 0.6 * outline.area as f64 {
+        out.assign(mask);
+        return None;
+    }
+    Some(beta)
+}
+
+/// Takes off what is not the body's, and of a shadow that lies sideways also what lies beyond the run point: a body and its shadow look
+/// alike near the feet. Gives the angle used.
 fn explained_cut(
     mask: &Mask,
     out: &mut Mask,
@@ -227,35 +244,15 @@ fn explained_cut(
     shadow: &ImageShadow,
     found: &cast::Explanation,
 ) -> f64 {
-    let flip = shadow.mirrored.then_some(mask.ncols() as f32);
-    let run = if shadow.eta_rad.sin().abs() < SIDEWAYS {
-        longest_run(outline, flip, degrees_about(shadow.beta_rad))
-    } else {
-        None
-    };
-    let beta_rad = run.map_or(shadow.beta_rad, |(beta, limit)| {
-        let gone = clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
-        if gone as f64 > 0.6 * outline.area as f64 {
-            out.assign(mask);
-        }
-        beta
-    });
+    let beta_rad = clear_sideways(mask, out, outline, shadow).unwrap_or(shadow.beta_rad);
     out.zip_mut_with(&found.body, |left, &body| *left &= body);
     beta_rad
 }
 
 /// The default method where nothing explains the silhouette; gives the angle used and whether the half-plane was.
 fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> (f64, bool) {
-    let flip = shadow.mirrored.then_some(mask.ncols() as f32);
-    let sideways = shadow.eta_rad.sin().abs() < SIDEWAYS;
-    if sideways {
-        if let Some((beta, limit)) = longest_run(outline, flip, degrees_about(shadow.beta_rad)) {
-            let gone = clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
-            if gone as f64 <= 0.6 * outline.area as f64 {
-                return (beta, false);
-            }
-            out.assign(mask);
-        }
+    if let Some(beta) = clear_sideways(mask, out, outline, shadow) {
+        return (beta, false);
     }
     half_plane(mask, out, shadow);
     if shadow.eta_rad.sin() < -SIDEWAYS {
