@@ -68,7 +68,7 @@ impl Translated {
             twin.reset();
             Some(twin.save())
         });
-        if !reset.is_some_and(|reset| self.running.load(&reset).is_ok()) {
+        if reset.is_none_or(|reset| self.running.load(&reset).is_err()) {
             self.running.reset();
         }
         self.running.take_reset_request(); // a request that came before the reset is no other one
