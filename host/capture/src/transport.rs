@@ -299,17 +299,22 @@ mod tests {
     #[test]
     fn a_link_that_leads_to_another_port_is_followed_and_a_name_that_does_not_come_back_is_told() {
         let folder = tempfile::tempdir().unwrap();
-        let link = folder.path().join("board");
+        // Both are links: the system may give a pseudo-terminal's name to another one at once.
+        let [link, name] = ["board", "port"].map(|name| folder.path().join(name));
         let (first, old) = serialport::TTYPort::pair().unwrap();
         let (_second, new) = serialport::TTYPort::pair().unwrap();
         let (old, new) = (old.name().unwrap(), new.name().unwrap());
-        std::os::unix::fs::symlink(&old, &link).unwrap();
+        for path in [&link, &name] {
+            std::os::unix::fs::symlink(&old, path).unwrap();
+        }
         let mut linked = Place::new(link.to_str().unwrap());
-        let mut named = Place::new(&old);
+        let mut named = Place::new(name.to_str().unwrap());
         drop(linked.open().unwrap());
         drop(named.open().unwrap());
         drop(first); // and with it the port
-        std::fs::remove_file(&link).unwrap();
+        for path in [&link, &name] {
+            std::fs::remove_file(path).unwrap();
+        }
         let error = linked.open().err().unwrap();
         assert!(matches!(error, PortError::NotBack { .. }), "{error:?}");
         std::os::unix::fs::symlink(&new, &link).unwrap();

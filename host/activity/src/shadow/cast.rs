@@ -1,6 +1,6 @@
 //! A silhouette explained as a body and the shadow that this body throws: what `hybrid` does where the light's place is known.
 //!
-//! The body stands in an upright plane at the subject's distance, as deep as it is wide up to [`DEEPEST`] of the stature. Its rows are read from the head downwards: every run of
+//! The body stands in an upright plane at the subject's distance, as deep as it is wide up to 0.17 of the stature. Its rows are read from the head downwards: every run of
 //! pixels throws the ellipse of its own width on the ground, at the place that its height and the light say, and what lies in the shadow thrown so far is shadow, unless
 //! the body goes on there from the row above. Below the feet there is no body, and near the ground none beside the legs.
 //!
