@@ -13,6 +13,11 @@ const VALUES: usize = 9;
 const TOLERANCE: [f64; 2] = [1e-4, 5e-3];
 const PICTURE_TOLERANCE: [f64; 2] = [0.0, 1.5];
 
+/// Bytes of a line of text at a file's beginning, of a binary file's mark, and of a TIFF's: what follows these two depends on rounding.
+const HEAD: usize = 100;
+const MARK: usize = 8;
+const TIFF_MARK: usize = 4;
+
 /// A file: its form, some of its values, and a hash of every byte.
 #[derive(Serialize, Deserialize, PartialEq, Debug)]
 pub struct Digest {
@@ -39,7 +44,7 @@ impl Digest {
                     some_of(&numbers),
                 )
             }
-            _ => (format!("{} bytes that begin {}", bytes.len(), beginning(bytes)), Vec::new()),
+            _ => (format!("{} bytes that begin {}", bytes.len(), beginning(bytes, MARK)), Vec::new()),
         };
         Self { name: name.into(), form, values, hash: format!("{:016x}", hash(bytes)) }
     }
@@ -63,8 +68,10 @@ fn of_map(name: &str, bytes: &[u8]) -> (String, Vec<f64>) {
     let values: Vec<f64> =
         map.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).collect();
     let (height, width) = map.dim();
+    // A NumPy file begins with a line of text; in a TIFF values may follow its mark at once.
+    let head = if name.ends_with(".npy") { HEAD } else { TIFF_MARK };
     (
-        format!("map of {width}x{height}, {} with a value, in {}", values.len(), beginning(bytes)),
+        format!("map of {width}x{height}, {} with a value, in {}", values.len(), beginning(bytes, head)),
         some_of(&values),
     )
 }
@@ -89,10 +96,10 @@ fn some_of(values: &[f64]) -> Vec<f64> {
     std::iter::once(mean).chain(places.map(|place| values[place])).collect()
 }
 
-/// The first line, as far as it is text.
-fn beginning(bytes: &[u8]) -> String {
+/// The first line, of at most so many bytes.
+fn beginning(bytes: &[u8], most: usize) -> String {
     let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let line: Vec<u8> = line.iter().take(100).copied().collect();
+    let line: Vec<u8> = line.iter().take(most).copied().collect();
     line.escape_ascii().to_string().trim_end().into()
 }
 
