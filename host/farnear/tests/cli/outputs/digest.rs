@@ -44,7 +44,10 @@ impl Digest {
                     some_of(&numbers),
                 )
             }
-            _ => (format!("{} bytes that begin {}", bytes.len(), beginning(bytes, MARK)), Vec::new()),
+            _ => {
+                let most = if bytes.contains(&0) { MARK } else { HEAD };
+                (format!("{} bytes that begin {}", bytes.len(), beginning(bytes, most)), Vec::new())
+            }
         };
         Self { name: name.into(), form, values, hash: format!("{:016x}", hash(bytes)) }
     }
