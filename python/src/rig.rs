@@ -57,11 +57,8 @@ impl RigClient {
             None => steppers(&self.0.hello().capabilities),
         };
         self.interruptibly(py, |client| {
-            let started: Vec<_> = axes
-                .into_iter()
-                .map(|axis| Ok((axis, client.start_home(axis)?)))
-                .collect::<Result<_, Failed>>()?;
-            started.into_iter().map(|(axis, work)| Ok((axis.name(), um(work.homed()?)))).collect()
+            let started = axes.iter().zip(client.start_homing(&axes)?);
+            started.map(|(axis, work)| Ok((axis.name(), um(work.homed()?)))).collect()
         })
     }
 
@@ -79,11 +76,8 @@ impl RigClient {
         let targets = targets_um.iter().map(|(name, to_um)| Ok((axis(name)?, position(*to_um)?)));
         let targets = targets.collect::<PyResult<Vec<_>>>()?;
         self.interruptibly(py, |client| {
-            let started: Vec<_> = targets
-                .into_iter()
-                .map(|(axis, target)| Ok((axis, client.start_move(axis, target)?)))
-                .collect::<Result<_, Failed>>()?;
-            started.into_iter().map(|(axis, work)| Ok((axis.name(), um(work.moved()?.measured)))).collect()
+            let started = targets.iter().zip(client.start_moves(&targets)?);
+            started.map(|((axis, _), work)| Ok((axis.name(), um(work.moved()?.measured)))).collect()
         })
     }
 

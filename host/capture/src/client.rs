@@ -24,7 +24,7 @@ use farnear_protocol::{
 use crate::{
     error::ClientError,
     log_stream::LogStream,
-    owner::{Command, Connect, Listener, Owner, Session, nonsense},
+    owner::{Answered, Command, Connect, Listener, Owner, Question, Session, nonsense, nothing},
     timing::{Pace, Timing},
     transport::{Place, Transport, with_rate},
 };
@@ -245,16 +245,20 @@ impl Client {
         during: &str,
         listener: Option<Listener>,
     ) -> Result<(u32, Response), ClientError> {
-        let (answer, answered) = sync_channel(1);
-        let command = Command::Ask {
-            session: self.session.number,
-            request: Box::new(request.clone()),
-            during: during.into(),
-            listener,
-            answer,
-        };
-        self.command(command, during)?;
-        answered.recv().map_err(|_| self.ended(during))?
+        let question = Question { request: request.clone(), during: during.into(), listener };
+        let answered = self.ask_together(vec![question], during)?;
+        answered.into_iter().next().unwrap_or_else(|| Err(nothing(during)))
+    }
+
+    /// Asks for several things by one write, so that they come at the same time however slow this computer is.
+    pub(crate) fn ask_together(
+        &self,
+        questions: Vec<Question>,
+        during: &str,
+    ) -> Result<Vec<Answered>, ClientError> {
+        let (answers, answered) = sync_channel(1);
+        self.command(Command::Ask { session: self.session.number, questions, answers }, during)?;
+        answered.recv().map_err(|_| self.ended(during))
     }
 
     /// Asks for something that is done at once.

@@ -11,11 +11,11 @@ use std::{
 
 use farnear_protocol::{
     Call, Request, RequestError,
-    frame::{Decoder, Header, Kind, Packet, delimited, encode},
+    frame::{Decoder, Delimited, Header, Kind, Packet, delimited, encode},
     message::{LinkRate, NO_SESSION},
 };
 
-use crate::{error::ClientError, transport::Transport};
+use crate::{error::ClientError, owner::nothing, transport::Transport};
 
 /// Quiet on the line that tells that nothing older is still under way.
 const QUIET: Duration = Duration::from_millis(5);
@@ -34,6 +34,14 @@ fn until_quiet(transport: &mut dyn Transport, buffer: &mut [u8]) -> io::Result<(
 
 fn is_queue_full(packet: &Packet) -> bool {
     matches!(packet.message(), Some(RequestError::QueueFull { .. }))
+}
+
+/// A request on its way.
+struct Asked {
+    id: u32,
+    /// The same each time that it is sent.
+    bytes: Delimited,
+    answer: Option<Packet>,
 }
 
 /// A transport with framing, request ids and retries.
@@ -121,16 +129,26 @@ impl Link {
         &self.port
     }
 
-    /// Sends a request at most `waits.len()` times, the same bytes each time, and gives its id and the frame
-    /// that answers it. Events and log frames that come meanwhile go to `on_other`.
+    /// As [`Link::ask_all`] with one request.
     pub(crate) fn ask(
         &mut self,
-        (version, boot): (u8, u32),
+        address: (u8, u32),
         request: &Request,
         waits: &[Duration],
         during: &str,
         on_other: &mut dyn FnMut(&Packet) -> Result<(), ClientError>,
     ) -> Result<(u32, Packet), ClientError> {
+        let answers = self.ask_all(address, &[request], waits, during, on_other)?;
+        answers.into_iter().next().ok_or_else(|| nothing(during))
+    }
+
+    /// A request with the next id.
+    fn number(
+        &mut self,
+        (version, boot): (u8, u32),
+        request: &Request,
+        during: &str,
+    ) -> Result<Asked, ClientError> {
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1).max(1);
         let header = Header { version, kind: Kind::Request, id, boot };
@@ -138,21 +156,47 @@ impl Link {
         let frame = encode(header, &Call { session, request: request.clone() }).ok_or_else(|| {
             ClientError::Nonsense { during: during.into(), answer: "the request does not fit a frame".into() }
         })?;
+        Ok(Asked { id, bytes: delimited(&frame), answer: None })
+    }
+
+    /// Sends requests, no more than the board lets wait for their answers, each at most `waits.len()` times, and gives
+    /// for each its id and the frame that answers it. Events and log frames that come meanwhile go to `on_other`.
+    pub(crate) fn ask_all(
+        &mut self,
+        address: (u8, u32),
+        requests: &[&Request],
+        waits: &[Duration],
+        during: &str,
+        on_other: &mut dyn FnMut(&Packet) -> Result<(), ClientError>,
+    ) -> Result<Vec<(u32, Packet)>, ClientError> {
+        let mut asked = requests
+            .iter()
+            .map(|request| self.number(address, request, during))
+            .collect::<Result<Vec<_>, _>>()?;
         let begin = Instant::now();
         let (bytes_before, bad_frames) = (self.bytes, self.bad_frames);
-        // One write for both delimiters, so that an emulated board never sees the first alone.
-        let bytes = delimited(&frame);
         for wait in waits {
+            // One write for all of them, so that an emulated board never sees one alone.
+            let open = asked.iter().filter(|one| one.answer.is_none());
+            let bytes: Vec<u8> = open.flat_map(|one| one.bytes.iter().copied()).collect();
             self.send(&bytes, *wait, during)?;
             let until = Instant::now() + *wait;
             while let Some(packet) = self.receive(until, during)? {
                 match packet.header.kind {
-                    // The board had no room for it and asks to be asked again.
-                    Kind::Error if packet.header.id == id && is_queue_full(&packet) => {}
-                    Kind::Response | Kind::Error if packet.header.id == id => return Ok((id, packet)),
                     Kind::Event | Kind::Log => on_other(&packet)?,
-                    // The late answer to an earlier attempt.
-                    Kind::Response | Kind::Error | Kind::Request => {}
+                    // The board had no room for it and asks to be asked again.
+                    Kind::Error if is_queue_full(&packet) => {}
+                    Kind::Response | Kind::Error => {
+                        // Any other is the late answer to an earlier request.
+                        if let Some(one) = asked.iter_mut().find(|one| one.id == packet.header.id) {
+                            one.answer = Some(packet);
+                        }
+                        let answers = asked.iter().map(|one| Some((one.id, one.answer.clone()?)));
+                        if let Some(answers) = answers.collect() {
+                            return Ok(answers);
+                        }
+                    }
+                    Kind::Request => {}
                 }
             }
         }

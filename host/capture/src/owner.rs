@@ -68,14 +68,24 @@ pub(crate) struct Listener {
     pub bears_loss: bool,
 }
 
+/// A request and what it is for.
+pub(crate) struct Question {
+    pub request: Request,
+    pub during: String,
+    /// Where it is long work.
+    pub listener: Option<Listener>,
+}
+
+/// The number of a request, and its answer or refusal.
+pub(crate) type Answered = Result<(u32, Response), ClientError>;
+
 /// What handles ask of the owner.
 pub(crate) enum Command {
     Ask {
         session: u32,
-        request: Box<Request>,
-        during: String,
-        listener: Option<Listener>,
-        answer: SyncSender<Result<(u32, Response), ClientError>>,
+        /// Sent together.
+        questions: Vec<Question>,
+        answers: SyncSender<Vec<Answered>>,
     },
     /// Gives the present session; says hello anew where it is still the known one, or none.
     Join {
@@ -188,9 +198,9 @@ impl Owner {
 
     fn obey(&mut self, command: Command) {
         match command {
-            Command::Ask { session, request, during, listener, answer } => {
-                let result = self.ask_for(session, &request, &during, listener);
-                let _ = answer.send(result); // who asked may have gone
+            Command::Ask { session, questions, answers } => {
+                let answered = self.ask_for(session, questions);
+                let _ = answers.send(answered); // who asked may have gone
             }
             Command::Join { known, answer } => {
                 let result = self.join(known);
@@ -200,47 +210,65 @@ impl Owner {
         }
     }
 
-    fn ask_for(
-        &mut self,
-        session: u32,
-        request: &Request,
-        during: &str,
-        listener: Option<Listener>,
-    ) -> Result<(u32, Response), ClientError> {
+    /// The answer to each question; where the session ends meanwhile, as many errors.
+    fn ask_for(&mut self, session: u32, questions: Vec<Question>) -> Vec<Answered> {
         if let Some(broken) = self.break_of(session) {
-            return Err(broken.error(self.link.port(), during));
+            let port = self.link.port();
+            return questions.iter().map(|question| Err(broken.error(port, &question.during))).collect();
         }
-        let (id, response) = self.ask(request, during)?;
-        if let (Some(listener), Response::Accepted) = (listener, &response) {
-            // Before any event is given out, so that even work that has ended already is told its end.
-            self.works.insert(id, listener);
+        let asked: Vec<_> =
+            questions.iter().map(|question| (&question.request, question.during.as_str())).collect();
+        let answered = match self.ask_all(&asked) {
+            Ok(answered) => answered,
+            Err(error) => return vec![Err(error)],
+        };
+        for (question, answered) in questions.into_iter().zip(&answered) {
+            if let (Some(listener), Ok((id, Response::Accepted))) = (question.listener, answered) {
+                // Before any event is given out, so that even work that has ended already is told its end.
+                self.works.insert(*id, listener);
+            }
         }
         self.give_out();
-        Ok((id, response))
+        answered
     }
 
     /// Sends a request until its answer comes.
-    fn ask(&mut self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
+    fn ask(&mut self, request: &Request, during: &str) -> Answered {
+        let answered = self.ask_all(&[(request, during)])?;
+        answered.into_iter().next().unwrap_or_else(|| Err(nothing(during)))
+    }
+
+    /// Sends requests together until all are answered.
+    fn ask_all(&mut self, asked: &[(&Request, &str)]) -> Result<Vec<Answered>, ClientError> {
+        let during = asked.iter().map(|(_, during)| *during).collect::<Vec<_>>().join(" and ");
+        let requests: Vec<_> = asked.iter().map(|(request, _)| *request).collect();
         let timing = self.timing();
         let waits = vec![timing.reply; timing.retries as usize + 1];
         let address = (self.session.version, self.session.hello.boot);
         let (events, mut logs) = (&mut self.events, Vec::new());
-        let asked = self.link.ask(address, request, &waits, during, &mut |packet| match packet.header.kind {
-            Kind::Event => events.take(packet, during),
+        let on_other = &mut |packet: &Packet| match packet.header.kind {
+            Kind::Event => events.take(packet, &during),
             _ => {
                 logs.push(packet.clone());
                 Ok(())
             }
-        });
+        };
+        let answers = self.link.ask_all(address, &requests, &waits, &during, on_other);
         logs.iter().for_each(|packet| self.take_log(packet));
-        let (id, packet) = asked.inspect_err(|error| self.break_off(error))?;
+        let answers = answers.inspect_err(|error| self.break_off(error))?;
         self.last_heard = Instant::now();
+        let answers = answers.into_iter().zip(asked);
+        Ok(answers.map(|((id, packet), (_, during))| Ok((id, self.read(&packet, during)?))).collect())
+    }
+
+    /// What a frame answers.
+    fn read(&mut self, packet: &Packet, during: &str) -> Result<Response, ClientError> {
         let unreadable = || ClientError::Nonsense {
             during: during.into(),
             answer: format!("{:?} {:02x?}", packet.header.kind, packet.body.as_slice()),
         };
         if packet.header.kind == Kind::Response {
-            return Ok((id, packet.message().ok_or_else(unreadable)?));
+            return packet.message().ok_or_else(unreadable);
         }
         Err(match packet.message().ok_or_else(unreadable)? {
             RequestError::Boot { current } => {
@@ -400,6 +428,11 @@ impl Owner {
             goes_on
         });
     }
+}
+
+/// Nothing where an answer must be.
+pub(crate) fn nothing(during: &str) -> ClientError {
+    ClientError::Nonsense { during: during.into(), answer: "no answer".into() }
 }
 
 /// An answer that is none to what was asked.

@@ -16,19 +16,20 @@ pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {
     [Axis::SensorCoarse, Axis::Lens].into_iter().filter(|axis| capabilities.has(*axis)).collect()
 }
 
-/// Homes what is not homed. One axis after the other: when a second request arrives while the first is under way
-/// depends on this computer, and would make each run of an emulated rig another one.
+/// Homes what is not homed, all at the same time.
 ///
 /// # Errors
 /// [`ClientError`].
 pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), ClientError> {
     let status = client.status()?;
-    for axis in steppers(&client.hello().capabilities) {
-        let state = status.axis(axis).state;
-        if state != PositionState::Homed {
-            say(&format!("homing the {} (its position is {})", axis_name(axis), state_name(state)));
-            client.home(axis)?;
-        }
+    let mut axes = steppers(&client.hello().capabilities);
+    axes.retain(|axis| status.axis(*axis).state != PositionState::Homed);
+    for axis in &axes {
+        let state = state_name(status.axis(*axis).state);
+        say(&format!("homing the {} (its position is {state})", axis_name(*axis)));
+    }
+    for work in client.start_homing(&axes)? {
+        work.homed()?;
     }
     Ok(())
 }

@@ -23,12 +23,20 @@ use crate::{
     client::Client,
     describe::{axis_name, routine_name, um},
     error::ClientError,
-    owner::{Listener, Note, nonsense},
+    owner::{Listener, Note, Question, nonsense, nothing},
     timing::{Pace, calibration_time, homing_time, move_time, program_time},
 };
 
 /// Longest single wait for an event, so that an interruption by the user is seen soon.
 const SLICE: Duration = Duration::from_millis(50);
+
+/// Long work that is to begin.
+struct Plan {
+    request: Request,
+    /// How long a healthy board takes for it at most.
+    work: Duration,
+    during: String,
+}
 
 /// How a move ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -242,30 +250,53 @@ impl Client {
         work: Duration,
         during: String,
     ) -> Result<Work, ClientError> {
+        let name = during.clone();
+        only(self.start_together(vec![Plan { request: request.clone(), work, during }])?, &name)
+    }
+
+    /// Begins several works at the same time. Where one is refused, those that have begun are stopped.
+    fn start_together(&self, plans: Vec<Plan>) -> Result<Vec<Work>, ClientError> {
+        let during = plans.iter().map(|plan| plan.during.as_str()).collect::<Vec<_>>().join(" and ");
         if self.interrupted() {
             return Err(ClientError::Interrupted { during });
         }
-        let ((notes, receiver), held) = (channel(), Arc::new(()));
-        let bears_loss = matches!(request, Request::RunContinuously { .. });
-        let listener = Listener { notes, held: Arc::downgrade(&held), bears_loss };
-        let (id, response) = self.ask(request, &during, Some(listener))?;
-        if response != Response::Accepted {
-            return Err(nonsense(&during, &response));
+        let (mut questions, mut ends) = (Vec::new(), Vec::new());
+        for plan in &plans {
+            let ((notes, receiver), held) = (channel(), Arc::new(()));
+            let bears_loss = matches!(plan.request, Request::RunContinuously { .. });
+            let listener = Listener { notes, held: Arc::downgrade(&held), bears_loss };
+            let (request, during) = (plan.request.clone(), plan.during.clone());
+            questions.push(Question { request, during, listener: Some(listener) });
+            ends.push((receiver, held));
         }
-        let allowed = self.timing().allowance(work);
-        Ok(Work {
-            client: self.clone(),
-            id,
-            request: request.clone(),
-            during,
-            notes: receiver,
-            _held: held,
-            allowed,
-            left: allowed,
-            paused: false,
-            alarm: None,
-            over: false,
-        })
+        let answered = self.ask_together(questions, &during)?;
+        let (mut started, mut refused) = (Vec::new(), None);
+        for ((plan, answered), (notes, held)) in plans.into_iter().zip(answered).zip(ends) {
+            match answered {
+                Ok((id, Response::Accepted)) => {
+                    let allowed = self.timing().allowance(plan.work);
+                    started.push(Work {
+                        client: self.clone(),
+                        id,
+                        request: plan.request,
+                        during: plan.during,
+                        notes,
+                        _held: held,
+                        allowed,
+                        left: allowed,
+                        paused: false,
+                        alarm: None,
+                        over: false,
+                    });
+                }
+                Ok((_, other)) => refused = refused.or_else(|| Some(nonsense(&plan.during, &other))),
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        match refused {
+            Some(error) => Err(error),
+            None => Ok(started),
+        }
     }
 
     /// The keep-alive timeout that goes with work, within what the board allows.
@@ -286,14 +317,27 @@ impl Client {
         Ok(pace)
     }
 
-    /// Begins to home an axis; another one may be homed or moved at the same time.
+    /// Begins to home axes, all at the same time.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn start_homing(&self, axes: &[Axis]) -> Result<Vec<Work>, ClientError> {
+        let plan = |axis: &Axis| {
+            Ok(Plan {
+                request: Request::Home { axis: *axis, silence: self.keep_alive() },
+                work: homing_time(*axis, &self.hello().limits, self.pace(*axis)?),
+                during: format!("homing the {}", axis_name(*axis)),
+            })
+        };
+        self.start_together(axes.iter().map(plan).collect::<Result<_, ClientError>>()?)
+    }
+
+    /// Begins to home an axis.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
-        let during = format!("homing the {}", axis_name(axis));
-        let work = homing_time(axis, &self.hello().limits, self.pace(axis)?);
-        self.start_work(&Request::Home { axis, silence: self.keep_alive() }, work, during)
+        only(self.start_homing(&[axis])?, "homing")
     }
 
     /// Homes an axis. Gives how far the encoder's old zero was from the new one.
@@ -304,15 +348,28 @@ impl Client {
         self.start_home(axis)?.homed()
     }
 
-    /// Begins to move an axis to an absolute position; another one may move at the same time.
+    /// Begins to move axes to absolute positions, all at the same time.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn start_moves(&self, targets: &[(Axis, Nanometres)]) -> Result<Vec<Work>, ClientError> {
+        let status = self.status()?;
+        let plan = |&(axis, target): &(Axis, Nanometres)| {
+            Ok(Plan {
+                request: Request::Move { axis, target, silence: self.keep_alive() },
+                work: move_time(axis, status.axis(axis).measured, target, self.pace(axis)?),
+                during: format!("moving the {} to {:.3} um", axis_name(axis), um(target)),
+            })
+        };
+        self.start_together(targets.iter().map(plan).collect::<Result<_, ClientError>>()?)
+    }
+
+    /// Begins to move an axis to an absolute position.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
-        let during = format!("moving the {} to {:.3} um", axis_name(axis), um(target));
-        let status = self.status()?;
-        let work = move_time(axis, status.axis(axis).measured, target, self.pace(axis)?);
-        self.start_work(&Request::Move { axis, target, silence: self.keep_alive() }, work, during)
+        only(self.start_moves(&[(axis, target)])?, "moving")
     }
 
     /// Moves an axis to an absolute position.
@@ -405,6 +462,11 @@ impl Client {
             }
         }
     }
+}
+
+/// The one that was started.
+fn only(started: Vec<Work>, during: &str) -> Result<Work, ClientError> {
+    started.into_iter().next().ok_or_else(|| nothing(during))
 }
 
 /// Whether an event that bears the request's id can be about it: the same axis and the same target.

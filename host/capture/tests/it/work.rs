@@ -126,6 +126,25 @@ fn two_axes_move_at_the_same_time() {
 }
 
 #[test]
+fn what_begins_together_ends_each_by_itself_and_where_one_is_refused_none_goes_on() {
+    let (client, peer) = connect(Faults::default());
+    let homed = client.start_homing(&[Axis::SensorCoarse, Axis::Lens]).unwrap();
+    for work in homed {
+        work.homed().unwrap();
+    }
+    let targets = [(Axis::Lens, Nanometres(3_000_000)), (Axis::SensorCoarse, Nanometres(2_000_000))];
+    let ends = client.start_moves(&targets).unwrap().into_iter().map(|work| work.moved().unwrap().measured);
+    assert_eq!(ends.collect::<Vec<_>>(), [Nanometres(3_000_125), Nanometres(2_000_375)]);
+    assert_eq!(peer.board().acts, 4);
+    assert_eq!(peer.board().stops, 0);
+    peer.board().faults = Faults { never_ends: true, ..Faults::default() };
+    let targets = [(Axis::Lens, Nanometres(1_000_000)), (Axis::SensorCoarse, Nanometres(14_000_000))];
+    let error = client.start_moves(&targets).err().unwrap();
+    assert!(error.to_string().contains("14000"), "{error}");
+    assert_eq!(peer.board().stops, 1);
+}
+
+#[test]
 fn a_program_is_armed_once_run_twice_and_told_of_shots_that_the_host_triggers() {
     let (client, peer) = connect(Faults::default());
     let error = client.start_program(&[]).err().unwrap();

@@ -78,10 +78,8 @@ pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
 pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<HomeFigures> {
     let rig = Rig::connect(rig, None, context)?;
     let axes = if axes.is_empty() { steppers(&rig.client.hello().capabilities) } else { axes.to_vec() };
-    let started: Vec<_> =
-        axes.iter().map(|axis| Ok((*axis, rig.client.start_home(*axis)?))).collect::<Result<_>>()?;
     let mut homed = HomeFigures::default();
-    for (axis, work) in started {
+    for (axis, work) in axes.iter().zip(rig.client.start_homing(&axes)?) {
         let shift = Some(um(work.homed()?));
         match axis {
             Axis::Lens => homed.lens_shift_um = shift,
@@ -105,12 +103,8 @@ pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFig
     if settings.home {
         ensure_homed(&rig.client, &mut |what| context.say(what))?;
     }
-    let started: Vec<_> = targets
-        .into_iter()
-        .map(|(axis, target)| Ok((axis, rig.client.start_move(axis, target)?)))
-        .collect::<Result<_>>()?;
     let mut moved = Vec::new();
-    for (axis, work) in started {
+    for ((axis, _), work) in targets.iter().zip(rig.client.start_moves(&targets)?) {
         let end = work.moved()?;
         moved.push(MovedAxis { axis: axis.name(), asked_um: um(end.asked), measured_um: um(end.measured) });
     }
