@@ -68,13 +68,13 @@ subject = "ben"
 activity = "sit down"
 "#;
 
-const JOBS: &str = r#"[shadow]
+const JOBS: &str = r#"[shadow-remove]
 camera = "camera.toml"
 lat = 52.38
 lon = -1.56
 
 [[job]]
-do = "shadow"
+do = "shadow-remove"
 masks = "a"
 time = "2014-06-23T11:30:00Z"
 out = "one"
@@ -86,12 +86,14 @@ near = "near.png"
 out = "two"
 "#;
 
-const JOBS_CSV: &str =
-    "do,masks,camera,lamp,out\nshadow,a,camera.toml,\"-1.5,6,3\",one\nshadow,b,camera.toml,,two\n";
+const JOBS_CSV: &str = "do,masks,camera,lamp,out\nshadow-remove,a,camera.toml,\"-1.5,6,3\",one\nshadow-remove,b,camera.toml,,two\n";
 
-/// Two folders of small masks: a person and half of one.
+const CAMERA: &str = "[camera]\nheight_m = 1.2\nazimuth_deg = 140.0\nfocal_length_mm = 4.0\npixel_um = 120.0\nwidth_px = 32\nheight_px = 32\n";
+
+/// Two folders of small masks, a person and half of one, and the camera that saw them.
 fn folder() -> tempfile::TempDir {
     let root = tempfile::tempdir().expect("a folder");
+    fs::write(root.path().join("camera.toml"), CAMERA).expect("a file");
     for (name, rows) in [("a", 30), ("b", 12)] {
         fs::create_dir(root.path().join(name)).expect("a folder");
         let level = |x, y| Luma([if (12..20).contains(&x) && y < rows { 255 } else { 0 }]);
@@ -178,5 +180,6 @@ fn undamaged_lists_are_read() {
     let samples = Samples::read(&list("samples.toml", SAMPLES), &Context::unattended()).expect("read");
     assert_eq!((samples.clips.len(), samples.frames, samples.full_frames), (2, 3, true));
     assert_eq!(done(&list("jobs.toml", JOBS)), 2);
+    assert!(root.path().join("one/shadow.toml").exists(), "the first of them can be done");
     assert_eq!(done(&list("jobs.csv", JOBS_CSV)), 2);
 }
