@@ -94,8 +94,7 @@ fn from_markers(page: &mut Page, data: &Data) -> Result<()> {
         "Silhouettes from markers, fig. 7.6: markers, projected hulls of the body's parts, silhouettes after closing, from four sides",
     )?;
     page.paragraph(&format!(
-        "A frame of CMU's motion capture ({has} of the template's {of} markers; the thesis' own suit has 77, and 29 on props). As in the thesis heads come out small, for few markers are on them, and limbs as thin as their markers lie; \
-         hulls of rigid parts leave gaps at the joints, which the thesis closes and so does `farnear silhouettes markers`."
+        "A frame of CMU's motion capture ({has} of the template's {of} markers; the thesis' own suit has 77, and 29 on props). As in the thesis heads come out small, for few markers are on them. The template has few markers a part and thickens its parts, so that closing gaps of 126 mm, as the thesis does with its thin ones, fuses the legs here; `farnear silhouettes markers` closes 40 mm with such templates. Sides are the laboratory's axes: the actor faces aside."
     ));
     Ok(())
 }
