@@ -10,13 +10,14 @@ use anyhow::Result;
 use crate::run::{cargo, finish, step};
 
 /// Crates whose tests read what others send: frames, requests, files.
-const CRATES: [&str; 6] = [
+const CRATES: [&str; 7] = [
     "farnear-protocol",
     "farnear-rig",
     "farnear-capture",
     "farnear-scene",
     "farnear-activity",
     "farnear-files",
+    "farnear-workflows",
 ];
 /// Cases per property and round.
 const CASES: &str = "20000";

@@ -1,8 +1,10 @@
 //! The parts of `docs/activity.md`: people's shadows, silhouettes and activities, like Li 2014, chapters 8 and 9.
 
 mod between;
+mod bodies;
 mod broken;
 pub mod data;
+mod embedded;
 mod everyday;
 mod figures;
 mod layout;

@@ -14,7 +14,7 @@ type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
 
 /// In the order of the page.
 pub const PARTS: [Part; 2] =
-    [("chapters-4-to-6", |page, _| depth::measure(page)), ("chapters-8-and-9", people::thesis::measure)];
+    [("chapters-4-to-6", |page, _| depth::measure(page)), ("chapters-7-to-9", people::thesis::measure)];
 
 /// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# The thesis, redone

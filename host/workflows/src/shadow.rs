@@ -4,4 +4,5 @@
 
 pub mod removal;
 pub mod score;
+mod stages;
 pub mod video;

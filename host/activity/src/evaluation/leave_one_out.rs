@@ -135,6 +135,7 @@ pub fn train_on_others(
     if !strangers.is_empty() {
         groups.push(strangers);
     }
+    watch.folds_begin(groups.len(), experiment.spaces());
     let folds: Result<Vec<Outcome>, EvaluationError> = groups
         .par_iter()
         .map(|tested| {

@@ -158,6 +158,11 @@ impl Experiment {
         Self { classifiers: family.tried(), ..self }
     }
 
+    /// How many spaces are tried. Which variants of a parameter change nothing hangs on what was chosen before, so that a search may try some more or fewer.
+    pub fn spaces(&self) -> usize {
+        1 + self.sweeps.iter().map(|sweep| sweep.variants(&self.space).len()).sum::<usize>()
+    }
+
     /// The same with nothing chosen: the first of everything.
     #[must_use]
     pub fn fixed(mut self) -> Self {

@@ -2,6 +2,9 @@
 
 /// Told how far the work has come, and asked whether to go on; by several threads at once.
 pub trait Watch: Sync {
+    /// An evaluation of so many folds begins, each of which tries about so many spaces.
+    fn folds_begin(&self, _folds: usize, _spaces: usize) {}
+
     /// One more space was learned and tried; a search tries some dozens, how many is known at its end only.
     fn space_tried(&self) {}
 

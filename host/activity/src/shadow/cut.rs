@@ -53,6 +53,9 @@ pub struct CutReport {
     pub removed_fraction: f64,
     /// Whether the half-plane through the feet was used in place of the run point.
     pub half_plane: bool,
+    /// Where the straight edge lies that was cut along, pixels: beyond it `x cos beta - y sin beta` is less, x counted from the right in mirrored
+    /// pictures; `None` where the body that explains the silhouette alone decided.
+    pub edge_px: Option<f64>,
     /// Share of the silhouette that body and shadow together leave unexplained, 0 to 1; `None` where the cut went by angles alone.
     pub unexplained: Option<f64>,
     /// The shadow found for this silhouette.
@@ -61,6 +64,14 @@ pub struct CutReport {
     pub subject: Subject,
     /// False when more than half of the silhouette went or the shadow points away, where cutting is guesswork: look at the frame.
     pub trustworthy: bool,
+}
+
+/// The straight edge that a cut goes along.
+struct Edge {
+    beta_rad: f64,
+    /// [`CutReport::edge_px`].
+    limit: Option<f32>,
+    half_plane: bool,
 }
 
 /// Sine of eta up to which a shadow counts as lying sideways.
@@ -113,10 +124,10 @@ pub fn remove(
     let reach_px = |foot_px, eta_rad| reach_px(mask, &outline, foot_px, eta_rad);
     let shadow = light.shadow_of(subject, camera, reach_px)?;
     let mut out = mask.clone();
-    let (beta_rad, half_plane) = match (method, &explained) {
+    let edge = match (method, &explained) {
         (Method::Thesis, _) => thesis(mask, &mut out, &outline, &shadow, beta_sd_rad),
         (Method::Hybrid, None) => hybrid(mask, &mut out, &outline, &shadow),
-        (Method::Hybrid, Some(found)) => (explained_cut(mask, &mut out, &outline, &shadow, found), false),
+        (Method::Hybrid, Some(found)) => explained_cut(mask, &mut out, &outline, &shadow, found),
     };
     let left = crate::mask::area(out.view());
     let removed_fraction = 1.0 - left as f64 / outline.area as f64;
@@ -124,9 +135,10 @@ pub fn remove(
     Ok((
         out,
         CutReport {
-            beta_rad,
+            beta_rad: edge.beta_rad,
             removed_fraction,
-            half_plane,
+            half_plane: edge.half_plane,
+            edge_px: edge.limit.map(f64::from),
             unexplained: explained.map(|found| found.unexplained),
             shadow,
             subject,
@@ -175,8 +187,8 @@ fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subjec
     Subject { distance_m, offset_m: slope * distance_m, height_m: file.subject.height_m }
 }
 
-/// The printed method; gives the angle used and whether a half-plane was.
-fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, sd_rad: f64) -> (f64, bool) {
+/// The printed method.
+fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, sd_rad: f64) -> Edge {
     /// The largest step over beta's range (10 degrees).
     const STEP_RAD: f64 = 10.0 * PI / 180.0;
     /// "Close to 90 degrees": the shadow is cut by length.
@@ -185,16 +197,18 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
         let bottom = outline.bounds.1 as f64;
         let limit = -(bottom - shadow.m_px[1].max(0.0)) as f32;
         clear_left_of(mask.view(), out, FRAC_PI_2 as f32, limit, false);
-        return (FRAC_PI_2, true);
+        return Edge { beta_rad: FRAC_PI_2, limit: Some(limit), half_plane: true };
     }
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
     let sd_rad = sd_rad.abs().min(FRAC_PI_2);
     // Also where the step is larger than the range: its middle and both ends.
     let steps = (sd_rad / STEP_RAD).ceil().max(1.0) as i32;
     let angles = (-steps..=steps).map(|i| shadow.beta_rad + sd_rad * f64::from(i) / f64::from(steps));
-    let Some((beta, limit)) = longest_run(outline, flip, angles) else { return (shadow.beta_rad, false) };
-    clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
-    (beta, false)
+    let Some((beta_rad, limit)) = longest_run(outline, flip, angles) else {
+        return Edge { beta_rad: shadow.beta_rad, limit: None, half_plane: false };
+    };
+    clear_left_of(mask.view(), out, beta_rad as f32, limit, shadow.mirrored);
+    Edge { beta_rad, limit: Some(limit), half_plane: false }
 }
 
 /// The angle at which the run of negative slope is longest, and where it ends there. Beta lies in [pi/2, pi] (8.20); of equals the angle nearest to the
@@ -219,46 +233,47 @@ fn degrees_about(beta_rad: f64) -> impl Iterator<Item = f64> {
     (-3..=3).map(move |i| beta_rad + f64::from(i).to_radians())
 }
 
-/// Clears what lies beyond the run point of a shadow that lies sideways, and gives the angle used; `None` where it lies otherwise, and
+/// Clears what lies beyond the run point of a shadow that lies sideways, and gives the edge; `None` where it lies otherwise, and
 /// where that would take more than 60 % of the silhouette.
-fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Option<f64> {
+fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Option<Edge> {
     if shadow.eta_rad.sin().abs() >= SIDEWAYS {
         return None;
     }
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
-    let (beta, limit) = longest_run(outline, flip, degrees_about(shadow.beta_rad))?;
-    let gone = clear_left_of(mask.view(), out, beta as f32, limit, shadow.mirrored);
+    let (beta_rad, limit) = longest_run(outline, flip, degrees_about(shadow.beta_rad))?;
+    let gone = clear_left_of(mask.view(), out, beta_rad as f32, limit, shadow.mirrored);
     if gone as f64 > 0.6 * outline.area as f64 {
         out.assign(mask);
         return None;
     }
-    Some(beta)
+    Some(Edge { beta_rad, limit: Some(limit), half_plane: false })
 }
 
 /// Takes off what is not the body's, and of a shadow that lies sideways also what lies beyond the run point: a body and its shadow look
-/// alike near the feet. Gives the angle used.
+/// alike near the feet.
 fn explained_cut(
     mask: &Mask,
     out: &mut Mask,
     outline: &Outline,
     shadow: &ImageShadow,
     found: &cast::Explanation,
-) -> f64 {
-    let beta_rad = clear_sideways(mask, out, outline, shadow).unwrap_or(shadow.beta_rad);
+) -> Edge {
+    let no_edge = Edge { beta_rad: shadow.beta_rad, limit: None, half_plane: false };
+    let edge = clear_sideways(mask, out, outline, shadow).unwrap_or(no_edge);
     out.zip_mut_with(&found.body, |left, &body| *left &= body);
-    beta_rad
+    edge
 }
 
-/// The default method where nothing explains the silhouette; gives the angle used and whether the half-plane was.
-fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> (f64, bool) {
-    if let Some(beta) = clear_sideways(mask, out, outline, shadow) {
-        return (beta, false);
+/// The default method where nothing explains the silhouette.
+fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Edge {
+    if let Some(edge) = clear_sideways(mask, out, outline, shadow) {
+        return edge;
     }
-    half_plane(mask, out, shadow);
+    let edge = half_plane(mask, out, shadow);
     if shadow.eta_rad.sin() < -SIDEWAYS {
         give_back_the_body(mask, out, outline, shadow);
     }
-    (shadow.beta_rad, true)
+    edge
 }
 
 /// Where the shadow points away, the half-plane takes the near side of the upper body with it. The shadow lies on a strip of ground
@@ -285,9 +300,10 @@ fn give_back_the_body(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &I
 }
 
 /// Clears the shadow's side of the bisector through the feet.
-fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) {
+fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
     let (sin, cos) = shadow.beta_rad.sin_cos();
     let x = if shadow.mirrored { mask.ncols() as f64 - 1.0 - shadow.foot_px[0] } else { shadow.foot_px[0] };
-    let limit = x * cos - shadow.foot_px[1] * sin;
-    clear_left_of(mask.view(), out, shadow.beta_rad as f32, limit as f32, shadow.mirrored);
+    let limit = (x * cos - shadow.foot_px[1] * sin) as f32;
+    clear_left_of(mask.view(), out, shadow.beta_rad as f32, limit, shadow.mirrored);
+    Edge { beta_rad: shadow.beta_rad, limit: Some(limit), half_plane: true }
 }

@@ -26,17 +26,22 @@ const PERSON: f32 = 0.0;
 const SHADOW: f32 = 0.6;
 const NEITHER: f32 = 1.0;
 
-/// A silhouette cut out of its picture: all of a figure are as large.
-fn cut_out(map: &Array2<f32>, scene: &Scene) -> Array2<f32> {
-    /// Rows and columns, before the panels' shrinking.
-    const SIZE: [usize; 2] = [240, 270];
+/// A part of a scene's picture of that size about its silhouette.
+fn cut_out(map: &Array2<f32>, scene: &Scene, size: [usize; 2]) -> Array2<f32> {
     let bounds = BoundingBox::of(scene.silhouette.view());
     let [middle_y, middle_x] = bounds.map_or([0; 2], |b| [(b.top + b.bottom) / 2, (b.left + b.right) / 2]);
-    Array2::from_shape_fn((SIZE[0], SIZE[1]), |(y, x)| {
-        let at = [(middle_y + y).checked_sub(SIZE[0] / 2), (middle_x + x).checked_sub(SIZE[1] / 2)];
+    Array2::from_shape_fn((size[0], size[1]), |(y, x)| {
+        let at = [(middle_y + y).checked_sub(size[0] / 2), (middle_x + x).checked_sub(size[1] / 2)];
         let [Some(y), Some(x)] = at else { return NEITHER };
         map.get([y, x]).copied().unwrap_or(NEITHER)
     })
+}
+
+/// Rows and columns that hold every scene's silhouette, with a margin; all of a figure are as large.
+fn size_of(scenes: &[Scene]) -> [usize; 2] {
+    const MARGIN: usize = 12;
+    let bounds = scenes.iter().filter_map(|scene| BoundingBox::of(scene.silhouette.view()));
+    bounds.fold([0; 2], |[rows, columns], b| [rows.max(b.height() + MARGIN), columns.max(b.width() + MARGIN)])
 }
 
 fn of_mask(mask: &Mask) -> Array2<f32> {
@@ -46,14 +51,15 @@ fn of_mask(mask: &Mask) -> Array2<f32> {
 /// Fig. 8.6: shadow off by every method, scene by scene.
 pub fn shadows_off(page: &mut Page, scenes: u64) -> Result<()> {
     let mut maps: Vec<(String, Array2<f32>)> = Vec::new();
-    for seed in 0..scenes {
-        let scene = scene(Kind::Standard, seed);
+    let drawn: Vec<Scene> = (0..scenes).map(|seed| scene(Kind::Standard, seed)).collect();
+    let size = size_of(&drawn);
+    for (seed, scene) in (0..).zip(&drawn) {
         let truth = scene.truth().mapv(|truth| match truth {
             Truth::Subject => PERSON,
             Truth::Shadow => SHADOW,
             Truth::Background | Truth::Ignored => NEITHER,
         });
-        maps.push((format!("S{} truth", seed + 1), cut_out(&truth, &scene)));
+        maps.push((format!("S{} truth", seed + 1), cut_out(&truth, scene, size)));
         let pictures = colour_in(scene.truth().view(), seed);
         let foreground = scene.silhouette.view();
         let images = Images::new(pictures.frame.view(), pictures.background.view(), foreground)?;
@@ -62,16 +68,16 @@ pub fn shadows_off(page: &mut Page, scenes: u64) -> Result<()> {
         {
             let shadow = Detector::new(method).detect(&images);
             let left = Mask::from_shape_fn(foreground.dim(), |at| foreground[at] && !shadow[at]);
-            maps.push((short.into(), cut_out(&of_mask(&left), &scene)));
+            maps.push((short.into(), cut_out(&of_mask(&left), scene, size)));
         }
         let (left, _) = remove(&scene.silhouette, &scene.camera, scene.sun, 0.05, Cutter::Hybrid)
             .with_context(|| format!("scene {seed}"))?;
-        maps.push(("hybrid".into(), cut_out(&of_mask(&left), &scene)));
+        maps.push(("hybrid".into(), cut_out(&of_mask(&left), scene, size)));
     }
     let scale = Scale::Grey(1.0);
     let shown: Vec<Panel<'_>> =
         maps.iter().map(|(title, map)| Panel { title: title.clone(), map: map.view(), scale }).collect();
-    let across = maps.len() / scenes.max(1) as usize;
+    let across = maps.len() / drawn.len().max(1);
     page.picture(
         "thesis-shadows.png",
         &panels::grid(across, &shown)?,

@@ -1,4 +1,4 @@
-//! Chapters 8 and 9 of the thesis once more: its tables beside ours on the data at hand.
+//! Chapters 7 to 9 of the thesis once more: its tables beside ours on the data at hand.
 
 use anyhow::{Context, Result};
 use farnear_activity::{
@@ -15,9 +15,9 @@ use farnear_activity::{
 };
 
 use super::{
-    broken,
+    bodies, broken,
     data::Data,
-    figures,
+    embedded, figures,
     sets::{self, Set},
     shadows,
 };
@@ -54,14 +54,16 @@ const TABLE_9_3: [(&str, f64); 4] =
 const PEOPLE: usize = 9;
 
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
-    page.heading("Chapters 8 and 9: shadows and activities");
+    page.heading("Chapters 7 to 9: silhouettes, shadows and activities");
     page.paragraph(
         "The thesis' recordings of people (21 actors, five scenes in the sun) were never published either, so that no number here is on the same pictures as \
          the one beside it; what differs is said under each table.",
     );
+    bodies::measure(page, data)?;
     tables_8(page)?;
     page.heading("What recognition sees");
     figures::centroid_distances(page)?;
+    embedded::measure(page).context("figs. 9.3, 9.5 and 9.6")?;
     table_9_1(page).context("table 9.1")?;
     table_9_2(page, data).context("table 9.2")?;
     table_9_3(page, data).context("table 9.3")?;

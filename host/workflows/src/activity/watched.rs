@@ -1,5 +1,10 @@
 //! The context of a workflow as what watches a training or an evaluation.
 
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
+
 use farnear_activity::recognition::watch::Watch;
 
 use crate::{
@@ -27,22 +32,67 @@ impl Watch for Training<'_> {
     }
 }
 
-/// Counts the folds of an evaluation.
-pub(super) struct Folds<'a>(Counter<'a>);
+/// Counts the folds of an evaluation, and says how much longer it will take.
+pub(super) struct Folds<'a> {
+    context: &'a Context<'a>,
+    begun: Instant,
+    /// Held while it is told, or another thread's higher count might be told first.
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    folds: usize,
+    folds_done: usize,
+    /// About so many spaces a fold, and how many were tried in all.
+    spaces: usize,
+    spaces_tried: usize,
+}
+
+impl State {
+    /// The share of the work that is done. A fold that is done counts as one, however many spaces it took.
+    fn share(&self) -> f64 {
+        let each = self.spaces.max(1);
+        let spaces = self.spaces_tried.max(self.folds_done * each) as f64;
+        (spaces / (self.folds * each).max(1) as f64).min(1.0)
+    }
+}
 
 impl<'a> Folds<'a> {
     pub fn new(context: &'a Context<'_>) -> Self {
-        Self(Counter::new(context, "folds"))
+        Self { context, begun: Instant::now(), state: Mutex::default() }
+    }
+
+    fn note(&self, change: impl FnOnce(&mut State)) {
+        // Numbers cannot be half-changed.
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut state);
+        let share = state.share();
+        if share > 0.0 {
+            self.context.progress.time_left(self.begun.elapsed().mul_f64(1.0 / share - 1.0));
+        }
+        self.context.progress.advance("folds", state.folds_done, Some(state.folds));
     }
 }
 
 impl Watch for Folds<'_> {
+    fn folds_begin(&self, folds: usize, spaces: usize) {
+        self.note(|state| *state = State { folds, spaces, ..State::default() });
+    }
+
+    fn space_tried(&self) {
+        self.note(|state| state.spaces_tried += 1);
+    }
+
     fn fold_done(&self, folds: usize) {
-        self.0.one(Some(folds));
+        self.note(|state| {
+            state.folds = folds;
+            state.folds_done += 1;
+        });
     }
 
     fn is_stopped(&self) -> bool {
-        self.0.is_cancelled()
+        self.context.cancel.is_cancelled()
     }
 }
 

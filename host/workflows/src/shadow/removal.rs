@@ -21,6 +21,7 @@ use farnear_activity::{
 use farnear_files::{masks, staging::Staging};
 use serde::Serialize;
 
+use super::stages::{Stage, Stages};
 use crate::{
     context::Context,
     counter::Counter,
@@ -49,6 +50,8 @@ pub struct RemovalSettings {
     pub method: Method,
     /// The new folder for the masks without shadow.
     pub out: PathBuf,
+    /// A new folder for a picture per mask of how it was cut, beside `out`.
+    pub stages: Option<PathBuf>,
 }
 
 /// What throws the shadow.
@@ -145,6 +148,7 @@ struct Cut {
 pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
     settings.light.check()?;
+    settings.check_folders()?;
     let camera = camera(&settings.camera)?;
     let (light, _) = settings.light.at(0)?;
     // Before any mask is read: without a usable light there is nothing to do.
@@ -157,7 +161,8 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     }
     let all = masks::read_all(&settings.masks)?;
     let out = Staging::new_folder(&settings.out)?;
-    let mut work = Work { settings, camera: &camera, chooser: None, cut_seconds: 0.0 };
+    let stages = settings.stages.as_deref().map(Stages::begin).transpose()?;
+    let mut work = Work { settings, camera: &camera, chooser: None, stages, cut_seconds: 0.0 };
     let mut index = Index { sun, frame: Vec::with_capacity(all.len()) };
     let counter = Counter::new(context, "masks");
     for (number, named) in all.iter().enumerate() {
@@ -171,6 +176,10 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     out.write("shadow.toml", toml::to_string(&index)?.as_bytes())?;
     out.finish()?;
     context.say(&format!("wrote {}", settings.out.display()));
+    if let (Some(stages), Some(folder)) = (work.stages.take(), &settings.stages) {
+        stages.finish()?;
+        context.say(&format!("wrote {}", folder.display()));
+    }
     let removed: Vec<f64> =
         index.frame.iter().filter_map(|entry| Some(entry.cut.as_ref()?.removed_percent)).collect();
     let mean = removed.iter().sum::<f64>() / removed.len().max(1) as f64;
@@ -209,6 +218,19 @@ fn sun_of(light: Light, camera: &CameraFile) -> Option<Sun> {
         azimuth_deg: rounded(sun.azimuth_deg, 4),
         in_view: camera.camera.sees_sun(sun),
     })
+}
+
+impl RemovalSettings {
+    /// Of two new folders none may lie in the other: each appears at once, when it is whole.
+    fn check_folders(&self) -> Result<()> {
+        let Some(stages) = &self.stages else { return Ok(()) };
+        if stages.starts_with(&self.out) || self.out.starts_with(stages) {
+            let expected =
+                format!("a folder of its own, not in {} nor the other way round", self.out.display());
+            return Err(WorkflowError::parameter("stages' folder", stages.display(), expected));
+        }
+        Ok(())
+    }
 }
 
 impl LightSource {
@@ -254,6 +276,7 @@ struct Work<'a> {
     settings: &'a RemovalSettings,
     camera: &'a CameraFile,
     chooser: Option<SubjectChooser>,
+    stages: Option<Stages>,
     cut_seconds: f64,
 }
 
@@ -275,6 +298,9 @@ impl Work<'_> {
                 if flags.is_empty() {
                     flags.push(Flag::Empty.to_string());
                 }
+                if let Some(stages) = &mut self.stages {
+                    stages.nobody(&file, mask)?;
+                }
                 return Ok((mask.clone(), Entry { file, flags, cut: None }));
             }
             Err(error) => return Err(error.into()),
@@ -287,6 +313,12 @@ impl Work<'_> {
         let sd_rad = sure.map_or(0.0, |sure| sure.beta_rad);
         let (clean, cut) = remove(mask, self.camera, light, sd_rad, self.settings.method)?;
         self.cut_seconds += start.elapsed().as_secs_f64();
+        if let Some(stages) = &mut self.stages {
+            let (camera, method) = (self.camera, self.settings.method);
+            let stage =
+                Stage { mask, clean: &clean, camera, light, method, report: &cut, sure: sure.as_ref() };
+            stages.draw(&file, stage)?;
+        }
         flags.extend(doubts(&cut, light).into_iter().map(str::to_owned));
         if sure.is_some_and(|sure| !sure.first_order_holds) {
             flags.push("angle-unsure".into());

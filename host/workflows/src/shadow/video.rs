@@ -98,6 +98,7 @@ pub fn remove_from_video(
             light: LightSource::Sun { moment: settings.moment, rate_hz: settings.rate_hz },
             method: Method::default(),
             out: without,
+            stages: None,
         },
         context,
     )?;

@@ -4,6 +4,7 @@ use std::{
     fs,
     path::{Path, PathBuf},
     sync::Mutex,
+    time::Duration,
 };
 
 use farnear_activity::recognition::{classifier::Family, frames::Mode};
@@ -50,6 +51,10 @@ impl Listener {
 impl Progress for Listener {
     fn say(&self, what: &str) {
         self.note(what.into());
+    }
+
+    fn time_left(&self, left: Duration) {
+        self.note(format!("left {:.3}", left.as_secs_f64()));
     }
 
     fn advance(&self, unit: &'static str, done: usize, total: Option<usize>) {
@@ -135,6 +140,18 @@ fn training_and_evaluation_are_counted_and_stop_in_the_middle() {
     let figures = evaluation::evaluate(&evaluation, &whole.context()).expect("evaluated");
     assert_eq!((figures.subjects, figures.clips, figures.answers), (3, 6, 6));
     assert!(whole.heard().contains(&"3/Some(3) folds".into()), "{:?}", whole.heard());
+
+    // A search is long: what is left is told from the first space on, and nothing is left at the end.
+    let searched =
+        EvaluationSettings { method: Method { search: true, ..evaluation.method }, out: None, ..evaluation };
+    let watched = Listener::default();
+    evaluation::evaluate(&searched, &watched.context()).expect("evaluated");
+    let heard = watched.heard();
+    let told = heard.iter().position(|what| what.starts_with("left ")).expect("time left");
+    assert_eq!(heard[told + 1], "0/Some(3) folds", "{heard:?}");
+    assert!(heard[told] != "left 0.000", "{heard:?}");
+    let last = heard.iter().rposition(|what| what.starts_with("left ")).expect("time left");
+    assert_eq!(heard[last..last + 2], ["left 0.000", "3/Some(3) folds"], "{heard:?}");
 }
 
 #[test]

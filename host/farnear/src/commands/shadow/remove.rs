@@ -72,6 +72,10 @@ pub struct Arguments {
     /// Folder for the masks without shadow; must not exist or be empty.
     #[arg(long)]
     out: PathBuf,
+    /// Folder for a picture per mask of how it was cut: the mask, its lower edge along the turned axis, where the shadow is expected and how sure that is, the body
+    /// and shadow that explain it, what went; must not exist or be empty.
+    #[arg(long, value_name = "DIR")]
+    stages: Option<PathBuf>,
     /// Print figures as JSON.
     #[arg(long)]
     json: bool,
@@ -101,6 +105,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         light,
         method: arguments.method,
         out: arguments.out,
+        stages: arguments.stages,
     };
     report::print(&removal::remove_from_masks(&settings, &terminal::counting(json)?)?, json)
 }

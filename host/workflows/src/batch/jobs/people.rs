@@ -108,6 +108,7 @@ pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Work>> {
         light,
         method: fields.or("method", shadow::Method::default())?,
         out: fields.path("out")?,
+        stages: None, // a job makes the one folder that is written down as its result
     };
     Ok(Box::new(Call {
         inputs: vec![settings.masks.clone(), settings.camera.clone()],

@@ -1,0 +1,95 @@
+//! Pictures of how a shadow was cut off.
+
+use std::{fs, path::Path};
+
+use farnear_activity::{
+    mask::Mask,
+    shadow::{Lamp, Method},
+};
+use farnear_workflows::{
+    Context, WorkflowError,
+    shadow::removal::{LightSource, RemovalSettings, remove_from_masks},
+};
+use image::{GrayImage, Luma, RgbImage};
+
+const CAMERA: &str = "[camera]\nheight_m = 1.5\nazimuth_deg = 0\nfocal_length_mm = 4.0\npixel_um = 6.0\nwidth_px = 640\nheight_px = 480\n[subject]\ndistance_m = 6.0\n";
+
+fn save(path: &Path, mask: &Mask) {
+    fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+    let level = |x, y| Luma([if mask[[y as usize, x as usize]] { 255 } else { 0 }]);
+    GrayImage::from_fn(640, 480, level).save(path).expect("a picture");
+}
+
+/// A person 60 px wide, whose shadow lies to the right as a lamp to the left throws it.
+fn person(y: usize, x: usize) -> bool {
+    (180..360).contains(&y) && (290..350).contains(&x)
+}
+
+fn settings(folder: &Path) -> RemovalSettings {
+    let shadow = |y: usize, x: usize| (355..365).contains(&y) && (320..460).contains(&x);
+    save(
+        &folder.join("masks/a1.png"),
+        &Mask::from_shape_fn((480, 640), |(y, x)| person(y, x) || shadow(y, x)),
+    );
+    save(&folder.join("masks/a2.png"), &Mask::default((480, 640)));
+    fs::write(folder.join("camera.toml"), CAMERA).expect("a file");
+    RemovalSettings {
+        masks: folder.join("masks"),
+        camera: folder.join("camera.toml"),
+        light: LightSource::Lamp(Lamp { right_m: -3.0, ahead_m: 6.0, up_m: 3.0 }),
+        method: Method::Hybrid,
+        out: folder.join("out"),
+        stages: Some(folder.join("stages")),
+    }
+}
+
+fn count(picture: &RgbImage, is: impl Fn([u8; 3]) -> bool) -> usize {
+    picture.pixels().filter(|pixel| is(pixel.0)).count()
+}
+
+#[test]
+fn every_mask_has_a_picture_of_its_stages() {
+    let root = tempfile::tempdir().expect("a folder");
+    let hybrid = settings(root.path());
+    remove_from_masks(&hybrid, &Context::unattended()).expect("cut");
+    let read = |name: &str| image::open(root.path().join(name)).expect("a picture").into_rgb8();
+    let (explained, nobody) = (read("stages/a1.png"), read("stages/a2.png"));
+    let red = |[r, g, b]: [u8; 3]| r > 150 && g < 90 && b < 90;
+    let blue = |[r, g, b]: [u8; 3]| b > 200 && r < 120 && g < 200;
+    // What went is red: in the picture of the cut as many pixels as the mask lost.
+    let lost = |out: &str| {
+        let [before, after] = [read("masks/a1.png"), read(out)].map(|p| count(&p, |[r, ..]| r > 127));
+        before - after
+    };
+    assert!(lost("out/a1.png") > 600);
+    assert!(
+        count(&explained, red) >= lost("out/a1.png"),
+        "{} {}",
+        count(&explained, red),
+        lost("out/a1.png")
+    );
+    assert!(count(&explained, blue) > 100, "the edge is drawn");
+    // Nobody is one panel, somebody five: mask, edge, direction, explanation, cut.
+    assert_eq!((count(&nobody, red), count(&nobody, blue)), (0, 0));
+    let panels_of = |picture: &RgbImage| picture.width() / 210;
+    assert!(panels_of(&explained) >= 5 && nobody.width() < 700, "{} {}", explained.width(), nobody.width());
+
+    // The printed method has no explanation: a panel less, of the same mask.
+    let printed = RemovalSettings {
+        method: Method::Thesis,
+        out: root.path().join("printed"),
+        stages: Some(root.path().join("printed-stages")),
+        ..hybrid.clone()
+    };
+    remove_from_masks(&printed, &Context::unattended()).expect("cut");
+    assert!(read("printed-stages/a1.png").width() < explained.width());
+
+    let inside = RemovalSettings {
+        out: root.path().join("more"),
+        stages: Some(root.path().join("more/stages")),
+        ..hybrid
+    };
+    let error = remove_from_masks(&inside, &Context::unattended()).expect_err("one inside of the other");
+    assert!(matches!(error, WorkflowError::Parameter { name: "stages' folder", .. }), "{error}");
+    assert!(!root.path().join("more").exists());
+}
