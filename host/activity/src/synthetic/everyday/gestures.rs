@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 /// A hand at the ear.
 pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
     Hand::at(rng.random_range(-0.14..0.06), rng.random_range(0.06..0.28), rng.random_range(0.1..0.4))
-        .elbow(rng.random_range(0.2..0.95))
+        .elbow(rng.random_range(0.0..0.7))
 }
 
 /// The two ends of a wave: with the forearm, or with the whole arm up and down at the side.
@@ -94,7 +94,7 @@ pub fn answer_phone(maker: &mut Maker) -> Motion {
 /// Drinking: the hand goes to the mouth, the head goes back.
 pub fn drink(maker: &mut Maker) -> Motion {
     // A cup that is tilted is held above the mouth; some bring it in the hand.
-    let mouth = Hand::at(-0.13, 0.28, 0.4).elbow(0.6);
+    let mouth = Hand::at(-0.13, 0.28, 0.4).elbow(0.35);
     let hand = maker.near(mouth, 0.15);
     if maker.chance(0.3) {
         let main = maker.main;
