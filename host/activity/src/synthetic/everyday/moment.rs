@@ -63,7 +63,8 @@ impl Hand {
             return straight;
         }
         let length = mixed(a, b, s);
-        let (p, q) = (length * ((1.0 - s) * angle).sin() / (sine * a), length * (s * angle).sin() / (sine * b));
+        let (p, q) =
+            (length * ((1.0 - s) * angle).sin() / (sine * a), length * (s * angle).sin() / (sine * b));
         Self {
             out: mixed(straight.out, p * self.out + q * to.out, arc),
             ahead: mixed(straight.ahead, p * self.ahead + q * to.ahead, arc),
@@ -233,6 +234,19 @@ mod tests {
         assert!((half - 0.5 * (0.9 - 0.96)).abs() < 1e-9, "{half}");
         // Least jerk: hardly any way in the first tenth of the time.
         assert!((at(&keys, 0.1).hands[0].up + 0.96).abs() < 0.02);
+    }
+
+    #[test]
+    fn hands_on_an_arc_keep_their_reach_and_straight_ones_do_not() {
+        let (low, ahead) = (Hand::at(0.1, 0.0, -0.9), Hand::at(0.1, 0.9, 0.0));
+        let half = |arc: f64| low.on_the_way(ahead, 0.5, arc);
+        assert!((half(1.0).reach() - low.reach()).abs() < 1e-9, "{:?}", half(1.0));
+        // The chord of a right angle is nearer by the square root of a half, but for what both are outwards.
+        assert!((half(0.0).reach() - (0.405_f64 + 0.01).sqrt()).abs() < 1e-9, "{:?}", half(0.0));
+        assert_eq!(low.on_the_way(ahead, 0.5, 0.0), Hand::at(0.1, 0.45, -0.45));
+        // Between opposite places there is no shortest arc: the line is as good.
+        let up = Hand::at(-0.1, 0.0, 0.9);
+        assert!(low.on_the_way(up, 0.5, 1.0).reach() < 1e-9);
     }
 
     #[test]

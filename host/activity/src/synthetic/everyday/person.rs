@@ -201,7 +201,8 @@ mod tests {
                 let fore = norm(difference(found.hands[side], found.elbows[side]));
                 assert!((upper - 0.186 * person.reach * h).abs() < 1e-6);
                 assert!((fore - 0.2 * person.reach * h).abs() < 1e-6);
-                let reach = norm([hand.out, hand.ahead, hand.up]).clamp(0.22, 0.998) * 0.386 * person.reach * h;
+                let reach =
+                    norm([hand.out, hand.ahead, hand.up]).clamp(0.22, 0.998) * 0.386 * person.reach * h;
                 let found = norm(difference(found.hands[side], found.shoulders[side]));
                 assert!((found - reach).abs() < 1e-6, "{found} {reach}");
             }
