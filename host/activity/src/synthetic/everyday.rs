@@ -3,8 +3,9 @@
 //!
 //! Bodies are drawn from published anthropometry ([`person`]), going from published joint angles ([`gait`]), hands follow least-jerk paths
 //! between places ([`gestures`], [`postures`]); amplitude, tempo, handedness, stance and cut vary ([`motion`]), cameras stand anywhere and
-//! segmentation damages masks ([`camera`]). No recording was used: neither to make this nor to choose its numbers, except that clothes,
-//! damage and the picture's borders are as wide as public sets show them to be. Everything is seeded.
+//! segmentation damages masks ([`camera`]). No recording is part of this, but spreads were chosen after looking at some: clothes, damage and
+//! the picture's borders are as wide as public sets show them to be, and proportions, errors of trackers, places of hands and what
+//! a clip begins and ends with as wide as the joints of UTKinect and Florence have them. Everything is seeded.
 
 pub mod camera;
 pub mod gait;
@@ -110,15 +111,29 @@ fn placed(person: &Person, moments: &[Moment], going: bool) -> Vec<Joints> {
     joints
 }
 
-/// What trackers of joints add: nothing for half of all clips, else a few millimetres to centimetres of noise.
+/// Coordinates of all joints of a body.
+const COORDINATES: usize = 51;
+
+/// What trackers of joints add: nothing for half of all clips, else millimetres from frame to frame and, for they smooth, centimetres that
+/// stay or wander over the clip.
 fn tremble(joints: &mut [Joints], rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.5) {
         return;
     }
-    let noise_mm = rng.random_range(3.0..25.0);
-    let Ok(normal) = Normal::new(0.0, noise_mm) else { return };
-    for found in joints {
-        found.each(|p| p.iter_mut().for_each(|v| *v += normal.sample(rng)));
+    let (noise_mm, off_mm) =
+        (rng.random_range(0.5_f64.ln()..15.0_f64.ln()).exp(), rng.random_range(0.0..30.0));
+    let (Ok(noise), Ok(off)) = (Normal::new(0.0, noise_mm), Normal::new(0.0, off_mm)) else { return };
+    let ends: Vec<[f64; 2]> = (0..COORDINATES).map(|_| [off.sample(rng), off.sample(rng)]).collect();
+    let last = joints.len().saturating_sub(1).max(1) as f64;
+    for (frame, found) in joints.iter_mut().enumerate() {
+        let s = frame as f64 / last;
+        let mut ends = ends.iter();
+        found.each(|p| {
+            for v in p {
+                let [from, to] = ends.next().copied().unwrap_or_default();
+                *v += noise.sample(rng) + from + (to - from) * s;
+            }
+        });
     }
 }
 

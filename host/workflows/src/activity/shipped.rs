@@ -103,7 +103,7 @@ pub fn list() -> Result<Vec<ModelFigures>> {
 }
 
 /// People and passes that the shipped models were made with.
-pub const PEOPLE: usize = 300;
+pub const PEOPLE: usize = 450;
 /// See [`PEOPLE`].
 pub const PASSES: usize = 12;
 

@@ -10,8 +10,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// A hand at the ear.
 pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
-    Hand::at(rng.random_range(-0.15..0.06), rng.random_range(0.06..0.26), rng.random_range(0.2..0.45))
-        .elbow(rng.random_range(0.2..0.95))
+    Hand::at(rng.random_range(-0.14..0.06), rng.random_range(0.06..0.28), rng.random_range(0.1..0.4))
+        .elbow(rng.random_range(0.0..0.7))
 }
 
 /// The two ends of a wave: with the forearm, or with the whole arm up and down at the side.
@@ -41,7 +41,13 @@ fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
     let (a, b) = (with(maker.rest, low), with(maker.rest, high));
     let (rise, swing) = (maker.seconds(0.7), maker.seconds(0.4));
     let times = maker.rng.random_range(2..6);
-    maker.repeated(vec![(rise, a)], &[(swing, b), (swing, a)], times)
+    // Some raise a stretched arm at the side, others bring the hand up before the body.
+    let mut way_in = vec![(rise, a)];
+    if maker.chance(0.4) {
+        let side = Hand::sideways(maker.draw(-45.0, 35.0), maker.draw(0.75, 0.98), maker.draw(0.0, 0.35));
+        way_in = vec![(0.7 * rise, with(maker.rest, side)), (0.5 * rise, a)];
+    }
+    maker.repeated(way_in, &[(swing, b), (swing, a)], times)
 }
 
 /// Waving with one hand.
@@ -59,7 +65,7 @@ pub fn wave_two_hands(maker: &mut Maker) -> Motion {
 pub fn clap(maker: &mut Maker) -> Motion {
     let place = Hand::at(-0.28, 0.55, -0.1);
     let middle = Hand { out: -0.29, ..maker.near(place, 0.22) };
-    let wide = maker.draw(0.12, 0.5);
+    let wide = maker.draw(0.12, 0.85);
     let (together, apart) = (maker.rest.both(middle), maker.rest.both(middle.moved(wide, -0.3 * wide, 0.0)));
     let (rise, beat) = (maker.seconds(0.6), maker.seconds(0.22));
     let times = maker.rng.random_range(2..9);
@@ -87,8 +93,13 @@ pub fn answer_phone(maker: &mut Maker) -> Motion {
 
 /// Drinking: the hand goes to the mouth, the head goes back.
 pub fn drink(maker: &mut Maker) -> Motion {
-    let mouth = Hand::at(-0.26, 0.34, 0.26).elbow(0.6);
-    let hand = maker.near(mouth, 0.09);
+    // A cup that is tilted is held above the mouth; some bring it in the hand.
+    let mouth = Hand::at(-0.13, 0.28, 0.4).elbow(0.35);
+    let hand = maker.near(mouth, 0.15);
+    if maker.chance(0.3) {
+        let main = maker.main;
+        maker.rest.hands[main] = maker.near(Hand::at(0.08, 0.35, -0.7), 0.2);
+    }
     let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(-25.0, 5.0));
     bring(maker, hand, nod, hold, back)
 }
@@ -97,8 +108,8 @@ pub fn drink(maker: &mut Maker) -> Motion {
 pub fn read_watch(maker: &mut Maker) -> Motion {
     // The watch is on the other arm.
     maker.main = 1 - maker.main;
-    let chest = Hand::at(-0.34, 0.42, -0.12).elbow(0.75);
-    let hand = maker.near(chest, 0.14);
+    let chest = Hand::at(-0.28, 0.46, -0.04).elbow(0.75);
+    let hand = maker.near(chest, 0.17);
     let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(10.0, 40.0));
     bring(maker, hand, nod, hold, back)
 }
@@ -112,11 +123,11 @@ pub fn throw(maker: &mut Maker) -> Motion {
         (Hand::swung(-50.0, 10.0, 0.15), Hand::swung(85.0, 8.0, 0.0), Hand::swung(120.0, 20.0, 0.0))
     } else {
         // The hand winds up behind the shoulder or no further than the ear.
-        let behind = maker.draw(-0.35, 0.2);
+        let behind = maker.draw(-0.35, 0.5);
         (
             Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.7),
-            Hand::at(0.0, maker.draw(0.55, 0.95), maker.draw(0.0, 0.5)),
-            Hand::at(maker.draw(-0.3, 0.15), maker.draw(0.15, 0.8), maker.draw(-0.9, -0.2)),
+            Hand::at(maker.draw(0.0, 0.5), maker.draw(0.55, 0.95), maker.draw(-0.1, 0.5)),
+            Hand::at(maker.draw(-0.3, 0.45), maker.draw(0.15, 0.8), maker.draw(-0.9, -0.2)),
         )
     };
     let (back, front, end) = (maker.near(back, 0.16), maker.near(front, 0.16), maker.near(end, 0.2));
@@ -146,12 +157,17 @@ fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
     if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
 }
 
-/// The two places between which hands push and pull: at the chest or waist, and stretched ahead.
-fn near_and_far(maker: &mut Maker) -> (Hand, Hand) {
-    let up = maker.draw(-0.35, 0.2);
-    let (reach, out) = (maker.draw(0.75, 0.98), maker.draw(-0.22, 0.1));
-    let near = Hand::at(maker.draw(-0.1, 0.12), maker.draw(0.1, 0.4), up + maker.draw(-0.25, 0.4));
-    (near.elbow(maker.draw(0.0, 0.5)), Hand::at(out, reach, up).elbow(maker.draw(0.0, 0.5)))
+/// The two places between which hands push and pull: at the chest or waist, and stretched ahead; and how far the shoulders turn after a
+/// single hand. Seen from turned shoulders, what lies ahead of the body lies outwards.
+fn near_and_far(maker: &mut Maker, single: bool) -> (Hand, Hand, f64) {
+    let up = maker.draw(-0.35, 0.25);
+    let turn = if single { maker.draw(0.0, 40.0) } else { 0.0 };
+    let (reach, across) = (maker.draw(0.75, 0.99), maker.draw(-0.22, 0.15));
+    let (s, c) = (turn + maker.draw(-5.0, 15.0)).to_radians().sin_cos();
+    let near = Hand::at(maker.draw(-0.1, 0.16), maker.draw(0.1, 0.5), up + maker.draw(-0.25, 0.3));
+    let far = Hand::at(across + reach * s, reach * c, up);
+    let turn = if maker.main == 1 { turn } else { -turn };
+    (near.elbow(maker.draw(0.0, 0.5)), far.elbow(maker.draw(0.0, 0.5)), turn)
 }
 
 fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
@@ -164,15 +180,15 @@ fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
 
 /// Pushing something away.
 pub fn push(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.4);
-    let (near, far) = near_and_far(maker);
+    let hands = both_or_one(maker, 0.3);
+    let (near, far, turn) = near_and_far(maker, hands.len() == 1);
     let (lean, step) = (maker.draw(0.0, 16.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
     let ready = with(rest, &hands, near).bent(-0.2 * lean, 5.0);
-    let pushed = with(rest, &hands, far).bent(rest.pose.lean_deg + lean, 5.0).gone(step);
+    let pushed = with(rest, &hands, far).bent(rest.pose.lean_deg + lean, 5.0).gone(step).twisted(turn);
     let mut parts =
-        vec![(maker.seconds(0.5), ready), (maker.seconds(0.45), pushed), (maker.seconds(0.25), pushed)];
-    if maker.chance(0.5) {
+        vec![(maker.seconds(0.5), ready), (maker.seconds(0.45), pushed), (maker.seconds(0.2), pushed)];
+    if maker.chance(0.35) {
         if maker.chance(0.4) {
             parts.push((maker.seconds(0.5), ready));
         }
@@ -183,17 +199,17 @@ pub fn push(maker: &mut Maker) -> Motion {
 
 /// Pulling something near.
 pub fn pull(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.4);
-    let (near, far) = near_and_far(maker);
+    let hands = both_or_one(maker, 0.3);
+    let (near, far, turn) = near_and_far(maker, hands.len() == 1);
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
-    let reached = with(rest, &hands, far).bent(rest.pose.lean_deg + 0.6 * lean, 5.0);
+    let reached = with(rest, &hands, far).bent(rest.pose.lean_deg + 0.6 * lean, 5.0).twisted(turn);
     let pulled = with(rest, &hands, near.moved(0.0, -0.1, maker.draw(-0.2, 0.15)))
         .bent(rest.pose.lean_deg - lean, 5.0)
         .gone(-step);
     let mut parts =
-        vec![(maker.seconds(0.7), reached), (maker.seconds(0.25), reached), (maker.seconds(0.45), pulled)];
-    if maker.chance(0.5) {
+        vec![(maker.seconds(0.7), reached), (maker.seconds(0.2), reached), (maker.seconds(0.45), pulled)];
+    if maker.chance(0.35) {
         parts.push((maker.seconds(0.6), rest));
     }
     maker.gesture(parts)
@@ -213,6 +229,7 @@ pub fn punch(maker: &mut Maker) -> Motion {
     guard.pose.legs[0].knee_deg += bend;
     guard.pose.legs[1].knee_deg += bend;
     let fist = maker.near(Hand::at(-0.12, 0.95, 0.08), 0.12);
+    let fist = fist.moved(turn.to_radians().sin() * maker.draw(0.0, 1.0), 0.0, 0.0);
     let hit = guard.hand(main, fist).twisted(sign * turn).bent(guard.pose.lean_deg + lean, 0.0);
     let (raise, out, back) = (maker.seconds(0.5), maker.seconds(0.2), maker.seconds(0.3));
     let other = guard.hand(1 - main, fist).twisted(-sign * turn).bent(guard.pose.lean_deg + lean, 0.0);

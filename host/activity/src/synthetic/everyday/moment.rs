@@ -45,6 +45,39 @@ impl Hand {
         Self { out: reach * c, ahead, up: reach * s, elbow: 0.5 }
     }
 
+    /// Some way to another place, between the straight line (`arc` 0) and the arc round the shoulder (1): hands keep to neither, for
+    /// arms turn about their joints (Atkeson and Hollerbach, J. Neurosci. 5, 1985).
+    fn on_the_way(self, to: Self, s: f64, arc: f64) -> Self {
+        let straight = Self {
+            out: mixed(self.out, to.out, s),
+            ahead: mixed(self.ahead, to.ahead, s),
+            up: mixed(self.up, to.up, s),
+            elbow: mixed(self.elbow, to.elbow, s),
+        };
+        let (a, b) = (self.reach().max(1e-6), to.reach().max(1e-6));
+        let cosine = (self.out * to.out + self.ahead * to.ahead + self.up * to.up) / (a * b);
+        let angle = cosine.clamp(-1.0, 1.0).acos();
+        let sine = angle.sin();
+        // Places in one direction are on a line; between opposite ones there is no shortest arc.
+        if sine < 0.05 {
+            return straight;
+        }
+        let length = mixed(a, b, s);
+        let (p, q) =
+            (length * ((1.0 - s) * angle).sin() / (sine * a), length * (s * angle).sin() / (sine * b));
+        Self {
+            out: mixed(straight.out, p * self.out + q * to.out, arc),
+            ahead: mixed(straight.ahead, p * self.ahead + q * to.ahead, arc),
+            up: mixed(straight.up, p * self.up + q * to.up, arc),
+            ..straight
+        }
+    }
+
+    /// How far from the shoulder.
+    fn reach(self) -> f64 {
+        (self.out * self.out + self.ahead * self.ahead + self.up * self.up).sqrt()
+    }
+
     /// Moved by so much.
     pub fn moved(self, out: f64, ahead: f64, up: f64) -> Self {
         Self { out: self.out + out, ahead: self.ahead + ahead, up: self.up + up, ..self }
@@ -70,6 +103,8 @@ pub struct Moment {
     pub ahead: f64,
     /// Where the way leads, degrees to the left of where it began.
     pub heading_deg: f64,
+    /// How hands get here: 0 straight, 1 round the shoulder as the arm turns.
+    pub arc: f64,
 }
 
 /// `a` and what lies `s` of the way to `b`.
@@ -89,6 +124,7 @@ impl Moment {
             lift: 0.0,
             ahead: 0.0,
             heading_deg: 0.0,
+            arc: 0.0,
         }
     }
 
@@ -104,12 +140,7 @@ impl Moment {
         };
         let hand = |side: usize| {
             let (p, q) = (a.hands[side], b.hands[side]);
-            Hand {
-                out: mixed(p.out, q.out, s),
-                ahead: mixed(p.ahead, q.ahead, s),
-                up: mixed(p.up, q.up, s),
-                elbow: mixed(p.elbow, q.elbow, s),
-            }
+            p.on_the_way(q, s, b.arc)
         };
         Self {
             pose: Pose {
@@ -125,6 +156,7 @@ impl Moment {
             lift: mixed(a.lift, b.lift, s),
             ahead: mixed(a.ahead, b.ahead, s),
             heading_deg: mixed(a.heading_deg, b.heading_deg, s),
+            arc: b.arc,
         }
     }
 
@@ -202,6 +234,19 @@ mod tests {
         assert!((half - 0.5 * (0.9 - 0.96)).abs() < 1e-9, "{half}");
         // Least jerk: hardly any way in the first tenth of the time.
         assert!((at(&keys, 0.1).hands[0].up + 0.96).abs() < 0.02);
+    }
+
+    #[test]
+    fn hands_on_an_arc_keep_their_reach_and_straight_ones_do_not() {
+        let (low, ahead) = (Hand::at(0.1, 0.0, -0.9), Hand::at(0.1, 0.9, 0.0));
+        let half = |arc: f64| low.on_the_way(ahead, 0.5, arc);
+        assert!((half(1.0).reach() - low.reach()).abs() < 1e-9, "{:?}", half(1.0));
+        // The chord of a right angle is nearer by the square root of a half, but for what both are outwards.
+        assert!((half(0.0).reach() - (0.405_f64 + 0.01).sqrt()).abs() < 1e-9, "{:?}", half(0.0));
+        assert_eq!(low.on_the_way(ahead, 0.5, 0.0), Hand::at(0.1, 0.45, -0.45));
+        // Between opposite places there is no shortest arc: the line is as good.
+        let up = Hand::at(-0.1, 0.0, 0.9);
+        assert!(low.on_the_way(up, 0.5, 1.0).reach() < 1e-9);
     }
 
     #[test]

@@ -55,13 +55,14 @@ impl<'r> Maker<'r> {
             .bent(rng.random_range(-2.0..9.0), rng.random_range(-6.0..18.0))
             .legs(rng.random_range(0.0..4.0), rng.random_range(0.0..8.0), rng.random_range(-1.0..6.0))
             .twisted(rng.random_range(-6.0..6.0));
+        rest.arc = rng.random_range(0.0..1.0);
         let step = rng.random_range(-7.0..7.0);
         rest.pose.legs[0].hip_deg += step;
         rest.pose.legs[1].hip_deg -= step;
         for side in 0..2 {
             rest.hands[side] = Hand::swung(
-                rng.random_range(-8.0..14.0),
-                rng.random_range(4.0..30.0),
+                rng.random_range(-14.0..11.0),
+                rng.random_range(3.0..26.0),
                 rng.random_range(0.04..0.26),
             );
         }
@@ -187,8 +188,8 @@ impl Motion {
                 // Half are cut tight at either side, up to a tenth short; some begin when everything is ready.
                 let (core, all) = (to - from, duration(keys));
                 let begin = match rng.random_range(0..20) {
-                    0..8 => from + rng.random_range(-0.04..0.1) * core,
-                    8..14 => ready - rng.random_range(0.0..0.3) * (ready - from),
+                    0..7 => from + rng.random_range(-0.04..0.1) * core,
+                    7..14 => ready - rng.random_range(0.0..0.3) * (ready - from),
                     _ => rng.random_range(0.0..1.0) * from,
                 };
                 let end = match rng.random_range(0..10) {
@@ -208,9 +209,11 @@ impl Motion {
                 let end = match rng.random_range(0..4) {
                     0 => duration(keys),
                     1 => *to,
+                    // Hands have hardly got there.
+                    2 => begin.max(*from) + rng.random_range(0.3..1.2) * period,
                     _ => least + rng.random_range(0.0..3.0) * period,
                 };
-                let end = end.max(least).min(duration(keys));
+                let end = end.min(duration(keys));
                 (begin.min(end - 0.9 * period).max(0.0), end)
             }
         }

@@ -19,6 +19,8 @@ pub struct Person {
     legs: f64,
     /// Head, with hair or a hat.
     head: f64,
+    /// Length of the arms; body trackers and short sleeves end at the wrist.
+    reach: f64,
     /// Whether feet stick out ahead; body trackers often know ankles only.
     feet: bool,
     /// A skirt or coat: down to this share of the legs.
@@ -29,7 +31,8 @@ pub struct Person {
 
 impl Person {
     /// Somebody. Stature after the spread of grown-ups (mean 1.70 m, SD 0.10 m; NCD-RisC, eLife 5, 2016), breadths and lengths of limbs
-    /// with the coefficients of variation of Gordon et al. (ANSUR, 1989), 4 to 6 %; clothes are guessed wide.
+    /// with the coefficients of variation of Gordon et al. (ANSUR, 1989), 4 to 6 %, and down to the shorter trunks and arms that trackers of
+    /// joints measure (trunk and arm 0.48 and 0.67 of a leg, where Winter has 0.59 and 0.79); clothes are guessed wide.
     pub fn drawn(rng: &mut ChaCha8Rng) -> Self {
         let girth = rng.random_range(0.85..1.12);
         Self {
@@ -37,12 +40,13 @@ impl Person {
                 height_mm: rng.random_range(1500.0..1930.0),
                 girth: 1.0,
                 breadth: rng.random_range(0.7..1.05),
-                leg: rng.random_range(0.92..1.07),
+                leg: rng.random_range(0.92..1.12),
             },
             trunk: girth * rng.random_range(0.75..1.2),
             arms: girth * rng.random_range(0.75..1.3),
             legs: girth * rng.random_range(0.75..1.15),
             head: rng.random_range(0.95..1.4),
+            reach: rng.random_range(0.82..1.03),
             feet: rng.random_bool(0.8),
             skirt: if rng.random_bool(0.15) { rng.random_range(0.2..0.8) } else { 0.0 },
             pack_mm: if rng.random_bool(0.07) { rng.random_range(90.0..170.0) } else { 0.0 },
@@ -80,14 +84,14 @@ impl Person {
     /// Elbow and hand: two bones that reach for a place (the law of cosines), the elbow on the side that the hand asks for.
     fn arm(&self, shoulder: Point3, side: usize, moment: &Moment) -> (Point3, Point3) {
         let h = self.build.height_mm;
-        let (upper, fore) = (0.186 * h, 0.2 * h);
+        let (upper, fore) = (0.186 * self.reach * h, 0.2 * self.reach * h);
         let Hand { out, ahead, up, elbow } = moment.hands[side];
         let sign = if side == 0 { -1.0 } else { 1.0 };
         let (s, c) = moment.twist_deg.to_radians().sin_cos();
         let turned = |p: Point3| [c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]];
         let way = turned([sign * out, ahead, up].map(|v| v * (upper + fore)));
         let (direction, length) = (unit(way), norm(way).clamp(0.22 * (upper + fore), 0.998 * (upper + fore)));
-        let hint = turned([sign * (0.2 + 0.8 * elbow), -0.5 + 0.3 * elbow, -1.0 + elbow]);
+        let hint = turned([sign * (0.2 + 0.8 * elbow), -0.3 + 0.3 * elbow, -1.0 + elbow]);
         let along = dot(hint, direction);
         let across = unit(std::array::from_fn(|k| hint[k] - along * direction[k]));
         let cosine =
@@ -195,8 +199,10 @@ mod tests {
             for side in 0..2 {
                 let upper = norm(difference(found.elbows[side], found.shoulders[side]));
                 let fore = norm(difference(found.hands[side], found.elbows[side]));
-                assert!((upper - 0.186 * h).abs() < 1e-6 && (fore - 0.2 * h).abs() < 1e-6);
-                let reach = norm([hand.out, hand.ahead, hand.up]).clamp(0.22, 0.998) * 0.386 * h;
+                assert!((upper - 0.186 * person.reach * h).abs() < 1e-6);
+                assert!((fore - 0.2 * person.reach * h).abs() < 1e-6);
+                let reach =
+                    norm([hand.out, hand.ahead, hand.up]).clamp(0.22, 0.998) * 0.386 * person.reach * h;
                 let found = norm(difference(found.hands[side], found.shoulders[side]));
                 assert!((found - reach).abs() < 1e-6, "{found} {reach}");
             }

@@ -8,7 +8,7 @@ use rand::Rng;
 fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     // How much of it the knees do.
     let squat = maker.draw(0.0, 1.0);
-    let lean = deep * (95.0 - 50.0 * squat) * maker.draw(0.85, 1.12);
+    let lean = deep * (95.0 - 65.0 * squat) * maker.draw(0.75, 1.12);
     let knee = deep * (15.0 + 105.0 * squat) * maker.draw(0.85, 1.1);
     let mut moment =
         maker.rest.bent(lean, maker.draw(-35.0, 20.0)).legs(0.72 * knee, knee, maker.draw(1.0, 9.0));
@@ -16,7 +16,7 @@ fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     moment.pose.legs[0].hip_deg += step;
     moment.pose.legs[1].hip_deg -= step;
     for &side in hands {
-        moment.hands[side] = maker.near(Hand::at(-0.08, 0.3, -0.9), 0.12);
+        moment.hands[side] = maker.near(Hand::at(-0.06, 0.15, -0.85), 0.22);
     }
     if hands.len() == 1 {
         let other = 1 - hands[0];
@@ -98,7 +98,7 @@ pub fn bow(maker: &mut Maker) -> Motion {
 
 /// Tying a lace: down on a knee or bent over a foot, hands busy there.
 pub fn tie_laces(maker: &mut Maker) -> Motion {
-    let foot = Hand::at(-0.12, 0.4, -0.85);
+    let foot = maker.near(Hand::at(-0.06, 0.2, -0.85), 0.2);
     let mut low = down(maker, &[0, 1], 0.95);
     let side = maker.main;
     match maker.rng.random_range(0..4) {
@@ -124,7 +124,11 @@ pub fn tie_laces(maker: &mut Maker) -> Motion {
         (0..2).map(|_| low.hand(0, maker.near(place, 0.09)).hand(1, maker.near(place, 0.09))).collect();
     let (go, beat) = (maker.seconds(1.0), maker.seconds(0.35));
     let times = maker.rng.random_range(2..6);
-    maker.repeated(vec![(go, busy[1])], &[(beat, busy[0]), (beat, busy[1])], times)
+    if maker.chance(0.5) {
+        return maker.repeated(vec![(go, busy[1])], &[(beat, busy[0]), (beat, busy[1])], times);
+    }
+    // From standing to the lace, and no further.
+    maker.once(vec![(go, busy[1]), (beat, busy[0]), (0.5 * beat, busy[1])])
 }
 
 /// Crouching, staying there, and getting up.
@@ -146,7 +150,7 @@ pub fn crouch(maker: &mut Maker) -> Motion {
 
 /// Sitting on a chair, and the way there: trunk ahead while the seat is not reached.
 fn seated(maker: &mut Maker) -> (Moment, Moment) {
-    let knee = maker.draw(68.0, 112.0);
+    let knee = maker.draw(50.0, 112.0);
     let hip = knee + maker.draw(-20.0, 10.0);
     let lap = if maker.chance(0.6) { Hand::at(0.0, 0.45, -0.7) } else { Hand::at(0.12, 0.1, -0.9) };
     let seated = maker
