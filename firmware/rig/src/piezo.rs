@@ -142,8 +142,8 @@ impl Piezo {
         core::mem::replace(&mut self.failed, false)
     }
 
-    /// Whether the gauge has been silent or saturated for too long.
-    const fn gauge_failed(&self) -> bool {
+    /// Whether the gauge has been silent or saturated for too long: where the piezo stands is not known then.
+    pub(crate) const fn gauge_failed(&self) -> bool {
         self.gauge_missing_ticks as u64 * TICK_US as u64 > self.settings.gauge_deadline.0 as u64
     }
 
@@ -208,6 +208,7 @@ impl Piezo {
     pub(crate) fn sense(&mut self, gauge_code: Option<u32>) {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
+            self.near_ticks = 0; // nobody has seen it near
             if self.gauge_failed() {
                 self.failed |= self.closing || self.driven || self.control.is_some();
                 (self.control, self.closing, self.driven) = (None, false, false);

@@ -54,7 +54,8 @@ pub enum PositionState {
     Unknown,
     /// Homed, and steps and encoder have agreed since.
     Homed,
-    /// Was homed, but steps and encoder disagree, or it moved when the power went: home again.
+    /// Was homed, but steps and encoder disagree, or it moved when the power went: home again. The piezo's as long as its
+    /// gauge is silent.
     Lost,
 }
 

@@ -105,10 +105,11 @@ impl Stage {
         }
     }
 
-    /// What is known of the axis' position. The gauge is absolute.
+    /// What is known of the axis' position. The gauge is absolute: as long as it speaks.
     pub(crate) const fn state(&self, axis: Axis) -> PositionState {
         match self.stepper(axis) {
             Some(stepper) => stepper.state(),
+            None if self.fine.gauge_failed() => PositionState::Lost,
             None => PositionState::Homed,
         }
     }

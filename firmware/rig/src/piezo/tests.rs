@@ -130,6 +130,16 @@ fn a_dead_gauge_opens_the_loop_and_holds_the_command() {
 }
 
 #[test]
+fn a_piezo_whose_gauge_is_silent_is_not_called_at_rest() {
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    let mut plant = Plant::new(NOMINAL, 1);
+    step(&mut piezo, &mut plant, 100_000);
+    assert!(!piezo.is_moving());
+    piezo.sense(None);
+    assert!(piezo.is_moving(), "as long as the loop is closed nobody has seen it stand");
+}
+
+#[test]
 fn a_single_lost_conversion_is_bridged() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(NOMINAL, 1);

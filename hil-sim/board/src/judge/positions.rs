@@ -43,6 +43,8 @@ fn truly_um(truth: &Truth, axis: Axis) -> f64 {
 pub fn position(case: &Case<'_>) -> Vec<Broken> {
     let mut homed: BTreeSet<(u32, &str)> = BTreeSet::new();
     let mut broken = Vec::new();
+    // What is asked again is answered again as it was: what was true then may have moved since.
+    let mut answered = BTreeSet::new();
     for sight in case.sights {
         let off = match &sight.seen {
             // The edge is found some time before the end of the homing; calibrations home, too.
@@ -56,8 +58,11 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
                 }
                 _ => continue,
             },
-            Seen::Answered { boot, answer, truth, .. } => {
+            Seen::Answered { id, boot, answer, truth } => {
                 let Ok(Response::Status(status)) = &**answer else { continue };
+                if !answered.insert((*boot, *id)) {
+                    continue;
+                }
                 Axis::ALL.into_iter().find_map(|axis| {
                     let told = status.axis(axis);
                     if told.state != PositionState::Homed {

@@ -73,6 +73,16 @@ fn loses(case: &Case<'_>, record: RecordName) -> bool {
     })
 }
 
+/// Until when the board wrote that was reset at this moment: one that hangs writes nothing.
+fn wrote_until_ns(case: &Case<'_>, reset_ns: u64) -> u64 {
+    let before = case.sights.iter().take_while(|sight| sight.at_ns < reset_ns);
+    before.fold(reset_ns, |until, sight| match &sight.seen {
+        Seen::Happened { what: "firmware-hangs", mends: false } => until.min(sight.at_ns),
+        Seen::Reset => reset_ns,
+        _ => until,
+    })
+}
+
 /// Alarms stay latched until they are cleared.
 fn alarms(case: &Case<'_>) -> Vec<Broken> {
     if loses(case, RecordName::Alarms) {
@@ -96,8 +106,9 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
             },
             // What was not written yet may be forgotten; and a clearing whose answer never left may have been done.
             Seen::Reset | Seen::Powered(false) => {
+                let wrote_ns = wrote_until_ns(case, at_ns);
                 latched.retain(|number, since| {
-                    at_ns > *since + WRITTEN_NS && !asked.values().any(|asked| asked == number)
+                    wrote_ns > *since + WRITTEN_NS && !asked.values().any(|asked| asked == number)
                 });
             }
             Seen::Answered { id, boot, answer, .. } => match &**answer {
@@ -169,9 +180,10 @@ fn settings(case: &Case<'_>) -> Vec<Broken> {
                 *known = Known { kept: Some(setting.value), since: Vec::new() };
             }
             Seen::Reset | Seen::Powered(false) => {
+                let wrote_ns = wrote_until_ns(case, at_ns);
                 for known in known.values_mut() {
                     let written =
-                        |(since, _): &&(u64, i32)| *since != u64::MAX && at_ns > *since + WRITTEN_NS;
+                        |(since, _): &&(u64, i32)| *since != u64::MAX && wrote_ns > *since + WRITTEN_NS;
                     if let Some((at, value)) = known.since.iter().rfind(written).copied() {
                         known.kept = Some(value);
                         known.since.retain(|(since, _)| *since > at);

@@ -2,7 +2,7 @@
 
 use farnear_protocol::{
     RequestError,
-    message::{CorrectionFault, ShotFault},
+    message::{Axis, CorrectionFault, ShotFault},
 };
 
 use super::{alarm_text, axis_name, program_name, state_name, um};
@@ -36,6 +36,10 @@ pub fn refusal_text(error: &RequestError) -> String {
             axis_name(*axis),
             um(*min),
             um(*max)
+        ),
+        RequestError::NotHomed { axis: axis @ Axis::SensorFine, .. } => format!(
+            "nobody knows where the {} stands, for its gauge says nothing: check its converter, its cable and its supply",
+            axis_name(*axis)
         ),
         RequestError::NotHomed { axis, state } => {
             format!("the position of the {} is {}; home it first", axis_name(*axis), state_name(*state))
