@@ -153,9 +153,9 @@ impl Piezo {
         !self.closing && self.control.as_ref().is_none_or(|control| control.shaper.arrived(shaper))
     }
 
-    /// Whether it moves: its set-point does, or the loop has not brought it there yet.
+    /// Whether it moves: its set-point does, or the loop has not brought it there yet, or it is led down after a start.
     pub(crate) fn is_moving(&self) -> bool {
-        !self.arrived() || self.control.is_some() && self.near_ticks < NEAR_TICKS
+        !self.arrived() || self.control.is_some() && self.near_ticks < NEAR_TICKS || self.start != Start::Over
     }
 
     /// Goes to `target`, closing the loop where it is open.

@@ -8,7 +8,7 @@ use rand::Rng;
 fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     // How much of it the knees do.
     let squat = maker.draw(0.0, 1.0);
-    let lean = deep * (95.0 - 65.0 * squat) * maker.draw(0.75, 1.12);
+    let lean = deep * (95.0 - 58.0 * squat) * maker.draw(0.8, 1.12);
     let knee = deep * (15.0 + 105.0 * squat) * maker.draw(0.85, 1.1);
     let mut moment =
         maker.rest.bent(lean, maker.draw(-35.0, 20.0)).legs(0.72 * knee, knee, maker.draw(1.0, 9.0));
@@ -150,7 +150,7 @@ pub fn crouch(maker: &mut Maker) -> Motion {
 
 /// Sitting on a chair, and the way there: trunk ahead while the seat is not reached.
 fn seated(maker: &mut Maker) -> (Moment, Moment) {
-    let knee = maker.draw(50.0, 112.0);
+    let knee = maker.draw(60.0, 112.0);
     let hip = knee + maker.draw(-20.0, 10.0);
     let lap = if maker.chance(0.6) { Hand::at(0.0, 0.45, -0.7) } else { Hand::at(0.12, 0.1, -0.9) };
     let seated = maker
