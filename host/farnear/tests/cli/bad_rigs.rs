@@ -76,8 +76,8 @@ fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
     let folder = Folder::new();
-    // Homing takes some 4 s of the board's time, both exposures lie at 5.365 s and 5.385 s.
-    for milliseconds in [300, 5_375] {
+    // Both stages are homed in some 2 s of the board's time, the exposures lie at 3.546 s and 3.565 s.
+    for milliseconds in [300, 3_556] {
         let faults = format!("unplug_after_ms = {milliseconds}");
         fails(&mut capture(&folder, Some(&faults), "out"), 1, &["went away while", "check its cable"]);
         assert_eq!(folder.listing(), ["faults.toml"]);
