@@ -117,7 +117,15 @@ impl Camera {
 
     /// The host lets the camera run freely, or (period 0) stops that.
     pub fn run_freely(&mut self, now_ns: u64, period_ns: u64, exposure_ns: u64) {
-        self.free_run = None;
+        // The next exposure is due a period ahead: one that has not begun never will, and is in no trigger's way.
+        if let (Some(run), Some((&begin_ns, Edge::Begin(FREE_RUNNING)))) =
+            (self.free_run.take(), self.coming.first_key_value())
+            && begin_ns > now_ns
+        {
+            let last_end_ns = begin_ns + run.exposure_ns - run.period_ns.min(begin_ns);
+            self.coming.clear();
+            self.busy_until_ns = last_end_ns + READOUT_NS + self.delay_ns;
+        }
         if period_ns > 0 {
             let shortest_ns = exposure_ns.max(1) + READOUT_NS;
             self.free_run = Some(FreeRun { period_ns: period_ns.max(shortest_ns), exposure_ns });
@@ -217,8 +225,15 @@ mod tests {
             edges.iter().filter(|e| e.1 == Edge::Begin(FREE_RUNNING)).map(|e| e.0).collect();
         assert_eq!(begins, [21_000_000, 61_000_000, 101_000_000]);
         camera.run_freely(130_000_000, 0, 0);
-        assert_eq!(camera.due(141_000_000).map(|e| e.1), Some(Edge::Begin(FREE_RUNNING)), "one was begun");
-        assert_eq!(camera.due(200_000_000).map(|e| e.1), Some(Edge::End));
+        assert_eq!(camera.next_ns(), None, "the next had not begun, so that it hears a trigger at once");
+        camera.expose(130_000_000, 5_000_000, 8);
+        assert!(camera.next_ns().is_some_and(|begin_ns| begin_ns < 132_000_000), "{:?}", camera.next_ns());
+
+        let mut camera = Camera::new(1);
+        camera.run_freely(20_000_000, 40_000_000, 5_000_000);
+        assert_eq!(camera.due(21_000_000).map(|e| e.1), Some(Edge::Begin(FREE_RUNNING)));
+        camera.run_freely(23_000_000, 0, 0);
+        assert_eq!(camera.due(200_000_000), Some((26_000_000, Edge::End)), "what has begun comes to its end");
         assert_eq!(camera.next_ns(), None);
     }
 }
