@@ -210,7 +210,7 @@ impl Owner {
         }
     }
 
-    /// The answer to each question; where the session ends meanwhile, as many errors.
+    /// The answer to each question; one error where nobody answers.
     fn ask_for(&mut self, session: u32, questions: Vec<Question>) -> Vec<Answered> {
         if let Some(broken) = self.break_of(session) {
             let port = self.link.port();
