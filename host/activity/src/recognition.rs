@@ -21,6 +21,7 @@ pub mod network;
 pub mod occupancy;
 pub(crate) mod patterns;
 pub mod residuals;
+pub mod second_opinion;
 pub mod segmentation;
 pub mod self_training;
 pub mod space;

@@ -7,7 +7,9 @@
 use super::alignment::Alignment;
 use super::classifier::{ClassifierKind, Family};
 use super::frames::{Mode, Weights};
+use super::model::Recogniser;
 use super::space::{Layout, PatternKind, Space, SpaceSettings};
+use std::sync::Arc;
 
 /// One parameter of the space and the values it may take.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +88,8 @@ pub struct Experiment {
     pub self_training: usize,
     /// A space that is learned already, of a model's network: then only the classifier is trained, and nothing about spaces is chosen.
     pub features: Option<Box<Space>>,
+    /// Who says beside the trained recogniser whether a clip is unknown ([`super::second_opinion`]).
+    pub second: Option<Arc<Recogniser>>,
 }
 
 impl Experiment {
@@ -101,6 +105,7 @@ impl Experiment {
             align: Alignment::None,
             self_training: 0,
             features: None,
+            second: None,
         }
     }
 
@@ -137,6 +142,7 @@ impl Experiment {
             align: Alignment::None,
             self_training: 0,
             features: None,
+            second: None,
         }
     }
 

@@ -5,6 +5,7 @@ use super::classifier::{Classifier, ClassifierKind, largest};
 use super::clip::Track;
 use super::frames::Mode;
 use super::patterns::joined;
+use super::second_opinion::SecondOpinion;
 use super::self_training::{Labelled, self_trained};
 use super::space::{Map, Pattern, Space, SpaceSettings};
 use super::unknown::Limits;
@@ -53,12 +54,14 @@ pub struct Recogniser {
     pub space: Space,
     /// The classifier, trained on the patterns.
     pub classifier: Classifier,
-    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown.
+    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown to who has no second opinion.
     pub limits: Limits,
     /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
     pub patterns: Array2<f32>,
     /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
     pub labels: Vec<usize>,
+    /// What another recogniser says, from which whole clips are called unknown.
+    pub second: Option<SecondOpinion>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
 }
@@ -72,8 +75,9 @@ pub struct Answer {
     pub confidence: f32,
     /// Probability of every activity.
     pub probabilities: Vec<(String, f32)>,
-    /// Squared distance to the nearest training pattern over the largest at which an activity still counts as known: above 1 is
-    /// unknown.
+    /// How far the clip is from what was learned over the largest such distance at which the activity still counts as known: above 1
+    /// is unknown. The distance is that of a second opinion from what it said of the activity's training clips, or the squared one
+    /// to the nearest training pattern.
     pub outlier_score: f32,
 }
 
@@ -173,6 +177,9 @@ pub enum ModelError {
          worse): train one on labelled samples, with this model's features if they are few"
     )]
     Unlabelled,
+    /// The other recogniser in a model's file.
+    #[error("the model's second opinion: {0}")]
+    Second(Box<ModelError>),
     /// Nothing to train on.
     #[error("a model needs clips of at least two activities, found {0}")]
     Activities(usize),
@@ -188,7 +195,8 @@ fn with(boxes: bool) -> &'static str {
 impl Recogniser {
     /// Recognises one clip.
     ///
-    /// A model of one view takes any number of views: the answers of all that see somebody count together.
+    /// A model of one view takes any number of views: the answers of all that see somebody count together. Whether the clip is unknown
+    /// says the second opinion, where the model has one.
     ///
     /// # Errors
     /// A clip with other views than the model's, or with cut-out silhouettes where the model knows full frames.
@@ -199,11 +207,15 @@ impl Recogniser {
             .iter()
             .map(|group| Ok(self.answer(self.pattern(group)?.view())))
             .collect::<Result<Vec<Answer>, ModelError>>()?;
-        Ok(match answers.len() {
-            0 => Answer::nobody(&self.activities),
+        let answer = match answers.len() {
+            0 => return Ok(Answer::nobody(&self.activities)),
             1 => answers.swap_remove(0),
             _ => Answer::joint(&answers),
-        })
+        };
+        let Some(second) = &self.second else { return Ok(answer) };
+        let class = answer.best().and_then(|best| self.activities.iter().position(|name| name == best));
+        let strangeness = second.strangeness(&second.recogniser.recognise(views)?, class.unwrap_or(0));
+        Ok(Answer::of(answer.probabilities, strangeness))
     }
 
     /// Whether views fit the model.

@@ -12,6 +12,7 @@ use super::model::{ModelError, Recogniser, RecogniserSettings};
 use super::network::Network;
 use super::network::features::Features;
 use super::occupancy::OccupancyGrid;
+use super::second_opinion::SecondOpinion;
 use super::space::{Map, Pattern, Space};
 use super::unknown::Limits;
 use crate::embedding::descriptor::{ANGLES, DESCRIPTOR_VERSION};
@@ -19,10 +20,13 @@ use crate::embedding::pca::Pca;
 use crate::embedding::rbf::Rbf;
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Version of the file's format.
-pub const FORMAT_VERSION: u32 = 3;
-/// The version before, which is read too: it has no labels.
+pub const FORMAT_VERSION: u32 = 4;
+/// The version before, without a second opinion; models that have none are written so still.
+const SINGLE_VERSION: u32 = 3;
+/// The version before that, which is read too: it has no labels.
 const UNLABELLED_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
@@ -94,11 +98,18 @@ impl Recogniser {
             patterns: self.patterns.clone(),
             typical_frames: self.typical_frames as u64,
         };
-        let body = postcard::to_stdvec(&(body, &self.labels))
-            .map_err(|error| ModelError::Body(error.to_string()))?;
+        let encoded = match &self.second {
+            None => postcard::to_stdvec(&(body, &self.labels)),
+            Some(second) => {
+                let other = second.recogniser.to_bytes()?;
+                postcard::to_stdvec(&(body, &self.labels, &other, &second.profiles, &second.limits))
+            }
+        };
+        let version = if self.second.is_some() { FORMAT_VERSION } else { SINGLE_VERSION };
+        let body = encoded.map_err(|error| ModelError::Body(error.to_string()))?;
         let mut bytes = Vec::with_capacity(HEADER + body.len());
         bytes.extend(MAGIC);
-        bytes.extend(FORMAT_VERSION.to_le_bytes());
+        bytes.extend(version.to_le_bytes());
         bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
         bytes.extend((body.len() as u64).to_le_bytes());
         bytes.extend(checksum(&body).to_le_bytes());
@@ -116,9 +127,9 @@ impl Recogniser {
             return Err(ModelError::NotAModel("it does not start with `farnearA`"));
         }
         let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
-        let unlabelled = word(8) == UNLABELLED_VERSION;
+        let version = word(8);
         for (what, at, expected) in [("format", 8, FORMAT_VERSION), ("descriptor", 12, DESCRIPTOR_VERSION)] {
-            if word(at) != expected && !(at == 8 && unlabelled) {
+            if word(at) != expected && !(at == 8 && [SINGLE_VERSION, UNLABELLED_VERSION].contains(&version)) {
                 return Err(ModelError::Version { what, found: word(at), expected });
             }
         }
@@ -131,8 +142,20 @@ impl Recogniser {
         }
         let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
         let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
-        let labels =
-            if unlabelled { Vec::new() } else { postcard::from_bytes::<Vec<usize>>(rest).map_err(wrong)? };
+        let (labels, second) = match version {
+            UNLABELLED_VERSION => (Vec::new(), None),
+            SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None),
+            _ => {
+                let (labels, other, profiles, limits): (_, Vec<u8>, _, _) =
+                    postcard::from_bytes(rest).map_err(wrong)?;
+                // Who says something of another has nobody behind it: a file may nest without end.
+                if other.get(8..12) == Some(&FORMAT_VERSION.to_le_bytes()) {
+                    return Err(ModelError::Parts("the second opinion"));
+                }
+                let other = Self::from_bytes(&other).map_err(|error| ModelError::Second(Box::new(error)))?;
+                (labels, Some(SecondOpinion { recogniser: Arc::new(other), profiles, limits }))
+            }
+        };
         let map = match body.map {
             SavedMap::Rbf { centres, weights, gamma, ridge, condition } => {
                 Map::Rbf(Rbf::assemble(centres, weights, gamma, ridge, condition))
@@ -162,6 +185,7 @@ impl Recogniser {
             limits: body.limits,
             patterns: body.patterns,
             labels,
+            second,
             typical_frames: body.typical_frames as usize,
         };
         recogniser.checked()
@@ -229,8 +253,11 @@ impl Recogniser {
         let labelled = self.labels.len() == self.patterns.nrows()
             && self.labels.iter().all(|label| *label < self.activities.len());
         fits(self.labels.is_empty() || labelled, "the training patterns' activities")?;
-        fits(self.limits.squared_distances.len() == self.activities.len(), "the limits of what is known")?;
+        fits(self.limits.distances.len() == self.activities.len(), "the limits of what is known")?;
         fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
+        let second = self.second.as_ref();
+        let judges = second.is_none_or(|second| second.fits(self.activities.len(), self.uses_boxes()));
+        fits(judges, "the second opinion")?;
         Ok(self)
     }
 }

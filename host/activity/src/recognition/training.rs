@@ -7,6 +7,7 @@ use super::clip::Clip;
 use super::experiment::Experiment;
 use super::model::{ModelError, Recogniser, RecogniserSettings, nearest};
 use super::patterns::gathered;
+use super::second_opinion::SecondOpinion;
 use super::unknown::Limits;
 use super::watch::{Unwatched, Watch};
 use crate::embedding::descriptor::Scaling;
@@ -29,6 +30,7 @@ impl Recogniser {
             align: Alignment::None,
             self_training: 0,
             features: None,
+            second: None,
         };
         Self::train_searched(clips, &experiment, settings.scaling, &Unwatched)
             .map(|(recogniser, _)| recogniser)
@@ -72,6 +74,9 @@ impl Recogniser {
             all.iter().map(|clip| activities.iter().position(|a| *a == clip.activity).unwrap_or(0)).collect();
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
+        let other = experiment.second.clone();
+        let second =
+            other.map(|other| SecondOpinion::learned(other, clips, &labels[..clips.len()], activities.len()));
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
             limits: limits(&all, &labels, activities.len(), clips.len(), &patterns),
@@ -88,6 +93,7 @@ impl Recogniser {
             space,
             patterns,
             labels,
+            second: second.transpose()?,
         };
         Ok((recogniser, inner_accuracy))
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Per class.
-    pub squared_distances: Vec<f32>,
+    pub distances: Vec<f32>,
     /// Share of what is known that is called unknown, as asked for.
     pub false_alarms: f32,
 }
@@ -22,10 +22,10 @@ impl Limits {
 
     /// Nothing is unknown.
     pub fn none(classes: usize) -> Self {
-        Self { squared_distances: vec![f32::INFINITY; classes], false_alarms: 0.0 }
+        Self { distances: vec![f32::INFINITY; classes], false_alarms: 0.0 }
     }
 
-    /// From the class and squared distance of clips that are known and taught nothing.
+    /// From the class and distance of clips that are known and taught nothing.
     pub fn conformal(scored: &[(usize, f32)], classes: usize, false_alarms: f32) -> Self {
         let all = limit(scored.iter().map(|(_, distance)| *distance).collect(), false_alarms)
             .unwrap_or(f32::INFINITY);
@@ -33,12 +33,12 @@ impl Limits {
             let own = scored.iter().filter(|(answer, _)| *answer == class).map(|(_, distance)| *distance);
             limit(own.collect(), false_alarms).unwrap_or(all)
         };
-        Self { squared_distances: (0..classes).map(of_class).collect(), false_alarms }
+        Self { distances: (0..classes).map(of_class).collect(), false_alarms }
     }
 
     /// The outlier score of an answer: above 1 is unknown.
-    pub fn score(&self, class: usize, squared_distance: f32) -> f32 {
-        squared_distance / self.squared_distances.get(class).copied().unwrap_or(f32::INFINITY).max(1e-9)
+    pub fn score(&self, class: usize, distance: f32) -> f32 {
+        distance / self.distances.get(class).copied().unwrap_or(f32::INFINITY).max(1e-9)
     }
 }
 
@@ -80,7 +80,7 @@ mod tests {
     fn classes_with_few_clips_share_a_limit_and_none_means_all_are_known() {
         let scored: Vec<(usize, f32)> = (0..99).map(|i| (0, i as f32)).chain([(1, 5.0)]).collect();
         let limits = Limits::conformal(&scored, 3, 0.05);
-        assert_eq!(limits.squared_distances[1], limits.squared_distances[2]);
+        assert_eq!(limits.distances[1], limits.distances[2]);
         assert_eq!(Limits::conformal(&[], 2, 0.05), Limits { false_alarms: 0.05, ..Limits::none(2) });
         assert_eq!(Limits::none(2).score(1, 1e9), 0.0);
     }

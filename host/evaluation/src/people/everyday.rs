@@ -1,5 +1,7 @@
 //! The recognisers that come with the program, on sets of which they have never seen anything.
 
+use std::sync::Arc;
+
 use anyhow::{Context, Result};
 use farnear_activity::{
     embedding::descriptor::Scaling,
@@ -98,7 +100,14 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     let mut rows = Vec::new();
     for (name, clips) in all.iter().filter(|(_, clips)| activities(clips).len() > 2) {
         for (mode_name, mode) in [("ordered", Mode::Ordered), ("order-free", Mode::OrderFree)] {
-            let experiment = Experiment::codebook(SpaceSettings { mode, ..SpaceSettings::default() });
+            let kind =
+                usize::from(clips.iter().any(|clip| clip.views.iter().any(|view| view.boxes.is_none())));
+            let second =
+                Recogniser::from_bytes(MODELS[kind].2).context("a model that comes with the program")?;
+            let experiment = Experiment {
+                second: Some(Arc::new(second)),
+                ..Experiment::codebook(SpaceSettings { mode, ..SpaceSettings::default() })
+            };
             let found = open_set(clips, &experiment, Scaling::default(), &Unwatched)?;
             let Some(mean) = found.last() else { continue };
             let shares = [mean.unknown_of_strangers, mean.unknown_of_known]

@@ -1,10 +1,12 @@
 //! How activities are told apart: what training and evaluation share.
 
+use std::sync::Arc;
+
 use farnear_activity::recognition::{
     alignment::Alignment, classifier::Family, experiment::Experiment, frames::Mode, space::SpaceSettings,
 };
 
-use super::shipped::Shipped;
+use super::shipped::{self, Shipped};
 use crate::error::Result;
 
 /// What is done for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled.
@@ -66,6 +68,11 @@ impl Method {
                     .with_classifier(classifier)
             }
         };
+        let [full, cut_out] = shipped::second_opinion()?;
+        // The thesis' grids see no boxes, and the thesis knows no unknown.
+        let second =
+            (self.pattern != Pattern::Thesis).then(|| Arc::new(if full_frames { full } else { cut_out }));
+        let experiment = Experiment { second, ..experiment };
         Ok(if self.search { experiment } else { experiment.fixed() })
     }
 

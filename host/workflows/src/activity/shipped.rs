@@ -43,6 +43,15 @@ pub const MODELS: &[Shipped] = &[
     },
 ];
 
+/// The recogniser of full frames, and that of cut-out silhouettes, that say beside a trained one what is unknown. Of those that come with the
+/// program it is the one that sees order, whatever the trained one sees: it knows strangers better.
+///
+/// # Errors
+/// As [`Shipped::recognisers`].
+pub fn second_opinion() -> Result<[Recogniser; 2]> {
+    MODELS[0].recognisers()
+}
+
 /// What they were trained on and tested on, and where they fail.
 pub const SHEET: &str = include_str!("../../../activity/models/README.md");
 

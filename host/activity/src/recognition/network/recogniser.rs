@@ -72,6 +72,7 @@ impl Recogniser {
             patterns,
             // Learning on from typical patterns made models worse on every set that was tried.
             labels: Vec::new(),
+            second: None,
             activities,
             views: 1,
             space,

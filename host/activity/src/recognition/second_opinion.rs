@@ -1,0 +1,114 @@
+//! A second opinion: what another recogniser says of a clip, against what it said of the training clips of the activity answered.
+//!
+//! A recogniser knows the activities that it was taught, and what nobody taught often lies among them. Another one that knows many more
+//! activities - from synthetic people, whom everybody has - tells strangers from them better, though its own answer may be wrong: it need
+//! not know an activity's name, only say of a clip what it says of such clips. An activity's profile is the mean over its training
+//! clips of the square roots of the other's probabilities, to length 1; a clip lies off by the Bhattacharyya distance to it, -ln of the
+//! scalar product (Kailath, IEEE Trans. Communication Technology 15, 1967). Clips of other activities as a background: Hendrycks et al.,
+//! ICLR 2019.
+
+use super::clip::Clip;
+use super::model::{Answer, ModelError, Recogniser};
+use super::unknown::Limits;
+use ndarray::{Array1, Array2, ArrayView1};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Another recogniser and what it says of the activities that were taught.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SecondOpinion {
+    /// The other.
+    pub recogniser: Arc<Recogniser>,
+    /// Activities taught x activities of the other: square roots, each row of length 1.
+    pub profiles: Array2<f32>,
+    /// Distances to an activity's profile beyond which a clip is unknown.
+    pub limits: Limits,
+}
+
+impl SecondOpinion {
+    /// Asks another recogniser about clips of so many classes. The limits are the conformal rule's for people who taught nothing: every
+    /// clip is compared with other subjects' profile of its class (with a single subject, with that of the other clips), so that what is
+    /// answered rightly is called unknown no more often than stated; a wrong answer oftener, and rightly.
+    pub(super) fn learned(
+        recogniser: Arc<Recogniser>,
+        clips: &[Clip],
+        labels: &[usize],
+        classes: usize,
+    ) -> Result<Self, ModelError> {
+        let said: Vec<Option<Array1<f32>>> =
+            clips.par_iter().map(|clip| roots(&recogniser, clip)).collect::<Result<_, ModelError>>()?;
+        let width = recogniser.activities.len();
+        let profile = |class: usize, of: &dyn Fn(usize) -> bool| {
+            let own = (0..said.len()).filter(|i| labels[*i] == class && of(*i));
+            let sum = own.filter_map(|i| said[i].as_ref()).fold(Array1::zeros(width), |sum, said| sum + said);
+            to_unit_length(sum)
+        };
+        let mut profiles = Array2::zeros((classes, width));
+        for (class, mut row) in profiles.rows_mut().into_iter().enumerate() {
+            row.assign(&profile(class, &|_| true));
+        }
+        let alone = clips.iter().all(|clip| clip.subject == clips[0].subject);
+        let scored: Vec<(usize, f32)> = (0..clips.len())
+            .into_par_iter()
+            .filter_map(|i| {
+                let other = |j: usize| if alone { j != i } else { clips[j].subject != clips[i].subject };
+                let others = profile(labels[i], &other);
+                Some((labels[i], distance(said[i].as_ref()?.view(), others.view())))
+            })
+            .collect();
+        let limits = Limits::conformal(&scored, classes, Limits::FALSE_ALARMS);
+        Ok(Self { recogniser, profiles, limits })
+    }
+
+    /// How strange what the other says of a clip is for one of a class: above 1 is unknown.
+    pub(super) fn strangeness(&self, said: &Answer, class: usize) -> f32 {
+        self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
+    }
+
+    /// Whether all sizes fit a recogniser of these activities.
+    pub(super) fn fits(&self, classes: usize, boxes: bool) -> bool {
+        self.recogniser.second.is_none()
+            && self.recogniser.views == 1
+            && (boxes || !self.recogniser.uses_boxes())
+            && self.profiles.dim() == (classes, self.recogniser.activities.len())
+            && self.limits.distances.len() == classes
+    }
+}
+
+/// Square roots of what a recogniser says of a clip; `None` where nobody is seen.
+fn roots(recogniser: &Recogniser, clip: &Clip) -> Result<Option<Array1<f32>>, ModelError> {
+    let said = recogniser.recognise(&clip.views)?;
+    Ok(said.outlier_score.is_finite().then(|| roots_of(&said)))
+}
+
+fn roots_of(said: &Answer) -> Array1<f32> {
+    said.probabilities.iter().map(|(_, share)| share.max(0.0).sqrt()).collect()
+}
+
+fn to_unit_length(sum: Array1<f32>) -> Array1<f32> {
+    let length = sum.dot(&sum).sqrt();
+    if length > 0.0 { sum / length } else { sum }
+}
+
+/// Bhattacharyya distance of square roots of probabilities; what has nothing in common is far, but not at infinity.
+fn distance(said: ArrayView1<f32>, profile: ArrayView1<f32>) -> f32 {
+    -said.dot(&profile).clamp(1e-9, 1.0).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_bhattacharyyas() {
+        let of = |shares: [f32; 3]| -> Array1<f32> { shares.iter().map(|share| share.sqrt()).collect() };
+        let same = distance(of([0.5, 0.3, 0.2]).view(), of([0.5, 0.3, 0.2]).view());
+        assert!(same.abs() < 1e-6, "{same}"); // rounding
+        // By hand: -ln(sqrt(0.5 * 0.2) + sqrt(0.3 * 0.3) + sqrt(0.2 * 0.5)) = 0.07005.
+        let apart = distance(of([0.5, 0.3, 0.2]).view(), of([0.2, 0.3, 0.5]).view());
+        assert!((apart - 0.070_05).abs() < 1e-4, "{apart}");
+        let nothing = distance(of([1.0, 0.0, 0.0]).view(), of([0.0, 0.0, 1.0]).view());
+        assert!(nothing.is_finite() && nothing > 20.0, "{nothing}");
+        assert_eq!(to_unit_length(Array1::zeros(3)), Array1::<f32>::zeros(3));
+    }
+}
