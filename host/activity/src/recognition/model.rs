@@ -54,13 +54,13 @@ pub struct Recogniser {
     pub space: Space,
     /// The classifier, trained on the patterns.
     pub classifier: Classifier,
-    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown to who has no second opinion.
+    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown where there is no second opinion.
     pub limits: Limits,
     /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
     pub patterns: Array2<f32>,
     /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
     pub labels: Vec<usize>,
-    /// What another recogniser says, from which whole clips are called unknown.
+    /// What another recogniser says, from which clips and windows are called unknown.
     pub second: Option<SecondOpinion>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
