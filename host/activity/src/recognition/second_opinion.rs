@@ -52,7 +52,9 @@ impl SecondOpinion {
             .into_par_iter()
             .filter_map(|i| {
                 let other = |j: usize| if alone { j != i } else { clips[j].subject != clips[i].subject };
-                let others = profile(labels[i], &other);
+                // Of a class that nobody else has taught there is nothing to compare with.
+                let others =
+                    Some(profile(labels[i], &other)).filter(|sum| sum.iter().any(|root| *root > 0.0))?;
                 Some((labels[i], distance(said[i].as_ref()?.view(), others.view())))
             })
             .collect();

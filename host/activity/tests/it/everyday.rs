@@ -134,3 +134,21 @@ fn a_second_opinion_calls_what_nobody_taught_unknown_and_survives_a_file() {
     let error = Recogniser::from_bytes(&cut.to_bytes().expect("encoded")).expect_err("too narrow");
     assert!(error.to_string().contains("second opinion"), "{error}");
 }
+
+#[test]
+fn an_activity_that_one_person_taught_does_not_lift_the_limits_of_others() {
+    let other = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
+    let mut taught = few(600, 12);
+    taught.retain(|clip| clip.activity != "lie down");
+    for clip in taught.iter_mut().filter(|clip| clip.activity == "crouch") {
+        clip.subject = "one".into();
+    }
+    let space =
+        SpaceSettings { gallery: 400, pattern: PatternKind::Codebook(40), ..SpaceSettings::default() };
+    let experiment = Experiment { second: Some(Arc::new(other)), ..Experiment::codebook(space).fixed() };
+    let (model, _) =
+        Recogniser::train_searched(&taught, &experiment, Scaling::default(), &Unwatched).expect("trained");
+    let limits = model.second.expect("asked for").limits.distances;
+    // What has nothing in common is 20 apart; people who do the same, as everyday sees them, not a tenth of that.
+    assert!(limits.iter().all(|limit| *limit < 2.0), "{limits:?}");
+}

@@ -250,7 +250,7 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     let bytes = fs::read(&model).expect("a model");
     let changed = |name: &str, at: usize| {
         let mut bytes = bytes.clone();
-        bytes[at] ^= 4;
+        bytes[at] ^= 8;
         people.folder.file(name, bytes)
     };
     let [format, descriptor, body] =
@@ -260,8 +260,8 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     let masks = people.masks("p01-dig", 1);
     let shapes = shapes.display().to_string();
     for (view, model, phrases) in [
-        (&masks, &format, vec!["format.fnm", "format version 7", "train it again"]),
-        (&masks, &descriptor, vec!["descriptor.fnm", "descriptor version 5", "train it again"]),
+        (&masks, &format, vec!["format.fnm", "format version 12", "train it again"]),
+        (&masks, &descriptor, vec!["descriptor.fnm", "descriptor version 9", "train it again"]),
         (&masks, &body, vec!["body.fnm", "damaged", "checksum"]),
         (&masks, &cut, vec!["cut.fnm", "cut short"]),
         (&masks, &people.samples, vec!["samples.toml", "not a farnear activity model"]),
