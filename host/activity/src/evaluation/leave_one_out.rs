@@ -69,6 +69,17 @@ pub enum EvaluationError {
     /// Two activities are taught when one is left out.
     #[error("an open set needs at least 3 activities, the samples have {0}")]
     Activities(usize),
+    /// What is unknown has no limit.
+    #[error(
+        "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
+         with fewer nothing can be called unknown at a stated share of false alarms"
+    )]
+    OpenSetClips {
+        /// Clips taught when one of the activities is left out on one of the halves.
+        found: usize,
+        /// Clips wanted.
+        fewest: usize,
+    },
     /// A model could not be made or used.
     #[error(transparent)]
     Model(Box<crate::recognition::model::ModelError>),

@@ -10,6 +10,7 @@ use crate::recognition::choice::names;
 use crate::recognition::clip::Clip;
 use crate::recognition::experiment::Experiment;
 use crate::recognition::model::{ModelError, Recogniser};
+use crate::recognition::unknown::Limits;
 use crate::recognition::watch::{Unwatched, Watch};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -38,14 +39,14 @@ struct Scores {
     strange: Vec<f32>,
 }
 
-/// Leaves every activity out in turn. The experiment's first settings are taken; all views are fused. Gives a row per activity and
-/// their mean last.
+/// Leaves every activity out in turn; `experiment` is told which. An experiment's first settings are taken; all views are fused. Gives a
+/// row per activity and their mean last.
 ///
 /// # Errors
-/// Fewer than 4 subjects or 3 activities; see [`EvaluationError`].
+/// Fewer than 4 subjects or 3 activities, too few clips for a limit; see [`EvaluationError`].
 pub fn open_set(
     clips: &[Clip],
-    experiment: &Experiment,
+    experiment: impl Fn(&str) -> Experiment + Sync,
     scaling: Scaling,
     watch: &dyn Watch,
 ) -> Result<Vec<OpenSet>, EvaluationError> {
@@ -57,21 +58,26 @@ pub fn open_set(
     if activities.len() < 3 {
         return Err(EvaluationError::Activities(activities.len()));
     }
-    let fixed = experiment.clone().fixed();
     let half = |clip: &Clip| subjects.iter().position(|subject| *subject == clip.subject).unwrap_or(0) % 2;
+    let taught = |left_out: &str, tested: usize| {
+        let is_taught = |clip: &&Clip| half(clip) != tested && clip.activity != left_out;
+        clips.iter().filter(is_taught).collect::<Vec<_>>()
+    };
+    let counts = activities.iter().flat_map(|left_out| [0, 1].map(|tested| taught(left_out, tested).len()));
+    let (found, fewest) = (counts.min().unwrap_or(0), Limits::fewest(Limits::FALSE_ALARMS));
+    if found < fewest {
+        return Err(EvaluationError::OpenSetClips { found, fewest });
+    }
     let rows: Result<Vec<OpenSet>, EvaluationError> = activities
         .par_iter()
         .map(|left_out| {
             let mut scores = Scores::default();
+            let fixed = experiment(left_out).fixed();
             for tested in 0..2 {
                 if watch.is_stopped() {
                     return Err(EmbeddingError::Stopped.into());
                 }
-                let taught: Vec<Clip> = clips
-                    .iter()
-                    .filter(|clip| half(clip) != tested && clip.activity != *left_out)
-                    .cloned()
-                    .collect();
+                let taught: Vec<Clip> = taught(left_out, tested).into_iter().cloned().collect();
                 let (model, _) =
                     Recogniser::train_searched(&taught, &fixed, scaling, &Unwatched).map_err(of_model)?;
                 for clip in clips.iter().filter(|clip| half(clip) == tested) {

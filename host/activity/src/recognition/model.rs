@@ -213,8 +213,7 @@ impl Recogniser {
             _ => Answer::joint(&answers),
         };
         let Some(second) = &self.second else { return Ok(answer) };
-        let class = answer.best().and_then(|best| self.activities.iter().position(|name| name == best));
-        let strangeness = second.strangeness(&second.recogniser.recognise(views)?, class.unwrap_or(0));
+        let strangeness = second.strangeness(&second.recogniser.recognise(views)?, &answer);
         Ok(Answer::of(answer.probabilities, strangeness))
     }
 

@@ -7,6 +7,7 @@
 //! scalar product (Kailath, IEEE Trans. Communication Technology 15, 1967). Clips of other activities as a background: Hendrycks et al.,
 //! ICLR 2019.
 
+use super::classifier::largest;
 use super::clip::Clip;
 use super::model::{Answer, ModelError, Recogniser};
 use super::unknown::Limits;
@@ -62,8 +63,10 @@ impl SecondOpinion {
         Ok(Self { recogniser, profiles, limits })
     }
 
-    /// How strange what the other says of a clip is for one of a class: above 1 is unknown.
-    pub(super) fn strangeness(&self, said: &Answer, class: usize) -> f32 {
+    /// How strange what the other says of a clip is for the activity answered: above 1 is unknown.
+    pub(super) fn strangeness(&self, said: &Answer, answer: &Answer) -> f32 {
+        let shares: Vec<f32> = answer.probabilities.iter().map(|(_, share)| *share).collect();
+        let (class, _) = largest(&shares);
         self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
     }
 

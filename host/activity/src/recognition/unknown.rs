@@ -36,6 +36,11 @@ impl Limits {
         Self { distances: (0..classes).map(of_class).collect(), false_alarms }
     }
 
+    /// Clips without which no limit can keep a share of false alarms.
+    pub fn fewest(false_alarms: f32) -> usize {
+        (1..).find(|clips| place(*clips, false_alarms) <= *clips).unwrap_or(usize::MAX)
+    }
+
     /// The outlier score of an answer: above 1 is unknown.
     pub fn score(&self, class: usize, distance: f32) -> f32 {
         distance / self.distances.get(class).copied().unwrap_or(f32::INFINITY).max(1e-9)
@@ -46,8 +51,12 @@ impl Limits {
 fn limit(mut distances: Vec<f32>, false_alarms: f32) -> Option<f32> {
     distances.retain(|distance| distance.is_finite());
     distances.sort_by(f32::total_cmp);
-    let place = ((distances.len() + 1) as f64 * (1.0 - f64::from(false_alarms))).ceil() as usize;
-    distances.get(place.checked_sub(1)?).copied()
+    distances.get(place(distances.len(), false_alarms).checked_sub(1)?).copied()
+}
+
+/// Which of so many distances, the smallest first and counted from 1, is the limit.
+fn place(distances: usize, false_alarms: f32) -> usize {
+    ((distances + 1) as f64 * (1.0 - f64::from(false_alarms))).ceil() as usize
 }
 
 #[cfg(test)]
@@ -83,5 +92,6 @@ mod tests {
         assert_eq!(limits.distances[1], limits.distances[2]);
         assert_eq!(Limits::conformal(&[], 2, 0.05), Limits { false_alarms: 0.05, ..Limits::none(2) });
         assert_eq!(Limits::none(2).score(1, 1e9), 0.0);
+        assert_eq!(Limits::fewest(0.05), 19);
     }
 }

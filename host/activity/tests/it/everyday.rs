@@ -1,6 +1,7 @@
 //! Models of everyday activities: made of synthetic people, and those that come with the program.
 
 use farnear_activity::embedding::descriptor::Scaling;
+use farnear_activity::evaluation::open_set::open_set;
 use farnear_activity::recognition::clip::Clip;
 use farnear_activity::recognition::experiment::Experiment;
 use farnear_activity::recognition::model::Recogniser;
@@ -101,16 +102,24 @@ fn the_shipped_models_are_small_and_know_people_they_never_saw() {
     }
 }
 
-#[test]
-fn a_second_opinion_calls_what_nobody_taught_unknown_and_survives_a_file() {
+/// An experiment with the shipped model beside it.
+fn with_second_opinion() -> Experiment {
     let other = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
-    let mut taught = few(600, 8);
-    taught.retain(|clip| clip.activity != "lie down");
     let space =
         SpaceSettings { gallery: 400, pattern: PatternKind::Codebook(40), ..SpaceSettings::default() };
-    let experiment = Experiment { second: Some(Arc::new(other)), ..Experiment::codebook(space).fixed() };
-    let (model, _) =
-        Recogniser::train_searched(&taught, &experiment, Scaling::default(), &Unwatched).expect("trained");
+    Experiment { second: Some(Arc::new(other)), ..Experiment::codebook(space).fixed() }
+}
+
+/// A model that has one, taught without an activity.
+fn taught_without(left_out: &str, mut clips: Vec<Clip>) -> Recogniser {
+    clips.retain(|clip| clip.activity != left_out);
+    let trained = Recogniser::train_searched(&clips, &with_second_opinion(), Scaling::default(), &Unwatched);
+    trained.expect("trained").0
+}
+
+#[test]
+fn a_second_opinion_calls_what_nobody_taught_unknown_and_survives_a_file() {
+    let model = taught_without("lie down", few(600, 8));
     let bytes = model.to_bytes().expect("encoded");
     let model = Recogniser::from_bytes(&bytes).expect("decoded");
     let people = few(700, 8);
@@ -137,18 +146,30 @@ fn a_second_opinion_calls_what_nobody_taught_unknown_and_survives_a_file() {
 
 #[test]
 fn an_activity_that_one_person_taught_does_not_lift_the_limits_of_others() {
-    let other = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
-    let mut taught = few(600, 12);
-    taught.retain(|clip| clip.activity != "lie down");
-    for clip in taught.iter_mut().filter(|clip| clip.activity == "crouch") {
+    let mut clips = few(600, 12);
+    for clip in clips.iter_mut().filter(|clip| clip.activity == "crouch") {
         clip.subject = "one".into();
     }
-    let space =
-        SpaceSettings { gallery: 400, pattern: PatternKind::Codebook(40), ..SpaceSettings::default() };
-    let experiment = Experiment { second: Some(Arc::new(other)), ..Experiment::codebook(space).fixed() };
-    let (model, _) =
-        Recogniser::train_searched(&taught, &experiment, Scaling::default(), &Unwatched).expect("trained");
+    let model = taught_without("lie down", clips);
     let limits = model.second.expect("asked for").limits.distances;
     // What has nothing in common is 20 apart; people who do the same, as everyday sees them, not a tenth of that.
     assert!(limits.iter().all(|limit| *limit < 2.0), "{limits:?}");
+}
+
+#[test]
+fn an_open_set_needs_clips_for_a_limit_and_most_strangers_are_found() {
+    let people = few(600, 14);
+    let evaluated =
+        |clips: &[Clip]| open_set(clips, |_| with_second_opinion(), Scaling::default(), &Unwatched);
+    let rows = evaluated(&people).expect("seven people teach 21 clips");
+    let mean = rows.last().expect("a mean");
+    // Four activities that look nothing like one another; half the rate that is asked of hard ones, for chance.
+    assert!(rows.len() == 5 && mean.auroc > 0.9 && mean.unknown_of_strangers > 0.3, "{mean:?}");
+    assert!(mean.unknown_of_known < 0.15, "5 % and what chance adds to 42 clips: {mean:?}");
+    let few: Vec<Clip> = people.into_iter().take(4 * 12).collect();
+    let error = evaluated(&few).expect_err("six people teach 18");
+    assert!(
+        error.to_string().contains("at least 19 clips") && error.to_string().contains("has 18"),
+        "{error}"
+    );
 }

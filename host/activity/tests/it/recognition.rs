@@ -10,12 +10,15 @@ use farnear_activity::recognition::experiment::Experiment;
 use farnear_activity::recognition::frames::Mode;
 use farnear_activity::recognition::live::{Live, windows};
 use farnear_activity::recognition::model::{ModelError, Recogniser, RecogniserSettings};
+use farnear_activity::recognition::second_opinion::SecondOpinion;
 use farnear_activity::recognition::space::{PatternKind, SpaceSettings};
+use farnear_activity::recognition::unknown::Limits;
 use farnear_activity::silhouette::view::{Canvas, draw, extent, views_round};
 use farnear_activity::synthetic::activities::{clips, performance};
+use ndarray::Array2;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// A small space: enough to recognise, quick to train.
 fn small(mode: Mode) -> SpaceSettings {
@@ -172,18 +175,28 @@ fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
 #[test]
 fn crafted_models_with_good_checksums_are_refused_or_answer_but_never_panic() {
     let (people, recogniser) = trained();
-    let bytes = recogniser.to_bytes().expect("encoded");
+    let classes = recogniser.activities.len();
+    let second = SecondOpinion {
+        recogniser: Arc::new(recogniser.clone()),
+        profiles: Array2::from_elem((classes, classes), (1.0 / classes as f32).sqrt()),
+        limits: Limits::none(classes),
+    };
+    let judged = Recogniser { second: Some(second), ..recogniser.clone() };
+    let files = [recogniser, &judged].map(|model| model.to_bytes().expect("encoded"));
+    assert!(files.iter().all(|bytes| Recogniser::from_bytes(bytes).is_ok()));
     let mut runner = TestRunner::new(ProptestConfig {
         failure_persistence: None,
         ..ProptestConfig::with_cases(crate::cases(150))
     });
     // Settings, names and lengths stand at the front, where most damage goes.
-    let place = prop_oneof![3 => 0..200_usize, 1 => 0..bytes.len()];
+    let place = prop_oneof![3 => 0..200_usize, 1 => 0..files[1].len()];
     let damage = proptest::collection::vec((place, any::<u8>()), 1..6);
     runner
         .run(&damage, |places| {
-            if let Ok(model) = Recogniser::from_bytes(&tampered(&bytes, &places)) {
-                let _ = model.recognise(&people[0].views);
+            for bytes in &files {
+                if let Ok(model) = Recogniser::from_bytes(&tampered(bytes, &places)) {
+                    let _ = model.recognise(&people[0].views);
+                }
             }
             Ok(())
         })

@@ -68,10 +68,11 @@ impl Method {
                     .with_classifier(classifier)
             }
         };
-        let [full, cut_out] = shipped::second_opinion()?;
-        // The thesis' grids see no boxes, and the thesis knows no unknown.
-        let second =
-            (self.pattern != Pattern::Thesis).then(|| Arc::new(if full_frames { full } else { cut_out }));
+        // The thesis knows no unknown.
+        let second = match self.pattern {
+            Pattern::Thesis => None,
+            _ => Some(Arc::new(shipped::second_opinion(full_frames)?)),
+        };
         let experiment = Experiment { second, ..experiment };
         Ok(if self.search { experiment } else { experiment.fixed() })
     }

@@ -43,13 +43,14 @@ pub const MODELS: &[Shipped] = &[
     },
 ];
 
-/// The recogniser of full frames, and that of cut-out silhouettes, that say beside a trained one what is unknown. Of those that come with the
-/// program it is the one that sees order, whatever the trained one sees: it knows strangers better.
+/// The recogniser that says beside one trained on full frames or cut-out silhouettes what is unknown. It is the one that sees order, whatever
+/// the trained one sees: it knows strangers better.
 ///
 /// # Errors
 /// As [`Shipped::recognisers`].
-pub fn second_opinion() -> Result<[Recogniser; 2]> {
-    MODELS[0].recognisers()
+pub fn second_opinion(full_frames: bool) -> Result<Recogniser> {
+    let [full, cut_out] = MODELS[0].recognisers()?;
+    Ok(if full_frames { full } else { cut_out })
 }
 
 /// What they were trained on and tested on, and where they fail.
