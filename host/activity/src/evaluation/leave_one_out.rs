@@ -72,7 +72,7 @@ pub enum EvaluationError {
     /// What is unknown has no limit.
     #[error(
         "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
-         with fewer nothing can be called unknown at a stated share of false alarms"
+         with fewer nothing can be called unknown at a stated share of false alarms; evaluate more people or clips"
     )]
     OpenSetClips {
         /// Clips taught when one of the activities is left out on one of the halves.

@@ -112,6 +112,7 @@ fn other_samples_can_be_learned_from_but_never_the_same_people() {
     fails(&mut evaluate(&one, &["--train", &people.samples]), 1, &["`p00`", "--leave-one-subject-out"]);
     fails(&mut evaluate(&one, &["--leave-one-subject-out"]), 1, &["at least 3 subjects", "1"]);
     fails(&mut evaluate(&one, &[]), 2, &["--leave-one-subject-out", "--train"]);
+    fails(&mut evaluate(&one, &["--open-set"]), 1, &["an open set needs at least 4 subjects", "1"]);
     let lame = people.only("lame.toml", |sample| !sample.contains("p02-dig-1/view2"));
     fails(
         &mut evaluate(&lame, &["--leave-one-subject-out", "--views", "fused"]),
