@@ -1,7 +1,7 @@
 //! The serial port that clients open: a pty.
 //!
 //! Bytes from the client travel on in whole frames, so that a frame reaches the board as one, however the
-//! operating system cut it.
+//! operating system cut it, and what the client writes at once travels at once: what comes a moment later finds the board elsewhere.
 
 use std::{
     io::{ErrorKind, Read, Write},
@@ -19,7 +19,7 @@ use serialport::{SerialPort, TTYPort};
 
 use crate::{command::Command, error::SimError};
 
-/// How long a read waits before it looks whether the port has been unplugged.
+/// How long a read waits before it looks whether the port has been unplugged, and whole frames for the rest of one behind them.
 const LOOK: Duration = Duration::from_millis(20);
 /// A client that reads nothing for this long loses bytes, as on a real serial line.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -64,8 +64,9 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Comman
     let mut cutter = FrameCutter::default();
     let mut bytes = [0; 4096];
     let mut rate = None;
+    let mut frames = Vec::new();
     while !unplugged.load(Ordering::Relaxed) {
-        match port.read(&mut bytes) {
+        let rest_may_come = match port.read(&mut bytes) {
             Ok(count) => {
                 // What a pseudo-terminal's client sets its rate to can be read at this end.
                 let now = port.baud_rate().ok();
@@ -73,14 +74,17 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Comman
                     return;
                 }
                 rate = now;
-                for frame in cutter.cut(&bytes[..count]) {
-                    if !from_client(Command::Bytes(frame)) {
-                        return;
-                    }
-                }
+                frames.extend(cutter.cut(&bytes[..count]).concat());
+                cutter.is_within_frame()
             }
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
-            Err(_) => thread::sleep(LOOK),
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => false,
+            Err(_) => {
+                thread::sleep(LOOK);
+                false
+            }
+        };
+        if !frames.is_empty() && !rest_may_come && !from_client(Command::Bytes(std::mem::take(&mut frames))) {
+            return;
         }
     }
 }
@@ -122,11 +126,45 @@ impl FrameCutter {
         }
         frames
     }
+
+    /// Whether a frame has begun that has not ended.
+    fn is_within_frame(&self) -> bool {
+        self.run > 0 && !self.piece.is_empty()
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::channel;
+
     use super::*;
+
+    #[test]
+    fn what_a_client_writes_at_once_travels_at_once_however_the_system_cuts_it() {
+        let (mut client, mut port) = TTYPort::pair().expect("a pty");
+        port.set_timeout(LOOK).expect("a timeout");
+        let (heard, commands) = channel();
+        let unplugged = Arc::new(AtomicBool::new(false));
+        let seen = unplugged.clone();
+        let reader = thread::spawn(move || read(&mut port, &seen, &|command| heard.send(command).is_ok()));
+        for parts in [&[[1, 2, 0, 3, 4, 0].as_slice()][..], &[&[1, 2, 0, 3], &[4, 0]]] {
+            for part in parts {
+                client.write_all(part).expect("room");
+                thread::sleep(LOOK / 10); // the operating system's pause within a write
+            }
+            let bytes = commands.iter().find_map(|command| match command {
+                Command::Bytes(bytes) => Some(bytes),
+                _ => None,
+            });
+            assert_eq!(bytes, Some(vec![1, 2, 0, 3, 4, 0]));
+        }
+        // A frame that never ends holds up no other for long.
+        client.write_all(&[5, 6, 0, 7]).expect("room");
+        let first = commands.recv_timeout(10 * LOOK);
+        assert!(matches!(first, Ok(Command::Bytes(bytes)) if bytes == [5, 6, 0]));
+        unplugged.store(true, Ordering::Relaxed);
+        reader.join().expect("an orderly end");
+    }
 
     #[test]
     fn frames_stay_whole_and_garbage_passes() {
