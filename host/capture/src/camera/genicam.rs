@@ -150,12 +150,19 @@ impl GenicamCamera {
     }
 
     fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
-        // Aravis takes the number of channels, where nobody tells it, for none.
-        let silent = [DeviceError::Timeout, DeviceError::NoStreamChannel];
-        move |error| match self.lost.load(Ordering::Relaxed) || silent.iter().any(|of| error.matches(*of)) {
-            true => self.gone(),
-            false => unusable(&self.id, error.to_string()),
+        move |error| {
+            let silent = self.lost.load(Ordering::Relaxed) || error.matches(DeviceError::Timeout);
+            // Of a camera that is silent Aravis says, too, that it has no channel, or packets of 0 bytes: so it is asked once more.
+            match silent || !self.answers() {
+                true => self.gone(),
+                false => unusable(&self.id, error.to_string()),
+            }
         }
+    }
+
+    /// Whether its first register, the version of its standard (GigE Vision and USB3 Vision alike), can be read; some seconds where not.
+    fn answers(&self) -> bool {
+        self.camera.device().is_some_and(|device| device.read_register(0).is_ok())
     }
 
     fn gone(&self) -> CameraError {

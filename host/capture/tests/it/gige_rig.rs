@@ -17,7 +17,7 @@ use farnear_capture::{
     pair::{CaptureError, Exposures, Pair, capture_pair, reach},
     plan::SensorPair,
 };
-use farnear_protocol::units::Micros;
+use farnear_protocol::{message::TriggerMode, units::Micros};
 
 /// Far and near focus of the emulated rig's usual lens.
 const SENSOR: SensorPair = SensorPair { far_mm: 52.831_257, near_mm: 52.987_52 };
@@ -136,6 +136,27 @@ fn a_rig_killed_in_mid_capture_is_said_and_the_next_one_works() {
     let rig = Rig::start(6, &[]);
     let mut camera = rig.gige();
     pair(&rig.client(), &mut camera).unwrap();
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_camera_that_falls_silent_while_it_is_armed_is_gone() {
+    for instant in [150_000, 153_300].map(Duration::from_micros) {
+        let mut rig = Rig::start(6, &[]);
+        let mut camera = rig.gige();
+        let arming = std::thread::spawn(move || {
+            loop {
+                if let Err(error) = camera.arm(TriggerMode::Hardware, Micros(5_000)) {
+                    return error;
+                }
+            }
+        });
+        // Arming takes some 60 ms; whatever it is about when it is told nothing more, the answer is the same.
+        std::thread::sleep(instant);
+        rig.child.kill().unwrap();
+        let error = arming.join().unwrap();
+        assert!(matches!(error, CameraError::Gone { .. }), "{error}");
+    }
 }
 
 #[test]
