@@ -1,4 +1,4 @@
-//! The control loop's clockwork: a tick every 200 us, how long each took, and a LED. What a tick does is
+//! The control loop's clockwork: a tick every 200 us, every 2 ms at rest, how long each took, and a LED. What a tick does is
 //! [`farnear_rig::control`]'s.
 
 use cortex_m::peripheral::DWT;
@@ -8,7 +8,7 @@ use embassy_stm32::{
     gpio::{Level, Output, Speed},
     peripherals::PB0,
 };
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Duration, Instant, Timer};
 use farnear_rig::{
     Rig,
     control::Control,
@@ -29,16 +29,19 @@ pub async fn run(mut board: Nucleo, rig: &mut Rig, led: Peri<'static, PB0>) -> !
     let mut control = Control::new(rig);
     board.wake_watchdog();
     let mut blink = BLINK;
-    let mut ticker = Ticker::every(Duration::from_micros(u64::from(TICK_US)));
+    let mut due = Instant::now();
+    let mut ticks = 1;
     loop {
-        ticker.next().await;
+        // What comes late is made up for: the next tick is due when it would have been.
+        due += Duration::from_micros(u64::from(ticks * TICK_US));
+        Timer::at(due).await;
         let begin = DWT::cycle_count();
-        control.tick(&mut board);
-        blink -= 1;
+        blink = blink.saturating_sub(ticks);
         if blink == 0 {
             led.toggle();
             blink = BLINK;
         }
+        ticks = control.tick(&mut board);
         let cycles = DWT::cycle_count().wrapping_sub(begin);
         if registers::note_tick(cycles) && cycles > LONG_TICK_CYCLES {
             warn!("the longest tick so far: {} cycles", cycles);

@@ -96,6 +96,11 @@ impl Camera {
         self.order.take()
     }
 
+    /// Whether no exposure is ordered or awaited.
+    pub(crate) const fn is_idle(&self) -> bool {
+        self.pending.is_none() && self.order.is_none()
+    }
+
     /// Whether the board is to report exposures that come without a trigger.
     pub(crate) fn is_listening(&self) -> bool {
         self.pending.is_some_and(|pending| pending.awaited != Awaited::Triggered)

@@ -15,6 +15,9 @@
 //!    which the memory was written, or a frame came to its end, this waits for the next.
 //! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
 //!
+//! A rig at which nothing moves and to which nobody has spoken for [`QUIET_TICKS`] rests: then only every [`REST_TICKS`]th tick is
+//! carried out, for a processor that sleeps warms no optics. The first byte, switch, alarm or step off the piezo's target ends it.
+//!
 //! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
 
 use farnear_protocol::frame::{Header, Kind, delimited, encode};
@@ -22,12 +25,14 @@ use farnear_protocol::message::LinkRate;
 use farnear_protocol::{BoardMicros, Log, Micros, PROTOCOL_CURRENT};
 
 use crate::Rig;
-use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, StrobeEdges};
+use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, REST_TICKS, StrobeEdges, TICK_HZ};
 use crate::motion::since;
 pub use crate::notes::Note;
 
 /// Answers and events after which the log has a turn.
 const FRAMES_BEFORE_LOG: u8 = 8;
+/// Ticks without a byte, a frame or a request after which the rig may rest: 20 ms. A host that asks more often is answered at once.
+pub const QUIET_TICKS: u32 = TICK_HZ / 50;
 /// A reset waits so long for the last frame: the longest takes 1.3 ms on the wire, and one may wait before it.
 pub const LAST_FRAME: Micros = Micros(10_000);
 
@@ -103,22 +108,29 @@ pub struct Control<'r> {
     frames_before_log: u8,
     /// What is to be done for the host was put off in the tick before.
     put_off: bool,
+    /// Ticks since something was heard, said or done.
+    quiet_ticks: u32,
 }
 
 impl<'r> Control<'r> {
     /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
-        Self { rig, dry: false, leaving: None, frames_before_log: 0, put_off: false }
+        Self { rig, dry: false, leaving: None, frames_before_log: 0, put_off: false, quiet_ticks: 0 }
     }
 
-    /// One tick.
-    pub fn tick(&mut self, board: &mut impl Board) {
+    /// One tick; gives after how many ticks' time the next is due.
+    pub fn tick(&mut self, board: &mut impl Board) -> u32 {
         if let Some(since) = self.leaving {
-            return leave(board, since);
+            leave(board, since);
+            return 1;
         }
         board.sample_gauge();
         let frames = self.rig.frames_received();
-        let link_overflow = board.receive(|byte| self.rig.receive(byte));
+        let mut heard = false;
+        let link_overflow = board.receive(|byte| {
+            heard = true;
+            self.rig.receive(byte);
+        });
         let frame_came = self.rig.frames_received() != frames;
         let gauge_code = board.gauge();
         let inputs = read(board, gauge_code, link_overflow);
@@ -137,16 +149,17 @@ impl<'r> Control<'r> {
         // Frames without a pause put it off by a tick at most; the memory's writes leave a tick out by themselves.
         let has_time = outputs.memory.is_none() && (!frame_came || self.put_off);
         self.put_off = !has_time;
-        if has_time && !self.speak(board) {
-            self.rig.serve(inputs.now);
-        }
+        let acted = !has_time || self.speak(board) || self.rig.serve(inputs.now);
         if outputs.reset {
             board.note(Note::Reset);
             let now = board.now();
             self.leaving = Some(now);
-            return leave(board, now);
+            leave(board, now);
+            return 1;
         }
         board.feed_watchdog();
+        self.quiet_ticks = if heard || acted { 0 } else { self.quiet_ticks.saturating_add(1) };
+        if self.quiet_ticks >= QUIET_TICKS && self.rig.rest() { REST_TICKS } else { 1 }
     }
 
     fn tell_of_dry_queues(&mut self, board: &mut impl Board, inputs: &Inputs) {

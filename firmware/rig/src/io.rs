@@ -28,6 +28,8 @@ use heapless::Vec;
 pub const TICK_HZ: u32 = 5_000;
 /// Microseconds between control ticks.
 pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
+/// Of a rig at rest only every tenth tick is carried out: 2 ms, in which the link brings less than half of what a board's ring holds.
+pub const REST_TICKS: u32 = 10;
 
 /// Clock of the step timer: the advanced timer's 168 MHz divided by 4, so that a period of 1 ms fits 16 bits and
 /// 40 kHz is exactly 1050 ticks.

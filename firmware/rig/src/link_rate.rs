@@ -35,6 +35,11 @@ impl LinkSpeed {
         Self { now: LinkRate::START, change: Change::None }
     }
 
+    /// Whether no change is under way.
+    pub(crate) const fn is_settled(&self) -> bool {
+        matches!(self.change, Change::None)
+    }
+
     /// Takes a request on. It came in at the present rate, which is a good one then.
     pub(crate) fn ask(&mut self, to: LinkRate, at: BoardMicros) {
         self.change = if to == self.now { Change::None } else { Change::Asked { to, at } };

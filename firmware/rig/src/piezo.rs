@@ -13,6 +13,9 @@
 //! for a stack that is let go at once swings into tension. If the gauge fails, the command is held and the loop opens until
 //! the next move.
 //!
+//! A piezo that has stood at its target for a second is at ease: then it is enough to look rarely, for creep is all that moves it. The
+//! model of the resonance knows control ticks only, so after a rest the gauge corrects disturbance and drift alone, slowly.
+//!
 //! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64; saturating, so no input can wrap it. Cost: about 35
 //! multiplications a tick.
 
@@ -30,6 +33,12 @@ use crate::shaper::Shaper;
 const AT_REST: Nanometres = Nanometres(100);
 /// For so long: one that swings through is on its way. A fifth of the resonance's period.
 const NEAR_TICKS: u16 = 5;
+/// Ticks near the target after which it is at ease.
+const EASE_TICKS: u16 = TICK_HZ as u16;
+/// Shares, as shifts, of what it is off after a rest that are disturbance and drift in a control tick: critically damped, with 64 rests (0.13 s) as
+/// time constant. At the resonance, of a Q of 30, the loop's gain is a half.
+const EASE_DISTURBANCE: u32 = 5;
+const EASE_DRIFT: u32 = 15;
 /// Ticks of the way down at the start, and the codes (3 um) below which it is none.
 const RELAX: u32 = TICK_HZ / 10;
 const RELAXED: u16 = 1_000;
@@ -50,6 +59,53 @@ struct Loop {
     state: State,
     /// The shaped set-point of the tick before.
     reference_before: i32,
+    trend: Trend,
+}
+
+impl Loop {
+    /// Believes that it stands at its target, after so many ticks; what the gauge says beside that is disturbance.
+    fn correct_after_rest(&mut self, measured: i32, target: i32, ticks: u32) {
+        let off = i64::from(measured.saturating_sub(target)) << Trend::BITS;
+        let (mut disturbance, mut drift) = self.trend.now();
+        drift += off >> EASE_DRIFT;
+        disturbance += drift * i64::from(ticks) + (off >> EASE_DISTURBANCE);
+        self.trend = Trend::new(disturbance, drift);
+        let fixed =
+            |value: i64| (value >> Trend::BITS).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+        (self.model, self.state) = ([target, 0], [target, 0, fixed(disturbance), fixed(drift)]);
+        self.reference_before = target;
+    }
+}
+
+/// Where the disturbance is, and where it goes. The observer's own follow the gauge's noise from tick to tick; over a rest goes on what two
+/// means say, of 128 and of 1,024 ticks, of which a ramp is behind by as many ticks' drift.
+#[derive(Clone, Copy, Debug)]
+struct Trend {
+    /// With [`Self::BITS`] more.
+    short: i64,
+    long: i64,
+}
+
+impl Trend {
+    const BITS: u32 = 16;
+    const SHORT: u32 = 7;
+    const LONG: u32 = 10;
+
+    /// A disturbance and its drift a tick, with [`Self::BITS`] more.
+    const fn new(disturbance: i64, drift: i64) -> Self {
+        Self { short: disturbance - (drift << Self::SHORT), long: disturbance - (drift << Self::LONG) }
+    }
+
+    const fn push(&mut self, disturbance: i32) {
+        let disturbance = (disturbance as i64) << Self::BITS;
+        self.short += (disturbance - self.short) >> Self::SHORT;
+        self.long += (disturbance - self.long) >> Self::LONG;
+    }
+
+    const fn now(self) -> (i64, i64) {
+        let drift = (self.short - self.long) / ((1 << Self::LONG) - (1 << Self::SHORT));
+        (self.short + (drift << Self::SHORT), drift)
+    }
 }
 
 /// How the piezo comes to rest after a start.
@@ -86,6 +142,8 @@ pub(crate) struct Piezo {
     driven: bool,
     /// Ticks for which it has been near its target.
     near_ticks: u16,
+    /// Control ticks since the one before: more than one after a rest.
+    passed: u32,
 }
 
 impl Piezo {
@@ -106,7 +164,20 @@ impl Piezo {
             failed: false,
             driven: false,
             near_ticks: 0,
+            passed: 1,
         }
+    }
+
+    /// So many control ticks' time after the tick before comes the one that follows.
+    pub(crate) const fn after(&mut self, ticks: u32) {
+        self.passed = ticks;
+    }
+
+    /// Whether it is enough to look rarely: it stands where it was sent for long, or nobody leads it, and the gauge speaks.
+    pub(crate) fn is_at_ease(&self) -> bool {
+        let led = self.control.is_some() || self.closing || self.driven;
+        let stands = self.arrived() && self.near_ticks >= EASE_TICKS;
+        self.start == Start::Over && self.gauge_fresh() && (stands || !led)
     }
 
     /// What the gauge says; the last believable value where it says nothing.
@@ -187,11 +258,13 @@ impl Piezo {
     /// Closes the loop without a jump: standing still, and what the command does not explain is disturbance.
     fn close(&mut self) {
         let here = fixed(self.measured);
+        let disturbance = here.saturating_sub(self.command).saturating_sub(self.lag.offset());
         self.control = Some(Loop {
             shaper: Shaper::at(here),
             model: [here, 0],
-            state: [here, 0, here.saturating_sub(self.command).saturating_sub(self.lag.offset()), 0],
+            state: [here, 0, disturbance, 0],
             reference_before: here,
+            trend: Trend::new(i64::from(disturbance) << Trend::BITS, 0),
         });
         (self.closing, self.start) = (false, Start::Over);
     }
@@ -217,6 +290,7 @@ impl Piezo {
         };
         self.gauge_missing_ticks = 0;
         self.measured = self.gauge.position(code as i32 - GAUGE_CODE_ZERO as i32);
+        let rested = self.passed > 1;
         let off = self.target.0.saturating_sub(self.measured.0).saturating_abs();
         self.near_ticks = if off > AT_REST.0 { 0 } else { self.near_ticks.saturating_add(1) };
         if self.start == Start::Unknown {
@@ -226,10 +300,14 @@ impl Piezo {
             return self.close();
         }
         if let Some(control) = &mut self.control {
+            if rested {
+                return control.correct_after_rest(fixed(self.measured), fixed(self.target), self.passed);
+            }
             let surprise = fixed(self.measured).saturating_sub(control.state[0]);
             for (state, gain) in control.state.iter_mut().zip(self.settings.gains.observer) {
                 *state = state.saturating_add(sum([(gain, surprise)]));
             }
+            control.trend.push(control.state[2]);
         }
     }
 
@@ -259,6 +337,9 @@ impl Piezo {
 
     /// The DAC's code of this tick; `None` as long as nobody knows where the piezo stands.
     pub(crate) fn act(&mut self) -> Option<u16> {
+        // What was played during the rest.
+        (1..self.passed).for_each(|_| self.lag.push(self.command));
+        self.passed = 1;
         let gains = &self.settings.gains;
         if let Some(control) = &mut self.control {
             let reference = control.shaper.push(&gains.shaper, fixed(self.target));

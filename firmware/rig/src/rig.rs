@@ -65,6 +65,8 @@ pub struct Rig {
     pub(crate) supply_low: bool,
     /// The memory was written in the tick before.
     wrote: bool,
+    /// The tick before was followed by a rest.
+    rested: bool,
     untold: Option<Untold>,
 }
 
@@ -128,6 +130,7 @@ impl Rig {
             emergency_stop: false,
             supply_low: false,
             wrote: false,
+            rested: false,
             untold: Some(Untold { found: memory.map(record::find_all), in_motion }),
         }
     }
@@ -301,7 +304,7 @@ impl Rig {
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
         // First: an open circuit has cut the pulses, which is no fault of the step timers then.
         self.watch_inputs(inputs);
-        self.stage.sense(inputs);
+        self.stage.sense(inputs, core::mem::take(&mut self.rested));
         let stage = &self.stage;
         self.notes.look(|axis| stage.state(axis));
         self.camera.sense(inputs);
@@ -320,6 +323,15 @@ impl Rig {
         self.stage.act(inputs, &mut outputs);
         outputs.memory = self.write();
         outputs
+    }
+
+    /// Whether the next tick may come after a rest, [`crate::io::REST_TICKS`]; that is reckoned with then. Nothing is under way, nothing waits to
+    /// be said or written, and all that is watched has said the same for long.
+    pub(crate) fn rest(&mut self) -> bool {
+        let said = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
+        let idle = self.works.any().is_none() && self.reboot.is_none() && self.camera.is_idle();
+        self.rested = said && idle && self.store.is_idle() && !self.supply_low && self.stage.is_at_ease();
+        self.rested
     }
 
     /// Looks for what must stop the rig in what the board reads.

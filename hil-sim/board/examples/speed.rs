@@ -1,4 +1,5 @@
-//! How fast the emulated rig is: board seconds per CPU second, idle, with two motors moving, and taking captures.
+//! How fast the emulated rig is: board seconds per CPU second, idle, with two motors moving, taking captures, and idle with the piezo
+//! held where the last exposure was.
 //!
 //! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` (after `cargo xtask firmware`). CPU time, not the
 //! wall clock, so that other work on the machine hardly shows; Linux only.
@@ -103,5 +104,6 @@ fn main() -> Result<(), SimError> {
         host.settle()
     })?;
     host.measure("moves", moves)?;
-    host.measure("captures", captures)
+    host.measure("captures", captures)?;
+    host.measure("held", |host| host.rig.advance_us(10_000_000).map(|_| ()))
 }

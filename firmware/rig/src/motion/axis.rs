@@ -178,6 +178,11 @@ impl Stepper {
         matches!(self.motion, Motion::Still)
     }
 
+    /// Whether it stands, and its switches say what is believed.
+    pub(crate) const fn is_at_ease(&self) -> bool {
+        self.is_still() && self.home_switch.is_steady() && self.far_switch.is_steady()
+    }
+
     /// Why the last motion ended early; given once.
     pub(crate) const fn take_fault(&mut self) -> Option<Failure> {
         self.fault.take()

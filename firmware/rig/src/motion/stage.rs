@@ -3,7 +3,7 @@
 use farnear_protocol::message::{Axis, AxisStatus, PositionState};
 use farnear_protocol::{BoardMicros, Nanometres};
 
-use crate::io::{Inputs, Outputs, TICK_US};
+use crate::io::{Inputs, Outputs, REST_TICKS, TICK_US};
 use crate::motion::axis::Stepper;
 use crate::motion::since;
 use crate::piezo::Piezo;
@@ -38,8 +38,8 @@ impl Stage {
         self.fine.apply(settings.fine);
     }
 
-    /// Reads the board.
-    pub(crate) fn sense(&mut self, inputs: &Inputs) {
+    /// Reads the board, after a rest or not.
+    pub(crate) fn sense(&mut self, inputs: &Inputs, rested: bool) {
         self.coarse.sense(&inputs.coarse);
         self.lens.sense(&inputs.lens);
         // Ticks that catch up after a long calculation follow each other faster than the loop's model of the piezo knows.
@@ -47,6 +47,7 @@ impl Stage {
         self.on_time = since >= TICK_US / 2;
         if self.on_time {
             self.looped = Some(inputs.now);
+            self.fine.after(if rested { REST_TICKS } else { 1 });
             self.fine.sense(inputs.gauge_code);
         }
     }
@@ -140,6 +141,11 @@ impl Stage {
     /// Whether no pulse comes any more on an axis.
     pub(crate) fn is_still(&self, axis: Axis) -> bool {
         self.stepper(axis).is_none_or(Stepper::is_still)
+    }
+
+    /// Whether it is enough to look rarely.
+    pub(crate) fn is_at_ease(&self) -> bool {
+        self.coarse.is_at_ease() && self.lens.is_at_ease() && self.fine.is_at_ease()
     }
 
     /// Whether no pulse comes any more.

@@ -2,6 +2,7 @@
 //! latency.
 
 use super::*;
+use crate::io::REST_TICKS;
 use crate::piezo::plant::{NOMINAL, Part, Plant};
 use crate::settings::Settings;
 
@@ -93,6 +94,65 @@ fn holding_turns_3_nm_of_gauge_noise_into_less_than_10_nm_of_motion() {
     }
     let rms = (squares / 10_000.0).sqrt();
     assert!(rms < 10.0 && worst < 50.0, "{rms} nm RMS, {worst} nm at worst");
+}
+
+/// Looks at the piezo for so long, rarely where that is enough; gives how far it was off at worst, and the share of control ticks that
+/// was carried out.
+fn look(piezo: &mut Piezo, plant: &mut Plant, seconds: u32) -> (f64, f64) {
+    let (mut worst, mut looks, mut tick) = (0f64, 0, 0);
+    while tick < seconds * TICK_HZ {
+        let ticks = if piezo.is_at_ease() { REST_TICKS } else { 1 };
+        for _ in 1..ticks {
+            plant.tick(None);
+            worst = worst.max((plant.position - f64::from(piezo.target().0)).abs());
+        }
+        tick += ticks;
+        looks += 1;
+        piezo.after(ticks);
+        piezo.sense(plant.gauge());
+        plant.tick(piezo.act());
+        worst = worst.max((plant.position - f64::from(piezo.target().0)).abs());
+    }
+    (worst, f64::from(looks) / f64::from(seconds * TICK_HZ))
+}
+
+#[test]
+fn at_ease_it_is_held_as_well_by_a_tenth_of_the_ticks_whatever_the_part_is_like() {
+    let worst = Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL };
+    let calibrated =
+        FineSettings { hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000, ..Settings::DEFAULT.fine };
+    for resonance_hz in [190.0, 200.0, 210.0, 250.0] {
+        for settings in [Settings::DEFAULT.fine, calibrated] {
+            let mut piezo = Piezo::new(settings);
+            let mut plant = Plant::new(Part { resonance_hz, ..worst }, 3);
+            for target in [176_270, 20_000, 100_000] {
+                step(&mut piezo, &mut plant, target);
+                let (off, share) = look(&mut piezo, &mut plant, 10);
+                // A second of all ticks, then nine of every tenth.
+                assert!(off < 100.0, "{off} nm off {target} at {resonance_hz} Hz");
+                assert!(share < 0.25, "{share} of the ticks");
+                // And the next move is as good as ever: 16 ms where it was never calibrated.
+                let (ticks, _) = step(&mut piezo, &mut plant, target / 2);
+                assert!(ticks <= 80, "{ticks} ticks from {target}");
+            }
+        }
+    }
+}
+
+#[test]
+fn who_is_pushed_off_at_ease_is_led_back_by_all_ticks() {
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    let mut plant = Plant::new(NOMINAL, 1);
+    step(&mut piezo, &mut plant, 100_000);
+    look(&mut piezo, &mut plant, 2);
+    assert!(piezo.is_at_ease());
+    plant.position += 400.0;
+    piezo.after(REST_TICKS);
+    piezo.sense(plant.gauge());
+    assert!(!piezo.is_at_ease());
+    plant.tick(piezo.act());
+    let (_, share) = look(&mut piezo, &mut plant, 1);
+    assert!(share > 0.9 && (plant.position - 100e3).abs() < 50.0, "{share}, {} nm", plant.position);
 }
 
 #[test]

@@ -10,8 +10,8 @@ use farnear_protocol::message::{
 };
 use farnear_protocol::{BoardMicros, Event, Log, Request};
 use farnear_rig::Rig;
-use farnear_rig::control::{Control, LAST_FRAME, Note};
-use farnear_rig::io::TICK_US;
+use farnear_rig::control::{Control, LAST_FRAME, Note, QUIET_TICKS};
+use farnear_rig::io::{REST_TICKS, TICK_US};
 use farnear_rig::settings::Settings;
 
 use self::fake::{Call, Fake};
@@ -57,9 +57,15 @@ fn events(fake: &Fake) -> Vec<EventKind> {
 
 fn run(control: &mut Control<'_>, fake: &mut Fake, ticks: usize) {
     for _ in 0..ticks {
-        control.tick(fake);
-        fake.pass();
+        tick(control, fake);
     }
+}
+
+/// A tick, and the time until the next; gives it in ticks.
+fn tick(control: &mut Control<'_>, fake: &mut Fake) -> u32 {
+    let due = control.tick(fake);
+    (0..due).for_each(|_| fake.pass());
+    due
 }
 
 #[test]
@@ -123,6 +129,53 @@ fn a_circuit_that_opens_between_two_readings_is_not_told_as_a_late_step() {
             assert_eq!(alarms, [Alarm::EmergencyStop], "{moment:?} in tick {ticks}");
         }
     }
+}
+
+#[test]
+fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    fake.ask(&Request::Status);
+    let awake = |control: &mut Control<'_>, fake: &mut Fake| {
+        let woken = fake.now;
+        while tick(control, fake) == 1 {
+            assert!(fake.now - woken < 10_000_000, "it never rests");
+        }
+        fake.now - woken
+    };
+    let quiet = u64::from(QUIET_TICKS * TICK_US);
+    assert!(awake(&mut control, &mut fake) >= quiet);
+    run(&mut control, &mut fake, 9);
+    assert!((0..100).all(|_| tick(&mut control, &mut fake) == REST_TICKS));
+    // Noise is no request, but who makes it may be about to speak.
+    fake.hear(&[1, 0]);
+    assert!(awake(&mut control, &mut fake) >= quiet);
+    // A request is answered without another rest.
+    let (asked, sent) = (fake.now, fake.sent.len());
+    fake.ask(&Request::Status);
+    while fake.sent.len() == sent {
+        assert_eq!(tick(&mut control, &mut fake), 1);
+    }
+    assert!(fake.now - asked < 2_000, "{} us", fake.now - asked);
+    awake(&mut control, &mut fake);
+    // A motion, and a while after it.
+    fake.ask(&bench::home(Axis::SensorCoarse));
+    let homing = awake(&mut control, &mut fake);
+    assert!(matches!(events(&fake).last(), Some(EventKind::Homed { axis: Axis::SensorCoarse, .. })));
+    assert!(homing > 100_000, "{homing} us");
+    // An emergency stop is told one rest later at most, its motors stood still.
+    let (pressed, heard) = (fake.now, events(&fake).len());
+    fake.hardware.open_circuit();
+    while events(&fake).len() == heard {
+        tick(&mut control, &mut fake);
+    }
+    let rest = u64::from((REST_TICKS + 2) * TICK_US);
+    assert!(fake.now - pressed <= rest, "{} us", fake.now - pressed);
+    // A supply that sinks is looked at all the time.
+    assert!(awake(&mut control, &mut fake) >= quiet);
+    fake.hardware.faults.supply_low = true;
+    tick(&mut control, &mut fake);
+    assert!((0..1_000).all(|_| tick(&mut control, &mut fake) == 1));
 }
 
 #[test]

@@ -70,8 +70,8 @@ fn an_adapter_that_keeps_what_it_hears_delays_answers_and_loses_none() {
             waited_us += 200;
             assert!(waited_us < 100_000, "no answer");
         }
-        // The answer's first byte comes within 2 ms; it waits 16 ms, or what was left of them for the log before it.
-        assert!(waited_us <= 18_200, "{waited_us} us");
+        // The answer's first byte comes within 4 ms, of which the board rests 2; it waits 16 ms, or what was left of them for the log before it.
+        assert!(waited_us <= 20_200, "{waited_us} us");
         assert!(waited_us >= 1_000, "{waited_us} us");
         bench.rig.advance_us(40_000).expect("the rig runs");
     }
