@@ -1,5 +1,5 @@
-//! How fast the emulated rig is: board seconds per CPU second, idle, with two motors moving, taking captures, and idle with the piezo
-//! held where the last exposure was.
+//! How fast the emulated rig is: board seconds per CPU second, idle, with two motors moving, taking captures, and idle with the
+//! piezo held where the last exposure was. Cold: with the translation of what runs for the first time.
 //!
 //! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` (after `cargo xtask firmware`). CPU time, not the
 //! wall clock, so that other work on the machine hardly shows; Linux only.
@@ -40,7 +40,7 @@ impl Host {
         let (cpu, board_ns) = (cpu().saturating_sub(begin), self.rig.report()?.now_ns - begin_ns);
         let board = Duration::from_nanos(board_ns);
         println!(
-            "{what:10} {:7.2} s of the board in {:6.2} s of CPU: {:.2}",
+            "{what:12} {:7.2} s of the board in {:6.2} s of CPU: {:.2}",
             board.as_secs_f64(),
             cpu.as_secs_f64(),
             board.as_secs_f64() / cpu.as_secs_f64()
@@ -103,6 +103,7 @@ fn main() -> Result<(), SimError> {
         }
         host.settle()
     })?;
+    host.measure("moves, cold", moves)?;
     host.measure("moves", moves)?;
     host.measure("captures", captures)?;
     host.measure("held", |host| host.rig.advance_us(10_000_000).map(|_| ()))
