@@ -1,11 +1,15 @@
-//! What some tests need and not every machine has: real data (photographs, motion capture, video), kept beside the
+//! What tests share: damaged texts ([`damaged`]), and what some need and not every machine has: real data (photographs, motion capture, video), kept beside the
 //! repository and not in it, and the emulated rig.
 //!
 //! A test that needs them is counted as skipped where they are missing. Its crate's build script calls [`declare`],
 //! which sets the configuration `shared_data` where the data are; the test bears
 //! `#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]` and finds its files by [`path`].
 
+mod damage;
+
 use std::path::{Path, PathBuf};
+
+pub use damage::damaged;
 
 /// The folder of the data, whether it is there or not.
 fn folder() -> PathBuf {

@@ -2,51 +2,16 @@
 
 use std::{cell::RefCell, fs, path::Path};
 
+use farnear_test_data::damaged;
 use farnear_workflows::{
     Context,
     activity::samples::Samples,
     batch::{self, BatchSettings, JobReport, Shard},
 };
 use image::{GrayImage, Luma};
-use proptest::{prelude::*, sample::Index};
+use proptest::prelude::*;
 
 use crate::cases;
-
-/// Words that readers stumble over.
-const WORDS: [&str; 19] = [
-    "",
-    "-1",
-    "0",
-    "1e999",
-    "nan",
-    "4294967296",
-    "18446744073709551615",
-    "\"",
-    "\"\"",
-    "'",
-    "[",
-    "]]",
-    "[[sample]]",
-    "[[job]]",
-    "=",
-    "\n",
-    ",",
-    "\0",
-    "é",
-];
-
-/// A text in which some words gave way to others, or lines were lost.
-fn damaged(text: &str, words: &[(Index, Index)], lost: Option<Index>) -> String {
-    let mut split: Vec<&str> = text.split_inclusive([' ', '\n', ',', '"']).collect();
-    for (place, word) in words {
-        let place = place.index(split.len());
-        split[place] = WORDS[word.index(WORDS.len())];
-    }
-    if let Some(lost) = lost {
-        split.truncate(lost.index(split.len()));
-    }
-    split.concat()
-}
 
 const SAMPLES: &str = r#"[[sample]]
 masks = "a"
@@ -134,8 +99,8 @@ proptest! {
 
     #[test]
     fn damaged_samples_are_read_or_refused(
-        words in proptest::collection::vec((any::<Index>(), any::<Index>()), 0..5),
-        lost in proptest::option::of(any::<Index>()),
+        words in proptest::collection::vec((any::<usize>(), any::<usize>()), 0..5),
+        lost in proptest::option::of(any::<usize>()),
     ) {
         let text = damaged(SAMPLES, &words, lost);
         let read = FOLDER.with_borrow(|root| {
@@ -154,8 +119,8 @@ proptest! {
 
     #[test]
     fn damaged_lists_of_jobs_are_gone_through_or_refused(
-        words in proptest::collection::vec((any::<Index>(), any::<Index>()), 0..5),
-        lost in proptest::option::of(any::<Index>()),
+        words in proptest::collection::vec((any::<usize>(), any::<usize>()), 0..5),
+        lost in proptest::option::of(any::<usize>()),
     ) {
         for (name, text) in [("jobs.toml", JOBS), ("jobs.csv", JOBS_CSV)] {
             let text = damaged(text, &words, lost);
