@@ -1,7 +1,7 @@
 //! # farnear-nucleo-f429zi
 //!
 //! The firmware on a NUCLEO-F429ZI. Thin on purpose: what the board does lives in `farnear-rig`; here are
-//! clocks, pins and registers. One file per driver; [`board`] joins them, and [`control`] ticks 5000 times a second.
+//! clocks, pins and registers. One file per driver; [`board`] joins them, and [`control`] ticks 5000 times a second, 500 times at rest.
 //!
 //! | pin | function | signal |
 //! |---|---|---|
