@@ -226,9 +226,11 @@ pub fn encode_tiff(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeE
 
 #[cfg(test)]
 mod tests {
+    use std::sync::LazyLock;
+
     use super::*;
     use ndarray::array;
-    use proptest::prelude::*;
+    use proptest::{prelude::*, sample::Index};
 
     #[test]
     fn pgm_and_colour_are_read() {
@@ -298,5 +300,57 @@ mod tests {
             let bytes = [heads[kind], &tail].concat();
             let _ = decode_grey(&bytes);
         }
+
+        /// The same of real ones of which some bytes are others, or of which the end is lost: these are read beyond their first lines.
+        #[test]
+        fn damaged_pictures_are_read_or_refused(
+            which in any::<Index>(),
+            hits in proptest::collection::vec((any::<Index>(), any::<u8>()), 1..6),
+            lost in proptest::option::of(any::<Index>()),
+        ) {
+            let mut bytes = which.get(&PICTURES).clone();
+            for (place, byte) in hits {
+                *place.get_mut(&mut bytes) = byte;
+            }
+            if let Some(lost) = lost {
+                bytes.truncate(lost.index(bytes.len()));
+            }
+            if let Ok(image) = decode_grey(&bytes) {
+                prop_assert!(image.pixels.iter().all(|value| image.samples == Samples::Float || (0.0..=1.0).contains(value)));
+            }
+        }
     }
+
+    /// One of each kind that is read, 7 x 5 pixels.
+    static PICTURES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+        use image::{ImageFormat, Luma, Rgb, RgbImage, codecs::jpeg::JpegEncoder};
+        use tiff::encoder::{Compression, colortype};
+        let pixels = Array2::from_shape_fn((5, 7), |(row, column)| (500 * row + 70 * column) as u16);
+        let colour = RgbImage::from_fn(7, 5, |x, y| Rgb([30 * x as u8, 40 * y as u8, 99]));
+        let grey = image::GrayImage::from_fn(7, 5, |x, y| Luma([30 * x as u8 + y as u8]));
+        let mut jpeg = Vec::new();
+        JpegEncoder::new(&mut jpeg).encode_image(&colour).unwrap();
+        let as_pnm = |image: DynamicImage| {
+            let mut bytes = Cursor::new(Vec::new());
+            image.write_to(&mut bytes, ImageFormat::Pnm).unwrap();
+            bytes.into_inner()
+        };
+        let packed = |compression| {
+            let mut bytes = Cursor::new(Vec::new());
+            let mut file = TiffEncoder::new(&mut bytes).unwrap().with_compression(compression);
+            file.write_image::<colortype::RGB8>(7, 5, colour.as_raw()).unwrap();
+            bytes.into_inner()
+        };
+        let mut pictures = vec![
+            encode_png(pixels.view(), 12).unwrap(),
+            encode_tiff(pixels.view(), 8).unwrap(),
+            encode_tiff(pixels.view(), 12).unwrap(),
+            crate::map::tiff(pixels.mapv(f32::from).view()).unwrap(),
+            jpeg,
+            as_pnm(colour.clone().into()),
+            as_pnm(grey.into()),
+        ];
+        pictures.extend([Compression::Lzw, Compression::Packbits].map(packed));
+        pictures
+    });
 }
