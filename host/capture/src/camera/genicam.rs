@@ -267,7 +267,10 @@ impl GenicamCamera {
             value: setting.value(),
             expected,
         };
-        let range = self.range(setting).ok_or_else(|| wrong(format!("{} has no such feature", self.id)))?;
+        let range = self.range(setting).ok_or_else(|| match self.answers() {
+            true => wrong(format!("{} has no such feature", self.id)),
+            false => self.gone(),
+        })?;
         if !range.has(value) {
             return Err(wrong(format!("expected {range}")));
         }
