@@ -8,27 +8,31 @@ use farnear_protocol::message::SettingKey;
 use super::{Checkup, Found, failed, passed, passed_over};
 
 /// Questions that are asked to judge the line.
-const QUESTIONS: u32 = 200;
-/// A real board answers within this.
+const QUESTIONS: usize = 200;
+/// A real board answers within this, nineteen times of twenty.
 const ANSWER: Duration = Duration::from_millis(50);
 
 pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
     let client = checkup.client();
     let before = client.status()?.link;
-    let mut slowest = Duration::ZERO;
+    let mut answers = Vec::with_capacity(QUESTIONS);
     for _ in 0..QUESTIONS {
         let begin = Instant::now();
         client.status()?;
-        slowest = slowest.max(begin.elapsed());
+        answers.push(begin.elapsed());
     }
     let after = client.status()?.link;
     let bad = after.bad_frames - before.bad_frames;
     let repeated = after.repeated - before.repeated;
+    answers.sort_unstable();
+    let [usual, slowest] = [QUESTIONS * 19 / 20, QUESTIONS - 1].map(|rank| answers[rank]);
     let said = format!(
-        "{QUESTIONS} questions, {bad} broken frames, {repeated} asked again, slowest answer {:.1} ms",
+        "{QUESTIONS} questions, {bad} broken frames, {repeated} asked again, 19 of 20 answers within {:.1} ms, the slowest {:.1} ms",
+        usual.as_secs_f64() * 1e3,
         slowest.as_secs_f64() * 1e3
     );
-    if bad > 0 || repeated > 0 || (slowest > ANSWER && !client.hello().emulated) {
+    // A line that is slow is slow with most; with a few it is this computer, which had something else to do.
+    if bad > 0 || repeated > 0 || (usual > ANSWER && !client.hello().emulated) {
         return failed(format!("{said}: is the cable short and whole, is a hub in between?"));
     }
     passed(said)
