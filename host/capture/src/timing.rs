@@ -62,7 +62,8 @@ impl Timing {
     pub const EMULATED: Self = Self {
         reply: Duration::from_secs(5),
         retries: 2,
-        poll: Duration::from_secs(10),
+        // Homing takes 13 s where eleven programs share two cores.
+        poll: Duration::from_secs(30),
         work_factor: 10,
         work_slack: Duration::from_secs(20),
         // Longer: its time may run faster than this computer's, which may be slow to answer.
