@@ -62,7 +62,7 @@ impl Timing {
     pub const EMULATED: Self = Self {
         reply: Duration::from_secs(5),
         retries: 2,
-        // Homing takes 13 s where eleven programs share two cores.
+        // Homing takes more than 10 s where eleven programs share two cores.
         poll: Duration::from_secs(30),
         work_factor: 10,
         work_slack: Duration::from_secs(20),
