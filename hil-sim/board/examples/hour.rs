@@ -3,13 +3,15 @@
 //! `cargo run --release --ignore-rust-version -p farnear-sim --example hour` (after `cargo xtask firmware`); a number behind it asks for
 //! another count of pairs. Linux only, for the memory.
 
+mod common;
+
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use farnear_protocol::{
     Call, Event, EventKind, Micros, Nanometres, PROTOCOL_CURRENT, Request,
     frame::{Header, Kind, encode},
-    message::{Axis, Shot, TriggerMode},
+    message::Axis,
 };
 use farnear_scene::{Camera, Lens, OpticsFile, standard};
 use farnear_sim::{EmulatedRig, RigConfig, campaign::cpu_time, imager::Imager};
@@ -67,16 +69,7 @@ fn main() -> Result<()> {
     for axis in [Axis::SensorCoarse, Axis::Lens] {
         host.ask(Request::Home { axis, silence: SILENCE })?;
     }
-    for (index, target) in [(0, 10_000), (1, 166_270)] {
-        let shot = Shot {
-            axis: Axis::SensorFine,
-            target: Nanometres(target),
-            exposure: Micros(5_000),
-            settle_window: Nanometres(100),
-            settle_dwell: Micros(2_000),
-            repeat: 1,
-            mode: TriggerMode::Hardware,
-        };
+    for (index, shot) in (0..).zip(common::far_and_near()) {
         host.ask(Request::LoadShot { index, shot })?;
     }
     host.ask(Request::ArmProgram { shots: 2 })?;

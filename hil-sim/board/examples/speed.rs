@@ -4,12 +4,14 @@
 //! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` (after `cargo xtask firmware`). CPU time, not the
 //! wall clock, so that other work on the machine hardly shows; Linux only.
 
+mod common;
+
 use std::time::Duration;
 
 use farnear_protocol::{
     Call, EventKind, Micros, Nanometres, PROTOCOL_CURRENT, Request,
     frame::{Header, Kind, encode},
-    message::{Axis, Shot, TriggerMode},
+    message::Axis,
 };
 use farnear_sim::{EmulatedRig, RigConfig, SimError, campaign::cpu_time as cpu};
 
@@ -69,16 +71,7 @@ fn moves(host: &mut Host) -> Result<(), SimError> {
 }
 
 fn captures(host: &mut Host) -> Result<(), SimError> {
-    for (index, target) in [(0, 10_000), (1, 166_270)] {
-        let shot = Shot {
-            axis: Axis::SensorFine,
-            target: Nanometres(target),
-            exposure: Micros(5_000),
-            settle_window: Nanometres(100),
-            settle_dwell: Micros(2_000),
-            repeat: 1,
-            mode: TriggerMode::Hardware,
-        };
+    for (index, shot) in (0..).zip(common::far_and_near()) {
         host.send(Request::LoadShot { index, shot })?;
     }
     host.send(Request::ArmProgram { shots: 2 })?;
