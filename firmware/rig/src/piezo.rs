@@ -31,8 +31,8 @@ use crate::shaper::Shaper;
 
 /// A piezo this near its target is at rest: what swings less stays within the stated error.
 const AT_REST: Nanometres = Nanometres(100);
-/// For so long: one that swings through is on its way. A fifth of the resonance's period.
-const NEAR_TICKS: u16 = 5;
+/// For so long: a period of the resonance, in which what swings farther is seen to.
+const NEAR_TICKS: u16 = 25;
 /// Ticks near the target after which it is at ease.
 const EASE_TICKS: u16 = TICK_HZ as u16;
 /// Shares, as shifts, of what it is off after a rest that are disturbance and drift in a control tick: critically damped, with 64 rests (0.13 s) as

@@ -79,6 +79,36 @@ fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
 }
 
 #[test]
+fn stopped_on_its_way_it_is_called_at_rest_only_where_it_no_more_swings_through() {
+    // Found by the campaign: the loop's own swing after a stop passed the target for a millisecond, and an answer took as long.
+    const ANSWER_TICKS: usize = 6;
+    let (mut worst, mut longest) = (0f64, 0);
+    for stop in 1..120_usize {
+        let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+        let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, stop as u64);
+        step(&mut piezo, &mut plant, 20_000);
+        piezo.go(Nanometres(176_270));
+        let (mut told, mut moved) = ([None; 700], 0);
+        for tick in 0..told.len() {
+            piezo.sense(plant.gauge());
+            if tick == stop {
+                piezo.hold();
+            }
+            plant.tick(piezo.act());
+            told[tick] = (tick > stop && !piezo.is_moving()).then_some(f64::from(piezo.measured().0));
+            moved += usize::from(tick > stop && piezo.is_moving());
+            let answered = tick.checked_sub(ANSWER_TICKS).and_then(|at| told[at]);
+            worst = answered.map_or(worst, |told| worst.max((plant.position - told).abs()));
+        }
+        longest = longest.max(moved);
+    }
+    assert!(
+        worst < 120.0 && longest < 150,
+        "{worst} nm beside what is told, {longest} ticks until it is at rest"
+    );
+}
+
+#[test]
 fn holding_turns_3_nm_of_gauge_noise_into_less_than_10_nm_of_motion() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 1);
