@@ -4,6 +4,9 @@
 //! [`CameraSettings::readout`] after the end of the exposure. Known from the strobe; until that is in, from the
 //! length of the trigger pulse and the longest answer a camera may take.
 //!
+//! A strobe that is shorter than the pulse has lost its beginning (a loose contact): it would put the exposure at a wrong moment, so
+//! it is none.
+//!
 //! An exposure that the board does not trigger (by the host, or of a camera that runs freely) is listened for: the first
 //! one that begins after listening did is it.
 
@@ -11,6 +14,9 @@ use farnear_protocol::{BoardMicros, Micros};
 
 use crate::io::{ExposureEdges, Inputs, Trigger};
 use crate::settings::CameraSettings;
+
+/// What a strobe may be shorter than its pulse: cameras count their exposure in lines of some 10 us.
+const SHORTER_US: u64 = 100;
 
 /// How an awaited exposure comes about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -27,6 +33,8 @@ struct Pending {
     number: u32,
     deadline: BoardMicros,
     awaited: Awaited,
+    /// A shorter one is none.
+    shortest_us: u64,
 }
 
 /// The camera as the board knows it.
@@ -70,19 +78,20 @@ impl Camera {
         let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
         self.order = Some(Trigger { at, length: exposure });
-        self.expect(BoardMicros(end), Awaited::Triggered)
+        let shortest_us = u64::from(exposure.0).saturating_sub(SHORTER_US);
+        self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
     }
 
     /// Listens for an exposure that begins from now on; gives its number.
     pub(crate) fn listen(&mut self, now: BoardMicros) -> u32 {
         let deadline = BoardMicros(now.0 + u64::from(self.settings.patience.0));
-        self.expect(deadline, Awaited::Since(now))
+        self.expect(deadline, Awaited::Since(now), 0)
     }
 
-    fn expect(&mut self, deadline: BoardMicros, awaited: Awaited) -> u32 {
+    fn expect(&mut self, deadline: BoardMicros, awaited: Awaited, shortest_us: u64) -> u32 {
         let number = self.triggers;
         self.triggers = self.triggers.wrapping_add(1);
-        self.pending = Some(Pending { number, deadline, awaited });
+        self.pending = Some(Pending { number, deadline, awaited, shortest_us });
         number
     }
 
@@ -117,7 +126,8 @@ impl Camera {
             }),
         };
         if let Some(edges) = edges {
-            self.edges = Some((pending.number, edges));
+            let length_us = edges.strobe_end.0.saturating_sub(edges.strobe_start.0);
+            self.edges = (length_us >= pending.shortest_us).then_some((pending.number, edges));
             self.ready_at =
                 BoardMicros(edges.strobe_end.0.saturating_add(u64::from(self.settings.readout.0)));
             self.pending = None;
@@ -136,6 +146,30 @@ impl Camera {
     }
 }
 
-/// The camera's exposure-active signal did not come.
+/// The camera's exposure-active signal did not come, or not whole.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct NoAnswer;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    #[test]
+    fn a_strobe_that_has_lost_its_beginning_is_none_and_the_read_out_is_waited_for_all_the_same() {
+        // Found by the campaign: a wire came back within an exposure, which was told 0.86 ms late.
+        let answer = |lost_us: u64| {
+            let mut camera = Camera::new(Settings::DEFAULT.camera);
+            let number = camera.trigger(Micros(5_884), BoardMicros(1_000));
+            let edges = ExposureEdges {
+                trigger: BoardMicros(1_000),
+                strobe_start: BoardMicros(1_020 + lost_us),
+                strobe_end: BoardMicros(6_904),
+            };
+            camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(BoardMicros(7_000)) });
+            assert!(!camera.is_ready(BoardMicros(7_000)), "it reads out");
+            camera.result(number).map(|edges| edges.is_ok())
+        };
+        assert_eq!([0, 90, 859].map(answer), [Some(true), Some(true), Some(false)]);
+    }
+}

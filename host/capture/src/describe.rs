@@ -58,7 +58,7 @@ pub fn drop_text(reason: DropReason) -> String {
     match reason {
         DropReason::NotSettled { error } => format!("not settled, {:.3} um off", um(error)),
         DropReason::CameraBusy => "the camera was not ready".into(),
-        DropReason::NoStrobe => "the camera's exposure signal did not come".into(),
+        DropReason::NoStrobe => "the camera's exposure signal did not come or was too short".into(),
     }
 }
 

@@ -170,7 +170,7 @@ pub enum Failure {
         /// Asked minus measured when time was up.
         error: Nanometres,
     },
-    /// The camera's exposure-active signal did not come.
+    /// The camera's exposure-active signal did not come, or was more than 0.1 ms shorter than the trigger's pulse.
     NoStrobe,
     /// The driver reports a fault on its DIAG line.
     DriverFault,

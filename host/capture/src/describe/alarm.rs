@@ -71,7 +71,7 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
         Failure::NotSettled { error } => {
             format!("it did not settle in time ({:.3} um off at the end); is something shaking the rig?", um(error))
         }
-        Failure::NoStrobe => "the camera's exposure signal did not come; is the camera armed and its cable in?".into(),
+        Failure::NoStrobe => "the camera's exposure signal did not come or was shorter than the pulse; is the camera armed and its cable in?".into(),
         Failure::DriverFault => "the motor driver reports a fault; check its supply and temperature".into(),
         Failure::StepUnderrun => "the step timer ran dry; home again, and report this as a bug".into(),
         Failure::Gauge => "the piezo's strain gauge gives nonsense; check its cable".into(),
