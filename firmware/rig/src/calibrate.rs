@@ -89,7 +89,7 @@ fn go_home(
     axis: Axis,
     stepper: &mut Stepper,
     settings: &StepperSettings,
-    carried: Nanometres,
+    carried: Option<Nanometres>,
 ) -> Result<(), Step> {
     match homing.tick(stepper, settings, carried) {
         None => Err(Step::On),

@@ -185,6 +185,14 @@ impl Piezo {
         self.measured
     }
 
+    /// How far it is stretched: what the gauge says or, where that is silent, nothing where nothing is played.
+    pub(crate) fn extension(&self) -> Option<Nanometres> {
+        if !self.gauge_failed() {
+            return Some(self.measured);
+        }
+        (self.played() == Some(0)).then_some(Nanometres(0))
+    }
+
     /// Where it was last sent.
     pub(crate) const fn target(&self) -> Nanometres {
         self.target

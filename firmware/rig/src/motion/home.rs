@@ -64,16 +64,17 @@ impl Homing {
     }
 
     /// Goes on while the axis has no fault; gives the shift of position 0 at the end. `carried`: how far the piezo on the stage
-    /// holds the switch's tab away.
+    /// holds the switch's tab away, where that is known.
     pub(crate) fn tick(
         &mut self,
         axis: &mut Stepper,
         settings: &StepperSettings,
-        carried: Nanometres,
+        carried: Option<Nanometres>,
     ) -> Option<Result<Nanometres, Failure>> {
         if !self.leg.is_over(axis) {
             return None;
         }
+        let Some(carried) = carried else { return Some(Err(Failure::Gauge)) };
         self.phase = match (self.phase, self.leg.edge()) {
             // One that bounces, or was just released, says in a moment what it is.
             (Phase::Begin, _) if !axis.home_is_steady() => return None,

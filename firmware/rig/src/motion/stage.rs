@@ -98,11 +98,12 @@ impl Stage {
         }
     }
 
-    /// How far the piezo holds the tab of the axis' home switch away from it: that of stage A is on the sensor's plate.
-    pub(crate) const fn carried(&self, axis: Axis) -> Nanometres {
+    /// How far the piezo holds the tab of the axis' home switch away from it: that of stage A is on the sensor's plate. `None` where
+    /// nobody knows, so that no homing could say where position 0 is.
+    pub(crate) fn carried(&self, axis: Axis) -> Option<Nanometres> {
         match axis {
-            Axis::SensorCoarse => self.fine.measured(),
-            Axis::SensorFine | Axis::Lens => Nanometres(0),
+            Axis::SensorCoarse => self.fine.extension(),
+            Axis::SensorFine | Axis::Lens => Some(Nanometres(0)),
         }
     }
 

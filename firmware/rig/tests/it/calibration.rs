@@ -1,8 +1,10 @@
 //! The calibration routines through the rig's public face.
 
 use crate::bench::motor::{FAR_SWITCH_UM, PLAY, STEP_UM};
-use crate::bench::{self, Bench, SILENCE, failure, go};
-use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, PositionState, Routine, SettingKey};
+use crate::bench::{self, Bench, SILENCE, failure, go, home};
+use farnear_protocol::message::{
+    Axis, Calibration, EventKind, Failure, PositionState, ResetCause, Routine, SettingKey,
+};
 use farnear_protocol::{Nanometres, Request, RequestError, Response};
 
 fn calibrate(routine: Routine) -> Request {
@@ -126,4 +128,30 @@ fn a_dead_gauge_ends_the_sweep_and_a_missing_switch_the_travel() {
     let end = bench.work(&calibrate(Routine::Travel { axis: Axis::SensorCoarse }));
     assert_eq!(failure(&end), Failure::Implausible);
     assert!(bench.status().coarse.measured <= Nanometres(14_600_000));
+}
+
+#[test]
+fn stage_a_is_homed_only_where_it_is_known_how_far_the_piezo_holds_its_switch_away() {
+    // Found by the campaign: a gauge that died while the piezo was led down was believed, and position 0 lay 59 um off.
+    let mut bench = Bench::homed();
+    bench.work(&go(Axis::SensorFine, 100_000));
+    bench.hardware.faults.gauge = Some(None);
+    bench.run_ms(100);
+    bench.clear();
+    assert_eq!(failure(&bench.work(&home(Axis::SensorCoarse))), Failure::Gauge);
+    bench.hardware.faults.gauge = None;
+    bench.run_ms(1);
+    assert!(
+        matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { shift, .. } if shift.0.abs() < 5_000)
+    );
+    // One that was led down holds nothing away, whatever the gauge said last.
+    bench.restart(2, ResetCause::Software);
+    bench.run_ms(50);
+    bench.hardware.faults.gauge = Some(None);
+    bench.run_ms(200);
+    bench.open_session();
+    bench.clear();
+    assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+    let off = f64::from(bench.status().coarse.measured.0) - 1e3 * bench.hardware.coarse.position_um();
+    assert!(off.abs() < 10e3, "{off} nm");
 }
