@@ -1,8 +1,10 @@
 //! Requests: none acts twice.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use farnear_protocol::{Request, RequestError, Response, camera::FREE_RUNNING};
+use farnear_protocol::{
+    EventKind, Request, RequestError, Response, camera::FREE_RUNNING, message::DropReason,
+};
 
 use super::{Broken, Case, motion::ended};
 use crate::witness::Seen;
@@ -68,8 +70,9 @@ fn answers(case: &Case<'_>) -> Vec<Broken> {
     broken
 }
 
-/// No more exposures than were asked for.
+/// No more exposures than were asked for, and than a continuous run took again because it was not told of one.
 fn exposures(case: &Case<'_>) -> Vec<Broken> {
+    let mut unseen = BTreeSet::new();
     let mut runs: BTreeMap<(u32, u32), u64> = BTreeMap::new();
     let (mut armed, mut taken) = (0, 0);
     for sight in case.sights {
@@ -87,9 +90,14 @@ fn exposures(case: &Case<'_>) -> Vec<Broken> {
                 runs.entry((*boot, *id)).or_insert(exposures);
             }
             Seen::Exposed(shot) if shot.id != FREE_RUNNING => taken += 1,
+            Seen::Told { boot, number, event, .. } => {
+                if matches!(event.kind, EventKind::FrameDropped { reason: DropReason::NoStrobe, .. }) {
+                    unseen.insert((*boot, *number));
+                }
+            }
             _ => {}
         }
-        let asked: u64 = runs.values().sum();
+        let asked = runs.values().sum::<u64>() + unseen.len() as u64;
         if taken > asked {
             let what = format!("{taken} exposures were taken, {asked} were asked for");
             return vec![twice(sight.at_ns, what)];
