@@ -2,8 +2,10 @@
 //! clip go through a third (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017).
 //!
 //! Mean and largest do not know the order of frames, so that what shuffling leaves unchanged stays unchanged; order comes in by the
-//! frames' own motion ([`super::frames`]). A clip's pattern is what the third layer gives. Unlike a codebook it is learned with the
-//! activities' names, and needs many more clips: thousands, which synthetic people can give. O(frames x (F x 64 + 64 x 128)) a clip.
+//! frames' own motion ([`super::frames`]) and, where order counts, by a second layer that sees neighbours too: a frame with some before
+//! and behind it, nothing beyond the clip's ends (a convolution over time; Waibel et al., IEEE TASSP 37, 1989). How many is told by the layer's size.
+//! A clip's pattern is what the third layer gives. Unlike a codebook it is learned with the activities' names, and needs many more clips: tens of
+//! thousands, which synthetic people can give. O(frames x (F x 64 + 5 x 64 x 128)) a clip.
 
 pub mod features;
 pub mod recogniser;
@@ -50,6 +52,20 @@ fn rectified(mut values: Array2<f32>) -> Array2<f32> {
     values
 }
 
+/// Every row with `reach` before and behind it side by side; zeros where there is none.
+fn with_neighbours(rows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
+    let (n, width) = rows.dim();
+    let mut out = Array2::zeros((n, (2 * reach + 1) * width));
+    for (place, from) in (0..=2 * reach).map(|place| (place, place * width)) {
+        // Row i stands at this place of row i + reach - place.
+        let (begin, shift) = (reach.saturating_sub(place).min(n), place.saturating_sub(reach).min(n));
+        let count = n - begin - shift;
+        out.slice_mut(s![begin..begin + count, from..from + width])
+            .assign(&rows.slice(s![shift..shift + count, ..]));
+    }
+    out
+}
+
 /// Mean and largest of the rows, side by side.
 fn pooled(rows: ArrayView2<f32>) -> Array1<f32> {
     let (n, width) = rows.dim();
@@ -76,16 +92,24 @@ impl Network {
         }
         let inputs = (&frames - &self.mean) / &self.spread;
         let [first, second, third] = &self.layers;
-        let seen = rectified(second.apply(rectified(first.apply(inputs.view())).view()));
+        let hidden = rectified(first.apply(inputs.view()));
+        let seen = rectified(second.apply(with_neighbours(hidden.view(), self.reach()).view()));
         let clip = pooled(seen.view()).insert_axis(Axis(0));
         rectified(third.apply(clip.view())).remove_axis(Axis(0))
+    }
+
+    /// Frames before and behind a frame that its second layer sees.
+    fn reach(&self) -> usize {
+        let [first, second, _] = &self.layers;
+        second.weights.nrows() / first.offsets.len().max(1) / 2
     }
 
     /// Whether all sizes fit one another and frame vectors of `inputs` numbers.
     pub fn fits(&self, inputs: usize) -> bool {
         let [first, second, third] = &self.layers;
         let (a, b, c) = (first.offsets.len(), second.offsets.len(), third.offsets.len());
-        let layers = first.is(inputs, a) && second.is(a, b) && third.is(2 * b, c);
+        let neighbours = 2 * self.reach() + 1;
+        let layers = first.is(inputs, a) && second.is(neighbours * a, b) && third.is(2 * b, c);
         layers && [self.mean.len(), self.spread.len()] == [inputs; 2] && self.spread.iter().all(|v| *v > 0.0)
     }
 }

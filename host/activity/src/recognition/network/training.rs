@@ -1,6 +1,6 @@
 //! Training of the network: gradients by the chain rule, steps by Adam (Kingma and Ba, ICLR 2015) whose size falls as a cosine.
 
-use super::{Dense, Network, pooled, rectified, rows};
+use super::{Dense, Network, pooled, rectified, rows, with_neighbours};
 use crate::recognition::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
@@ -12,6 +12,8 @@ use rand_distr::{Distribution, Normal};
 pub struct NetworkSettings {
     /// Outputs of the first three layers.
     pub widths: [usize; 3],
+    /// Frames before and behind a frame that the second layer sees; 0 where order must not count.
+    pub reach: usize,
     /// Passes over all clips.
     pub passes: usize,
     /// Clips of a step.
@@ -34,6 +36,7 @@ impl Default for NetworkSettings {
     fn default() -> Self {
         Self {
             widths: [64, 128, 96],
+            reach: 0,
             passes: 30,
             batch: 64,
             rate: 2e-3,
@@ -131,7 +134,7 @@ pub fn train(
     let scaled: Vec<Array2<f32>> = clips.iter().map(|clip| (clip - &mean) / &spread).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let [a, b, c] = settings.widths;
-    let mut learners = [(inputs, a), (a, b), (2 * b, c), (c, classes)]
+    let mut learners = [(inputs, a), ((2 * settings.reach + 1) * a, b), (2 * b, c), (c, classes)]
         .map(|(inputs, outputs)| Learner::new(inputs, outputs, &mut rng));
     let mut order: Vec<usize> = (0..clips.len()).collect();
     let steps = settings.passes * clips.len().div_ceil(settings.batch.max(1));
@@ -182,16 +185,21 @@ fn one_step(
     }
     let [first, second, third, last] = learners;
     let hidden = rectified(first.layer.apply(frames.view()));
-    let seen = rectified(second.layer.apply(hidden.view()));
+    let mut spans = Vec::with_capacity(chosen.len());
+    let mut windows = Array2::zeros((hidden.nrows(), (2 * settings.reach + 1) * hidden.ncols()));
+    for part in &parts {
+        let from = spans.last().map_or(0, |(_, to)| *to);
+        let to = from + part.nrows();
+        windows
+            .slice_mut(s![from..to, ..])
+            .assign(&with_neighbours(rows(&hidden, from, to), settings.reach));
+        spans.push((from, to));
+    }
+    let seen = rectified(second.layer.apply(windows.view()));
     let width = seen.ncols();
     let mut clip = Array2::zeros((chosen.len(), 2 * width));
-    let mut spans = Vec::with_capacity(chosen.len());
-    let mut from = 0;
-    for (row, part) in parts.iter().enumerate() {
-        let to = from + part.nrows();
+    for (row, &(from, to)) in spans.iter().enumerate() {
         clip.row_mut(row).assign(&pooled(rows(&seen, from, to)));
-        spans.push((from, to));
-        from = to;
     }
     let keep = 1.0 - settings.dropout;
     let kept =
@@ -220,9 +228,27 @@ fn one_step(
         }
     }
     only_above_zero(&mut of_seen, &seen);
-    let Some(mut of_hidden) = second.step(hidden.view(), &of_seen, step, true) else { return };
+    let Some(of_windows) = second.step(windows.view(), &of_seen, step, true) else { return };
+    let mut of_hidden = Array2::zeros(hidden.dim());
+    for &(from, to) in &spans {
+        let own = to_neighbours(rows(&of_windows, from, to), settings.reach);
+        of_hidden.slice_mut(s![from..to, ..]).assign(&own);
+    }
     only_above_zero(&mut of_hidden, &hidden);
     first.step(frames.view(), &of_hidden, step, false);
+}
+
+/// The gradient of rows from that of every row with its neighbours: the sum over all places where a row stands.
+fn to_neighbours(windows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
+    let (n, width) = (windows.nrows(), windows.ncols() / (2 * reach + 1));
+    let mut out = Array2::zeros((n, width));
+    for (place, from) in (0..=2 * reach).map(|place| (place, place * width)) {
+        let (begin, shift) = (reach.saturating_sub(place).min(n), place.saturating_sub(reach).min(n));
+        let count = n - begin - shift;
+        let mut to = out.slice_mut(s![shift..shift + count, ..]);
+        to += &windows.slice(s![begin..begin + count, from..from + width]);
+    }
+    out
 }
 
 /// Gradient of the mean cross entropy between the softmax of decisions and smoothed labels.
@@ -267,6 +293,50 @@ mod tests {
                 (clip, label)
             })
             .unzip()
+    }
+
+    #[test]
+    fn neighbours_stand_beside_a_row_and_their_gradient_comes_back_to_it() {
+        let rows = Array2::from_shape_fn((3, 2), |(row, k)| (10 * (row + 1) + k) as f32);
+        let windows = with_neighbours(rows.view(), 1);
+        assert_eq!(windows.row(0).to_vec(), [0.0, 0.0, 10.0, 11.0, 20.0, 21.0]);
+        assert_eq!(windows.row(1).to_vec(), [10.0, 11.0, 20.0, 21.0, 30.0, 31.0]);
+        // The one is the other's transpose: <W x, y> = <x, W' y>, also where the reach is beyond both ends.
+        for reach in 0..5 {
+            let there = with_neighbours(rows.view(), reach);
+            let other = Array2::from_shape_fn(there.dim(), |(row, k)| (3 * row + 7 * k % 5) as f32);
+            let back = to_neighbours(other.view(), reach);
+            assert_eq!((&there * &other).sum(), (&rows * &back).sum(), "{reach}");
+        }
+    }
+
+    #[test]
+    fn with_neighbours_it_tells_what_only_the_order_of_frames_tells() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        // The same frames, in turn or in pairs.
+        let mut clips = |n: usize| -> (Vec<Array2<f32>>, Vec<usize>) {
+            let clip = |label: usize, rng: &mut ChaCha8Rng| {
+                Array2::from_shape_fn((12, 2), |(frame, k)| {
+                    let kind = if label == 0 { frame % 2 } else { frame / 2 % 2 };
+                    f32::from(k == kind) + rng.random_range(-0.3..0.3_f32)
+                })
+            };
+            (0..n).map(|i| (clip(i % 2, &mut rng), i % 2)).unzip()
+        };
+        let ((train_clips, labels), (fresh, truth)) = (clips(200), clips(100));
+        let right = |reach: usize| {
+            let settings =
+                NetworkSettings { widths: [8, 12, 8], batch: 16, reach, ..NetworkSettings::default() };
+            let (network, last) = train(&train_clips, &labels, 2, &settings, &Unwatched).expect("not stopped");
+            assert!(network.fits(2));
+            let says = |clip: &Array2<f32>| {
+                let decision = last.apply(network.pattern(clip.view()).insert_axis(Axis(0)).view());
+                usize::from(decision[[0, 1]] > decision[[0, 0]])
+            };
+            fresh.iter().zip(&truth).filter(|(clip, truth)| says(clip) == **truth).count()
+        };
+        assert!(right(2) > 97, "{}", right(2));
+        assert!(right(0) < 75, "{}", right(0));
     }
 
     #[test]
