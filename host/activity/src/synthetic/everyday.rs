@@ -80,7 +80,7 @@ pub fn performance(activity: usize, seed: u64) -> Performance {
     let person = Person::drawn(rng);
     let (_, make) = ACTIVITIES[activity % ACTIVITIES.len()];
     let motion = make(&mut Maker::new(rng));
-    let rate_hz = rng.random_range(7.0..26.0);
+    let rate_hz = rng.random_range(5.0_f64.ln()..26.0_f64.ln()).exp();
     let moments = motion.clip(rng, rate_hz);
     let mut joints = placed(&person, &moments, matches!(motion, Motion::Gait(_)));
     tremble(&mut joints, rng);

@@ -16,9 +16,9 @@ pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
 
 /// The two ends of a wave: with the forearm, or with the whole arm up and down at the side.
 fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
-    let ahead = maker.draw(-0.05, 0.35);
+    let ahead = maker.draw(-0.05, 0.5);
     if maker.chance(0.5) {
-        let (out, up, wide) = (maker.draw(0.0, 0.55), maker.draw(0.25, 0.85), maker.draw(0.12, 0.35));
+        let (out, up, wide) = (maker.draw(-0.1, 0.6), maker.draw(0.2, 0.85), maker.draw(0.12, 0.35));
         let elbow = maker.draw(0.2, 1.0);
         let at = |off: f64| Hand::at(out + off, ahead, up - 0.3 * off.abs()).elbow(elbow);
         (at(-wide), at(wide))
@@ -40,10 +40,10 @@ fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
     };
     let (a, b) = (with(maker.rest, low), with(maker.rest, high));
     let (rise, swing) = (maker.seconds(0.7), maker.seconds(0.4));
-    let times = maker.rng.random_range(2..6);
-    // Some raise a stretched arm at the side, others bring the hand up before the body.
+    let times = maker.rng.random_range(1..6);
+    // Most raise a stretched arm at the side, others bring the hand up before the body.
     let mut way_in = vec![(rise, a)];
-    if maker.chance(0.4) {
+    if maker.chance(0.6) {
         let side = Hand::sideways(maker.draw(-45.0, 35.0), maker.draw(0.75, 0.98), maker.draw(0.0, 0.35));
         way_in = vec![(0.7 * rise, with(maker.rest, side)), (0.5 * rise, a)];
     }
@@ -81,26 +81,32 @@ fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> 
     if back {
         parts.push((maker.seconds(0.9), maker.rest));
     }
-    maker.gesture(parts)
+    // Most clips show how the hand gets there.
+    if maker.chance(0.8) { maker.once(parts) } else { maker.gesture(parts) }
+}
+
+/// For how long a hand stays, seconds: mostly no longer than it takes to see what it does.
+fn hold(maker: &mut Maker) -> f64 {
+    maker.draw(0.1_f64.ln(), 2.2_f64.ln()).exp()
 }
 
 /// Taking a call: the hand goes to the ear and stays.
 pub fn answer_phone(maker: &mut Maker) -> Motion {
     let hand = ear(maker.rng);
-    let (hold, back, nod) = (maker.draw(0.3, 2.6), maker.chance(0.3), maker.draw(-5.0, 20.0));
+    let (hold, back, nod) = (hold(maker), maker.chance(0.25), maker.draw(-5.0, 20.0));
     bring(maker, hand, nod, hold, back)
 }
 
 /// Drinking: the hand goes to the mouth, the head goes back.
 pub fn drink(maker: &mut Maker) -> Motion {
     // A cup that is tilted is held above the mouth; some bring it in the hand.
-    let mouth = Hand::at(-0.13, 0.28, 0.4).elbow(0.35);
+    let mouth = Hand::at(-0.06, 0.28, 0.46).elbow(0.35);
     let hand = maker.near(mouth, 0.15);
     if maker.chance(0.3) {
         let main = maker.main;
         maker.rest.hands[main] = maker.near(Hand::at(0.08, 0.35, -0.7), 0.2);
     }
-    let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(-25.0, 5.0));
+    let (hold, back, nod) = (hold(maker), maker.chance(0.3), maker.draw(-25.0, 5.0));
     bring(maker, hand, nod, hold, back)
 }
 
@@ -110,7 +116,7 @@ pub fn read_watch(maker: &mut Maker) -> Motion {
     maker.main = 1 - maker.main;
     let chest = Hand::at(-0.28, 0.46, -0.04).elbow(0.75);
     let hand = maker.near(chest, 0.17);
-    let (hold, back, nod) = (maker.draw(0.2, 2.0), maker.chance(0.4), maker.draw(10.0, 40.0));
+    let (hold, back, nod) = (hold(maker), maker.chance(0.3), maker.draw(10.0, 40.0));
     bring(maker, hand, nod, hold, back)
 }
 
@@ -180,7 +186,7 @@ fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
 
 /// Pushing something away.
 pub fn push(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.3);
+    let hands = both_or_one(maker, 0.2);
     let (near, far, turn) = near_and_far(maker, hands.len() == 1);
     let (lean, step) = (maker.draw(0.0, 16.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
@@ -199,7 +205,7 @@ pub fn push(maker: &mut Maker) -> Motion {
 
 /// Pulling something near.
 pub fn pull(maker: &mut Maker) -> Motion {
-    let hands = both_or_one(maker, 0.3);
+    let hands = both_or_one(maker, 0.2);
     let (near, far, turn) = near_and_far(maker, hands.len() == 1);
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;

@@ -50,7 +50,7 @@ impl<'r> Maker<'r> {
     /// Somebody: nine in ten use the right hand.
     pub fn new(rng: &'r mut ChaCha8Rng) -> Self {
         let main = usize::from(rng.random_bool(0.85));
-        let tempo = rng.random_range(0.7..1.45);
+        let tempo = rng.random_range(0.55_f64.ln()..1.45_f64.ln()).exp();
         let mut rest = Moment::standing()
             .bent(rng.random_range(-2.0..9.0), rng.random_range(-6.0..18.0))
             .legs(rng.random_range(0.0..4.0), rng.random_range(0.0..8.0), rng.random_range(-1.0..6.0))
@@ -188,8 +188,8 @@ impl Motion {
                 // Half are cut tight at either side, up to a tenth short; some begin when everything is ready.
                 let (core, all) = (to - from, duration(keys));
                 let begin = match rng.random_range(0..20) {
-                    0..7 => from + rng.random_range(-0.04..0.1) * core,
-                    7..14 => ready - rng.random_range(0.0..0.3) * (ready - from),
+                    0..6 => from + rng.random_range(-0.04..0.1) * core,
+                    6..16 => ready - rng.random_range(0.0..0.3) * (ready - from),
                     _ => rng.random_range(0.0..1.0) * from,
                 };
                 let end = match rng.random_range(0..10) {

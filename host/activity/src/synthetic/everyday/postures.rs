@@ -8,8 +8,8 @@ use rand::Rng;
 fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     // How much of it the knees do.
     let squat = maker.draw(0.0, 1.0);
-    let lean = deep * (95.0 - 58.0 * squat) * maker.draw(0.8, 1.12);
-    let knee = deep * (15.0 + 105.0 * squat) * maker.draw(0.85, 1.1);
+    let lean = deep * (95.0 - 45.0 * squat) * maker.draw(0.8, 1.15);
+    let knee = (deep * (15.0 + 110.0 * squat) * maker.draw(0.85, 1.15)).min(150.0);
     let mut moment =
         maker.rest.bent(lean, maker.draw(-35.0, 20.0)).legs(0.72 * knee, knee, maker.draw(1.0, 9.0));
     let step = if maker.chance(0.4) { maker.draw(4.0, 22.0) } else { 0.0 };
@@ -29,6 +29,14 @@ fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     moment
 }
 
+/// How far from the thing on the ground somebody stands before and after, of stature: most make a step.
+fn steps(maker: &mut Maker) -> (f64, f64) {
+    if maker.chance(0.4) {
+        return (0.0, 0.0);
+    }
+    (-maker.draw(0.0, 0.3), maker.draw(-0.25, 0.25))
+}
+
 /// Something held before the body in the hands that have picked it up.
 fn held(maker: &mut Maker, hands: &[usize]) -> Moment {
     let mut moment = maker.rest;
@@ -46,9 +54,12 @@ fn one_or_two(maker: &mut Maker) -> Vec<usize> {
 /// Picking something up from the ground.
 pub fn pick_up(maker: &mut Maker) -> Motion {
     let hands = one_or_two(maker);
-    let deep = maker.draw(0.82, 1.05);
+    let deep = maker.draw(0.85, 1.2);
+    let (before, after) = steps(maker);
     let low = down(maker, &hands, deep);
+    maker.rest = maker.rest.gone(before);
     let end = if maker.chance(0.5) { held(maker, &hands) } else { maker.rest };
+    let end = end.gone(after);
     let parts = vec![(maker.seconds(1.0), low), (maker.seconds(0.25), low), (maker.seconds(1.0), end)];
     maker.once(parts)
 }
@@ -56,9 +67,10 @@ pub fn pick_up(maker: &mut Maker) -> Motion {
 /// Putting something down on the ground.
 pub fn put_down(maker: &mut Maker) -> Motion {
     let hands = one_or_two(maker);
-    let deep = maker.draw(0.82, 1.05);
+    let deep = maker.draw(0.85, 1.2);
+    let (before, after) = steps(maker);
     let low = down(maker, &hands, deep);
-    let (begin, end) = (held(maker, &hands), maker.rest);
+    let (begin, end) = (held(maker, &hands).gone(before), maker.rest.gone(after));
     maker.rest = begin;
     let parts = vec![(maker.seconds(1.1), low), (maker.seconds(0.3), low), (maker.seconds(0.9), end)];
     maker.once(parts)
@@ -99,7 +111,8 @@ pub fn bow(maker: &mut Maker) -> Motion {
 /// Tying a lace: down on a knee or bent over a foot, hands busy there.
 pub fn tie_laces(maker: &mut Maker) -> Motion {
     let foot = maker.near(Hand::at(-0.06, 0.2, -0.85), 0.2);
-    let mut low = down(maker, &[0, 1], 0.95);
+    let deep = maker.draw(0.9, 1.2);
+    let mut low = down(maker, &[0, 1], deep);
     let side = maker.main;
     match maker.rng.random_range(0..4) {
         // One foot set ahead or up.
@@ -124,7 +137,7 @@ pub fn tie_laces(maker: &mut Maker) -> Motion {
         (0..2).map(|_| low.hand(0, maker.near(place, 0.09)).hand(1, maker.near(place, 0.09))).collect();
     let (go, beat) = (maker.seconds(1.0), maker.seconds(0.35));
     let times = maker.rng.random_range(2..6);
-    if maker.chance(0.5) {
+    if maker.chance(0.35) {
         return maker.repeated(vec![(go, busy[1])], &[(beat, busy[0]), (beat, busy[1])], times);
     }
     // From standing to the lace, and no further.
