@@ -113,9 +113,9 @@ pub fn list() -> Result<Vec<ModelFigures>> {
 }
 
 /// People and passes that the shipped models were made with.
-pub const PEOPLE: usize = 900;
+pub const PEOPLE: usize = 1500;
 /// See [`PEOPLE`].
-pub const PASSES: usize = 8;
+pub const PASSES: usize = 6;
 
 /// How models are made of synthetic people.
 #[derive(Clone, PartialEq, Debug)]
