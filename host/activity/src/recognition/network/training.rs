@@ -190,9 +190,7 @@ fn one_step(
     for part in &parts {
         let from = spans.last().map_or(0, |(_, to)| *to);
         let to = from + part.nrows();
-        windows
-            .slice_mut(s![from..to, ..])
-            .assign(&with_neighbours(rows(&hidden, from, to), settings.reach));
+        windows.slice_mut(s![from..to, ..]).assign(&with_neighbours(rows(&hidden, from, to), settings.reach));
         spans.push((from, to));
     }
     let seen = rectified(second.layer.apply(windows.view()));
@@ -327,7 +325,8 @@ mod tests {
         let right = |reach: usize| {
             let settings =
                 NetworkSettings { widths: [8, 12, 8], batch: 16, reach, ..NetworkSettings::default() };
-            let (network, last) = train(&train_clips, &labels, 2, &settings, &Unwatched).expect("not stopped");
+            let (network, last) =
+                train(&train_clips, &labels, 2, &settings, &Unwatched).expect("not stopped");
             assert!(network.fits(2));
             let says = |clip: &Array2<f32>| {
                 let decision = last.apply(network.pattern(clip.view()).insert_axis(Axis(0)).view());
