@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use farnear_protocol::{
-    EventKind, Request, Response,
+    BoardMicros, EventKind, Request, Response,
     message::{Alarm, RecordName, SettingKey},
 };
 
@@ -88,8 +88,8 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
     if loses(case, RecordName::Alarms) {
         return Vec::new();
     }
-    // Number of each latched alarm, and since when.
-    let mut latched: BTreeMap<u32, u64> = BTreeMap::new();
+    // Number of each latched alarm, since when, and when that was in its boot.
+    let mut latched: BTreeMap<u32, (u64, (u32, BoardMicros))> = BTreeMap::new();
     let mut asked: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     for sight in case.sights {
         let at_ns = sight.at_ns;
@@ -99,15 +99,17 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                     asked.insert((*boot, *id), number);
                 }
             }
-            Seen::Told { event, .. } => match &event.kind {
-                EventKind::Alarm(record) => drop(latched.entry(record.number).or_insert(at_ns)),
+            Seen::Told { boot, event, .. } => match &event.kind {
+                EventKind::Alarm(record) => {
+                    latched.entry(record.number).or_insert((at_ns, (*boot, event.time)));
+                }
                 EventKind::AlarmCleared { number } => drop(latched.remove(number)),
                 _ => {}
             },
             // What was not written yet may be forgotten; and a clearing whose answer never left may have been done.
             Seen::Reset | Seen::Powered(false) => {
                 let wrote_ns = wrote_until_ns(case, at_ns);
-                latched.retain(|number, since| {
+                latched.retain(|number, (since, _)| {
                     wrote_ns > *since + WRITTEN_NS && !asked.values().any(|asked| asked == number)
                 });
             }
@@ -118,7 +120,11 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                     }
                 }
                 Ok(Response::Status(status)) => {
-                    let oldest = latched.keys().next();
+                    // An answer that was made before the alarm may leave after it.
+                    let told = |(_, (in_boot, time)): &(u64, (u32, BoardMicros))| {
+                        in_boot != boot || status.time >= *time
+                    };
+                    let oldest = latched.iter().find(|(_, alarm)| told(alarm)).map(|(number, _)| number);
                     if let (Some(oldest), None) = (oldest, &status.alarm) {
                         let what = format!("alarm {oldest} was told and not cleared, and none is latched");
                         return vec![broken(at_ns, what)];
