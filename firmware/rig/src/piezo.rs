@@ -20,10 +20,12 @@
 //! multiplications a tick.
 
 mod model;
+mod trend;
 
 use farnear_protocol::Nanometres;
 
 use self::model::{GaugeScale, Lag, Scale};
+use self::trend::Trend;
 use crate::gains::{GAIN_BITS, Gains};
 use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_HZ, TICK_US};
 use crate::settings::FineSettings;
@@ -74,37 +76,6 @@ impl Loop {
             |value: i64| (value >> Trend::BITS).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
         (self.model, self.state) = ([target, 0], [target, 0, fixed(disturbance), fixed(drift)]);
         self.reference_before = target;
-    }
-}
-
-/// Where the disturbance is, and where it goes. The observer's own follow the gauge's noise from tick to tick; over a rest goes on what two
-/// means say, of 128 and of 1,024 ticks, of which a ramp is behind by as many ticks' drift.
-#[derive(Clone, Copy, Debug)]
-struct Trend {
-    /// With [`Self::BITS`] more.
-    short: i64,
-    long: i64,
-}
-
-impl Trend {
-    const BITS: u32 = 16;
-    const SHORT: u32 = 7;
-    const LONG: u32 = 10;
-
-    /// A disturbance and its drift a tick, with [`Self::BITS`] more.
-    const fn new(disturbance: i64, drift: i64) -> Self {
-        Self { short: disturbance - (drift << Self::SHORT), long: disturbance - (drift << Self::LONG) }
-    }
-
-    const fn push(&mut self, disturbance: i32) {
-        let disturbance = (disturbance as i64) << Self::BITS;
-        self.short += (disturbance - self.short) >> Self::SHORT;
-        self.long += (disturbance - self.long) >> Self::LONG;
-    }
-
-    const fn now(self) -> (i64, i64) {
-        let drift = (self.short - self.long) / ((1 << Self::LONG) - (1 << Self::SHORT));
-        (self.short + (drift << Self::SHORT), drift)
     }
 }
 
