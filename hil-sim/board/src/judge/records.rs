@@ -83,13 +83,20 @@ fn wrote_until_ns(case: &Case<'_>, reset_ns: u64) -> u64 {
     })
 }
 
+/// An alarm that was told and not cleared.
+struct Latched {
+    told_ns: u64,
+    /// When it came up: in which boot, and by the board's clock.
+    boot: u32,
+    time: BoardMicros,
+}
+
 /// Alarms stay latched until they are cleared.
 fn alarms(case: &Case<'_>) -> Vec<Broken> {
     if loses(case, RecordName::Alarms) {
         return Vec::new();
     }
-    // Number of each latched alarm, since when, and when that was in its boot.
-    let mut latched: BTreeMap<u32, (u64, (u32, BoardMicros))> = BTreeMap::new();
+    let mut latched: BTreeMap<u32, Latched> = BTreeMap::new();
     let mut asked: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     for sight in case.sights {
         let at_ns = sight.at_ns;
@@ -101,7 +108,8 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
             }
             Seen::Told { boot, event, .. } => match &event.kind {
                 EventKind::Alarm(record) => {
-                    latched.entry(record.number).or_insert((at_ns, (*boot, event.time)));
+                    let alarm = Latched { told_ns: at_ns, boot: *boot, time: event.time };
+                    latched.entry(record.number).or_insert(alarm);
                 }
                 EventKind::AlarmCleared { number } => drop(latched.remove(number)),
                 _ => {}
@@ -109,8 +117,8 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
             // What was not written yet may be forgotten; and a clearing whose answer never left may have been done.
             Seen::Reset | Seen::Powered(false) => {
                 let wrote_ns = wrote_until_ns(case, at_ns);
-                latched.retain(|number, (since, _)| {
-                    wrote_ns > *since + WRITTEN_NS && !asked.values().any(|asked| asked == number)
+                latched.retain(|number, alarm| {
+                    wrote_ns > alarm.told_ns + WRITTEN_NS && !asked.values().any(|asked| asked == number)
                 });
             }
             Seen::Answered { id, boot, answer, .. } => match &**answer {
@@ -121,10 +129,8 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                 }
                 Ok(Response::Status(status)) => {
                     // An answer that was made before the alarm may leave after it.
-                    let told = |(_, (in_boot, time)): &(u64, (u32, BoardMicros))| {
-                        in_boot != boot || status.time >= *time
-                    };
-                    let oldest = latched.iter().find(|(_, alarm)| told(alarm)).map(|(number, _)| number);
+                    let known = |alarm: &Latched| alarm.boot != *boot || alarm.time <= status.time;
+                    let oldest = latched.iter().find(|(_, alarm)| known(alarm)).map(|(number, _)| number);
                     if let (Some(oldest), None) = (oldest, &status.alarm) {
                         let what = format!("alarm {oldest} was told and not cleared, and none is latched");
                         return vec![broken(at_ns, what)];

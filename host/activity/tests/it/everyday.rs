@@ -92,8 +92,8 @@ fn the_shipped_models_are_small_and_know_people_they_never_saw() {
         assert_eq!(model.activities.len(), everyday::ACTIVITIES.len());
         assert_eq!((model.views, model.uses_boxes()), (1, index < 2));
         let found = right(&model, &people);
-        // Nine in twenty: far above chance (one in twenty-nine), below all four models' figures in their data sheet.
-        assert!(20 * found >= 9 * people.len(), "model {index}: {found} of {}", people.len());
+        // Three in five: the weakest of the four is right in 73 % of such people's clips, of 116 with a standard deviation of 4.
+        assert!(5 * found >= 3 * people.len(), "model {index}: {found} of {}", people.len());
         // The limits were set for 5 % of false alarms; 116 clips leave room for chance.
         let unknown =
             people.iter().filter(|clip| model.recognise(&clip.views).expect("fits").outlier_score > 1.0);

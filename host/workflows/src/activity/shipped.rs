@@ -165,7 +165,7 @@ const FILES: [(&str, Mode, bool); 4] = [
     ("everyday-cut-out.fnm", Mode::Ordered, true),
     ("everyday-order-free-cut-out.fnm", Mode::OrderFree, true),
 ];
-/// Frames before and behind a frame that a network sees where their order counts: two in five of a second's at usual rates.
+/// Frames before and behind a frame that a network sees where their order counts: with it a fifth of a second to a whole one.
 const REACH: usize = 2;
 /// Silhouettes that principal components are found from.
 const GALLERY: usize = 4000;

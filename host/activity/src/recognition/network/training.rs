@@ -335,6 +335,7 @@ mod tests {
             fresh.iter().zip(&truth).filter(|(clip, truth)| says(clip) == **truth).count()
         };
         assert!(right(2) > 97, "{}", right(2));
+        // Chance, and five standard deviations of 100 guesses.
         assert!(right(0) < 75, "{}", right(0));
     }
 
