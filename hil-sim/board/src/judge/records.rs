@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use farnear_protocol::{
-    BoardMicros, EventKind, Request, Response,
-    message::{Alarm, RecordName, SettingKey},
+    EventKind, Request, Response,
+    message::{Alarm, AlarmRecord, RecordName, SettingKey},
 };
 
 use super::{Broken, Case};
@@ -83,20 +83,13 @@ fn wrote_until_ns(case: &Case<'_>, reset_ns: u64) -> u64 {
     })
 }
 
-/// An alarm that was told and not cleared.
-struct Latched {
-    told_ns: u64,
-    /// When it came up: in which boot, and by the board's clock.
-    boot: u32,
-    time: BoardMicros,
-}
-
 /// Alarms stay latched until they are cleared.
 fn alarms(case: &Case<'_>) -> Vec<Broken> {
     if loses(case, RecordName::Alarms) {
         return Vec::new();
     }
-    let mut latched: BTreeMap<u32, Latched> = BTreeMap::new();
+    // By number: when each latched alarm was told, and what it is.
+    let mut latched: BTreeMap<u32, (u64, AlarmRecord)> = BTreeMap::new();
     let mut asked: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     for sight in case.sights {
         let at_ns = sight.at_ns;
@@ -106,10 +99,9 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                     asked.insert((*boot, *id), number);
                 }
             }
-            Seen::Told { boot, event, .. } => match &event.kind {
+            Seen::Told { event, .. } => match &event.kind {
                 EventKind::Alarm(record) => {
-                    let alarm = Latched { told_ns: at_ns, boot: *boot, time: event.time };
-                    latched.entry(record.number).or_insert(alarm);
+                    latched.entry(record.number).or_insert((at_ns, *record));
                 }
                 EventKind::AlarmCleared { number } => drop(latched.remove(number)),
                 _ => {}
@@ -117,8 +109,8 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
             // What was not written yet may be forgotten; and a clearing whose answer never left may have been done.
             Seen::Reset | Seen::Powered(false) => {
                 let wrote_ns = wrote_until_ns(case, at_ns);
-                latched.retain(|number, alarm| {
-                    wrote_ns > alarm.told_ns + WRITTEN_NS && !asked.values().any(|asked| asked == number)
+                latched.retain(|number, (told_ns, _)| {
+                    wrote_ns > *told_ns + WRITTEN_NS && !asked.values().any(|asked| asked == number)
                 });
             }
             Seen::Answered { id, boot, answer, .. } => match &**answer {
@@ -129,8 +121,10 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                 }
                 Ok(Response::Status(status)) => {
                     // An answer that was made before the alarm may leave after it.
-                    let known = |alarm: &Latched| alarm.boot != *boot || alarm.time <= status.time;
-                    let oldest = latched.iter().find(|(_, alarm)| known(alarm)).map(|(number, _)| number);
+                    let mut known = latched
+                        .values()
+                        .filter(|(_, alarm)| alarm.boot != *boot || alarm.time <= status.time);
+                    let oldest = known.next().map(|(_, alarm)| alarm.number);
                     if let (Some(oldest), None) = (oldest, &status.alarm) {
                         let what = format!("alarm {oldest} was told and not cleared, and none is latched");
                         return vec![broken(at_ns, what)];

@@ -2,11 +2,18 @@
 
 use farnear_protocol::{
     BoardMicros, Call, Event, EventKind, Micros, Nanometres, Request, Response,
-    message::{Alarm, AlarmRecord, Axis, ResetCause, SettingKey},
+    message::{
+        Alarm, AlarmRecord, Axis, AxisStatus, DropReason, LinkCounters, PositionState, ProgramState,
+        ProgramStatus, ResetCause, SettingKey, Status,
+    },
 };
 
 use super::*;
-use crate::{plant::StageName, wiring::Burst, witness::Truth};
+use crate::{
+    plant::{ExposureTruth, StageName},
+    wiring::{Burst, Shot},
+    witness::Truth,
+};
 
 const MS: u64 = 1_000_000;
 
@@ -132,8 +139,78 @@ fn a_setting_that_is_another_one_is_seen() {
     assert_eq!((run(3, 10_500), run(3, 4)), (vec![], vec!["records"]));
 }
 
+/// An answer that was made at a moment, of a board without an alarm.
+fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
+    let axis = AxisStatus {
+        state: PositionState::Unknown,
+        asked: Nanometres(0),
+        measured: Nanometres(0),
+        moving: false,
+        request: None,
+    };
+    let status = Status {
+        time: BoardMicros(made_ms * 1000),
+        coarse: axis,
+        fine: axis,
+        lens: axis,
+        home_switch: false,
+        far_switch: false,
+        lens_home_switch: false,
+        lens_far_switch: false,
+        emergency_stop: false,
+        supply_low: false,
+        alarm: None,
+        program: ProgramStatus { state: ProgramState::Idle, shots: 0, index: 0, exposures: 0 },
+        next_event: 1,
+        triggers: 0,
+        steps: 0,
+        link: LinkCounters::default(),
+    };
+    answered(answered_ms, 2, Response::Status(status.into()))
+}
+
 #[test]
-fn an_alarm_that_is_gone_and_a_boot_that_comes_again_are_seen() {
+fn an_alarm_that_is_gone_is_seen_and_an_answer_from_before_it_is_none() {
+    let record = |number| AlarmRecord {
+        number,
+        boot: 1,
+        time: BoardMicros(9_000),
+        alarm: Alarm::DriverFault { axis: Axis::Lens },
+    };
+    let alarm = told(10, 0, EventKind::Alarm(record(1)), Truth::default());
+    let cleared = told(11, 1, EventKind::AlarmCleared { number: 1 }, Truth::default());
+    assert_eq!(broken("", &[alarm.clone(), without_alarm(12, 12)]), ["records"]);
+    assert_eq!(broken("", &[alarm.clone(), without_alarm(12, 8)]), [""; 0]);
+    assert_eq!(broken("", &[alarm, cleared, without_alarm(12, 12)]), [""; 0]);
+}
+
+#[test]
+fn an_exposure_too_many_is_seen_and_one_that_takes_the_place_of_an_unseen_one_is_none() {
+    let run = Request::RunContinuously { period: Micros(0), exposures: 1, silence: Micros(1_000_000) };
+    let exposed = |ms: u64, id| {
+        let (begin_ns, end_ns) = (ms * MS, (ms + 1) * MS);
+        let truth = ExposureTruth {
+            sensor_mm: 0.0,
+            coarse_um: 0.0,
+            lens_um: 0.0,
+            piezo_um: 0.0,
+            piezo_min_um: 0.0,
+            piezo_max_um: 0.0,
+        };
+        Sight {
+            at_ns: end_ns,
+            seen: Seen::Exposed(Shot { id, board_us: ms * 1000, begin_ns, end_ns, truth }),
+        }
+    };
+    let reason = DropReason::NoStrobe;
+    let dropped =
+        told(4, 0, EventKind::FrameDropped { request: 7, frame: 0, index: 0, reason }, Truth::default());
+    assert_eq!(broken("", &[asked(1, 7, run.clone()), exposed(2, 0), exposed(5, 1)]), ["acts-twice"]);
+    assert_eq!(broken("", &[asked(1, 7, run), exposed(2, 0), dropped, exposed(5, 1)]), [""; 0]);
+}
+
+#[test]
+fn a_boot_that_comes_again_is_seen() {
     let started = |ms| told(ms, 0, EventKind::Started { cause: ResetCause::Pin }, Truth::default());
     let reset = Sight { at_ns: 5 * MS, seen: Seen::Reset };
     assert_eq!(broken("", &[started(1), started(2)]), [""; 0], "told again");
