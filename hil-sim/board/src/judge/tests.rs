@@ -166,7 +166,7 @@ fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
         steps: 0,
         link: LinkCounters::default(),
     };
-    answered(answered_ms, 2, Response::Status(status.into()))
+    answered(answered_ms, 2, Response::Status(status))
 }
 
 #[test]
