@@ -291,6 +291,8 @@ impl Stepper {
                 let back = self.target.0.saturating_sub(self.approach().0);
                 Nanometres(self.measured().0.min(back))
             }
+            // One that was led below its switch comes up from there.
+            (PositionState::Homed, _) => self.measured().min(self.lowest_of_homing()),
             // Wherever the search for its switch brought it, or may bring it.
             _ => self.lowest_of_homing(),
         }

@@ -1,6 +1,6 @@
 //! What stops the rig: emergency stop, halt, the host's silence, supply, the link; and what survives the reset.
 
-use crate::bench::{self, Bench, failure, go, home};
+use crate::bench::{self, Answer, Bench, failure, go, home};
 use farnear_protocol::message::{
     Alarm, AlarmRecord, Axis, EventKind, Failure, PositionState, RecordName, ResetCause, Routine, SettingKey,
 };
@@ -345,6 +345,31 @@ fn homing_and_the_piezos_routines_are_kept_apart_as_far_as_they_go() {
         let refused = bench.ask(&Request::Calibrate { routine, silence: bench::SILENCE }).1;
         assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{routine:?}: {refused:?}");
     }
+}
+
+#[test]
+fn a_lens_below_its_zero_comes_up_before_the_sensor_is_homed() {
+    // Campaign, seed 106916: a dead switch let the lens run below its zero, farther than homing goes.
+    let mut bench = Bench::both_homed();
+    let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 46_450_000 };
+    bench.ask(&setting).1.expect("in range");
+    bench.hardware.lens.faults.home_switch = Some(false);
+    bench.accepted(&home(Axis::Lens));
+    while bench.status().lens.measured.0 > -320_000 {
+        bench.run_ms(1);
+    }
+    bench.ask(&Request::Stop).1.expect("always");
+    bench.run_ms(300);
+    bench.hardware.lens.faults.home_switch = None;
+    bench.run_ms(20);
+    let status = bench.status();
+    assert_eq!(status.lens.state, PositionState::Homed, "a stop loses nothing");
+    let too_close = |answer: Answer| matches!(answer, Err(RequestError::TooClose { .. }));
+    assert!(too_close(bench.ask(&home(Axis::SensorCoarse)).1), "{:?}", status.lens);
+    let lens = bench.accepted(&home(Axis::Lens));
+    assert!(too_close(bench.ask(&home(Axis::SensorCoarse)).1), "it is on its way up, and still below");
+    assert!(matches!(bench.end_of(lens), EventKind::Homed { .. }));
+    assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
 }
 
 #[test]

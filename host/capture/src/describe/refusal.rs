@@ -67,7 +67,7 @@ pub fn refusal_text(error: &RequestError) -> String {
         }
         RequestError::TooClose { distance, min } => format!(
             "sensor and lens would come within {:.4} mm of each other on the way, at least {:.4} mm are allowed \
-             (setting distance_min_nm)",
+             (setting distance_min_nm): move the other one away first, or home it where it stands below its zero",
             um(*distance) / 1e3,
             um(*min) / 1e3
         ),
