@@ -4,6 +4,9 @@
 //! a set pixel. Walking boundary pixels and binning them by angle leaves half of the angles empty; marching leaves none, and
 //! holes and breaks inside the outermost contour change nothing. Distances are in units of the frame's side, so they lie in
 //! [0, 0.7072] for a centroid at the middle. Angle 0 points right, angles grow anticlockwise. About 20 us a silhouette.
+//!
+//! Beside it the silhouette itself, coarsely: set pixels in each cell of that frame ("zoning": Trier, Jain and Taxt, Pattern Recognition 29,
+//! 1996). It shows what lies inside the outermost contour: an arm before the body's side, the gap under a raised hand.
 
 use crate::mask::BoundingBox;
 use ndarray::ArrayView2;
@@ -14,6 +17,14 @@ use std::sync::LazyLock;
 pub const ANGLES: usize = 360;
 /// Side of the normalised silhouette, pixels.
 pub const SIDE: usize = 100;
+/// Cells of the coarse silhouette across and down.
+pub const CELLS_ACROSS: usize = 20;
+/// Cells of the coarse silhouette.
+pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
+/// Pixels of a cell's side.
+const CELL_SIDE: usize = SIDE / CELLS_ACROSS;
+/// Pixels of a cell.
+pub const CELL_PIXELS: usize = CELL_SIDE * CELL_SIDE;
 /// Version of this descriptor; a model says which one it was trained with.
 pub const DESCRIPTOR_VERSION: u32 = 1;
 
@@ -36,6 +47,9 @@ pub struct EmptyMask;
 /// A frame's descriptor: what the embedding sees.
 pub type CentroidDistance = [f32; ANGLES];
 
+/// Set pixels of every cell, 0 to [`CELL_PIXELS`], row by row from the top left.
+pub type CoarseSilhouette = [u8; CELLS];
+
 /// March step in pixels of the frame; half of it bounds the error from stepping.
 const STEP_PX: f64 = 0.5;
 /// Empty pixels round the frame, so that a ray may start a step outside.
@@ -50,6 +64,33 @@ pub fn centroid_distance(mask: ArrayView2<bool>, scaling: Scaling) -> Result<Cen
     let bounds = BoundingBox::of(mask).ok_or(EmptyMask)?;
     let (frame, inner) = normalise(mask, bounds, scaling);
     Ok(march(&frame, inner))
+}
+
+/// The centroid distance and the coarse silhouette of the subject in a mask of any size, and its bounds.
+///
+/// # Errors
+/// [`EmptyMask`].
+pub fn described(
+    mask: ArrayView2<bool>,
+    scaling: Scaling,
+) -> Result<(CentroidDistance, CoarseSilhouette, BoundingBox), EmptyMask> {
+    let bounds = BoundingBox::of(mask).ok_or(EmptyMask)?;
+    let (frame, inner) = normalise(mask, bounds, scaling);
+    Ok((march(&frame, inner), coarse(&frame), bounds))
+}
+
+/// Set pixels of every cell of the padded frame.
+fn coarse(frame: &[bool]) -> CoarseSilhouette {
+    let mut cells = [0_u8; CELLS];
+    for y in 0..SIDE {
+        let line = &frame[(MARGIN + y) * PADDED + MARGIN..][..SIDE];
+        for (cell, pixels) in
+            cells[y / CELL_SIDE * CELLS_ACROSS..].iter_mut().zip(line.chunks_exact(CELL_SIDE))
+        {
+            *cell += pixels.iter().map(|&set| u8::from(set)).sum::<u8>();
+        }
+    }
+    cells
 }
 
 /// The box scaled into the padded frame, nearest neighbour, and where it lies there.
@@ -197,6 +238,25 @@ mod tests {
         let degrees = toe.to_degrees().rem_euclid(360.0).round() as usize;
         assert!((f64::from(found[degrees]) - right.hypot(down) / 100.0).abs() < 0.03);
         assert_eq!(found[45], 0.0, "nothing lies up and to the right");
+    }
+
+    #[test]
+    fn a_coarse_silhouette_counts_the_pixels_of_its_cells() {
+        // The L of above; a cell is 5 pixels wide, so the bar is 4 cells wide and the foot 4 high.
+        let mask = Mask::from_shape_fn((100, 100), |(y, x)| x < 20 || y >= 82);
+        let (distances, cells, bounds) = described(mask.view(), Scaling::Stretch).expect("not empty");
+        assert_eq!(distances, centroid_distance(mask.view(), Scaling::Stretch).expect("not empty"));
+        assert_eq!((bounds.height(), bounds.width()), (100, 100));
+        for (at, &found) in cells.iter().enumerate() {
+            let (row, column) = (at / CELLS_ACROSS, at % CELLS_ACROSS);
+            let expected = match (row, column) {
+                (_, 0..4) | (17.., _) => 25,
+                (16, _) => 15,
+                _ => 0,
+            };
+            assert_eq!(found, expected, "row {row}, column {column}");
+        }
+        assert!(described(Mask::default((5, 5)).view(), Scaling::Stretch).is_err());
     }
 
     #[test]

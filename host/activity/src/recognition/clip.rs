@@ -1,7 +1,9 @@
 //! Clips: what was seen of one performance from one or more views, as numbers per frame.
 
-use crate::embedding::descriptor::{ANGLES, Scaling, centroid_distance};
-use crate::mask::{BoundingBox, Mask};
+use crate::embedding::descriptor::{
+    ANGLES, CELL_PIXELS, CELLS, CELLS_ACROSS, CentroidDistance, CoarseSilhouette, Scaling, described,
+};
+use crate::mask::Mask;
 use crate::silhouette::capsule::Capsule;
 use crate::silhouette::raster::Point;
 use crate::silhouette::view::{Canvas, View, draw, extent};
@@ -16,6 +18,8 @@ pub const BOX_NUMBERS: usize = 4;
 pub struct Track {
     /// Centroid distances, one frame per row.
     pub descriptors: Array2<f32>,
+    /// Coarse silhouettes, one frame per row.
+    pub cells: Array2<u8>,
     /// Height, width, centroid x and y in pixels, one frame per row; `None` for silhouettes that are already cut out and scaled, whose
     /// motion is gone.
     pub boxes: Option<Array2<f32>>,
@@ -37,11 +41,10 @@ pub struct Clip {
 impl Track {
     /// Describes the masks of a clip. With `full_frames` the masks are whole camera frames and the box's motion is kept.
     pub fn from_masks(masks: &[Mask], scaling: Scaling, full_frames: bool) -> Self {
-        let found: Vec<Option<([f32; ANGLES], [f32; BOX_NUMBERS])>> = masks
+        let found: Vec<Option<(CentroidDistance, CoarseSilhouette, [f32; BOX_NUMBERS])>> = masks
             .par_iter()
             .map(|mask| {
-                let descriptor = centroid_distance(mask.view(), scaling).ok()?;
-                let bounds = BoundingBox::of(mask.view())?;
+                let (descriptor, cells, bounds) = described(mask.view(), scaling).ok()?;
                 let (mut n, mut sx, mut sy) = (0.0_f64, 0.0, 0.0);
                 for (y, row) in mask.axis_iter(Axis(0)).enumerate().take(bounds.bottom).skip(bounds.top) {
                     for x in (bounds.left..bounds.right).filter(|&x| row[x]) {
@@ -52,14 +55,15 @@ impl Track {
                 }
                 let motion =
                     [bounds.height() as f32, bounds.width() as f32, (sx / n) as f32, (sy / n) as f32];
-                Some((descriptor, motion))
+                Some((descriptor, cells, motion))
             })
             .collect();
         let kept: Vec<_> = found.iter().flatten().collect();
         let descriptors = Array2::from_shape_fn((kept.len(), ANGLES), |(f, a)| kept[f].0[a]);
+        let cells = Array2::from_shape_fn((kept.len(), CELLS), |(f, k)| kept[f].1[k]);
         let boxes =
-            full_frames.then(|| Array2::from_shape_fn((kept.len(), BOX_NUMBERS), |(f, k)| kept[f].1[k]));
-        Self { descriptors, boxes, empty_frames: masks.len() - kept.len() }
+            full_frames.then(|| Array2::from_shape_fn((kept.len(), BOX_NUMBERS), |(f, k)| kept[f].2[k]));
+        Self { descriptors, cells, boxes, empty_frames: masks.len() - kept.len() }
     }
 
     /// Draws every frame of a performance of capsule bodies on one canvas (10 mm per pixel), so that the box's motion is kept, and
@@ -79,9 +83,20 @@ impl Track {
         self.descriptors.nrows()
     }
 
-    /// The track as a mirror would show it: angle a becomes 180 - a, x turns round.
+    /// What principal components over `width` numbers see of a frame: its centroid distances, and where there are more numbers than
+    /// those its coarse silhouette too, weighted so that both vary alike over everyday activities.
+    pub(super) fn seen(&self, frame: usize, width: usize) -> impl Iterator<Item = f32> {
+        const WEIGHT: f32 = 0.35 / CELL_PIXELS as f32;
+        let cells = self.cells.row(frame).into_iter().map(|&cell| WEIGHT * f32::from(cell));
+        self.descriptors.row(frame).into_iter().copied().chain(cells).take(width)
+    }
+
+    /// The track as a mirror would show it: angle a becomes 180 - a, columns and x turn round.
     pub fn mirrored(&self) -> Self {
         let angles: Vec<usize> = (0..ANGLES).map(|a| (ANGLES + ANGLES / 2 - a) % ANGLES).collect();
+        let cells: Vec<usize> = (0..CELLS)
+            .map(|k| k / CELLS_ACROSS * CELLS_ACROSS + CELLS_ACROSS - 1 - k % CELLS_ACROSS)
+            .collect();
         let boxes = self.boxes.as_ref().map(|boxes| {
             let mut boxes = boxes.clone();
             boxes.column_mut(2).mapv_inplace(|x| -x);
@@ -89,6 +104,7 @@ impl Track {
         });
         Self {
             descriptors: self.descriptors.select(Axis(1), &angles),
+            cells: self.cells.select(Axis(1), &cells),
             boxes,
             empty_frames: self.empty_frames,
         }
@@ -98,6 +114,7 @@ impl Track {
     pub fn select(&self, frames: &[usize]) -> Self {
         Self {
             descriptors: self.descriptors.select(Axis(0), frames),
+            cells: self.cells.select(Axis(0), frames),
             boxes: self.boxes.as_ref().map(|boxes| boxes.select(Axis(0), frames)),
             empty_frames: self.empty_frames,
         }

@@ -121,6 +121,7 @@ mod tests {
         let n = 12;
         let track = Track {
             descriptors: Array2::zeros((n, 360)),
+            cells: Array2::zeros((n, 400)),
             boxes: Some(Array2::from_shape_fn((n, 4), |(f, k)| (50 + f * (k + 1)) as f32)),
             empty_frames: 0,
         };

@@ -111,9 +111,11 @@ pub fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
     let parts: Vec<&Track> = parts.collect();
     let empty_frames = parts.iter().map(|part| part.empty_frames).sum();
     let descriptors: Vec<_> = parts.iter().map(|part| part.descriptors.view()).collect();
+    let cells: Vec<_> = parts.iter().map(|part| part.cells.view()).collect();
     let boxes: Option<Vec<_>> = parts.iter().map(|part| part.boxes.as_ref().map(|b| b.view())).collect();
     Track {
         descriptors: concatenate(Axis(0), &descriptors).unwrap_or_default(),
+        cells: concatenate(Axis(0), &cells).unwrap_or_default(),
         boxes: boxes.and_then(|boxes| concatenate(Axis(0), &boxes).ok()),
         empty_frames,
     }

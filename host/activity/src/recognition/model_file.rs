@@ -15,7 +15,7 @@ use super::occupancy::OccupancyGrid;
 use super::second_opinion::SecondOpinion;
 use super::space::{Map, Pattern, Space};
 use super::unknown::Limits;
-use crate::embedding::descriptor::{ANGLES, DESCRIPTOR_VERSION};
+use crate::embedding::descriptor::{ANGLES, CELLS, DESCRIPTOR_VERSION};
 use crate::embedding::pca::Pca;
 use crate::embedding::rbf::Rbf;
 use ndarray::{Array1, Array2};
@@ -210,7 +210,8 @@ impl Recogniser {
                 rbf.dimensions()
             }
             Map::Pca(pca) => {
-                let sizes = pca.mean.len() == ANGLES && pca.directions.ncols() == ANGLES;
+                let width = pca.mean.len();
+                let sizes = [ANGLES, ANGLES + CELLS].contains(&width) && pca.directions.ncols() == width;
                 fits(sizes && pca.directions.nrows() > 0, "mean and directions of the principal components")?;
                 pca.directions.nrows()
             }

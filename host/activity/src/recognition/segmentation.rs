@@ -216,7 +216,7 @@ fn merged(recording: &Recording, borders: &[usize]) -> Vec<Segment> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::embedding::descriptor::ANGLES;
+    use crate::embedding::descriptor::{ANGLES, CELLS};
     use crate::recognition::clip::Clip;
     use crate::recognition::live::{Live, joined};
     use crate::recognition::model::RecogniserSettings;
@@ -236,7 +236,7 @@ mod tests {
         let boxes = Array2::from_shape_fn((frames, 4), |(_, k)| {
             [90.0, 45.0, 60.0, 70.0][k] + rng.random_range(-1.0..1.0_f32)
         });
-        Track { descriptors, boxes: Some(boxes), empty_frames: 0 }
+        Track { descriptors, cells: Array2::zeros((frames, CELLS)), boxes: Some(boxes), empty_frames: 0 }
     }
 
     fn model(rng: &mut ChaCha8Rng) -> Recogniser {

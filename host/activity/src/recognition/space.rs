@@ -8,12 +8,13 @@ use super::network::Network;
 use super::network::features::{Features, values};
 use super::occupancy::OccupancyGrid;
 use crate::embedding::EmbeddingError;
+use crate::embedding::descriptor::{ANGLES, CELLS};
 use crate::embedding::isomap::isomap;
 use crate::embedding::landmark::landmark_isomap;
 use crate::embedding::neighbours::Neighbourhood;
 use crate::embedding::pca::Pca;
 use crate::embedding::rbf::Rbf;
-use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayView2, s};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +36,8 @@ pub enum PatternKind {
     Thesis(Vec<usize>),
     /// Square-rooted mean soft assignments to a codebook of this size.
     Codebook(usize),
-    /// What a network gives that has learned the activities' names; made by [`Recogniser::train_network`](super::model::Recogniser).
+    /// What a network gives that has learned the activities' names; made by [`Recogniser::train_network`](super::model::Recogniser). Its
+    /// principal components see coarse silhouettes beside centroid distances.
     Network,
 }
 
@@ -203,14 +205,18 @@ impl Space {
     }
 }
 
-/// At most `count` rows, evenly spread over all.
-fn evenly(all: ArrayView2<f32>, count: usize) -> Array2<f32> {
-    let n = all.nrows();
-    if n <= count {
-        return all.to_owned();
+/// What an embedding of `width` numbers sees of at most `count` frames, evenly spread over all of the tracks'.
+fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
+    let frames: Vec<(&Track, usize)> =
+        tracks.iter().flat_map(|track| (0..track.frames()).map(|frame| (*track, frame))).collect();
+    let n = frames.len();
+    let kept = n.min(count);
+    let mut rows = Array2::zeros((kept, width));
+    for (i, mut row) in rows.rows_mut().into_iter().enumerate() {
+        let (track, frame) = frames[(2 * i + 1) * n / (2 * kept)];
+        row.iter_mut().zip(track.seen(frame, width)).for_each(|(out, value)| *out = value);
     }
-    let rows: Vec<usize> = (0..count).map(|i| (2 * i + 1) * n / (2 * count)).collect();
-    all.select(Axis(0), &rows)
+    rows
 }
 
 /// Galleries above this size are laid out by landmarks.
@@ -219,7 +225,7 @@ const LARGE: usize = 4000;
 /// A gallery laid out: what spaces share that differ in their RBF map, weights or patterns only.
 #[derive(Debug)]
 struct Gallery {
-    key: (Layout, usize, usize),
+    key: (Layout, usize, usize, usize),
     samples: Array2<f32>,
     coordinates: Array2<f32>,
     pca: Option<Pca>,
@@ -310,12 +316,14 @@ impl Galleries {
 
     /// The place of the gallery that these settings ask for.
     fn gallery(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
-        let key = (settings.layout, settings.dimensions, settings.gallery);
+        let width = if settings.pattern == PatternKind::Network { ANGLES + CELLS } else { ANGLES };
+        let key = (settings.layout, settings.dimensions, settings.gallery, width);
         if let Some(index) = self.galleries.iter().position(|gallery| gallery.key == key) {
             return Ok(index);
         }
-        let all = stacked(clips.iter().flat_map(|clip| &clip.views).map(|track| track.descriptors.view()));
-        self.galleries.push(Gallery::new(evenly(all.view(), settings.gallery), settings, key)?);
+        let tracks: Vec<&Track> = clips.iter().flat_map(|clip| &clip.views).collect();
+        let samples = evenly(&tracks, settings.gallery, width);
+        self.galleries.push(Gallery::new(samples, settings, key)?);
         Ok(self.galleries.len() - 1)
     }
 }
@@ -338,7 +346,8 @@ impl Map {
     fn points(&self, track: &Track, spread: f32) -> Result<Array2<f32>, EmbeddingError> {
         let points = match self {
             Self::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,
-            Self::Pca(pca) => pca.transform(track.descriptors.view())?,
+            Self::Pca(pca) if pca.mean.len() == ANGLES => pca.transform(track.descriptors.view())?,
+            Self::Pca(pca) => pca.transform(evenly(&[track], track.frames(), pca.mean.len()).view())?,
         };
         Ok(points / spread)
     }
@@ -348,7 +357,7 @@ impl Gallery {
     fn new(
         samples: Array2<f32>,
         settings: &SpaceSettings,
-        key: (Layout, usize, usize),
+        key: (Layout, usize, usize, usize),
     ) -> Result<Self, EmbeddingError> {
         let Layout::Isomap(least) = settings.layout else {
             let pca = Pca::fit(samples.view(), settings.dimensions)?;

@@ -167,6 +167,8 @@ const FILES: [(&str, Mode, bool); 4] = [
 ];
 /// Frames before and behind a frame that a network sees where their order counts: with it a fifth of a second to a whole one.
 const REACH: usize = 2;
+/// Principal components of centroid distances and coarse silhouettes.
+const DIMENSIONS: usize = 60;
 /// Silhouettes that principal components are found from.
 const GALLERY: usize = 4000;
 
@@ -218,7 +220,7 @@ fn one(
     out: &Staging,
     context: &Context<'_>,
 ) -> Result<MadeModel> {
-    let space = SpaceSettings { mode, gallery: GALLERY, ..SpaceSettings::default() };
+    let space = SpaceSettings { mode, dimensions: DIMENSIONS, gallery: GALLERY, ..SpaceSettings::default() };
     let reach = if mode == Mode::Ordered { REACH } else { 0 };
     let network = NetworkSettings { passes, reach, ..NetworkSettings::default() };
     let watch = watched::Passes::new(context);

@@ -11,12 +11,12 @@ use rand_chacha::ChaCha8Rng;
 /// A hand at the ear.
 pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
     Hand::at(rng.random_range(-0.14..0.06), rng.random_range(0.06..0.28), rng.random_range(0.1..0.4))
-        .elbow(rng.random_range(0.0..0.7))
+        .elbow(rng.random_range(0.0..0.4))
 }
 
 /// The two ends of a wave: with the forearm, or with the whole arm up and down at the side.
 fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
-    let ahead = maker.draw(-0.05, 0.5);
+    let ahead = maker.draw(0.0, 0.55);
     if maker.chance(0.5) {
         let (out, up, wide) = (maker.draw(-0.1, 0.6), maker.draw(0.2, 0.85), maker.draw(0.12, 0.35));
         let elbow = maker.draw(0.2, 1.0);
@@ -63,7 +63,7 @@ pub fn wave_two_hands(maker: &mut Maker) -> Motion {
 
 /// Clapping before the chest.
 pub fn clap(maker: &mut Maker) -> Motion {
-    let place = Hand::at(-0.28, 0.55, -0.1);
+    let place = Hand::at(-0.28, 0.57, -0.12);
     let middle = Hand { out: -0.29, ..maker.near(place, 0.22) };
     let wide = maker.draw(0.12, 0.85);
     let (together, apart) = (maker.rest.both(middle), maker.rest.both(middle.moved(wide, -0.3 * wide, 0.0)));
@@ -114,7 +114,7 @@ pub fn drink(maker: &mut Maker) -> Motion {
 pub fn read_watch(maker: &mut Maker) -> Motion {
     // The watch is on the other arm.
     maker.main = 1 - maker.main;
-    let chest = Hand::at(-0.28, 0.46, -0.04).elbow(0.75);
+    let chest = Hand::at(-0.27, 0.48, 0.0).elbow(0.8);
     let hand = maker.near(chest, 0.17);
     let (hold, back, nod) = (hold(maker), maker.chance(0.3), maker.draw(10.0, 40.0));
     bring(maker, hand, nod, hold, back)
@@ -124,14 +124,14 @@ pub fn read_watch(maker: &mut Maker) -> Motion {
 pub fn throw(maker: &mut Maker) -> Motion {
     let main = maker.main;
     let sign = if main == 1 { 1.0 } else { -1.0 };
-    let under = maker.chance(0.2);
+    let under = maker.chance(0.12);
     let (back, front, end) = if under {
         (Hand::swung(-50.0, 10.0, 0.15), Hand::swung(85.0, 8.0, 0.0), Hand::swung(120.0, 20.0, 0.0))
     } else {
         // The hand winds up behind the shoulder or no further than the ear.
-        let behind = maker.draw(-0.35, 0.5);
+        let behind = maker.draw(-0.15, 0.75);
         (
-            Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.7),
+            Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.35),
             Hand::at(maker.draw(0.0, 0.5), maker.draw(0.55, 0.95), maker.draw(-0.1, 0.5)),
             Hand::at(maker.draw(-0.3, 0.45), maker.draw(0.15, 0.8), maker.draw(-0.9, -0.2)),
         )
@@ -139,7 +139,8 @@ pub fn throw(maker: &mut Maker) -> Motion {
     let (back, front, end) = (maker.near(back, 0.16), maker.near(front, 0.16), maker.near(end, 0.2));
     let turn = sign * maker.draw(5.0, 38.0);
     let (lean, step) = (maker.draw(0.0, 16.0), if maker.chance(0.4) { maker.draw(0.05, 0.3) } else { 0.0 });
-    let other = Hand::at(maker.draw(0.05, 0.3), maker.draw(0.0, 0.5), maker.draw(-0.9, -0.3));
+    // The other hand hangs, balances, or has held what is thrown.
+    let other = Hand::at(maker.draw(-0.3, 0.25), maker.draw(0.0, 0.5), maker.draw(-0.95, -0.25));
     let stride = |mut moment: Moment, s: f64| {
         moment.pose.legs[1 - main].hip_deg += 60.0 * step * s;
         moment.pose.legs[main].hip_deg -= 60.0 * step * s;
@@ -209,6 +210,8 @@ pub fn pull(maker: &mut Maker) -> Motion {
     let (near, far, turn) = near_and_far(maker, hands.len() == 1);
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
+    // A single arm often reaches for it at the side.
+    let far = if hands.len() == 1 { far.moved(maker.draw(0.0, 0.45), 0.0, 0.0) } else { far };
     let reached = with(rest, &hands, far).bent(rest.pose.lean_deg + 0.6 * lean, 5.0).twisted(turn);
     let pulled = with(rest, &hands, near.moved(0.0, -0.1, maker.draw(-0.2, 0.15)))
         .bent(rest.pose.lean_deg - lean, 5.0)

@@ -61,7 +61,7 @@ impl<'r> Maker<'r> {
         rest.pose.legs[1].hip_deg -= step;
         for side in 0..2 {
             rest.hands[side] = Hand::swung(
-                rng.random_range(-14.0..11.0),
+                rng.random_range(-18.0..8.0),
                 rng.random_range(3.0..26.0),
                 rng.random_range(0.04..0.26),
             );
