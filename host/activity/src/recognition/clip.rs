@@ -7,7 +7,7 @@ use crate::mask::Mask;
 use crate::silhouette::capsule::Capsule;
 use crate::silhouette::raster::Point;
 use crate::silhouette::view::{Canvas, View, draw, extent};
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, ArrayViewMut1, Axis};
 use rayon::prelude::*;
 
 /// Numbers of the box per frame: height, width, and the silhouette's centroid (x, y), pixels.
@@ -83,12 +83,15 @@ impl Track {
         self.descriptors.nrows()
     }
 
-    /// What principal components over `width` numbers see of a frame: its centroid distances, and where there are more numbers than
+    /// What principal components over as many numbers as `row` see of a frame: its centroid distances, and where there is more room than for
     /// those its coarse silhouette too, weighted so that both vary alike over everyday activities.
-    pub(super) fn seen(&self, frame: usize, width: usize) -> impl Iterator<Item = f32> {
+    pub(super) fn seen(&self, frame: usize, row: ArrayViewMut1<f32>) {
         const WEIGHT: f32 = 0.35 / CELL_PIXELS as f32;
-        let cells = self.cells.row(frame).into_iter().map(|&cell| WEIGHT * f32::from(cell));
-        self.descriptors.row(frame).into_iter().copied().chain(cells).take(width)
+        let (mut distances, mut cells) = row.split_at(Axis(0), ANGLES);
+        distances.assign(&self.descriptors.row(frame));
+        if !cells.is_empty() {
+            cells.zip_mut_with(&self.cells.row(frame), |out, &cell| *out = WEIGHT * f32::from(cell));
+        }
     }
 
     /// The track as a mirror would show it: angle a becomes 180 - a, columns and x turn round.

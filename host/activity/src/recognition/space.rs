@@ -212,9 +212,9 @@ fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
     let n = frames.len();
     let kept = n.min(count);
     let mut rows = Array2::zeros((kept, width));
-    for (i, mut row) in rows.rows_mut().into_iter().enumerate() {
+    for (i, row) in rows.rows_mut().into_iter().enumerate() {
         let (track, frame) = frames[(2 * i + 1) * n / (2 * kept)];
-        row.iter_mut().zip(track.seen(frame, width)).for_each(|(out, value)| *out = value);
+        track.seen(frame, row);
     }
     rows
 }
