@@ -150,3 +150,28 @@ impl Clip {
         starts.map(|from| self.select(|_| (from..(from + length).min(frames)).collect())).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mirrored_track_is_the_track_of_mirrored_masks() {
+        // As large as the frame, so that scaling takes the same pixels of both.
+        let mask =
+            Mask::from_shape_fn((100, 60), |(y, x)| (20..40).contains(&x) || (y < 30 && x > 35) || y > 95);
+        let turned = Mask::from_shape_fn((100, 60), |(y, x)| mask[[y, 59 - x]]);
+        let of = |mask: &Mask| Track::from_masks(std::slice::from_ref(mask), Scaling::KeepAspect, true);
+        let (mirrored, expected) = (of(&mask).mirrored(), of(&turned));
+        assert_eq!(mirrored.cells, expected.cells);
+        assert_ne!(mirrored.cells, of(&mask).cells);
+        // A ray that just meets a corner or just misses it: all but a few of 360.
+        let off =
+            mirrored.descriptors.iter().zip(&expected.descriptors).filter(|(a, b)| (*a - *b).abs() > 0.011);
+        assert!(off.count() < 8, "a step of the march and a pixel's half");
+        let (found, expected) = (mirrored.boxes.expect("full frames"), expected.boxes.expect("full frames"));
+        assert_eq!(found.row(0).to_vec()[..2], expected.row(0).to_vec()[..2]);
+        assert!((found[[0, 2]] + 59.0 - expected[[0, 2]]).abs() < 1e-3, "x turns round");
+        assert!((found[[0, 3]] - expected[[0, 3]]).abs() < 1e-3);
+    }
+}

@@ -110,6 +110,7 @@ fn differences(rows: ArrayView2<f32>) -> Array2<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::embedding::descriptor::{ANGLES, CELLS};
     use crate::recognition::clip::Track;
 
     fn boxes(track: &Track) -> Option<ArrayView2<'_, f32>> {
@@ -120,8 +121,8 @@ mod tests {
     fn shuffled_frames_give_the_same_vectors_in_order_free_mode() {
         let n = 12;
         let track = Track {
-            descriptors: Array2::zeros((n, 360)),
-            cells: Array2::zeros((n, 400)),
+            descriptors: Array2::zeros((n, ANGLES)),
+            cells: Array2::zeros((n, CELLS)),
             boxes: Some(Array2::from_shape_fn((n, 4), |(f, k)| (50 + f * (k + 1)) as f32)),
             empty_frames: 0,
         };
