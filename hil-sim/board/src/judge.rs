@@ -19,8 +19,6 @@ mod positions;
 mod records;
 mod requests;
 
-use std::collections::BTreeMap;
-
 use crate::{
     parts::Parts,
     scenario::Scenario,
@@ -55,16 +53,18 @@ impl Case<'_> {
         self.scenario.happens.iter().any(|happening| kinds.contains(&happening.what.name))
     }
 
-    /// For each boot, virtual nanoseconds less the board's time: the least delay with which one of its events was heard.
-    fn clocks(&self) -> BTreeMap<u32, u64> {
-        let mut clocks = BTreeMap::new();
+    /// For each life of the board, from one reset to the next, virtual nanoseconds less the board's time: the least delay with which one of
+    /// its events was heard. Not by the number of its boot: a board whose memory is dead counts from 1 again when power comes back.
+    fn clocks(&self) -> Vec<u64> {
+        let mut clocks = vec![u64::MAX];
         for sight in self.sights {
-            if let Seen::Told { boot, event, .. } = &sight.seen {
-                let offset = sight.at_ns.saturating_sub(event.time.0.saturating_mul(1000));
-                clocks
-                    .entry(*boot)
-                    .and_modify(|least: &mut u64| *least = offset.min(*least))
-                    .or_insert(offset);
+            match &sight.seen {
+                Seen::Reset => clocks.push(u64::MAX),
+                Seen::Told { event, .. } => {
+                    let offset = sight.at_ns.saturating_sub(event.time.0.saturating_mul(1000));
+                    clocks.last_mut().into_iter().for_each(|least| *least = offset.min(*least));
+                }
+                _ => {}
             }
         }
         clocks

@@ -43,6 +43,7 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
 /// Property `step-after-alarm`.
 pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
     let clocks = case.clocks();
+    let mut life = 0;
     // Since when an alarm is latched, and its number; and when the last was cleared or the board reset.
     let mut spans: Vec<(u64, u64, u32)> = Vec::new();
     let mut known = std::collections::BTreeSet::new();
@@ -50,14 +51,16 @@ pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
         match &sight.seen {
             Seen::Told { boot, event, .. } => match &event.kind {
                 EventKind::Alarm(record) if record.boot == *boot && known.insert(record.number) => {
-                    let at_ns = clocks.get(boot).map_or(sight.at_ns, |zero| zero + record.time.0 * 1000);
+                    let at_ns = clocks[life] + record.time.0 * 1000;
                     spans.push((at_ns.min(sight.at_ns), u64::MAX, record.number));
                 }
                 EventKind::AlarmCleared { number } => end(&mut spans, *number, sight.at_ns),
                 _ => {}
             },
             Seen::Reset => {
-                spans.iter_mut().filter(|span| span.1 == u64::MAX).for_each(|span| span.1 = sight.at_ns)
+                life += 1;
+                known.clear();
+                spans.iter_mut().filter(|span| span.1 == u64::MAX).for_each(|span| span.1 = sight.at_ns);
             }
             _ => {}
         }

@@ -88,6 +88,14 @@ fn steps_after_an_alarm_or_without_work_are_seen() {
     assert_eq!(broken("", &[stepped(2, 9)]), ["moves-unasked"]);
     let reset = Sight { at_ns: 5 * MS, seen: Seen::Reset };
     assert_eq!(broken("", &[asked(1, 7, go()), reset, stepped(6, 7)]), ["moves-unasked"]);
+    // Seed 107727: a memory that died with the power, so that the next boot has the number of the one before and its clock begins anew.
+    let reset = Sight { at_ns: 95 * MS, seen: Seen::Reset };
+    let (Sight { seen, .. }, at_ns) = (begin[1].clone(), 106 * MS);
+    let next_life = [asked(101, 7, go()), Sight { at_ns, seen }];
+    let lives =
+        [&[asked(1, 6, go()), told(3, 0, done(9, 5_000), at(5.0)), stepped(60, 70), reset], &next_life[..]];
+    assert_eq!(broken("", &lives.concat()), [""; 0]);
+    assert_eq!(broken("", &[&lives.concat()[..], &[stepped(102, 115)]].concat()), ["step-after-alarm"]);
 }
 
 #[test]
