@@ -19,7 +19,7 @@
 //! Masks are `Array2<bool>` of shape (height, width), row 0 at the top.
 //!
 //! # From markers to an activity
-//! A recording's points are turned to a view, filled part by part and described by 360 centroid distances; clips of such
+//! A recording's points are turned to a view, filled part by part and described by 360 centroid distances and a coarse silhouette; clips of such
 //! silhouettes train a recogniser, which then answers for one that it has not seen.
 //!
 //! ```

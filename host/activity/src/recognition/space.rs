@@ -317,7 +317,7 @@ impl Galleries {
     /// The place of the gallery that these settings ask for.
     fn gallery(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
         // Codebooks keep to the distances: with coarse silhouettes too they know the people of their own set a little better (fused, 0 to 3
-        // points on two public sets), and those of another one much worse (up to 15).
+        // points on two public sets), and those of another one mostly worse (by up to 15).
         let width = if settings.pattern == PatternKind::Network { ANGLES + CELLS } else { ANGLES };
         let key = (settings.layout, settings.dimensions, settings.gallery, width);
         if let Some(index) = self.galleries.iter().position(|gallery| gallery.key == key) {

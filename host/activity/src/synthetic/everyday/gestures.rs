@@ -128,7 +128,7 @@ pub fn throw(maker: &mut Maker) -> Motion {
     let (back, front, end) = if under {
         (Hand::swung(-50.0, 10.0, 0.15), Hand::swung(85.0, 8.0, 0.0), Hand::swung(120.0, 20.0, 0.0))
     } else {
-        // The hand winds up behind the shoulder or no further than the ear.
+        // The hand winds up a little behind the shoulder, or is ready before it.
         let behind = maker.draw(-0.15, 0.75);
         (
             Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.35),
