@@ -124,6 +124,20 @@ fn a_position_beside_the_truth_is_seen() {
     assert_eq!(broken("", &[asked(1, 7, go()), told(9, 0, done(7, 5_000), at(19.0))]), ["position"]);
 }
 
+#[test]
+fn a_piezo_beside_the_truth_is_seen_but_where_a_program_may_have_sent_it_on() {
+    let said = |state: ProgramState, measured_nm: i32| {
+        let mut status = status(3);
+        (status.fine.state, status.fine.measured) = (PositionState::Homed, Nanometres(measured_nm));
+        status.program.state = state;
+        broken("", &[answered(3, 2, Response::Status(status))])
+    };
+    // It is at 0.
+    assert_eq!(said(ProgramState::Idle, 50), [""; 0]);
+    assert_eq!(said(ProgramState::Idle, 5_000), ["position"]);
+    assert_eq!(said(ProgramState::Running, 5_000), [""; 0]);
+}
+
 fn setting(value: i32) -> Response {
     let key = SettingKey::CameraReadoutUs;
     Response::Setting(farnear_protocol::message::Setting {
@@ -147,8 +161,8 @@ fn a_setting_that_is_another_one_is_seen() {
     assert_eq!((run(3, 10_500), run(3, 4)), (vec![], vec!["records"]));
 }
 
-/// An answer that was made at a moment, of a board without an alarm.
-fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
+/// What a board says of itself at a moment at which nothing is homed, armed or wrong.
+fn status(made_ms: u64) -> Status {
     let axis = AxisStatus {
         state: PositionState::Unknown,
         asked: Nanometres(0),
@@ -156,7 +170,7 @@ fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
         moving: false,
         request: None,
     };
-    let status = Status {
+    Status {
         time: BoardMicros(made_ms * 1000),
         coarse: axis,
         fine: axis,
@@ -173,8 +187,12 @@ fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
         triggers: 0,
         steps: 0,
         link: LinkCounters::default(),
-    };
-    answered(answered_ms, 2, Response::Status(status))
+    }
+}
+
+/// An answer that was made at a moment, of a board without an alarm.
+fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
+    answered(answered_ms, 2, Response::Status(status(made_ms)))
 }
 
 #[test]
