@@ -80,9 +80,8 @@ impl Homing {
             (Phase::Begin, _) if !axis.home_is_steady() => return None,
             (Phase::Begin, _) => {
                 self.known_before = axis.state() != PositionState::Unknown;
-                if axis.state() != PositionState::Homed {
-                    axis.follow_encoder();
-                }
+                // A disagreement that is allowed at rest becomes a fault by the encoder's lag in motion.
+                axis.follow_encoder();
                 if axis.home_closed() { Phase::Leave } else { Phase::Search }
             }
             (Phase::Search, Some(edge)) => {
