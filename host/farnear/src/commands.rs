@@ -21,3 +21,4 @@ pub mod serve;
 pub mod shadow;
 pub mod silhouettes;
 pub mod sun;
+pub mod target;

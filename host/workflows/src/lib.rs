@@ -11,7 +11,7 @@
 //! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
 //! - [`measure`]: figures of a map: a region with its plane, a profile, a difference; [`picture`]: figures of an image;
 //!   [`lens_table`]: the working range as it is typed; [`sessions`], [`report`]: captures that were kept, and a page about one.
-//! - [`calibrate`]: learning the point spread function and corrections.
+//! - [`target`]: a flat target to print; [`calibrate`]: learning the point spread function and corrections.
 //! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
 //!   [`sun`] stands; [`activity`]: what the person does.
 //! - [`batch`]: a list of such jobs on all cores, to be gone on with after whatever stopped it.
@@ -90,6 +90,7 @@ pub mod shadow;
 pub mod silhouettes;
 pub mod simulator;
 pub mod sun;
+pub mod target;
 
 pub use context::{Cancel, Context, Nobody, Progress, Questions};
 pub use error::{Result, WorkflowError};

@@ -29,6 +29,7 @@ mod shadow_remove;
 mod shadow_score;
 mod silhouettes;
 mod sun;
+mod target;
 mod uncertainty;
 mod usage;
 mod writers;

@@ -26,6 +26,7 @@ const COMMANDS: &[&[&str]] = &[
     &["measure", "plane"],
     &["measure", "profile"],
     &["measure", "difference"],
+    &["target"],
     &["render"],
     &["report"],
     &["serve"],

@@ -1,0 +1,229 @@
+//! A flat target to print: a random texture that is as fine on paper as the optics can use, true to scale.
+
+mod page;
+
+use std::{fmt, path::PathBuf, str::FromStr};
+
+use farnear_files::staging;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    optics::GivenOptics,
+    parameters::within,
+};
+
+/// Millimetres of an inch.
+const INCH_MM: f64 = 25.4;
+/// Side of a cell in pixels of the image that printer's dots come nearest to: of 1 to 6 it gave the least noise of depth (`docs/bench.md`).
+const CELL_PX: f64 = 2.5;
+/// Cells that are finer than this many dots come out grey: ink spreads.
+const LEAST_DOTS: f64 = 2.0;
+/// Cells of so many pixels have half as much noise again.
+const COARSE_PX: f64 = 4.0;
+/// What printers leave white around a page, mm.
+const MARGIN_MM: f64 = 10.0;
+/// For the line of 100 mm and what stands on it.
+const FOOT_MM: f64 = 18.0;
+/// Cells of a page of 16 MB.
+const MOST_CELLS: usize = 1 << 27;
+/// Half the length of the cross in the middle, in cells.
+const CROSS_CELLS: usize = 12;
+
+/// A sheet of paper, upright.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Paper {
+    /// Width in mm.
+    pub width_mm: f64,
+    /// Height in mm.
+    pub height_mm: f64,
+}
+
+/// Papers by name: ISO 216, and the American one.
+const PAPERS: [(&str, [f64; 2]); 6] = [
+    ("a4", [210.0, 297.0]),
+    ("a3", [297.0, 420.0]),
+    ("a2", [420.0, 594.0]),
+    ("a1", [594.0, 841.0]),
+    ("a0", [841.0, 1189.0]),
+    ("letter", [215.9, 279.4]),
+];
+
+impl FromStr for Paper {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = PAPERS.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)).map(|(_, size)| *size);
+        let written = || {
+            let (width, height) = text.split_once('x')?;
+            Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
+        };
+        match named.or_else(written) {
+            Some([width_mm, height_mm])
+                if [width_mm, height_mm].iter().all(|mm| (130.0..=2000.0).contains(mm)) =>
+            {
+                Ok(Self { width_mm, height_mm })
+            }
+            Some(_) => Err(format!("paper {text}: expected sides of 130 to 2000 mm")),
+            None => {
+                let names: Vec<&str> = PAPERS.iter().map(|(name, _)| *name).collect();
+                Err(format!("unknown paper `{text}`: expected {}, or WIDTHxHEIGHT in mm", names.join(", ")))
+            }
+        }
+    }
+}
+
+impl fmt::Display for Paper {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{} mm", self.width_mm, self.height_mm)
+    }
+}
+
+/// What is to be printed.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TargetSettings {
+    /// The optics file.
+    pub optics: PathBuf,
+    /// How far from the lens the target will stand, mm; without it the distance of the far focus.
+    pub distance_mm: Option<f64>,
+    /// The sheet.
+    pub paper: Paper,
+    /// The printer's dots per inch, 150 to 4800.
+    pub dpi: u32,
+    /// Decides the texture.
+    pub seed: u64,
+    /// The PDF file.
+    pub out: PathBuf,
+}
+
+/// What there is to say of a target.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct TargetFigures {
+    /// A pixel of the camera on the target, mm.
+    pub pixel_on_target_mm: f64,
+    /// Side of a cell, mm.
+    pub cell_mm: f64,
+    /// The same in pixels of the camera.
+    pub cell_px: f64,
+    /// The same in dots of the printer.
+    pub cell_dots: u32,
+    /// Cells of a row.
+    pub columns: usize,
+    /// Rows of cells.
+    pub rows: usize,
+}
+
+/// Black (`true`) and white cells, row by row from the top, with a cross in the middle.
+struct Texture {
+    columns: usize,
+    rows: usize,
+    black: Vec<bool>,
+}
+
+impl Texture {
+    /// Each cell by itself black or white: all that a printer can do without a screen of its own, whose period would be seen.
+    fn drawn(columns: usize, rows: usize, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (middle_column, middle_row) = (columns / 2, rows / 2);
+        let cell = |index: usize| {
+            let noise = rng.random::<bool>();
+            let across = (index % columns).abs_diff(middle_column);
+            let down = (index / columns).abs_diff(middle_row);
+            match (across.min(down), across.max(down)) {
+                (0, far) if far <= CROSS_CELLS => true,
+                (1, far) if far <= CROSS_CELLS => false,
+                _ => noise,
+            }
+        };
+        Self { columns, rows, black: (0..columns * rows).map(cell).collect() }
+    }
+}
+
+/// Writes a target as a PDF page.
+///
+/// # Errors
+/// Optics that cannot be read; [`WorkflowError::Parameter`] for a distance within the focal length, or dots so coarse that no texture is
+/// left; a file that cannot be written.
+pub fn print(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {
+    within("dpi", settings.dpi, &(150..=4800), "")?;
+    let optics = GivenOptics::read(&settings.optics)?.optics;
+    let focal_mm = optics.focal_length_mm();
+    let distance_mm = settings.distance_mm.unwrap_or(optics.working_range().far_mm);
+    if !(distance_mm.is_finite() && distance_mm > focal_mm) {
+        let expected = format!("expected more than the focal length, {focal_mm} mm");
+        return Err(WorkflowError::parameter("distance", distance_mm, expected));
+    }
+    // In focus an object is as many times larger than its image as it stands further from the front focus than that from the lens.
+    let pixel_mm = optics.pixel_um() * 1e-3 * (distance_mm - focal_mm) / focal_mm;
+    let dot_mm = INCH_MM / f64::from(settings.dpi);
+    let dots = (CELL_PX * pixel_mm / dot_mm).round().max(LEAST_DOTS);
+    let cell_mm = dots * dot_mm;
+    let cell_px = cell_mm / pixel_mm;
+    let cells = |mm: f64| (mm / cell_mm) as usize;
+    let columns = cells(settings.paper.width_mm - 2.0 * MARGIN_MM);
+    let rows = cells(settings.paper.height_mm - 2.0 * MARGIN_MM - FOOT_MM);
+    if columns.min(rows) < 4 * CROSS_CELLS {
+        let expected = format!("expected room for {} cells of {cell_mm:.3} mm either way", 4 * CROSS_CELLS);
+        return Err(WorkflowError::parameter("paper", settings.paper, expected));
+    }
+    if columns * rows > MOST_CELLS {
+        let expected = format!(
+            "expected at most {MOST_CELLS} cells, and these are {columns} x {rows} of {cell_mm:.3} mm"
+        );
+        return Err(WorkflowError::parameter("paper", settings.paper, expected));
+    }
+    if cell_px > COARSE_PX {
+        context.say(&format!(
+            "the printer's dots make cells of {cell_px:.1} px, and depth wants some {CELL_PX}: more dots per inch, or a larger distance, give finer ones"
+        ));
+    }
+    let texture = Texture::drawn(columns, rows, settings.seed);
+    let label = format!("farnear target, cells of {cell_mm:.3} mm, seed {}", settings.seed);
+    let bytes = page::pdf(&texture, settings.paper, cell_mm, &label);
+    staging::write_file(&settings.out, &bytes)?;
+    context.say(&format!("wrote {}; print it at its actual size", settings.out.display()));
+    Ok(TargetFigures {
+        pixel_on_target_mm: rounded(pixel_mm, 4),
+        cell_mm: rounded(cell_mm, 4),
+        cell_px: rounded(cell_px, 3),
+        cell_dots: dots as u32,
+        columns,
+        rows,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn papers_have_names_or_sides() {
+        assert_eq!("A4".parse(), Ok(Paper { width_mm: 210.0, height_mm: 297.0 }));
+        assert_eq!("300x400.5".parse(), Ok(Paper { width_mm: 300.0, height_mm: 400.5 }));
+        for (text, expected) in
+            [("b5", "expected a4, a3"), ("1x1", "130 to 2000 mm"), ("NaNxinf", "130 to 2000 mm")]
+        {
+            assert!(text.parse::<Paper>().expect_err(text).contains(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn half_of_the_cells_are_black_and_neighbours_know_nothing_of_each_other() {
+        let texture = Texture::drawn(301, 401, 3);
+        let sign = |black: bool| if black { 1.0 } else { -1.0 };
+        let n = texture.black.len() as f64;
+        // Sums of n signs, and their products with the neighbour's: five standard deviations of sqrt(n).
+        let sum: f64 = texture.black.iter().map(|black| sign(*black)).sum();
+        let together: f64 = texture.black.windows(2).map(|pair| sign(pair[0]) * sign(pair[1])).sum();
+        assert!(sum.abs() < 5.0 * n.sqrt() && together.abs() < 5.0 * n.sqrt(), "{sum} {together}");
+        let middle = 200 * 301 + 150;
+        assert!(texture.black[middle] && texture.black[middle + CROSS_CELLS]);
+        assert!(!texture.black[middle + 301 + 2] && !texture.black[middle - 301 - 2]);
+        assert_eq!(texture.black, Texture::drawn(301, 401, 3).black);
+        assert_ne!(texture.black, Texture::drawn(301, 401, 4).black);
+    }
+}
