@@ -158,6 +158,7 @@ impl Driver {
             coarse: self.stage_report(StageName::Sensor),
             lens: self.stage_report(StageName::Lens),
             piezo_um: with_plant(&self.plant, |plant| plant.piezo().position_um()),
+            piezo_pulled_um: with_plant(&self.plant, |plant| plant.piezo().pulled_um()),
             triggers: self.wiring.camera().triggers(),
             missed_triggers: self.wiring.camera().missed(),
             flipped_bits: self.lines.to_board.flipped() + self.lines.to_host.flipped(),

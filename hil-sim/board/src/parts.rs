@@ -23,6 +23,8 @@ pub struct Parts {
     pub gauge_converter: ConverterParts,
     /// The strain gauge with its amplifier.
     pub gauge: GaugeParts,
+    /// The piezo with its flexure.
+    pub piezo: PiezoParts,
     /// The FRAM.
     pub memory: MemoryParts,
     /// The chip's own supervision of its supply.
@@ -242,6 +244,18 @@ impl SupplyParts {
     }
 }
 
+/// The piezo with its flexure.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PiezoParts {
+    /// Frequency of the flexure's second mode.
+    pub second_mode_hz: f64,
+    /// Its damping ratio.
+    pub second_mode_damping: f64,
+    /// Its share of what a slow drive moves; 0 = there is none.
+    pub second_mode_share: f64,
+}
+
 /// End switches.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -313,6 +327,9 @@ impl Parts {
             ("gauge.gain", self.gauge.gain, 0.5, 1.5),
             ("gauge.offset_um", self.gauge.offset_um, -20.0, 20.0),
             ("gauge.noise_um", self.gauge.noise_um, 0.0, 10.0),
+            ("piezo.second_mode_hz", self.piezo.second_mode_hz, 1.0, 5e3),
+            ("piezo.second_mode_damping", self.piezo.second_mode_damping, 1e-4, 0.9),
+            ("piezo.second_mode_share", self.piezo.second_mode_share, 0.0, 1.0),
             ("switches.bounces_per_ms", self.switches.bounces_per_ms, 0.0, 1e3),
             ("switches.glitches_per_s", self.switches.glitches_per_s, 0.0, 1e4),
             ("imaging.field_offset", self.imaging.field_offset, -2.0, 2.0),

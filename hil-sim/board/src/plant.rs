@@ -90,7 +90,7 @@ impl Plant {
             now_ns: 0,
             sensor_stage: Stage::new(StageName::Sensor, seed, start_um.map(|[sensor, _]| sensor)),
             lens_stage: Stage::new(StageName::Lens, seed, start_um.map(|[_, lens]| lens)),
-            piezo: Piezo::new(),
+            piezo: Piezo::new(parts.piezo),
             gauge: parts.gauge,
             drift: Drift::default(),
             gauge_noise: Noise::new(seed, "gauge"),

@@ -34,6 +34,8 @@ pub struct Report {
     pub lens: StageReport,
     /// Where the piezo really is, micrometres.
     pub piezo_um: f64,
+    /// How far the piezo's stack was pulled at most since power-on, micrometres: 200 are its blocking force.
+    pub piezo_pulled_um: f64,
     /// Triggers since the board's reset.
     pub triggers: u32,
     /// Triggers that the camera was too busy to hear.

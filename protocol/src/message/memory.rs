@@ -75,11 +75,13 @@ pub enum SettingKey {
     GaugeGainPpm,
     /// What the strain gauge says where the piezo is relaxed, from its calibration.
     GaugeOffsetNm,
+    /// 1 where the piezo's flexure has a second mode that the fast loop would feed: a slower one then leaves it alone.
+    PiezoSecondMode,
 }
 
 impl SettingKey {
     /// All, in order.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::DatumNm,
         Self::DistanceMinNm,
         Self::CoarseMinNm,
@@ -105,6 +107,7 @@ impl SettingKey {
         Self::StrobeDeadlineUs,
         Self::GaugeGainPpm,
         Self::GaugeOffsetNm,
+        Self::PiezoSecondMode,
     ];
 
     /// Its name for people and files, e.g. `coarse_min_nm`.
@@ -135,6 +138,7 @@ impl SettingKey {
             Self::StrobeDeadlineUs => "strobe_deadline_us",
             Self::GaugeGainPpm => "gauge_gain_ppm",
             Self::GaugeOffsetNm => "gauge_offset_nm",
+            Self::PiezoSecondMode => "piezo_second_mode",
         }
     }
 }

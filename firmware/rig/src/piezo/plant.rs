@@ -12,9 +12,12 @@ pub(crate) struct Part {
     pub(crate) creep: f64,
     /// From the gauge's sample to the DAC's answer.
     pub(crate) latency_us: usize,
+    /// A second mode's frequency, and its share of what a slow drive moves.
+    pub(crate) second: (f64, f64),
 }
 
-pub(crate) const NOMINAL: Part = Part { resonance_hz: 200.0, hysteresis: 0.0, creep: 0.0, latency_us: 40 };
+pub(crate) const NOMINAL: Part =
+    Part { resonance_hz: 200.0, hysteresis: 0.0, creep: 0.0, latency_us: 40, second: (700.0, 0.0) };
 
 /// A piezo, stepped at 10 us.
 pub(crate) struct Plant {
@@ -27,12 +30,15 @@ pub(crate) struct Plant {
     drive: f64,
     pub(crate) position: f64,
     velocity: f64,
+    /// Position and velocity of the second mode.
+    second: (f64, f64),
     code: u16,
     random: u64,
 }
 
 impl Plant {
     const DAMPING: f64 = 0.03;
+    const SECOND_DAMPING: f64 = 0.02;
     /// First-order lag of the amplifier: 5 kHz.
     const AMPLIFIER_S: f64 = 32e-6;
     const STROKE: f64 = 200e3;
@@ -47,9 +53,15 @@ impl Plant {
             drive: 0.0,
             position: 0.0,
             velocity: 0.0,
+            second: (0.0, 0.0),
             code: 0,
             random: seed,
         }
+    }
+
+    /// Where the sensor is: [`Self::position`] where there is one mode alone.
+    pub(crate) fn at(&self) -> f64 {
+        self.position + self.part.second.1 * (self.second.0 - self.position)
     }
 
     /// The gauge with its noise: a sum of twelve uniform numbers is normal enough.
@@ -59,7 +71,7 @@ impl Plant {
             self.random = self.random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             noise += (self.random >> 11) as f64 / (1u64 << 53) as f64;
         }
-        let code = self.position + Self::NOISE * noise + f64::from(GAUGE_CODE_ZERO);
+        let code = self.at() + Self::NOISE * noise + f64::from(GAUGE_CODE_ZERO);
         Some(code.round().clamp(0.0, f64::from(GAUGE_CODE_MAX)) as u32)
     }
 
@@ -94,6 +106,11 @@ impl Plant {
             let force = omega * omega * (target - self.position);
             self.velocity += h * (force - 2.0 * Self::DAMPING * omega * self.velocity);
             self.position += h * self.velocity;
+            let omega = 2.0 * core::f64::consts::PI * self.part.second.0;
+            let (position, velocity) = &mut self.second;
+            *velocity +=
+                h * (omega * omega * (target - *position) - 2.0 * Self::SECOND_DAMPING * omega * *velocity);
+            *position += h * *velocity;
         }
     }
 }

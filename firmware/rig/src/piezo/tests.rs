@@ -4,18 +4,19 @@
 use super::*;
 use crate::io::REST_TICKS;
 use crate::piezo::plant::{NOMINAL, Part, Plant};
-use crate::settings::Settings;
+use crate::settings::{Settings, Values};
+use farnear_protocol::message::SettingKey;
 
 /// Moves, and gives the ticks after which the plant itself stays within 50 nm, and its worst overshoot in nm.
 fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
-    let up = f64::from(target) > plant.position;
+    let up = f64::from(target) > plant.at();
     piezo.go(Nanometres(target));
     let (mut settled, mut overshoot) = (0, 0f64);
     for tick in 0..500 {
         let gauge = plant.gauge();
         piezo.sense(gauge);
         plant.tick(piezo.act());
-        let error = plant.position - f64::from(target);
+        let error = plant.at() - f64::from(target);
         overshoot = overshoot.max(if up { error } else { -error });
         if error.abs() > 50.0 {
             settled = tick + 1;
@@ -35,12 +36,12 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
         Part { hysteresis: 0.12, ..NOMINAL },
         Part { creep: 0.015, ..NOMINAL },
         Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL },
-        Part { resonance_hz: 210.0, hysteresis: 0.12, creep: 0.015, latency_us: 40 },
+        Part { resonance_hz: 210.0, hysteresis: 0.12, creep: 0.015, ..NOMINAL },
     ];
     let blind = Settings::DEFAULT.fine;
     let calibrated = FineSettings { hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000, ..blind };
     // Everything wrong at once is too much for a piezo that was never calibrated: 16 ms.
-    let worst = Part { resonance_hz: 190.0, hysteresis: 0.12, creep: 0.015, latency_us: 40 };
+    let worst = Part { resonance_hz: 190.0, hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     for (part, settings) in parts.map(|part| (part, blind)).into_iter().chain([(worst, calibrated)]) {
         for seed in 1..4 {
             let mut piezo = Piezo::new(settings);
@@ -54,6 +55,39 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
             }
         }
     }
+}
+
+#[test]
+fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
+    let mut values = Values::DEFAULT;
+    values.set(SettingKey::PiezoHysteresisPpm, 120_000).expect("in range");
+    values.set(SettingKey::PiezoCreepPpmPerDecade, 15_000).expect("in range");
+    let fast = Settings::DEFAULT.with(&values).fine;
+    values.set(SettingKey::PiezoSecondMode, 1).expect("in range");
+    let gentle = Settings::DEFAULT.with(&values).fine;
+    let ticks = |settings, second, resonance_hz| {
+        let mut piezo = Piezo::new(settings);
+        let mut plant =
+            Plant::new(Part { hysteresis: 0.12, creep: 0.015, resonance_hz, second, ..NOMINAL }, 7);
+        step(&mut piezo, &mut plant, 20_000);
+        [176_270, 20_000, 176_270].map(|target| step(&mut piezo, &mut plant, target).0).into_iter().max()
+    };
+    // The fast loop feeds it until the amplifier is at its ends.
+    assert_eq!(ticks(fast, (900.0, 0.05), 200.0), Some(500));
+    // What swings against a slow drive is the harder the nearer it is to the resonance.
+    let modes = [350.0, 500.0, 700.0, 900.0, 1_300.0, 2_000.0]
+        .into_iter()
+        .flat_map(|hz| [0.02, 0.05, 0.1, 0.2].map(|share| (hz, share)))
+        .chain([500.0, 900.0, 2_000.0].map(|hz| (hz, -0.05)));
+    for second in modes {
+        for resonance_hz in [190.0, 200.0, 210.0] {
+            let longest = ticks(gentle, second, resonance_hz);
+            // 0.1 s; the mode itself takes as long to die away.
+            assert!(longest < Some(500), "{second:?}, {resonance_hz} Hz: {longest:?}");
+        }
+    }
+    // And without one: 41 ms.
+    assert!(ticks(gentle, (700.0, 0.0), 200.0) < Some(220));
 }
 
 #[test]
@@ -281,7 +315,7 @@ fn any_gauge_keeps_the_loop_in_bounds() {
 #[test]
 fn any_way_settles_in_time() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
-    let part = Part { resonance_hz: 205.0, hysteresis: 0.12, creep: 0.015, latency_us: 50 };
+    let part = Part { resonance_hz: 205.0, hysteresis: 0.12, creep: 0.015, latency_us: 50, ..NOMINAL };
     let mut plant = Plant::new(part, 3);
     let mut random = 99u64;
     for _ in 0..200 {

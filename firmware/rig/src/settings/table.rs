@@ -122,6 +122,8 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
         SettingKey::GaugeGainPpm => (1_000_000, 900_000, 1_100_000),
         // The converter sees 10 um below zero.
         SettingKey::GaugeOffsetNm => (0, -9_000, 9_000),
+        // The fast loop, for a flexure that has its resonance and little else.
+        SettingKey::PiezoSecondMode => (0, 0, 1),
     }
 }
 
@@ -145,6 +147,9 @@ impl Settings {
         self.fine.hysteresis_ppm = values.get(SettingKey::PiezoHysteresisPpm) as u32;
         self.fine.creep_ppm_per_decade = values.get(SettingKey::PiezoCreepPpmPerDecade) as u32;
         self.fine.gauge_gain_ppm = values.get(SettingKey::GaugeGainPpm) as u32;
+        if values.get(SettingKey::PiezoSecondMode) != 0 {
+            self.fine.gains = self.fine.gentle_gains;
+        }
         self.fine.gauge_offset = Nanometres(values.get(SettingKey::GaugeOffsetNm));
         self.camera.readout = Micros(values.get(SettingKey::CameraReadoutUs) as u32);
         self.camera.strobe_deadline = Micros(values.get(SettingKey::StrobeDeadlineUs) as u32);

@@ -4,9 +4,13 @@
 //! - Hysteresis: Prandtl & Ishlinskii, ten play operators (Kuhnen, European J. Control 9, 2003, sec. 2); the full
 //!   loop is 12 % of the stroke wide, closed at both ends.
 //! - Creep: 1.5 % of the stroke per decade of time from 0.1 s to 1000 s, four first-order lags.
-//! - Flexure: second order, 200 Hz, damping 0.03.
+//! - Flexure: second order, 200 Hz, damping 0.03; a second mode of the same kind where `parts.toml` has one.
+//! - Tension: the board's inertia may pull the stack beyond its own length. Stacks bear pressure and little else, so what they are pulled at most is
+//!   kept for whoever asks; nothing breaks here.
 //!
 //! Solved exactly over steps of [`Piezo::STEP_NS`] with a constant drive: 0.2 us of the host per step.
+
+use crate::parts::PiezoParts;
 
 /// Free stroke at full voltage, micrometres; also what the DAC's full scale asks for.
 const STROKE_UM: f64 = 200.0;
@@ -30,28 +34,42 @@ pub struct Piezo {
     drive_um: f64,
     plays_um: [f64; PLAYS],
     creep_um: [f64; CREEP_S.len()],
-    position_um: f64,
-    velocity_um_s: f64,
+    first: Mode,
+    second: Mode,
+    parts: PiezoParts,
+    pulled_um: f64,
     full_step: Propagator,
 }
 
-/// The oscillator's state after a step of constant drive: deviation and velocity mix by these factors; and what
-/// the first-order lags keep.
+/// How a mode of the flexure stands.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mode {
+    position_um: f64,
+    velocity_um_s: f64,
+}
+
+impl Mode {
+    fn step(&mut self, rest_um: f64, by: &Oscillation) {
+        let (deviation, velocity) = (self.position_um - rest_um, self.velocity_um_s);
+        self.position_um = rest_um + by.xx * deviation + by.xv * velocity;
+        self.velocity_um_s = by.vx * deviation + by.vv * velocity;
+    }
+}
+
+/// An oscillator's state after a step of constant drive: deviation and velocity mix by these factors.
 #[derive(Clone, Copy, Debug)]
-struct Propagator {
+struct Oscillation {
     xx: f64,
     xv: f64,
     vx: f64,
     vv: f64,
-    amplifier: f64,
-    creep: [f64; CREEP_S.len()],
 }
 
-impl Propagator {
-    fn over(seconds: f64) -> Self {
-        let omega = core::f64::consts::TAU * RESONANCE_HZ;
-        let decay = DAMPING * omega;
-        let damped = omega * libm::sqrt(1.0 - DAMPING * DAMPING);
+impl Oscillation {
+    fn over(seconds: f64, resonance_hz: f64, damping: f64) -> Self {
+        let omega = core::f64::consts::TAU * resonance_hz;
+        let decay = damping * omega;
+        let damped = omega * libm::sqrt(1.0 - damping * damping);
         let fade = libm::exp(-decay * seconds);
         let (sin, cos) = (libm::sin(damped * seconds), libm::cos(damped * seconds));
         Self {
@@ -59,6 +77,24 @@ impl Propagator {
             xv: fade * sin / damped,
             vx: -fade * omega * omega / damped * sin,
             vv: fade * (cos - decay / damped * sin),
+        }
+    }
+}
+
+/// What a step of constant drive does to both modes, and what the first-order lags keep.
+#[derive(Clone, Copy, Debug)]
+struct Propagator {
+    first: Oscillation,
+    second: Oscillation,
+    amplifier: f64,
+    creep: [f64; CREEP_S.len()],
+}
+
+impl Propagator {
+    fn over(seconds: f64, parts: &PiezoParts) -> Self {
+        Self {
+            first: Oscillation::over(seconds, RESONANCE_HZ, DAMPING),
+            second: Oscillation::over(seconds, parts.second_mode_hz, parts.second_mode_damping),
             amplifier: libm::exp(-core::f64::consts::TAU * AMPLIFIER_HZ * seconds),
             creep: CREEP_S.map(|tau| libm::exp(-seconds / tau)),
         }
@@ -81,16 +117,18 @@ impl Piezo {
     pub const STEP_NS: u64 = 20_000;
 
     /// A relaxed piezo.
-    pub fn new() -> Self {
+    pub fn new(parts: PiezoParts) -> Self {
         Self {
             code: 0,
             drive_um: 0.0,
             // As after a descent from the top: the loop's lower left corner is position 0.
             plays_um: core::array::from_fn(radius_um),
             creep_um: [0.0; CREEP_S.len()],
-            position_um: 0.0,
-            velocity_um_s: 0.0,
-            full_step: Propagator::over(Self::STEP_NS as f64 * 1e-9),
+            first: Mode::default(),
+            second: Mode::default(),
+            pulled_um: 0.0,
+            full_step: Propagator::over(Self::STEP_NS as f64 * 1e-9, &parts),
+            parts,
         }
     }
 
@@ -106,7 +144,13 @@ impl Piezo {
 
     /// Where the sensor board really is, micrometres from the relaxed position.
     pub fn position_um(&self) -> f64 {
-        self.position_um
+        let Mode { position_um, .. } = self.first;
+        position_um + self.parts.second_mode_share * (self.second.position_um - position_um)
+    }
+
+    /// How far the stack was pulled at most, beyond the length that its drive gave it: over the full stroke that is the share of its blocking force.
+    pub fn pulled_um(&self) -> f64 {
+        self.pulled_um
     }
 
     /// Stroke that the drive makes in the end, creep aside: hysteresis.
@@ -129,7 +173,7 @@ impl Piezo {
         let by = if nanoseconds == Self::STEP_NS {
             self.full_step
         } else {
-            Propagator::over(nanoseconds as f64 * 1e-9)
+            Propagator::over(nanoseconds as f64 * 1e-9, &self.parts)
         };
         let asked_um = f64::from(self.code) / DAC_MAX * STROKE_UM;
         self.drive_um = asked_um + (self.drive_um - asked_um) * by.amplifier;
@@ -138,22 +182,16 @@ impl Piezo {
             *creep = CREEP * strain_um + (*creep - CREEP * strain_um) * keeps;
         }
         let rest_um = strain_um + self.creep_um.iter().sum::<f64>();
-        let deviation = self.position_um - rest_um;
-        let velocity = self.velocity_um_s;
-        self.position_um = rest_um + by.xx * deviation + by.xv * velocity;
-        self.velocity_um_s = by.vx * deviation + by.vv * velocity;
-    }
-}
-
-impl Default for Piezo {
-    fn default() -> Self {
-        Self::new()
+        self.first.step(rest_um, &by.first);
+        self.second.step(rest_um, &by.second);
+        self.pulled_um = self.pulled_um.max(self.position_um() - rest_um);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parts::Parts;
 
     fn run(piezo: &mut Piezo, code: u16, seconds: f64) -> Vec<f64> {
         piezo.set_dac(code);
@@ -167,7 +205,7 @@ mod tests {
 
     #[test]
     fn a_step_rings_at_200_hz_and_decays_with_its_damping() {
-        let mut piezo = Piezo::new();
+        let mut piezo = Piezo::new(Parts::default().piezo);
         let path = run(&mut piezo, 6554, 0.05);
         let end = *run(&mut piezo, 6554, 0.5).last().expect("not empty");
         let peaks: Vec<usize> =
@@ -179,9 +217,34 @@ mod tests {
     }
 
     #[test]
+    fn a_second_mode_rings_beside_the_first_with_its_share() {
+        let parts = PiezoParts { second_mode_hz: 800.0, second_mode_share: 0.1, ..Parts::default().piezo };
+        let [mut with, mut without] = [parts, Parts::default().piezo].map(Piezo::new);
+        let [a, b] = [&mut with, &mut without].map(|piezo| run(piezo, 6554, 0.02));
+        // Of 17.6 um, in the first half period of the second mode the first one has hardly begun.
+        let most = a.iter().zip(&b).take(63).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!((1.0..5.0).contains(&most), "{most}");
+        let [a, b] = [&mut with, &mut without].map(|piezo| *run(piezo, 6554, 0.5).last().expect("not empty"));
+        assert!((a - b).abs() < 1e-6, "a slow drive moves both alike: {a} {b}");
+    }
+
+    #[test]
+    fn letting_a_stretched_stack_go_at_once_pulls_it_and_a_ramp_does_not() {
+        let mut piezo = Piezo::new(Parts::default().piezo);
+        for code in 0..=52_000 / 20 {
+            run(&mut piezo, 20 * code, 40e-6);
+        }
+        assert!(piezo.pulled_um() < 2.0, "{} um by a ramp of 0.1 s", piezo.pulled_um());
+        let before_um = piezo.position_um();
+        run(&mut piezo, 0, 0.05);
+        // All of it at once, less what hysteresis and creep keep and the amplifier delays.
+        assert!((0.7..1.0).contains(&(piezo.pulled_um() / before_um)), "{} um", piezo.pulled_um());
+    }
+
+    #[test]
     fn the_full_loop_is_twelve_percent_wide_and_closed_at_both_ends() {
         // Strain alone, as creep and ringing are not what is measured here.
-        let mut piezo = Piezo::new();
+        let mut piezo = Piezo::new(Parts::default().piezo);
         let mut at = |um: f64| {
             piezo.drive_um = um;
             piezo.strain_um()
@@ -195,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_held_drive_creeps_by_its_share_per_decade() {
-        let mut piezo = Piezo::new();
+        let mut piezo = Piezo::new(Parts::default().piezo);
         run(&mut piezo, 32_768, 1.0);
         let early = piezo.position_um();
         run(&mut piezo, 32_768, 9.0);

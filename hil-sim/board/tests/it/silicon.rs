@@ -5,8 +5,8 @@ use farnear_protocol::{
     message::{Alarm, Axis, Calibration, PositionState, ResetCause, Routine, SettingKey, Shot, TriggerMode},
 };
 use farnear_sim::{
-    Parts, RigConfig,
-    parts::{BrownOut, GaugeParts, MemoryMake, SwitchParts},
+    Parts, Report, RigConfig,
+    parts::{BrownOut, GaugeParts, MemoryMake, PiezoParts, SwitchParts},
 };
 
 use crate::bench::{Bench, SILENCE, fine_shot, go};
@@ -150,11 +150,58 @@ fn a_reset_does_not_let_the_piezo_go_at_once() {
     for _ in 0..2_000 {
         lowest = lowest.min(bench.rig.advance_us(200).expect("runs").piezo_um);
     }
-    let rest = bench.report().piezo_um;
-    println!("after the reset down to {lowest:.2} um at least, {rest:.2} um at rest");
+    let Report { piezo_um: rest, piezo_pulled_um: pulled, .. } = bench.report();
+    println!(
+        "pulled by {pulled:.1} um; after the reset down to {lowest:.2} um at least, {rest:.2} um at rest"
+    );
     // Let go at once it would swing to some -130 um. Creep and hysteresis leave it a little above its zero.
     assert!(lowest > -5.0, "{lowest} um: the stack is under tension");
     assert!(rest.abs() < 10.0, "{rest} um: it is relaxed");
+}
+
+#[test]
+fn a_second_mode_of_the_flexure_is_left_alone_where_the_board_knows_of_it() {
+    const WINDOW_NM: f64 = 200.0;
+    for (hz, share) in [(700.0, 0.0), (500.0, 0.05), (700.0, 0.1), (1_000.0, 0.1), (700.0, 0.2)] {
+        let mut bench = rig_with(|parts| {
+            parts.piezo = PiezoParts { second_mode_hz: hz, second_mode_share: share, ..parts.piezo };
+        });
+        let shots = [10_000, 166_270].map(|nm| fine_shot(nm, 5_000, WINDOW_NM as i32, 10_000));
+        if share >= 0.1 {
+            // The fast loop feeds it: no exposure is made where nothing stands still, and what swings out of the gauge's sight is an alarm.
+            bench.arm(&shots);
+            let end = bench.run();
+            assert!(matches!(end, EventKind::Failed { .. }), "{hz} Hz, {share}: {end:?}");
+        }
+        // What the calibration finds of hysteresis and creep is left for the slow loop to learn otherwise.
+        for (key, value) in [
+            (SettingKey::PiezoSecondMode, 1),
+            (SettingKey::PiezoHysteresisPpm, 120_000),
+            (SettingKey::PiezoCreepPpmPerDecade, 15_000),
+        ] {
+            assert!(bench.ask(&Request::WriteSetting { key, value }).is_ok());
+        }
+        bench.rig.advance_us(300_000).expect("runs");
+        if bench.alarm().is_some() {
+            bench.clear(|alarm| *alarm == Alarm::Gauge);
+        }
+        bench.move_to(Axis::SensorFine, Nanometres(10_000));
+        bench.arm(&shots);
+        for _ in 0..3 {
+            let begin_ns = bench.report().now_ns;
+            let end = bench.run();
+            assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{hz} Hz, {share}: {end:?}");
+            let shots = bench.rig.take_shots();
+            let took_ms = (shots[1].end_ns - begin_ns) / 1_000_000;
+            for (shot, asked_um) in shots.iter().zip([10.0, 166.27]) {
+                let off_nm =
+                    [shot.truth.piezo_min_um, shot.truth.piezo_max_um].map(|um| 1e3 * (um - asked_um));
+                println!("{hz} Hz, {share}: a pair in {took_ms} ms, off by {off_nm:.1?} nm");
+                assert!(off_nm.iter().all(|nm| nm.abs() <= WINDOW_NM), "{hz} Hz, {share}: {off_nm:?} nm");
+            }
+        }
+        println!("{hz} Hz, {share}: the stack was pulled by {:.1} um", bench.report().piezo_pulled_um);
+    }
 }
 
 #[test]
