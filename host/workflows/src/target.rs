@@ -157,7 +157,7 @@ pub fn print(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetF
         let expected = format!("expected more than the focal length, {focal_mm} mm");
         return Err(WorkflowError::parameter("distance", distance_mm, expected));
     }
-    // In focus an object is as many times larger than its image as it stands further from the front focus than that from the lens.
+    // An object in focus is larger than its image by its distance from the front focal point over the focal length.
     let pixel_mm = optics.pixel_um() * 1e-3 * (distance_mm - focal_mm) / focal_mm;
     let dot_mm = INCH_MM / f64::from(settings.dpi);
     let dots = (CELL_PX * pixel_mm / dot_mm).round().max(LEAST_DOTS);

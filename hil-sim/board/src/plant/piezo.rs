@@ -92,9 +92,15 @@ struct Propagator {
 
 impl Propagator {
     fn over(seconds: f64, parts: &PiezoParts) -> Self {
+        let first = Oscillation::over(seconds, RESONANCE_HZ, DAMPING);
+        let second = if parts.second_mode_share > 0.0 {
+            Oscillation::over(seconds, parts.second_mode_hz, parts.second_mode_damping)
+        } else {
+            first // nobody sees it
+        };
         Self {
-            first: Oscillation::over(seconds, RESONANCE_HZ, DAMPING),
-            second: Oscillation::over(seconds, parts.second_mode_hz, parts.second_mode_damping),
+            first,
+            second,
             amplifier: libm::exp(-core::f64::consts::TAU * AMPLIFIER_HZ * seconds),
             creep: CREEP_S.map(|tau| libm::exp(-seconds / tau)),
         }
