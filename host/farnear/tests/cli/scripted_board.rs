@@ -1,6 +1,7 @@
 //! Boards in trouble, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
 #![cfg(target_os = "linux")]
 
+use farnear_protocol::message::SettingKey;
 use farnear_scripted_board::{Faults, plug_in};
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
@@ -74,7 +75,7 @@ fn settings_and_counters_are_read_and_changed() {
         command
     };
     let list = figures(&mut settings(&["list"]));
-    assert_eq!(list["settings"].as_array().map(Vec::len), Some(25), "{list}");
+    assert_eq!(list["settings"].as_array().map(Vec::len), Some(SettingKey::ALL.len()), "{list}");
     let set = figures(&mut settings(&["set", "coarse_backlash_nm", "4000"]));
     assert_eq!((number(&set, "value"), number(&set, "default")), (4000.0, 1000.0));
     assert_eq!(number(&figures(&mut settings(&["get", "coarse_backlash_nm"])), "value"), 4000.0);
