@@ -220,7 +220,6 @@ impl Settings {
     }
 }
 
-/// The parts of `docs/rig.md`; what is 0 here comes from the settings.
 /// The piezo of the parts list, and the fast loop.
 const PIEZO: PiezoModel = PiezoModel {
     resonance_hz: 200.0,
@@ -236,6 +235,7 @@ const PIEZO: PiezoModel = PiezoModel {
     observer: Poles { hz: 500.0, damping: 1.0 },
 };
 
+/// The parts of `docs/rig.md`; what is 0 here comes from the settings.
 const PARTS: Settings = Settings {
     datum: Nanometres(0),
     distance_min: Nanometres(0),
@@ -251,8 +251,8 @@ const PARTS: Settings = Settings {
         gauge_gain_ppm: 0,
         gauge_offset: Nanometres(0),
         gains: Gains::design(&PIEZO),
-        // Fed with what the gauge sees of a second mode, the loop must not answer: a mode with a damping of 0.01 from 320 Hz on may have a share of 0.3
-        // of what a slow drive moves, and of 0.05 against it. Learns the offset of hysteresis in 20 ms.
+        // Fed with what the gauge sees of a second mode, the loop must not answer: by its eigenvalues a mode with a damping of 0.01, from 320 Hz on, may
+        // have a share of 0.3 of what a slow drive moves, and 0.05 against it. A calibrated piezo is within 50 nm after 41 ms.
         gentle_gains: Gains::design(&PiezoModel {
             feedback: Poles { hz: 200.0, damping: 0.3 },
             observer: Poles { hz: 80.0, damping: 1.0 },
