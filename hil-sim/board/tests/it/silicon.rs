@@ -157,6 +157,8 @@ fn a_reset_does_not_let_the_piezo_go_at_once() {
     // Let go at once it would swing to some -130 um. Creep and hysteresis leave it a little above its zero.
     assert!(lowest > -5.0, "{lowest} um: the stack is under tension");
     assert!(rest.abs() < 10.0, "{rest} um: it is relaxed");
+    // The shaper takes a quarter of the way at a time, 39 um.
+    assert!((30.0..50.0).contains(&pulled), "{pulled} um");
 }
 
 #[test]
@@ -185,7 +187,8 @@ fn a_second_mode_of_the_flexure_is_left_alone_where_the_board_knows_of_it() {
         if bench.alarm().is_some() {
             bench.clear(|alarm| *alarm == Alarm::Gauge);
         }
-        bench.move_to(Axis::SensorFine, Nanometres(10_000));
+        let end = bench.move_to(Axis::SensorFine, Nanometres(10_000));
+        assert!(matches!(end, EventKind::MoveDone { .. }), "{hz} Hz, {share}: {end:?}");
         bench.arm(&shots);
         for _ in 0..3 {
             let begin_ns = bench.report().now_ns;
