@@ -11,7 +11,8 @@
 //! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a reset of the board, so at
 //! the start the piezo may stand anywhere: nothing is played until the gauge has said where, and it is led down from there,
 //! for a stack that is let go at once swings into tension. If the gauge fails, the command is held and the loop opens until
-//! the next move.
+//! the next move. So it does where the piezo does not move as it should: a loop that feeds a mode of the flexure which it does
+//! not know is opened before the stack is pulled apart.
 //!
 //! A piezo that has stood at its target for a second is at ease: then it is enough to look rarely, for creep is all that moves it. The
 //! model of the resonance knows control ticks only, so after a rest the gauge corrects disturbance and drift alone, slowly.
@@ -41,6 +42,13 @@ const EASE_TICKS: u16 = TICK_HZ as u16;
 /// time constant. At the resonance, of a Q of 30, the loop's gain is a half.
 const EASE_DISTURBANCE: u32 = 5;
 const EASE_DRIFT: u32 = 15;
+/// Mean surprise beyond which the piezo does not follow. The fast loop's stays below 2 um, also with a resonance a quarter off, and the gentle loop's below
+/// 11 um; one that feeds a mode goes to 60 um and more.
+const STRANGE: i32 = 15_000 << BITS;
+/// Ticks of that mean, as a shift: 3 ms.
+const STRANGE_SHIFT: u32 = 4;
+/// No tick counts for more, for a single reading may be all wrong.
+const STRANGEST: i32 = 2 * STRANGE;
 /// Ticks of the way down at the start, and the codes (3 um) below which it is none.
 const RELAX: u32 = TICK_HZ / 10;
 const RELAXED: u16 = 1_000;
@@ -62,6 +70,8 @@ struct Loop {
     /// The shaped set-point of the tick before.
     reference_before: i32,
     trend: Trend,
+    /// Running mean of how far the gauge is beside what was expected of the tick, without sign.
+    surprise: i32,
 }
 
 impl Loop {
@@ -244,6 +254,7 @@ impl Piezo {
             state: [here, 0, disturbance, 0],
             reference_before: here,
             trend: Trend::new(i64::from(disturbance) << Trend::BITS, 0),
+            surprise: 0,
         });
         (self.closing, self.start) = (false, Start::Over);
     }
@@ -287,6 +298,14 @@ impl Piezo {
                 *state = state.saturating_add(sum([(gain, surprise)]));
             }
             control.trend.push(control.state[2]);
+            control.surprise +=
+                (surprise.saturating_abs().min(STRANGEST) - control.surprise) >> STRANGE_SHIFT;
+            if control.surprise > STRANGE {
+                // The last command is somewhere on its swing; the set-point's does not swing.
+                let still = control.reference_before.saturating_sub(self.lag.offset());
+                (self.code, self.command) = self.scale.playable(still);
+                (self.control, self.near_ticks, self.failed) = (None, 0, true);
+            }
         }
     }
 

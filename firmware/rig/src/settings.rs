@@ -102,6 +102,8 @@ pub struct FineSettings {
     pub gentle_gains: Gains,
     /// When a plain move has settled.
     pub settle: Settle,
+    /// Nobody's dwell is shorter.
+    pub dwell_min: Micros,
     /// Time to settle from the start of the move, dwell not included.
     pub settle_deadline: Micros,
     /// Longest time without a believable gauge reading.
@@ -259,6 +261,7 @@ const PARTS: Settings = Settings {
             ..PIEZO
         }),
         settle: Settle::of_move(Axis::SensorFine),
+        dwell_min: Micros(0),
         // A full-stroke step settles within 15 ms; 20 times that is broken.
         settle_deadline: Micros(300_000),
         // Five samples: single lost conversions are bridged by the observer.

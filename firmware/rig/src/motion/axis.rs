@@ -83,6 +83,8 @@ pub(crate) struct Stepper {
     encoder: i32,
     pulses: Option<u32>,
     total_pulses: u64,
+    /// Pulses in which the rotor may still fall to a pole.
+    falling: u32,
     /// Pulses of the segments under way, oldest first, and how many of the oldest are counted already.
     outstanding: Deque<u16, OUTSTANDING>,
     counted_of_oldest: u32,
@@ -112,6 +114,7 @@ impl Stepper {
             encoder: 0,
             pulses: None,
             total_pulses: 0,
+            falling: 0,
             outstanding: Deque::new(),
             counted_of_oldest: 0,
             target: Nanometres(0),
@@ -318,6 +321,14 @@ impl Stepper {
     /// Believes the encoder: homing begins from a position that steps and encoder do not agree on.
     pub(crate) const fn follow_encoder(&mut self) {
         self.position = steps::to_steps(self.measured());
+    }
+
+    /// Believes the encoder, also while the first pulses wake a rotor that stood between two poles: a jam that was freed may have left it there.
+    /// It falls by half a period of the torque, 32 pulses, and swings on. That many pulses of a motor that is blocked are no
+    /// following error yet.
+    pub(crate) const fn begin_to_home(&mut self) {
+        self.follow_encoder();
+        self.falling = 32;
     }
 
     /// Makes the edge of the home switch, which was met going down at `edge` (in pulses of the present count), position 0

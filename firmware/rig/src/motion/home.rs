@@ -81,7 +81,7 @@ impl Homing {
             (Phase::Begin, _) => {
                 self.known_before = axis.state() != PositionState::Unknown;
                 // A disagreement that is allowed at rest becomes a fault by the encoder's lag in motion.
-                axis.follow_encoder();
+                axis.begin_to_home();
                 if axis.home_closed() { Phase::Leave } else { Phase::Search }
             }
             (Phase::Search, Some(edge)) => {

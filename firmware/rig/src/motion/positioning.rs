@@ -29,6 +29,11 @@ impl Positioning {
         settle: Settle,
         now: BoardMicros,
     ) -> Self {
+        let settle = if axis == Axis::SensorFine {
+            Settle { dwell: settle.dwell.max(settings.fine.dwell_min), ..settle }
+        } else {
+            settle
+        };
         let (deadline, waiting_since) = match stage.with_numbers(axis, settings) {
             Some((stepper, settings)) => {
                 stepper.go(target);

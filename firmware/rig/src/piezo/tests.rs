@@ -265,6 +265,47 @@ fn a_piezo_whose_gauge_is_silent_is_not_called_at_rest() {
 }
 
 #[test]
+fn a_loop_that_feeds_a_mode_is_opened_before_the_stack_is_pulled_apart() {
+    for second in [(900.0, 0.02), (900.0, 0.05), (700.0, 0.2), (2_000.0, 0.2), (500.0, -0.05)] {
+        let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+        let mut plant = Plant::new(Part { second, ..NOMINAL }, 7);
+        piezo.go(Nanometres(100_000));
+        let (mut failed, mut off) = (0, 0f64);
+        for tick in 0..5_000 {
+            piezo.sense(plant.gauge());
+            plant.tick(piezo.act());
+            if piezo.take_failure() {
+                assert_eq!(failed, 0, "once");
+                failed = tick;
+            }
+            if tick > 100 {
+                off = off.max((plant.at() - 100e3).abs());
+            }
+        }
+        std::println!(
+            "{second:?}: opened after {failed} ticks, {off:.0} nm off at worst, {:.0} at the end",
+            plant.at() - 100e3
+        );
+        // Left alone it swings by the whole stroke.
+        assert!(failed > 0 && off < 100e3, "{second:?}: tick {failed}, {off} nm off");
+        assert!((plant.at() - 100e3).abs() < 100e3 && !piezo.gauge_failed());
+    }
+}
+
+#[test]
+fn a_single_wrong_reading_is_no_piezo_that_does_not_follow() {
+    for jump in [-90_000, 100_000] {
+        let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+        let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 7);
+        step(&mut piezo, &mut plant, 100_000);
+        piezo.sense(plant.gauge().and_then(|code| code.checked_add_signed(jump)));
+        plant.tick(piezo.act());
+        assert!(step(&mut piezo, &mut plant, 100_000).0 < 100);
+        assert!(!piezo.take_failure());
+    }
+}
+
+#[test]
 fn a_single_lost_conversion_is_bridged() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(NOMINAL, 1);

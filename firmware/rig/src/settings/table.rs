@@ -149,6 +149,8 @@ impl Settings {
         self.fine.gauge_gain_ppm = values.get(SettingKey::GaugeGainPpm) as u32;
         if values.get(SettingKey::PiezoSecondMode) != 0 {
             self.fine.gains = self.fine.gentle_gains;
+            // Within a shorter one this loop may still creep through the window.
+            self.fine.dwell_min = Micros(10_000);
         }
         self.fine.gauge_offset = Nanometres(values.get(SettingKey::GaugeOffsetNm));
         self.camera.readout = Micros(values.get(SettingKey::CameraReadoutUs) as u32);

@@ -387,6 +387,23 @@ fn an_encoder_that_is_just_not_wrong_enough_to_be_told_at_rest_does_not_keep_its
 }
 
 #[test]
+fn a_rotor_that_stood_between_two_poles_falls_to_one_of_them_as_homing_begins() {
+    // Campaign, seed 117365: a jam was freed and left it there, and it fell by 5 um and swung on to more than 6.
+    for microsteps in [42, -42] {
+        let mut bench = Bench::both_homed();
+        let homing = bench.accepted(&home(Axis::Lens));
+        let edges = bench.hardware.lens.edges;
+        while bench.hardware.lens.edges == edges {
+            bench.run_ms(1);
+        }
+        bench.hardware.lens.turn(microsteps);
+        let end = bench.end_of(homing);
+        assert!(matches!(end, EventKind::Homed { .. }), "{microsteps}: {end:?}");
+        assert!((bench.hardware.lens.position_um()).abs() < 3.0, "{}", bench.hardware.lens.position_um());
+    }
+}
+
+#[test]
 fn a_board_without_memory_works_and_says_so() {
     let mut bench = Bench::new(700.0);
     bench.rig = farnear_rig::Rig::new(*bench.rig.identity(), None, farnear_protocol::BoardMicros(0));

@@ -135,6 +135,25 @@ impl Motor {
     }
 }
 
+/// A piezo that swings at its 200 Hz, damped by 0.03: one that does not is none, and the board would open its loop.
+#[derive(Default)]
+struct Piezo {
+    /// In nm.
+    position: f32,
+    speed: f32,
+}
+
+impl Piezo {
+    fn run(&mut self, code: u16) {
+        // A tick of 0.2 ms is 0.2513 rad; the damping of that is its factor 0.9925.
+        const COS: f32 = 0.9925 * 0.9686;
+        const SIN: f32 = 0.9925 * 0.2487;
+        let drive = f32::from(code) * 3.052;
+        let off = self.position - drive;
+        (self.position, self.speed) = (drive + COS * off + SIN * self.speed, COS * self.speed - SIN * off);
+    }
+}
+
 /// A rig with hardware that does what it is told.
 struct Bench {
     rig: Rig,
@@ -142,7 +161,7 @@ struct Bench {
     id: u32,
     coarse: Motor,
     lens: Motor,
-    piezo: u32,
+    piezo: Piezo,
     longest: u32,
 }
 
@@ -150,7 +169,7 @@ impl Bench {
     fn new() -> Self {
         let rig = Rig::with_parts(identity(), WITHOUT_MEMORY, None, BoardMicros(0));
         let (coarse, lens) = (Motor::new(), Motor::new());
-        let mut bench = Self { rig, now: 0, id: 0, coarse, lens, piezo: 0, longest: 0 };
+        let mut bench = Self { rig, now: 0, id: 0, coarse, lens, piezo: Piezo::default(), longest: 0 };
         bench.ask(&Request::OpenSession);
         bench
     }
@@ -160,7 +179,7 @@ impl Bench {
         let inputs = black_box(Inputs {
             coarse: self.coarse.inputs(),
             lens: self.lens.inputs(),
-            gauge_code: Some(GAUGE_CODE_ZERO + self.piezo),
+            gauge_code: Some(GAUGE_CODE_ZERO.saturating_add_signed(self.piezo.position as i32)),
             ..Inputs::idle(BoardMicros(self.now))
         });
         let mut outputs = None;
@@ -170,7 +189,7 @@ impl Bench {
         let Some(outputs) = outputs else { fail() };
         self.coarse.run(&outputs.coarse);
         self.lens.run(&outputs.lens);
-        self.piezo = u32::from(outputs.piezo_dac.unwrap_or(0)) * 3_052 / 1_000;
+        self.piezo.run(outputs.piezo_dac.unwrap_or(0));
         while self.rig.transmit().is_some() {}
     }
 

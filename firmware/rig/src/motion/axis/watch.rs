@@ -46,6 +46,7 @@ impl Stepper {
         let new = stepper.pulses.wrapping_sub(self.pulses.unwrap_or(stepper.pulses));
         self.pulses = Some(stepper.pulses);
         self.total_pulses += u64::from(new);
+        self.falling = self.falling.saturating_sub(new);
         let way = new as i32; // between two ticks there are a few pulses
         self.position = self.position.wrapping_add(if self.away { way } else { -way });
         if new > 0 {
@@ -78,7 +79,10 @@ impl Stepper {
             // its current back is pulled to the next phase.
             self.follow_encoder();
         } else if let Some(error) = self.following_error() {
-            return Some(Failure::Following { error });
+            if self.falling == 0 {
+                return Some(Failure::Following { error });
+            }
+            self.follow_encoder();
         }
         if inputs.driver_fault && self.enabled && !matches!(self.motion, Motion::Preparing { .. }) {
             return Some(Failure::DriverFault);
