@@ -43,7 +43,7 @@ const EASE_TICKS: u16 = TICK_HZ as u16;
 const EASE_DISTURBANCE: u32 = 5;
 const EASE_DRIFT: u32 = 15;
 /// Mean surprise beyond which the piezo does not follow. The fast loop's stays below 2 um, also with a resonance a quarter off, and the gentle loop's below
-/// 11 um; one that feeds a mode goes to 60 um and more.
+/// 11 um; one that feeds a mode with a share of 2 % goes to 18 um and more within 0.1 s, with 5 % to 60.
 const STRANGE: i32 = 15_000 << BITS;
 /// Ticks of that mean, as a shift: 3 ms.
 const STRANGE_SHIFT: u32 = 4;
