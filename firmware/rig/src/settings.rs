@@ -102,7 +102,7 @@ pub struct FineSettings {
     pub gentle_gains: Gains,
     /// When a plain move has settled.
     pub settle: Settle,
-    /// Nobody's dwell is shorter.
+    /// No dwell of this axis is shorter, whatever is asked.
     pub dwell_min: Micros,
     /// Time to settle from the start of the move, dwell not included.
     pub settle_deadline: Micros,

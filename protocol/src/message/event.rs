@@ -176,7 +176,7 @@ pub enum Failure {
     DriverFault,
     /// The step timer could not be fed in time; the position is now `Lost`.
     StepUnderrun,
-    /// The gauge's converter answers nonsense (not connected, saturated).
+    /// The gauge's converter answers nonsense (not connected, saturated), or the piezo does not follow.
     Gauge,
     /// An alarm stopped it; [`EventKind::Alarm`] names which.
     Alarm {

@@ -26,14 +26,9 @@ impl Positioning {
         stage: &mut Stage,
         settings: &Settings,
         (axis, target): (Axis, Nanometres),
-        settle: Settle,
+        mut settle: Settle,
         now: BoardMicros,
     ) -> Self {
-        let settle = if axis == Axis::SensorFine {
-            Settle { dwell: settle.dwell.max(settings.fine.dwell_min), ..settle }
-        } else {
-            settle
-        };
         let (deadline, waiting_since) = match stage.with_numbers(axis, settings) {
             Some((stepper, settings)) => {
                 stepper.go(target);
@@ -41,6 +36,7 @@ impl Positioning {
             }
             None => {
                 stage.fine.go(target);
+                settle.dwell = settle.dwell.max(settings.fine.dwell_min);
                 (settings.fine.settle_deadline, Some(now))
             }
         };

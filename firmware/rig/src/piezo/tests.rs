@@ -286,10 +286,52 @@ fn a_loop_that_feeds_a_mode_is_opened_before_the_stack_is_pulled_apart() {
             "{second:?}: opened after {failed} ticks, {off:.0} nm off at worst, {:.0} at the end",
             plant.at() - 100e3
         );
-        // Left alone it swings by the whole stroke.
+        // In the middle of its stroke of 200 um the stack is pulled from 100 um on.
         assert!(failed > 0 && off < 100e3, "{second:?}: tick {failed}, {off} nm off");
         assert!((plant.at() - 100e3).abs() < 100e3 && !piezo.gauge_failed());
     }
+}
+
+/// The largest mean surprise of some ways, um.
+fn surprise_um(settings: FineSettings, part: Part) -> f64 {
+    let (mut piezo, mut plant, mut worst) = (Piezo::new(settings), Plant::new(part, 7), 0);
+    for target in [20_000, 176_270, 20_000, 100_000] {
+        piezo.go(Nanometres(target));
+        for _ in 0..500 {
+            piezo.sense(plant.gauge());
+            plant.tick(piezo.act());
+            worst = piezo.control.as_ref().map_or(STRANGE, |control| control.surprise).max(worst);
+        }
+    }
+    f64::from(worst >> BITS) / 1e3
+}
+
+#[test]
+fn a_piezo_that_follows_is_far_from_one_that_does_not() {
+    let fine = |gentle, known| {
+        let mut values = Values::DEFAULT;
+        values.set(SettingKey::PiezoSecondMode, i32::from(gentle)).expect("in range");
+        values.set(SettingKey::PiezoHysteresisPpm, 120_000 * known).expect("in range");
+        values.set(SettingKey::PiezoCreepPpmPerDecade, 15_000 * known).expect("in range");
+        Settings::DEFAULT.with(&values).fine
+    };
+    let part =
+        |resonance_hz, second| Part { hysteresis: 0.12, creep: 0.015, resonance_hz, second, ..NOMINAL };
+    let (mut fast, mut gentle) = (0f64, 0f64);
+    for known in [0, 1] {
+        for resonance_hz in [150.0, 190.0, 210.0, 250.0] {
+            fast = fast.max(surprise_um(fine(false, known), part(resonance_hz, (700.0, 0.0))));
+        }
+        for resonance_hz in [190.0, 210.0, 250.0] {
+            for second in [(700.0, 0.0), (350.0, 0.1), (350.0, 0.2), (700.0, 0.2), (2_000.0, 0.2)] {
+                gentle = gentle.max(surprise_um(fine(true, known), part(resonance_hz, second)));
+            }
+        }
+    }
+    let limit = f64::from(STRANGE >> BITS) / 1e3;
+    std::println!("{fast} um with the fast loop, {gentle} um with the gentle one, of {limit}");
+    // A fifth for what a piezo may be off its data sheet in both, and a second mode of any share within what the gentle one bears.
+    assert!(fast < 0.2 * limit && gentle < 0.8 * limit, "{fast} um, {gentle} um");
 }
 
 #[test]
@@ -300,8 +342,9 @@ fn a_single_wrong_reading_is_no_piezo_that_does_not_follow() {
         step(&mut piezo, &mut plant, 100_000);
         piezo.sense(plant.gauge().and_then(|code| code.checked_add_signed(jump)));
         plant.tick(piezo.act());
-        assert!(step(&mut piezo, &mut plant, 100_000).0 < 100);
-        assert!(!piezo.take_failure());
+        // It is no more than a way of that length, which takes 15 ms.
+        let (ticks, _) = step(&mut piezo, &mut plant, 100_000);
+        assert!(!piezo.take_failure() && ticks as u32 * TICK_US <= 15_000, "{jump} nm: {ticks} ticks");
     }
 }
 
@@ -346,7 +389,8 @@ fn any_gauge_keeps_the_loop_in_bounds() {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         let wild = (random >> 40) as u32 & GAUGE_CODE_MAX;
         piezo.sense(Some(wild.clamp(1, GAUGE_CODE_MAX - 1)));
-        if tick % 101 == 0 {
+        // One that does not follow is let go at once.
+        if tick % 101 == 0 || piezo.control.is_none() {
             piezo.go(Nanometres((random >> 33) as i32 % 200_000));
         }
         piezo.act(); // overflow checks are on

@@ -27,7 +27,7 @@ pub fn alarm_text(alarm: Alarm) -> String {
             axis_name(axis)
         ),
         Alarm::Gauge => {
-            "the piezo's strain gauge gives nonsense, or the piezo does not follow; check cables and amplifier".into()
+            "the piezo's strain gauge gives nonsense, or the piezo does not follow; check cables and amplifier, and if its flexure has a second mode: `farnear rig settings set piezo_second_mode 1`".into()
         }
         Alarm::HostSilence { request } => {
             format!("the host said nothing for as long as request {request} had allowed; was the cable pulled?")
@@ -74,7 +74,7 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
         Failure::NoStrobe => "the camera's exposure signal did not come or was shorter than the pulse; is the camera armed and its cable in?".into(),
         Failure::DriverFault => "the motor driver reports a fault; check its supply and temperature".into(),
         Failure::StepUnderrun => "the step timer ran dry; home again, and report this as a bug".into(),
-        Failure::Gauge => "the piezo's strain gauge gives nonsense; check its cable".into(),
+        Failure::Gauge => alarm_text(Alarm::Gauge),
         Failure::Alarm { number } => match alarm {
             Some(record) => alarm_text(record.alarm),
             None => format!("alarm {number} stopped it"),

@@ -79,7 +79,8 @@ impl Stepper {
             // its current back is pulled to the next phase.
             self.follow_encoder();
         } else if let Some(error) = self.following_error() {
-            if self.falling == 0 {
+            // Left over from a homing that came to nothing it counts for nothing.
+            if resting || self.falling == 0 || self.purpose != Purpose::SeekHome {
                 return Some(Failure::Following { error });
             }
             self.follow_encoder();
