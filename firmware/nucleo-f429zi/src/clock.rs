@@ -13,17 +13,38 @@ pub const APB1_TIMER_HZ: u32 = 84_000_000;
 /// Clock of the timers on APB2 (TIM1, TIM8).
 pub const APB2_TIMER_HZ: u32 = 168_000_000;
 
-/// Starts clocks and time driver.
-pub fn start() -> Peripherals {
-    critical_section::with(|_| {
-        let peripherals = embassy_stm32::init(clock_tree::config());
+/// How often the clock from outside is looked for, and cycles of the chip's own 16 MHz in between: 0.2 s in all. An ST-LINK feeds
+/// it as soon as it lives, which is before it lets the chip start.
+const LOOKS: u32 = 20_000;
+const BETWEEN_LOOKS: u32 = 160;
+
+/// Whether the clock from outside does not come. embassy would wait for it for ever, and the watchdog is not awake yet.
+fn is_alone() -> bool {
+    // The one counts only as long as the other is off (RM0090, section 6.3.1).
+    pac::RCC.cr().modify(|cr| cr.set_hsebyp(true));
+    pac::RCC.cr().modify(|cr| cr.set_hseon(true));
+    (0..LOOKS).all(|_| {
+        cortex_m::asm::delay(BETWEEN_LOOKS);
+        !pac::RCC.cr().read().hserdy()
+    })
+}
+
+/// Starts clocks and time driver; gives whether the chip runs on its own clock. One that was `lost` in the boot before is not looked
+/// for: a loose wire would reset the board again and again.
+pub fn start(lost: bool) -> (Peripherals, bool) {
+    let own_clock = lost || is_alone();
+    let peripherals = critical_section::with(|_| {
+        let peripherals = embassy_stm32::init(clock_tree::config(own_clock));
         accelerate();
         // The update event that embassy's time driver makes while it sets TIM5 up also leaves a compare flag.
         // Its handler would take that for "half a period has gone", and the time would be 32 ms ahead.
         pac::TIM5.sr().write(|sr| sr.0 = 0);
         registers::unpend(Interrupt::TIM5);
         peripherals
-    })
+    });
+    // From here on a clock that stops breaks the motors' timers and resets the board (section 6.2.7).
+    pac::RCC.cr().modify(|cr| cr.set_csson(!own_clock));
+    (peripherals, own_clock)
 }
 
 /// Switches the flash's accelerator on (RM0090, section 3.5.2). embassy sets the wait states by writing the whole register, which

@@ -1,5 +1,5 @@
-//! The chip's clocks: the ST-LINK feeds 8 MHz into HSE; the PLL makes 168 MHz. Timers on APB1 count at 84 MHz, on APB2
-//! at 168 MHz.
+//! The chip's clocks: the ST-LINK feeds 8 MHz into HSE, or the chip's own oscillator gives 16 MHz; the PLL makes 168 MHz of either.
+//! Timers on APB1 count at 84 MHz, on APB2 at 168 MHz.
 
 use embassy_stm32::{
     Config,
@@ -10,12 +10,18 @@ use embassy_stm32::{
 };
 
 /// What embassy is to set up.
-pub fn config() -> Config {
+pub fn config(own_clock: bool) -> Config {
     let mut config = Config::default();
-    config.rcc.hse = Some(Hse { freq: Hertz::mhz(8), mode: HseMode::Bypass });
-    config.rcc.pll_src = PllSource::HSE;
+    let prediv = if own_clock {
+        config.rcc.pll_src = PllSource::HSI;
+        PllPreDiv::DIV8
+    } else {
+        config.rcc.hse = Some(Hse { freq: Hertz::mhz(8), mode: HseMode::Bypass });
+        config.rcc.pll_src = PllSource::HSE;
+        PllPreDiv::DIV4
+    };
     config.rcc.pll = Some(Pll {
-        prediv: PllPreDiv::DIV4,
+        prediv,
         mul: PllMul::MUL168,
         divp: Some(PllPDiv::DIV2),
         divq: Some(PllQDiv::DIV7),

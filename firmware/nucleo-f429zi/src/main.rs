@@ -95,6 +95,7 @@ fn tell_of(last: Option<Last>) {
             error!("a fault at {:#010x}, CFSR {:#010x}", program_counter, status);
         }
         Some(Last::StackOverflow) => error!("the stack overflowed"),
+        Some(Last::ClockLost) => error!("the clock from outside stopped"),
         None => {}
     }
 }
@@ -104,9 +105,12 @@ async fn main(_spawner: Spawner) {
     let brown_out_reset = option_bytes::demand_brown_out_reset();
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
-    let peripherals = clock::start();
+    let (peripherals, own_clock) = clock::start(last == Some(Last::ClockLost));
     count_cycles();
     tell_of(last);
+    if own_clock {
+        error!("there is no clock from outside: the chip's own is used");
+    }
     if !brown_out_reset {
         error!("the option bytes cannot be written: there is no brown-out reset");
     }
@@ -124,8 +128,9 @@ async fn main(_spawner: Spawner) {
         unique_id: uid::uid(),
         boot,
         reset_cause,
+        own_clock,
         emulated,
-        last_words: last.map(Last::words),
+        last_words: last.and_then(Last::words),
     };
     let rig = start(identity, &mut board.memory);
     info!("boot {}, emulated: {}, memory: {}", rig.boot(), emulated, board.memory.is_some());

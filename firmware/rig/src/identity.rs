@@ -16,6 +16,8 @@ pub struct Identity {
     pub boot: u32,
     /// Why the board was reset.
     pub reset_cause: ResetCause,
+    /// Whether the clock from outside did not come, or stopped in the boot before, so that the chip runs on its own.
+    pub own_clock: bool,
     /// Whether the strap says that this is an emulated board.
     pub emulated: bool,
     /// What the firmware wrote into retained RAM before it stopped itself; given once.

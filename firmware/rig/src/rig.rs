@@ -165,6 +165,9 @@ impl Rig {
         if found.is_none() && self.parts.memory {
             self.alarm(Alarm::MemoryMissing, now);
         }
+        if self.identity.own_clock {
+            self.alarm(Alarm::ClockLost, now);
+        }
         for (record, found) in record::ALL.into_iter().zip(found.into_iter().flatten()) {
             self.tell_of_record(record, found, now);
         }

@@ -99,6 +99,12 @@ impl RigAccess<'_, '_> {
         }
     }
 
+    /// The ST-LINK's clock stops, or comes back.
+    pub fn set_outer_clock(&mut self, there: bool) {
+        let at = self.stop.at;
+        self.chip().set_outer_clock(at, there);
+    }
+
     /// The supply dips to 2 V, so shortly that only a brown-out reset notices; a chip whose option bytes leave that off runs on.
     pub fn brown_out(&mut self) {
         if self.chip().dips(DIP_MV) {

@@ -38,7 +38,7 @@ use crate::{
     memory::MemoryChip,
     parts::{Parts, SupplyParts},
     plant::{Noise, StageName},
-    processor::{Costs, Metered},
+    processor::{Costs, Metered, OuterClock},
     serial::Line,
 };
 
@@ -180,6 +180,7 @@ pub struct Chip {
     supply: SupplyParts,
     /// The brown-out level, as the option bytes had it at the last reset.
     brown_out: u64,
+    clock: Arc<OuterClock>,
 }
 
 impl Chip {
@@ -245,6 +246,25 @@ impl Chip {
         let errors = self.part.usart[USART3].errors_mut();
         errors.framing = rigless::chip::uart::Rate { name: "framing", per_million };
         errors.seed = seed;
+    }
+
+    /// The clock that the ST-LINK feeds into HSE stops, or comes back. One that drives the system and stops is told by the clock
+    /// security system; where the firmware has left that off, the chip stands until its power has been away.
+    pub fn set_outer_clock(&mut self, at: VirtualNanos, there: bool) {
+        if !self.clock.set(there) || there {
+            return;
+        }
+        let (running, watched) = self.part.drive_clocks(at, |clocks, registers, context| {
+            let control = registers.get(rcc::Register::Cr);
+            clocks.fail_hse(registers, context);
+            context.schedule(at);
+            (rcc::cr::HSERDY.is_set(control), rcc::cr::CSSON.is_set(control))
+        });
+        match (running, watched) {
+            (true, true) => self.clock.tell(),
+            (true, false) => self.power(at, false),
+            (false, _) => {}
+        }
     }
 
     /// Cuts the part's supply or gives it back.
@@ -331,6 +351,7 @@ impl Mcu for Chip {
             other => (other, self.reset_flags.take()),
         };
         self.part.reset(at, cause);
+        self.clock.forget();
         if let Some(flags) = flags {
             let (_, registers) = self.part.clocks();
             registers.set(rcc::Register::Csr, flags);
@@ -400,6 +421,7 @@ impl RigBoard {
             reset_flags: None,
             supply: parts.supply,
             brown_out: parts.supply.brown_out.bits(),
+            clock: Arc::default(),
         };
         let start = VirtualNanos(0);
         chip.drive_pin(start, STRAP, Level::High);
@@ -447,10 +469,13 @@ impl Board for RigBoard {
         if let Ok(id) = Image::new(Path::new("unique id"), self.unique_id.to_vec(), Some(UNIQUE_ID_AT)) {
             core.factory_images.push(id);
         }
-        let (processor, costs) = (core.processor.clone(), self.costs.clone());
+        let (processor, costs, clock) =
+            (core.processor.clone(), self.costs.clone(), Arc::clone(&self.chip.clock));
         let program = self.program;
-        core.processor =
-            Arc::new(move |endian| Ok(Box::new(Metered::new(program, || processor(endian), costs.clone())?)));
+        core.processor = Arc::new(move |endian| {
+            let clock = Arc::clone(&clock);
+            Ok(Box::new(Metered::new(program, || processor(endian), costs.clone(), clock)?))
+        });
         vec![Target::new("stm32f427", &mut self.chip, core)]
     }
 }

@@ -42,7 +42,7 @@ pub struct Kind {
 }
 
 /// All kinds.
-pub const KINDS: [Kind; 40] = [
+pub const KINDS: [Kind; 41] = [
     motion::EMERGENCY_STOP,
     motion::EMERGENCY_STOP_RELEASED,
     power::RESET_BUTTON,
@@ -53,6 +53,7 @@ pub const KINDS: [Kind; 40] = [
     power::SUPPLY_LOW,
     power::SUPPLY_NORMAL,
     power::FIRMWARE_HANGS,
+    power::CLOCK_DEAD,
     motion::DRIVER_FAULT,
     motion::DRIVER_FINE,
     motion::DRIVER_RESETS,

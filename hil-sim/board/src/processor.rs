@@ -12,8 +12,9 @@
 mod flash;
 mod kept;
 mod kinds;
+mod outer_clock;
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use object::{Object, ObjectSegment};
 use rigless::{
@@ -25,6 +26,7 @@ use rigless::{
     time::VirtualNanos,
 };
 
+pub use self::outer_clock::OuterClock;
 use self::{
     flash::FlashInterface,
     kept::Translated,
@@ -114,6 +116,7 @@ pub struct Metered {
     inner: Translated,
     meter: Meter,
     model: Model,
+    clock: Arc<OuterClock>,
 }
 
 #[derive(Debug)]
@@ -153,6 +156,7 @@ impl Metered {
         program: u64,
         make: impl Fn() -> Result<Box<dyn Processor>, Error>,
         costs: Costs,
+        clock: Arc<OuterClock>,
     ) -> Result<Self, Error> {
         let inner = Translated::new(program, make)?;
         let model = match costs {
@@ -163,7 +167,7 @@ impl Metered {
         };
         let meter =
             Meter { counted: inner.retired(), cycles: inner.retired() << FRACTION, each: model.each() };
-        Ok(Self { inner, meter, model })
+        Ok(Self { inner, meter, model, clock })
     }
 
     /// Goes step by step.
@@ -171,7 +175,12 @@ impl Metered {
         let end = self.retired() + u64::from(budget);
         loop {
             let (pc, before) = (self.inner.pc(), self.inner.retired());
-            let mut metered = MeteredBus { bus: &mut *bus, meter: &mut self.meter, model: &mut self.model };
+            let mut metered = MeteredBus {
+                bus: &mut *bus,
+                meter: &mut self.meter,
+                model: &mut self.model,
+                clock: &self.clock,
+            };
             let (exit, _) = self.inner.run(1, &mut metered);
             let after = self.inner.retired();
             if after > before {
@@ -209,6 +218,7 @@ struct MeteredBus<'a> {
     bus: &'a mut dyn CoreBus,
     meter: &'a mut Meter,
     model: &'a mut Model,
+    clock: &'a OuterClock,
 }
 
 impl MeteredBus<'_> {
@@ -223,6 +233,7 @@ impl CoreBus for MeteredBus<'_> {
     fn access(&mut self, access: Access, from_code: bool) -> Option<u64> {
         let instructions = access.instruction_count;
         let answer = self.bus.access(self.in_cycles(access), from_code);
+        let answer = answer.map(|value| self.clock.seen(&access, value));
         if access.address == FLASH_ACR && access.kind == AccessKind::Write {
             self.model.set_acr(access.value);
             self.meter.note(instructions, 0, self.model.each());
@@ -275,11 +286,13 @@ impl CoreBus for MeteredBus<'_> {
 impl Processor for Metered {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let before = self.retired();
+        self.clock.interrupt(&mut *self.inner, bus.time(before));
         let exit = match &self.model {
             Model::ByKind { .. } => self.step_by_step(budget, bus),
             Model::Average { .. } => {
                 let fitting = self.meter.fitting(budget);
-                let mut bus = MeteredBus { bus, meter: &mut self.meter, model: &mut self.model };
+                let mut bus =
+                    MeteredBus { bus, meter: &mut self.meter, model: &mut self.model, clock: &self.clock };
                 self.inner.run(fitting, &mut bus).0
             }
         };

@@ -84,4 +84,7 @@ pub enum Alarm {
     },
     /// The board's memory does not answer: nothing outlasts a loss of power.
     MemoryMissing,
+    /// The clock that the board is fed did not come, or stopped, which resets the board. As long as it is missing the board runs on
+    /// the chip's own, by which times and speeds are a few per cent off.
+    ClockLost,
 }

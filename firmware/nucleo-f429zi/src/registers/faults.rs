@@ -1,4 +1,4 @@
-//! The way out of a panic and of a fault: last words into retained memory, then a reset. The motors' timers stop with
+//! The way out of a panic, of a fault and of a lost clock: last words into retained memory, then a reset. The motors' timers stop with
 //! the reset, so the last STEP pulse comes before anything else happens.
 
 use core::{arch::naked_asm, panic::PanicInfo};
@@ -34,6 +34,16 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     // SAFETY: `Location` of a panic in this program points into its flash (compiled-in constants).
     let file = file.map(|file| unsafe { core::mem::transmute::<&str, &'static str>(file) });
     leave(Last::Panic { file, line: place.map_or(0, |place| place.line()) });
+    SCB::sys_reset()
+}
+
+/// The clock security system's interrupt: the clock from outside has stopped, and the chip runs on its own 16 MHz. The motors' timers
+/// have had their break with it.
+// SAFETY: it returns to nothing. Retained memory that was just being written is not believed by `leave` nor after the reset.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() -> ! {
+    cortex_m::interrupt::disable();
+    leave(Last::ClockLost);
     SCB::sys_reset()
 }
 

@@ -43,14 +43,17 @@ pub enum Last {
     },
     /// The stack was full.
     StackOverflow,
+    /// The clock from outside stopped.
+    ClockLost,
 }
 
 impl Last {
-    /// What the rig is told.
-    pub fn words(self) -> LastWords {
+    /// What the rig is told; of a lost clock it hears by the one that it has.
+    pub fn words(self) -> Option<LastWords> {
         match self {
-            Self::Panic { .. } | Self::Fault { .. } => LastWords::Panic,
-            Self::StackOverflow => LastWords::StackOverflow,
+            Self::Panic { .. } | Self::Fault { .. } => Some(LastWords::Panic),
+            Self::StackOverflow => Some(LastWords::StackOverflow),
+            Self::ClockLost => None,
         }
     }
 
@@ -62,6 +65,7 @@ impl Last {
             }
             Self::Fault { program_counter, status } => [2, program_counter, status, 0],
             Self::StackOverflow => [3, 0, 0, 0],
+            Self::ClockLost => [4, 0, 0, 0],
         }
     }
 
@@ -70,6 +74,7 @@ impl Last {
             [1, pointer, length, line] => Some(Self::Panic { file: name(pointer, length), line }),
             [2, program_counter, status, _] => Some(Self::Fault { program_counter, status }),
             [3, ..] => Some(Self::StackOverflow),
+            [4, ..] => Some(Self::ClockLost),
             _ => None,
         }
     }

@@ -319,6 +319,7 @@ pub fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
         boot,
         reset_cause,
         emulated: true,
+        own_clock: false,
         last_words: None,
     }
 }

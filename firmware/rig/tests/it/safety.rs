@@ -5,6 +5,7 @@ use farnear_protocol::message::{
     Alarm, AlarmRecord, Axis, EventKind, Failure, PositionState, RecordName, ResetCause, Routine, SettingKey,
 };
 use farnear_protocol::{Micros, Nanometres, Request, RequestError, Response};
+use farnear_rig::{Identity, io::MEMORY_BYTES};
 
 /// Both stages in full motion and the piezo on its way; gives their requests.
 fn all_moving(bench: &mut Bench) -> [u32; 3] {
@@ -430,6 +431,18 @@ fn a_board_without_memory_works_and_says_so() {
     bench.clear();
     assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
     assert!(matches!(bench.work(&go(Axis::SensorCoarse, 50_000)), EventKind::MoveDone { .. }));
+}
+
+#[test]
+fn a_board_on_its_own_clock_works_and_says_so_once() {
+    let mut bench = Bench::new(700.0);
+    let identity = Identity { own_clock: true, ..*bench.rig.identity() };
+    bench.rig = farnear_rig::Rig::new(identity, Some(&[0; MEMORY_BYTES]), farnear_protocol::BoardMicros(0));
+    bench.open_session();
+    assert_eq!(bench.alarm(), Some(Alarm::ClockLost));
+    bench.clear();
+    assert_eq!(bench.alarm(), None);
+    assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
 }
 
 #[test]

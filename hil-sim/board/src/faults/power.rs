@@ -1,4 +1,4 @@
-//! Supply, resets, and a program that has lost its way.
+//! Supply, clock, resets, and a program that has lost its way.
 
 use super::{Kind, Takes};
 use crate::board::SUPPLY_MV;
@@ -54,4 +54,11 @@ pub const FIRMWARE_HANGS: Kind = Kind {
     takes: Takes::NOTHING,
     happen: |rig, _| rig.write_register(TIM5_CR1, 0),
     mend: None,
+};
+/// The ST-LINK, which clocks the chip, stops.
+pub const CLOCK_DEAD: Kind = Kind {
+    name: "clock-dead",
+    takes: Takes::NOTHING,
+    happen: |rig, _| rig.set_outer_clock(false),
+    mend: Some(|rig, _| rig.set_outer_clock(true)),
 };

@@ -34,6 +34,7 @@ impl Here {
             boot: 1,
             reset_cause: ResetCause::PowerOn,
             emulated: true,
+            own_clock: false,
             last_words: None,
         };
         let mut here = Self { rig: Rig::new(identity, None, BoardMicros(0)), now: 0, id: 0 };

@@ -334,3 +334,72 @@ fn by_kind_a_tick_takes_about_as_long_as_is_reckoned_with() {
     // 1.93 with every cost on its slow side: loads never overlap, waiting loops and registers of the slow bus count in full.
     assert!((1.3..2.2).contains(&ratio), "{by_kind} cycles by kind, {one_each} at one an instruction");
 }
+
+/// Homes a stage and exposes once.
+fn works(bench: &mut Bench) {
+    bench.home_axis(Axis::Lens);
+    bench.arm(&[fine_shot(50_000, 1_000, 1_000, 200)]);
+    let end = bench.run();
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 1, .. }), "{end:?}");
+}
+
+#[test]
+fn a_board_whose_clock_does_not_start_runs_on_its_own_and_says_so() {
+    let mut bench = Bench::new(1);
+    bench.access(|rig| {
+        rig.set_outer_clock(false);
+        rig.press_reset();
+    });
+    // It waits for the clock at first.
+    bench.rig.advance_us(500_000).expect("runs");
+    bench.settle();
+    let hello = bench.say_hello();
+    assert_eq!((hello.boot, hello.reset_cause), (2, ResetCause::Pin));
+    bench.clear(|alarm| *alarm == Alarm::ClockLost);
+    works(&mut bench);
+    bench.access(|rig| {
+        rig.set_outer_clock(true);
+        rig.press_reset();
+    });
+    bench.settle();
+    bench.say_hello();
+    assert_eq!(bench.alarm(), None, "the clock is there again");
+    works(&mut bench);
+}
+
+#[test]
+fn a_clock_that_stops_in_mid_move_stops_the_motors_and_is_told() {
+    let mut bench = Bench::new(1);
+    bench.home_axis(Axis::Lens);
+    bench.send(&go(Axis::Lens, 2_000_000));
+    bench.rig.advance_us(200_000).expect("runs");
+    bench.access(|rig| {
+        rig.record_steps();
+        rig.set_outer_clock(false);
+    });
+    bench.rig.advance_us(500_000).expect("runs");
+    let steps = bench.peek(|rig| rig.take_steps());
+    assert_eq!(steps, [Vec::<u64>::new(), Vec::new()], "the timers' break comes with the failure");
+    bench.settle();
+    let hello = bench.say_hello();
+    assert_eq!((hello.boot, hello.reset_cause), (2, ResetCause::Software));
+    let first = bench.alarm().expect("an alarm is latched");
+    assert_eq!(first.alarm, Alarm::ClockLost);
+    assert_eq!(bench.ask(&Request::ClearAlarm { number: first.number }), Ok(Response::Accepted));
+    bench.clear(|alarm| *alarm == Alarm::MotionInterrupted { axis: Axis::Lens });
+    works(&mut bench);
+}
+
+#[test]
+fn a_clock_that_fails_for_a_moment_is_told() {
+    let mut bench = Bench::new(1);
+    bench.access(|rig| rig.set_outer_clock(false));
+    bench.rig.advance_us(100).expect("runs");
+    bench.access(|rig| rig.set_outer_clock(true));
+    bench.rig.advance_us(500_000).expect("runs");
+    bench.settle();
+    let hello = bench.say_hello();
+    assert_eq!((hello.boot, hello.reset_cause), (2, ResetCause::Software));
+    bench.clear(|alarm| *alarm == Alarm::ClockLost);
+    works(&mut bench);
+}

@@ -51,6 +51,9 @@ pub fn alarm_text(alarm: Alarm) -> String {
         Alarm::MemoryMissing => {
             "the board's memory does not answer, so nothing outlasts a loss of power; check it and its wires".into()
         }
+        Alarm::ClockLost => {
+            "the board's clock (8 MHz from its ST-LINK) did not come or stopped; without it the chip's own is used, and times and speeds are a few per cent off; check the ST-LINK and its solder bridges, and reset the board".into()
+        }
     }
 }
 

@@ -89,7 +89,7 @@ pub const SHADOW: ShadowQuery = ShadowQuery {
     },
 };
 
-pub const ALARMS: [Alarm; 17] = [
+pub const ALARMS: [Alarm; 18] = [
     Alarm::EmergencyStop,
     Alarm::Halt,
     Alarm::DriverFault { axis: Axis::Lens },
@@ -107,6 +107,7 @@ pub const ALARMS: [Alarm; 17] = [
     Alarm::MotionInterrupted { axis: Axis::SensorCoarse },
     Alarm::RecordLost { record: RecordName::Program },
     Alarm::MemoryMissing,
+    Alarm::ClockLost,
 ];
 
 pub fn alarm(alarm: Alarm) -> AlarmRecord {

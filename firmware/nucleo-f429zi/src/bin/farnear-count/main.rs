@@ -93,7 +93,7 @@ pub static FARNEAR_COUNTS: [AtomicU32; ROUTINES] = [const { AtomicU32::new(0) };
 #[entry]
 fn main() -> ! {
     // At the firmware's clock: the emulated core's instructions come at that rate, whatever the clock.
-    let _peripherals = embassy_stm32::init(clock_tree::config());
+    let _peripherals = embassy_stm32::init(clock_tree::config(false));
     if let Some(mut core) = Peripherals::take() {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();

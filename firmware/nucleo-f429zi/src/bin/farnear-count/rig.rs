@@ -53,6 +53,7 @@ fn identity() -> Identity {
         boot: 1,
         reset_cause: ResetCause::PowerOn,
         emulated: true,
+        own_clock: false,
         last_words: None,
     }
 }
