@@ -32,8 +32,13 @@ use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_HZ, TICK_US};
 use crate::settings::FineSettings;
 use crate::shaper::Shaper;
 
-/// A piezo this near its target is at rest: what swings less stays within the stated error.
+/// A piezo this near its target is at rest ...
 const AT_REST: Nanometres = Nanometres(100);
+/// ... and swings by no more than this about the middle of what was measured lately: half the stated error, for what is told on one side may
+/// have swung to the other when it is heard.
+const SWING: i32 = 45 << BITS;
+/// Ticks of that middle, as a shift: two thirds of a period of the resonance, of which a quarter is left in it.
+const MIDDLE_SHIFT: u32 = 4;
 /// For so long: a period of the resonance, in which what swings farther is seen to.
 const NEAR_TICKS: u16 = 25;
 /// Ticks near the target after which it is at ease.
@@ -123,6 +128,10 @@ pub(crate) struct Piezo {
     driven: bool,
     /// Ticks for which it has been near its target.
     near_ticks: u16,
+    /// Those of them, the last ones, in which it has hardly swung.
+    still_ticks: u16,
+    /// The middle about which it swings there, nm in 2^-10.
+    middle: i32,
     /// Control ticks since the one before: more than one after a rest.
     passed: u32,
 }
@@ -145,6 +154,8 @@ impl Piezo {
             failed: false,
             driven: false,
             near_ticks: 0,
+            still_ticks: 0,
+            middle: 0,
             passed: 1,
         }
     }
@@ -215,7 +226,9 @@ impl Piezo {
 
     /// Whether it moves: its set-point does, or the loop has not brought it there yet, or it is led down after a start.
     pub(crate) fn is_moving(&self) -> bool {
-        !self.arrived() || self.control.is_some() && self.near_ticks < NEAR_TICKS || self.start != Start::Over
+        !self.arrived()
+            || self.control.is_some() && self.still_ticks < NEAR_TICKS
+            || self.start != Start::Over
     }
 
     /// Goes to `target`, closing the loop where it is open.
@@ -271,7 +284,7 @@ impl Piezo {
     pub(crate) fn sense(&mut self, gauge_code: Option<u32>) {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
-            self.near_ticks = 0; // nobody has seen it near
+            (self.near_ticks, self.still_ticks) = (0, 0); // nobody has seen it near
             if self.gauge_failed() {
                 self.failed |= self.closing || self.driven || self.control.is_some();
                 (self.control, self.closing, self.driven) = (None, false, false);
@@ -282,7 +295,11 @@ impl Piezo {
         self.measured = self.gauge.position(code as i32 - GAUGE_CODE_ZERO as i32);
         let rested = self.passed > 1;
         let off = self.target.0.saturating_sub(self.measured.0).saturating_abs();
-        self.near_ticks = if off > AT_REST.0 { 0 } else { self.near_ticks.saturating_add(1) };
+        let (near, here) = (off <= AT_REST.0, fixed(self.measured));
+        self.middle = if near { self.middle + ((here - self.middle) >> MIDDLE_SHIFT) } else { here };
+        let still = near && (here - self.middle).abs() <= SWING;
+        self.near_ticks = if near { self.near_ticks.saturating_add(1) } else { 0 };
+        self.still_ticks = if still { self.still_ticks.saturating_add(1) } else { 0 };
         if self.start == Start::Unknown {
             self.begin_to_relax();
         }
