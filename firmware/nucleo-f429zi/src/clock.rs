@@ -18,21 +18,24 @@ pub const APB2_TIMER_HZ: u32 = 168_000_000;
 const LOOKS: u32 = 20_000;
 const BETWEEN_LOOKS: u32 = 160;
 
-/// Whether the clock from outside does not come. embassy would wait for it for ever, and the watchdog is not awake yet.
-fn is_alone() -> bool {
-    // The one counts only as long as the other is off (RM0090, section 6.3.1).
+/// Whether the clock from outside comes. embassy would wait for it for ever, and the watchdog is not awake yet. From here on one that
+/// stops breaks the motors' timers and resets the board (RM0090, section 6.2.7).
+fn has_outer_clock() -> bool {
+    // The one counts only as long as the other is off (section 6.3.1).
     pac::RCC.cr().modify(|cr| cr.set_hsebyp(true));
     pac::RCC.cr().modify(|cr| cr.set_hseon(true));
-    (0..LOOKS).all(|_| {
+    let comes = (0..LOOKS).any(|_| {
         cortex_m::asm::delay(BETWEEN_LOOKS);
-        !pac::RCC.cr().read().hserdy()
-    })
+        pac::RCC.cr().read().hserdy()
+    });
+    pac::RCC.cr().modify(|cr| cr.set_csson(comes));
+    comes
 }
 
 /// Starts clocks and time driver; gives whether the chip runs on its own clock. One that was `lost` in the boot before is not looked
 /// for: a loose wire would reset the board again and again.
 pub fn start(lost: bool) -> (Peripherals, bool) {
-    let own_clock = lost || is_alone();
+    let own_clock = lost || !has_outer_clock();
     let peripherals = critical_section::with(|_| {
         let peripherals = embassy_stm32::init(clock_tree::config(own_clock));
         accelerate();
@@ -42,8 +45,6 @@ pub fn start(lost: bool) -> (Peripherals, bool) {
         registers::unpend(Interrupt::TIM5);
         peripherals
     });
-    // From here on a clock that stops breaks the motors' timers and resets the board (section 6.2.7).
-    pac::RCC.cr().modify(|cr| cr.set_csson(!own_clock));
     (peripherals, own_clock)
 }
 
