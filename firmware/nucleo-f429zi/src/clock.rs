@@ -13,8 +13,8 @@ pub const APB1_TIMER_HZ: u32 = 84_000_000;
 /// Clock of the timers on APB2 (TIM1, TIM8).
 pub const APB2_TIMER_HZ: u32 = 168_000_000;
 
-/// How often the clock from outside is looked for, and cycles of the chip's own 16 MHz in between: 0.2 s in all. An ST-LINK feeds
-/// it as soon as it lives, which is before it lets the chip start.
+/// How often the clock from outside is looked for, and cycles of the chip's own 16 MHz in between: 0.2 s in all. How long an
+/// ST-LINK takes until it feeds it is not published (not checked).
 const LOOKS: u32 = 20_000;
 const BETWEEN_LOOKS: u32 = 160;
 

@@ -34,8 +34,8 @@ use crate::shaper::Shaper;
 
 /// A piezo this near its target is at rest ...
 const AT_REST: Nanometres = Nanometres(100);
-/// ... and swings by no more than this about the middle of what was measured lately: half the stated error, for what is told on one side may
-/// have swung to the other when it is heard.
+/// ... and swings by no more than this about the middle of what was measured lately: half the stated error less the gauge's noise, for what
+/// is told on one side may have swung to the other when it is heard.
 const SWING: i32 = 45 << BITS;
 /// Ticks of that middle, as a shift: two thirds of a period of the resonance, of which a quarter is left in it.
 const MIDDLE_SHIFT: u32 = 4;
