@@ -244,9 +244,9 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
         return Ok((commands, thread));
     }
     let (done, wait) = mpsc::channel();
-    let started =
-        commands.send(Command::Settle { done }).is_ok() && wait.recv().is_ok_and(|report| report.started);
-    if started {
+    // A board that lost its power before it said that it started, as a scenario may have it, is no wrong firmware.
+    let runs = |report: Report| report.started || !report.powered;
+    if commands.send(Command::Settle { done }).is_ok() && wait.recv().is_ok_and(runs) {
         return Ok((commands, thread));
     }
     let _ = commands.send(Command::End); // it may have ended already
