@@ -1,16 +1,17 @@
 //! Models as files: bytes with a version and a checksum.
 //!
 //! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
-//! little-endian, then the body (postcard), in version 3 followed by the classes of its patterns. Anything that does not fit is refused by name, never guessed; a body that decodes is
-//! also checked part against part, so that a crafted file cannot make recognition panic.
+//! little-endian, then the body (postcard), from version 3 on followed by the classes of its patterns, in version 4 by a second opinion, in
+//! version 5, which networks of several members have, by a second opinion or none. Anything that does not fit is refused by name, never guessed; a
+//! body that decodes is also checked part against part, so that a crafted file cannot make recognition panic.
 
 use super::classifier::Classifier;
 use super::clip::BOX_NUMBERS;
 use super::codebook::Codebook;
 use super::frames::Mode;
 use super::model::{ModelError, Recogniser, RecogniserSettings};
-use super::network::Network;
 use super::network::features::Features;
+use super::network::{Layers, Network};
 use super::occupancy::OccupancyGrid;
 use super::second_opinion::SecondOpinion;
 use super::space::{Map, Pattern, Space};
@@ -23,11 +24,14 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Version of the file's format.
-pub const FORMAT_VERSION: u32 = 4;
-/// The version before, without a second opinion; models that have none are written so still.
+pub const FORMAT_VERSION: u32 = 5;
+/// The version before, without networks of several members; models that have a second opinion and no such network are written so still.
+const SECOND_VERSION: u32 = 4;
+/// The version before that, without a second opinion; models that have none are written so still.
 const SINGLE_VERSION: u32 = 3;
 /// The version before that, which is read too: it has no labels.
 const UNLABELLED_VERSION: u32 = 2;
+const READ: [u32; 4] = [UNLABELLED_VERSION, SINGLE_VERSION, SECOND_VERSION, FORMAT_VERSION];
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
@@ -57,12 +61,77 @@ enum SavedMap {
 enum SavedPattern {
     Thesis(OccupancyGrid),
     Codebook(Codebook),
-    Network(Box<Network>),
-    Features(Box<Features>),
+    Network(Box<OneMember>),
+    Features(Box<OneMember>, Array1<f32>, Array1<f32>),
+    Members(Box<Network>),
+    FeaturesOfMembers(Box<Features>),
 }
 
+/// A network of one member, as files had it when there were no others.
+#[derive(Serialize, Deserialize)]
+struct OneMember {
+    mean: Array1<f32>,
+    spread: Array1<f32>,
+    layers: Layers,
+}
+
+impl OneMember {
+    /// The network, if it has but one member.
+    fn of(network: &Network) -> Option<Box<Self>> {
+        let [layers] = network.members.as_slice() else { return None };
+        Some(Box::new(Self {
+            mean: network.mean.clone(),
+            spread: network.spread.clone(),
+            layers: layers.clone(),
+        }))
+    }
+}
+
+impl From<OneMember> for Network {
+    fn from(OneMember { mean, spread, layers }: OneMember) -> Self {
+        Self { mean, spread, members: vec![layers] }
+    }
+}
+
+impl SavedPattern {
+    fn of(pattern: &Pattern) -> Self {
+        match pattern {
+            Pattern::Thesis(grid) => Self::Thesis(grid.clone()),
+            Pattern::Codebook(book) => Self::Codebook(book.clone()),
+            Pattern::Network(network) => {
+                OneMember::of(network).map_or_else(|| Self::Members(network.clone()), Self::Network)
+            }
+            Pattern::Features(features) => match OneMember::of(&features.network) {
+                Some(one) => Self::Features(one, features.mean.clone(), features.scale.clone()),
+                None => Self::FeaturesOfMembers(features.clone()),
+            },
+        }
+    }
+
+    fn read(self) -> Pattern {
+        match self {
+            Self::Thesis(grid) => Pattern::Thesis(grid),
+            Self::Codebook(book) => Pattern::Codebook(book),
+            Self::Network(one) => Pattern::Network(Box::new((*one).into())),
+            Self::Features(one, mean, scale) => {
+                Pattern::Features(Box::new(Features { network: (*one).into(), mean, scale }))
+            }
+            Self::Members(network) => Pattern::Network(network),
+            Self::FeaturesOfMembers(features) => Pattern::Features(features),
+        }
+    }
+
+    /// Whether programs of before know it.
+    fn is_old(&self) -> bool {
+        !matches!(self, Self::Members(_) | Self::FeaturesOfMembers(_))
+    }
+}
+
+/// A second opinion: the other recogniser's file, its profiles and limits.
+type SavedSecond = (Vec<u8>, Array2<f32>, Limits);
+
 impl Recogniser {
-    /// The model as a file's bytes.
+    /// The model as a file's bytes, in the oldest format that has all it holds.
     ///
     /// # Errors
     /// [`ModelError::Body`] if it cannot be encoded.
@@ -87,25 +156,30 @@ impl Recogniser {
             },
             spread: self.space.spread,
             neighbours: self.space.neighbours,
-            pattern: match &self.space.pattern {
-                Pattern::Thesis(grid) => SavedPattern::Thesis(grid.clone()),
-                Pattern::Codebook(book) => SavedPattern::Codebook(book.clone()),
-                Pattern::Network(network) => SavedPattern::Network(network.clone()),
-                Pattern::Features(features) => SavedPattern::Features(features.clone()),
-            },
+            pattern: SavedPattern::of(&self.space.pattern),
             classifier: self.classifier.clone(),
             limits: self.limits.clone(),
             patterns: self.patterns.clone(),
             typical_frames: self.typical_frames as u64,
         };
-        let encoded = match &self.second {
-            None => postcard::to_stdvec(&(body, &self.labels)),
+        let second: Option<SavedSecond> = match &self.second {
+            None => None,
             Some(second) => {
-                let other = second.recogniser.to_bytes()?;
-                postcard::to_stdvec(&(body, &self.labels, &other, &second.profiles, &second.limits))
+                Some((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
             }
         };
-        let version = if self.second.is_some() { FORMAT_VERSION } else { SINGLE_VERSION };
+        let version = match &second {
+            _ if !body.pattern.is_old() => FORMAT_VERSION,
+            Some(_) => SECOND_VERSION,
+            None => SINGLE_VERSION,
+        };
+        let encoded = match second {
+            second if version == FORMAT_VERSION => postcard::to_stdvec(&(body, &self.labels, second)),
+            None => postcard::to_stdvec(&(body, &self.labels)),
+            Some((other, profiles, limits)) => {
+                postcard::to_stdvec(&(body, &self.labels, other, profiles, limits))
+            }
+        };
         let body = encoded.map_err(|error| ModelError::Body(error.to_string()))?;
         let mut bytes = Vec::with_capacity(HEADER + body.len());
         bytes.extend(MAGIC);
@@ -122,16 +196,23 @@ impl Recogniser {
     /// # Errors
     /// Anything that is not a whole, undamaged model of this version and this descriptor.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
+        Self::read(bytes, true)
+    }
+
+    /// A model; who says something of another has nobody behind it, or a file might nest without end.
+    fn read(bytes: &[u8], may_have_second: bool) -> Result<Self, ModelError> {
         let header = bytes.get(..HEADER).ok_or(ModelError::NotAModel("shorter than its header"))?;
         if &header[..8] != MAGIC {
             return Err(ModelError::NotAModel("it does not start with `farnearA`"));
         }
         let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
         let version = word(8);
-        for (what, at, expected) in [("format", 8, FORMAT_VERSION), ("descriptor", 12, DESCRIPTOR_VERSION)] {
-            if word(at) != expected && !(at == 8 && [SINGLE_VERSION, UNLABELLED_VERSION].contains(&version)) {
-                return Err(ModelError::Version { what, found: word(at), expected });
-            }
+        if !READ.contains(&version) {
+            return Err(ModelError::Version { what: "format", found: version, expected: FORMAT_VERSION });
+        }
+        if word(12) != DESCRIPTOR_VERSION {
+            let (found, expected) = (word(12), DESCRIPTOR_VERSION);
+            return Err(ModelError::Version { what: "descriptor", found, expected });
         }
         let body = &bytes[HEADER..];
         if body.len() as u64 != u64::from_le_bytes(header[16..24].try_into().unwrap_or_default()) {
@@ -142,18 +223,21 @@ impl Recogniser {
         }
         let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
         let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
-        let (labels, second) = match version {
+        let (labels, second): (Vec<usize>, Option<SavedSecond>) = match version {
             UNLABELLED_VERSION => (Vec::new(), None),
             SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None),
-            _ => {
-                let (labels, other, profiles, limits): (_, Vec<u8>, _, _) =
-                    postcard::from_bytes(rest).map_err(wrong)?;
-                // Who says something of another has nobody behind it: a file may nest without end.
-                if other.get(8..12) == Some(&FORMAT_VERSION.to_le_bytes()) {
-                    return Err(ModelError::Parts("the second opinion"));
-                }
-                let other = Self::from_bytes(&other).map_err(|error| ModelError::Second(Box::new(error)))?;
-                (labels, Some(SecondOpinion { recogniser: Arc::new(other), profiles, limits }))
+            SECOND_VERSION => {
+                let (labels, other, profiles, limits) = postcard::from_bytes(rest).map_err(wrong)?;
+                (labels, Some((other, profiles, limits)))
+            }
+            _ => postcard::from_bytes(rest).map_err(wrong)?,
+        };
+        let second = match second {
+            None => None,
+            Some(_) if !may_have_second => return Err(ModelError::Parts("the second opinion")),
+            Some((other, profiles, limits)) => {
+                let other = Self::read(&other, false).map_err(|error| ModelError::Second(Box::new(error)))?;
+                Some(SecondOpinion { recogniser: Arc::new(other), profiles, limits })
             }
         };
         let map = match body.map {
@@ -162,12 +246,7 @@ impl Recogniser {
             }
             SavedMap::Pca { mean, directions, variances } => Map::Pca(Pca { mean, directions, variances }),
         };
-        let pattern = match body.pattern {
-            SavedPattern::Thesis(grid) => Pattern::Thesis(grid),
-            SavedPattern::Codebook(book) => Pattern::Codebook(book),
-            SavedPattern::Network(network) => Pattern::Network(network),
-            SavedPattern::Features(features) => Pattern::Features(features),
-        };
+        let pattern = body.pattern.read();
         let space = Space {
             settings: body.settings.space.clone(),
             map,
@@ -260,5 +339,58 @@ impl Recogniser {
         let judges = second.is_none_or(|second| second.fits(self.activities.len(), self.uses_boxes()));
         fits(judges, "the second opinion")?;
         Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embedding::descriptor::Scaling;
+    use crate::recognition::network::training::NetworkSettings;
+    use crate::recognition::space::SpaceSettings;
+    use crate::recognition::watch::Unwatched;
+    use crate::synthetic::everyday;
+
+    /// A small model of two activities.
+    fn model(members: usize) -> Recogniser {
+        let clips = |first: usize, people: usize| {
+            let mut clips = everyday::clips(first, people, Scaling::default());
+            clips.retain(|clip| ["walk", "lie down"].contains(&clip.activity.as_str()));
+            clips
+        };
+        let space = SpaceSettings { dimensions: 4, gallery: 100, ..SpaceSettings::default() };
+        let network = NetworkSettings { widths: [4, 5, 6], passes: 1, members, ..NetworkSettings::default() };
+        let (people, others) = (clips(0, 3), clips(9, 2));
+        Recogniser::train_network(&people, &others, &space, &network, Scaling::default(), &Unwatched)
+            .expect("trained")
+    }
+
+    #[test]
+    fn one_member_is_written_as_before_and_several_in_a_format_of_their_own() {
+        let version = |model: &Recogniser| {
+            let bytes = model.to_bytes().expect("encoded");
+            assert_eq!(&Recogniser::from_bytes(&bytes).expect("decoded"), model);
+            u32::from(bytes[8])
+        };
+        let (one, two) = (model(1), model(2));
+        assert_eq!([version(&one), version(&two)], [SINGLE_VERSION, FORMAT_VERSION]);
+        // As the file's format 3 has always had it: mean, spread, three layers, with no count before them.
+        let Pattern::Network(network) = &one.space.pattern else { panic!("a network") };
+        let saved = OneMember::of(network).expect("one member");
+        let [first, second, third] = &network.members[0];
+        assert_eq!(
+            postcard::to_stdvec(&saved),
+            postcard::to_stdvec(&(&network.mean, &network.spread, first, second, third))
+        );
+        let second = |of: &Recogniser, by: &Recogniser| {
+            let limits = Limits::none(of.activities.len());
+            let profiles = Array2::zeros((of.activities.len(), by.activities.len()));
+            let second = SecondOpinion { recogniser: Arc::new(by.clone()), profiles, limits };
+            Recogniser { second: Some(second), ..of.clone() }
+        };
+        assert_eq!(version(&second(&one, &two)), SECOND_VERSION);
+        assert_eq!(version(&second(&two, &two)), FORMAT_VERSION);
+        let nested = second(&two, &second(&two, &two)).to_bytes().expect("encoded");
+        assert!(Recogniser::from_bytes(&nested).is_err(), "nested without end");
     }
 }

@@ -58,7 +58,7 @@ mod tests {
         let network = Network {
             mean: Array1::zeros(3),
             spread: Array1::ones(3),
-            layers: [dense(3, 4), dense(4, 5), dense(10, 6)],
+            members: vec![[dense(3, 4), dense(4, 5), dense(10, 6)]],
         };
         let clips: Vec<Array2<f32>> = (0..30)
             .map(|n| Array2::from_shape_fn((4, 3), |(f, k)| ((n * 5 + f * 3 + k) % 11) as f32 / 5.0))

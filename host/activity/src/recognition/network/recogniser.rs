@@ -1,6 +1,7 @@
 //! A recogniser around the network: trained on thousands of clips in one view, calibrated on other people.
 
 use super::training::{NetworkSettings, train};
+use super::variation::{Embedded, varied};
 use crate::embedding::EmbeddingError;
 use crate::embedding::descriptor::Scaling;
 use crate::recognition::choice::names;
@@ -43,14 +44,14 @@ impl Recogniser {
         let mut space = Space::train(&all, &settings)?;
         let label = |clip: &Clip| activities.iter().position(|a| *a == clip.activity).unwrap_or(0);
         let labels: Vec<usize> = all.iter().map(|clip| label(clip)).collect();
-        let vectors: Vec<Array2<f32>> = all
-            .par_iter()
-            .map(|clip| space.vectors(only_view(clip)?).map_err(ModelError::from))
-            .collect::<Result<_, _>>()?;
-        let (network, last) =
-            train(&vectors, &labels, activities.len(), network, watch).ok_or(EmbeddingError::Stopped)?;
+        let embedded: Vec<Embedded> =
+            all.par_iter().map(|clip| embedded(&space, clip)).collect::<Result<_, _>>()?;
+        let vectors = |clip: &Embedded| vectors(&space, clip);
+        let taught = network;
+        let (network, last) = train(&embedded, &vectors, &labels, activities.len(), taught, watch)
+            .ok_or(EmbeddingError::Stopped)?;
         let patterns: Vec<Array1<f32>> =
-            vectors.par_iter().map(|frames| network.pattern(frames.view())).collect();
+            embedded.par_iter().map(|clip| network.pattern(vectors(clip).view())).collect();
         space.pattern = Pattern::Network(Box::new(network));
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
@@ -77,20 +78,23 @@ impl Recogniser {
             views: 1,
             space,
         };
-        recogniser.calibrate(others)?;
+        recogniser.calibrate(others, taught)?;
         Ok(recogniser)
     }
 
-    /// How steep the softmax is (temperature scaling; Guo et al., ICML 2017) and what counts as unknown, from clips of other people.
-    fn calibrate(&mut self, others: &[Clip]) -> Result<(), ModelError> {
+    /// How steep the softmax is (temperature scaling; Guo et al., ICML 2017) and what counts as unknown, from clips of other people, varied as
+    /// a step of the training varies them: as they are they would be more alike to what was learned than anybody real.
+    fn calibrate(&mut self, others: &[Clip], taught: &NetworkSettings) -> Result<(), ModelError> {
         let known: Vec<(usize, &Clip)> = others
             .iter()
             .filter_map(|clip| Some((self.activities.iter().position(|a| *a == clip.activity)?, clip)))
             .collect();
-        let patterns: Vec<Array1<f32>> = known
+        let clips: Vec<Embedded> =
+            known.par_iter().map(|(_, clip)| embedded(&self.space, clip)).collect::<Result<_, _>>()?;
+        let patterns: Vec<Array1<f32>> = varied(&clips, taught)
             .par_iter()
-            .map(|(_, clip)| self.pattern(std::slice::from_ref(only_view(clip)?)))
-            .collect::<Result<_, ModelError>>()?;
+            .map(|clip| self.space.pattern_of(vectors(&self.space, clip).view(), self.settings.sharpness))
+            .collect();
         if let Classifier::Softmax(linear) = &mut self.classifier {
             let decisions: Vec<Vec<f32>> = patterns
                 .iter()
@@ -108,6 +112,17 @@ impl Recogniser {
         self.limits = Limits::conformal(&scored, self.activities.len(), Limits::FALSE_ALARMS);
         Ok(())
     }
+}
+
+/// A clip's frames in the space.
+fn embedded(space: &Space, clip: &Clip) -> Result<Embedded, ModelError> {
+    let view = only_view(clip)?;
+    Ok(Embedded { points: space.points(view)?, boxes: view.boxes.clone() })
+}
+
+/// Its frame vectors.
+fn vectors(space: &Space, clip: &Embedded) -> Array2<f32> {
+    space.vectors_of(clip.points.view(), clip.boxes.as_ref().map(|boxes| boxes.view()))
 }
 
 /// The view of a clip that has one.

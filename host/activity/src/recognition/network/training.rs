@@ -1,11 +1,13 @@
 //! Training of the network: gradients by the chain rule, steps by Adam (Kingma and Ba, ICLR 2015) whose size falls as a cosine.
 
-use super::{Dense, Network, pooled, rectified, rows, with_neighbours};
+use super::variation::{self, Embedded};
+use super::{Dense, Layers, Network, pooled, rectified, rows, with_neighbours};
 use crate::recognition::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
+use rayon::prelude::*;
 
 /// How the network is trained.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,12 +24,19 @@ pub struct NetworkSettings {
     pub rate: f32,
     /// How much weights shrink in a step, times its size.
     pub decay: f32,
+    /// Least share of a clip's frames that a step sees: each clip draws its share between this and all anew, 1 for all. Motion is taken between
+    /// those that are left.
+    pub keep: f32,
+    /// Spread of what is added at random to each component of a clip in a step, the same to all of its frames, in spreads of that component.
+    pub shift: f32,
     /// Share of the pooled values that is left out at random in a step.
     pub dropout: f32,
     /// Spread of what is added at random to every number of a frame in a step, in spreads of that number.
     pub noise: f32,
     /// Share of the probability that goes to all activities alike (label smoothing; Szegedy et al., CVPR 2016).
     pub smoothing: f32,
+    /// Networks that are taught the same and answer together.
+    pub members: usize,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -41,9 +50,12 @@ impl Default for NetworkSettings {
             batch: 64,
             rate: 2e-3,
             decay: 1e-2,
+            keep: 1.0,
+            shift: 0.0,
             dropout: 0.3,
             noise: 0.05,
             smoothing: 0.1,
+            members: 1,
             seed: 1,
         }
     }
@@ -120,21 +132,48 @@ impl Step {
     }
 }
 
-/// Trains on clips given by their frame vectors (frames x F each, at least one frame) and labels below `classes`; gives the network and
-/// the linear values per class that its patterns were learned for. `watch` may stop it (`None`), and hears of every pass.
+/// Frame vectors (frames x F) of an embedded clip.
+pub type Vectors<'a> = &'a (dyn Fn(&Embedded) -> Array2<f32> + Sync);
+
+/// Trains on clips (at least one frame each), what their frame vectors are, and labels below `classes`; gives the network and
+/// the linear values per class that its patterns were learned for: the mean of the members' own. `watch` may stop it (`None`), and hears of
+/// every pass of every member.
 pub fn train(
-    clips: &[Array2<f32>],
+    clips: &[Embedded],
+    vectors: Vectors<'_>,
     labels: &[usize],
     classes: usize,
     settings: &NetworkSettings,
     watch: &dyn Watch,
 ) -> Option<(Network, Dense)> {
-    let inputs = clips.first()?.ncols();
-    let (mean, spread) = scaling(clips, inputs);
-    let scaled: Vec<Array2<f32>> = clips.iter().map(|clip| (clip - &mean) / &spread).collect();
+    let scale = Scale::of(clips, vectors)?;
+    let seeds: Vec<u64> =
+        (0..settings.members.max(1) as u64).map(|n| settings.seed.wrapping_add(n)).collect();
+    let (members, last): (Vec<Layers>, Vec<Dense>) = seeds
+        .into_par_iter()
+        .map(|seed| {
+            let settings = NetworkSettings { seed, ..*settings };
+            one_member(clips, vectors, &scale, labels, classes, &settings, watch)
+        })
+        .collect::<Option<Vec<_>>>()?
+        .into_iter()
+        .unzip();
+    Some((Network { mean: scale.mean, spread: scale.spread, members }, Dense::mean_of(&last)))
+}
+
+/// Trains a member.
+fn one_member(
+    clips: &[Embedded],
+    vectors: Vectors<'_>,
+    scale: &Scale,
+    labels: &[usize],
+    classes: usize,
+    settings: &NetworkSettings,
+    watch: &dyn Watch,
+) -> Option<(Layers, Dense)> {
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let [a, b, c] = settings.widths;
-    let mut learners = [(inputs, a), ((2 * settings.reach + 1) * a, b), (2 * b, c), (c, classes)]
+    let mut learners = [(scale.mean.len(), a), ((2 * settings.reach + 1) * a, b), (2 * b, c), (c, classes)]
         .map(|(inputs, outputs)| Learner::new(inputs, outputs, &mut rng));
     let mut order: Vec<usize> = (0..clips.len()).collect();
     let steps = settings.passes * clips.len().div_ceil(settings.batch.max(1));
@@ -149,43 +188,63 @@ pub fn train(
             let share = number as f32 / steps.max(1) as f32;
             let rate = settings.rate * (0.5 + 0.5 * (std::f32::consts::PI * share).cos());
             let step = Step { number, rate, decay: settings.decay };
-            one_step(&mut learners, &scaled, labels, chosen, settings, step, &mut rng);
+            let varied: Vec<Embedded> =
+                chosen.iter().map(|&clip| clips[clip].varied(settings, &scale.points, &mut rng)).collect();
+            let seen: Vec<Array2<f32>> = varied.par_iter().map(|clip| scale.applied(vectors(clip))).collect();
+            let labels = chosen.iter().map(|&clip| labels[clip]);
+            one_step(&mut learners, &seen, labels, settings, step, &mut rng);
         }
-        watch.fold_done(settings.passes);
+        watch.fold_done(settings.passes * settings.members.max(1));
     }
     let [first, second, third, last] = learners.map(|learner| learner.layer);
-    Some((Network { mean, spread, layers: [first, second, third] }, last))
+    Some(([first, second, third], last))
 }
 
-/// Mean and spread of all frames; what never changes is left as it is.
-fn scaling(clips: &[Array2<f32>], width: usize) -> (Array1<f32>, Array1<f32>) {
-    let frames: usize = clips.iter().map(Array2::nrows).sum();
-    let n = frames.max(1) as f32;
-    let mut mean = Array1::<f32>::zeros(width);
-    clips.iter().for_each(|clip| mean += &(clip.sum_axis(Axis(0)) / n));
-    let mut spread = Array1::<f32>::zeros(width);
-    clips.iter().for_each(|clip| spread += &((clip - &mean).mapv(|v| v * v).sum_axis(Axis(0)) / n));
-    (mean, spread.mapv(|v| if v > 1e-10 { v.sqrt() } else { 1.0 }))
+/// Mean and spread of the frame vectors of all clips as they are; what never changes is left as it is.
+struct Scale {
+    mean: Array1<f32>,
+    spread: Array1<f32>,
+    /// Spread of the embedded frames themselves.
+    points: Array1<f32>,
+}
+
+impl Scale {
+    fn of(clips: &[Embedded], vectors: Vectors<'_>) -> Option<Self> {
+        let frames: usize = clips.iter().map(|clip| clip.points.nrows()).sum();
+        let n = frames.max(1) as f32;
+        let sums = |of: &(dyn Fn(Array2<f32>) -> Array2<f32> + Sync)| -> Option<Array1<f32>> {
+            let sums: Vec<Array1<f32>> =
+                clips.par_iter().map(|clip| of(vectors(clip)).sum_axis(Axis(0)) / n).collect();
+            sums.into_iter().reduce(|sum, next| sum + next)
+        };
+        let mean = sums(&|vectors| vectors)?;
+        let spread = sums(&|vectors| (vectors - &mean).mapv(|v| v * v))?;
+        let points = variation::spread(clips);
+        Some(Self { spread: spread.mapv(|v| if v > 1e-10 { v.sqrt() } else { 1.0 }), mean, points })
+    }
+
+    fn applied(&self, vectors: Array2<f32>) -> Array2<f32> {
+        (vectors - &self.mean) / &self.spread
+    }
 }
 
 /// One step on a few clips.
 fn one_step(
     learners: &mut [Learner; 4],
     clips: &[Array2<f32>],
-    labels: &[usize],
-    chosen: &[usize],
+    labels: impl Iterator<Item = usize>,
     settings: &NetworkSettings,
     step: Step,
     rng: &mut ChaCha8Rng,
 ) {
-    let parts: Vec<ArrayView2<f32>> = chosen.iter().map(|&clip| clips[clip].view()).collect();
+    let parts: Vec<ArrayView2<f32>> = clips.iter().map(|clip| clip.view()).collect();
     let Ok(mut frames) = ndarray::concatenate(Axis(0), &parts) else { return };
     if let Ok(normal) = Normal::new(0.0, settings.noise) {
         frames.mapv_inplace(|v| v + normal.sample(rng));
     }
     let [first, second, third, last] = learners;
     let hidden = rectified(first.layer.apply(frames.view()));
-    let mut spans = Vec::with_capacity(chosen.len());
+    let mut spans = Vec::with_capacity(clips.len());
     let mut windows = Array2::zeros((hidden.nrows(), (2 * settings.reach + 1) * hidden.ncols()));
     for part in &parts {
         let from = spans.last().map_or(0, |(_, to)| *to);
@@ -195,7 +254,7 @@ fn one_step(
     }
     let seen = rectified(second.layer.apply(windows.view()));
     let width = seen.ncols();
-    let mut clip = Array2::zeros((chosen.len(), 2 * width));
+    let mut clip = Array2::zeros((clips.len(), 2 * width));
     for (row, &(from, to)) in spans.iter().enumerate() {
         clip.row_mut(row).assign(&pooled(rows(&seen, from, to)));
     }
@@ -208,7 +267,7 @@ fn one_step(
     let dropped = &clip * &kept;
     let pattern = rectified(third.layer.apply(dropped.view()));
     let decision = last.layer.apply(pattern.view());
-    let gradient = cross_entropy(&decision, chosen.iter().map(|&clip| labels[clip]), settings.smoothing);
+    let gradient = cross_entropy(&decision, labels, settings.smoothing);
     let Some(mut gradient) = last.step(pattern.view(), &gradient, step, true) else { return };
     only_above_zero(&mut gradient, &pattern);
     let Some(gradient) = third.step(dropped.view(), &gradient, step, true) else { return };
@@ -276,6 +335,21 @@ fn only_above_zero(gradient: &mut Array2<f32>, values: &Array2<f32>) {
 mod tests {
     use super::*;
     use crate::recognition::watch::Unwatched;
+    use std::collections::BTreeSet;
+    use std::sync::Mutex;
+
+    /// Clips whose frame vectors are their points.
+    fn trained(
+        clips: &[Array2<f32>],
+        labels: &[usize],
+        classes: usize,
+        settings: &NetworkSettings,
+    ) -> (Network, Dense) {
+        let clips: Vec<Embedded> =
+            clips.iter().map(|points| Embedded { points: points.clone(), boxes: None }).collect();
+        train(&clips, &|clip| clip.points.clone(), labels, classes, settings, &Unwatched)
+            .expect("not stopped")
+    }
 
     /// Clips of two kinds of frames: classes differ in which kinds come up, not in how often.
     fn clips(rng: &mut ChaCha8Rng) -> (Vec<Array2<f32>>, Vec<usize>) {
@@ -325,8 +399,7 @@ mod tests {
         let right = |reach: usize| {
             let settings =
                 NetworkSettings { widths: [8, 12, 8], batch: 16, reach, ..NetworkSettings::default() };
-            let (network, last) =
-                train(&train_clips, &labels, 2, &settings, &Unwatched).expect("not stopped");
+            let (network, last) = trained(&train_clips, &labels, 2, &settings);
             assert!(network.fits(2));
             let says = |clip: &Array2<f32>| {
                 let decision = last.apply(network.pattern(clip.view()).insert_axis(Axis(0)).view());
@@ -340,11 +413,39 @@ mod tests {
     }
 
     #[test]
+    fn every_step_sees_other_frames_of_a_clip_and_the_scale_all_of_them() {
+        let whole: Vec<Embedded> = (0..4)
+            .map(|_| Embedded {
+                points: Array2::from_shape_fn((30, 1), |(frame, _)| frame as f32),
+                boxes: None,
+            })
+            .collect();
+        let seen = |keep: f32| {
+            let sums = Mutex::new(Vec::new());
+            let vectors = |clip: &Embedded| {
+                sums.lock().expect("not poisoned").push(clip.points.sum());
+                clip.points.clone()
+            };
+            let settings = NetworkSettings { widths: [2; 3], passes: 5, keep, ..NetworkSettings::default() };
+            let (network, _) =
+                train(&whole, &vectors, &[0, 1, 0, 1], 2, &settings, &Unwatched).expect("not stopped");
+            assert!((network.mean[0] - 14.5).abs() < 1e-4, "{}", network.mean);
+            let sums = sums.into_inner().expect("not poisoned");
+            // Twice for mean and spread, then once in each pass; 435 is that of all frames.
+            assert_eq!(sums.len(), 4 * 2 + 4 * 5);
+            assert!(sums[..8].iter().all(|sum| *sum == 435.0), "{sums:?}");
+            sums[8..].iter().map(|sum| sum.to_bits()).collect::<BTreeSet<u32>>().len()
+        };
+        assert_eq!(seen(1.0), 1);
+        assert!(seen(0.4) > 15, "nearly every time others");
+    }
+
+    #[test]
     fn it_learns_what_means_alone_tell_and_ignores_the_order_of_frames() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (train_clips, labels) = clips(&mut rng);
         let settings = NetworkSettings { widths: [8, 12, 8], batch: 16, ..NetworkSettings::default() };
-        let (network, last) = train(&train_clips, &labels, 3, &settings, &Unwatched).expect("not stopped");
+        let (network, last) = trained(&train_clips, &labels, 3, &settings);
         assert!(network.fits(4) && !network.fits(5) && last.is(8, 3));
         let (fresh, truth) = clips(&mut rng);
         let right = fresh.iter().zip(&truth).filter(|(clip, truth)| {
