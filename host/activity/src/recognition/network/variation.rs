@@ -1,8 +1,8 @@
 //! Clips as a step of the training sees them, never twice the same: some frames are left out at random, and motion is taken between those that
-//! are left, as by a camera that is slower and not always in time.
+//! are left, as by a camera that is slower and not always in time; and a whole clip is shifted, as by another build, clothes or tracker.
 //!
-//! Synthetic people are seen at an even rate, and moments follow each other as they were drawn; a network that sees every clip at many rates
-//! leans less on that (domain randomisation; Tobin et al., IROS 2017).
+//! Synthetic people are seen at an even rate, and look as they were drawn; a network that sees every clip at many rates and places leans less
+//! on that (domain randomisation; Tobin et al., IROS 2017).
 
 use super::training::NetworkSettings;
 use ndarray::{Array1, Array2, Axis};
@@ -72,8 +72,8 @@ impl Embedded {
         }
     }
 
-    /// The clip with an offset of its own on each component, the same in all frames, drawn with `shift` times the component's `spread`: another
-    /// build, other clothes, another tracker.
+    /// The clip with an offset of its own on each component, the same in all frames, drawn with `shift` times the component's
+    /// `spread`.
     fn shifted(mut self, spread: &Array1<f32>, shift: f32, rng: &mut ChaCha8Rng) -> Self {
         if shift > 0.0 {
             let offsets: Array1<f32> =
