@@ -84,8 +84,8 @@ fn training_stops_when_asked_and_refuses_a_single_activity() {
 #[test]
 fn the_shipped_models_are_small_and_know_people_they_never_saw() {
     let bytes: usize = SHIPPED.iter().map(|bytes| bytes.len()).sum();
-    // A tenth of the program that they come with.
-    assert!(bytes <= 3_000_000, "{bytes} bytes in the repository and the program");
+    // A fifth of the program that they come with.
+    assert!(bytes <= 5_000_000, "{bytes} bytes in the repository and the program");
     // Nobody who taught (from 0) or calibrated (from 100 000).
     let people = everyday::clips(700_000, 4, Scaling::default());
     for (index, shipped) in SHIPPED.iter().enumerate() {
