@@ -175,3 +175,31 @@ fn typical(patterns: &[Array1<f32>], labels: &[usize], classes: usize) -> Array2
     let views: Vec<ArrayView2<f32>> = centres.iter().map(|part| part.view()).collect();
     concatenate(Axis(0), &views).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recognition::watch::Unwatched;
+    use crate::synthetic::everyday;
+
+    #[test]
+    fn limits_are_set_on_clips_varied_as_in_training() {
+        let clips = |first: usize, people: usize| {
+            let mut clips = everyday::clips(first, people, Scaling::default());
+            clips.retain(|clip| ["walk", "lie down"].contains(&clip.activity.as_str()));
+            clips
+        };
+        // Twenty clips: one more than a limit needs.
+        let (people, others) = (clips(0, 3), clips(9, 10));
+        let space = SpaceSettings { dimensions: 4, gallery: 100, ..SpaceSettings::default() };
+        let taught = NetworkSettings { widths: [4, 5, 6], passes: 1, ..NetworkSettings::default() };
+        let mut model =
+            Recogniser::train_network(&people, &others, &space, &taught, Scaling::default(), &Unwatched)
+                .expect("trained");
+        let as_they_are = model.limits.clone();
+        assert!(as_they_are.distances.iter().all(|limit| limit.is_finite()));
+        model.calibrate(&others, &NetworkSettings { shift: 3.0, ..taught }).expect("clips that fit");
+        let wider = model.limits.distances.iter().zip(&as_they_are.distances);
+        assert!(wider.clone().all(|(shifted, limit)| shifted > limit), "{wider:?}");
+    }
+}
