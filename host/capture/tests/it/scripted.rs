@@ -9,15 +9,19 @@ use farnear_protocol::{
 };
 use farnear_scripted_board::{Board, Faults, Peer};
 
-/// Short waits: the board answers at once or never.
+/// Short waits: the board answers at once or never. Work has longer than a crowded machine makes this thread
+/// stand, or good work is called overdue.
 pub const SHORT: Timing = Timing {
-    reply: Duration::from_millis(4),
+    reply: Duration::from_millis(20),
     retries: 3,
     poll: Duration::from_millis(10),
     work_factor: 0,
-    work_slack: Duration::from_millis(80),
+    work_slack: Duration::from_secs(20),
     keep_alive: Duration::from_secs(2),
 };
+
+/// As [`SHORT`], for work that never ends.
+pub const OVERDUE_SOON: Timing = Timing { work_slack: Duration::from_millis(80), ..SHORT };
 
 /// A shot by piezo.
 pub const SHOT: Shot = Shot {

@@ -9,7 +9,7 @@ use farnear_protocol::{
 };
 use farnear_scripted_board::{Faults, Peer};
 
-use crate::scripted::{SHORT, connect, connect_error};
+use crate::scripted::{OVERDUE_SOON, SHORT, connect, connect_error};
 
 #[test]
 fn hello_gives_the_board_and_its_boot() {
@@ -125,7 +125,7 @@ fn the_work_of_a_program_that_died_is_not_taken_for_this_ones() {
     let (old_id, old_session) = (old.id(), peer.board().session);
     std::mem::forget(old); // a killed program says nothing
     let client = Client::connect(peer.connect(), "scripted").unwrap();
-    client.set_timing(SHORT);
+    client.set_timing(OVERDUE_SOON);
     assert_ne!(peer.board().session, old_session);
     let work = client.start_home(Axis::SensorCoarse).unwrap();
     assert!(work.id() > old_id);

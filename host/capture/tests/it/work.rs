@@ -5,14 +5,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_capture::{ClientError, Step, Timing};
+use farnear_capture::{ClientError, Step};
 use farnear_protocol::{
     message::{Axis, EventKind, Shot, TriggerMode},
     units::{Micros, Nanometres},
 };
 use farnear_scripted_board::Faults;
 
-use crate::scripted::{SHORT, SHOT, connect, run_shots};
+use crate::scripted::{OVERDUE_SOON, SHOT, connect, run_shots};
 
 #[test]
 fn homing_and_moving_end_with_their_events() {
@@ -59,6 +59,7 @@ fn work_whose_end_is_never_told_is_an_error() {
 #[test]
 fn work_that_does_not_end_is_stopped_at_its_deadline() {
     let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    client.set_timing(OVERDUE_SOON);
     let error = client.home(Axis::SensorCoarse).err().unwrap();
     assert!(matches!(error, ClientError::Overdue { .. }), "{error:?}");
     assert_eq!(peer.board().stops, 1);
@@ -69,7 +70,6 @@ fn an_interruption_stops_the_rig() {
     let (mut client, peer) = connect(Faults { never_ends: true, brakes_for: 12, ..Faults::default() });
     let flag = Arc::new(AtomicBool::new(false));
     client.interrupt_by(flag.clone());
-    client.set_timing(Timing { work_slack: Duration::from_secs(60), ..SHORT });
     let interrupter = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(20));
         flag.store(true, std::sync::atomic::Ordering::Relaxed);
