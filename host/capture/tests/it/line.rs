@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use farnear_capture::{Client, ClientError, Transport};
+use farnear_capture::{Client, ClientError, Timing, Transport};
 use farnear_protocol::{
     Response,
     message::{Axis, Status},
@@ -11,7 +11,7 @@ use farnear_protocol::{
 use farnear_scripted_board::{Faults, Peer};
 use proptest::prelude::*;
 
-use crate::scripted::{SHOT, connect, run_shots};
+use crate::scripted::{SHORT, SHOT, connect, run_shots};
 
 #[test]
 fn lost_requests_and_lost_answers_are_asked_again_and_act_once() {
@@ -53,6 +53,34 @@ fn what_an_earlier_program_left_on_the_line_is_not_believed() {
     peer.board().put_stale(2, &Response::Accepted);
     let client = Client::connect(peer.connect(), "scripted").unwrap();
     assert_eq!(client.hello().boot, 7);
+}
+
+#[test]
+fn an_answer_that_came_while_the_host_stood_still_is_not_asked_for_again() {
+    /// The first look for what came after a request ends when the wait is over, without what came meanwhile.
+    struct Late(Box<dyn Transport>, bool);
+    impl Transport for Late {
+        fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+            if std::mem::take(&mut self.1) {
+                std::thread::sleep(wait);
+                return Ok(0);
+            }
+            self.0.receive(buffer, wait)
+        }
+        fn send(&mut self, bytes: &[u8], wait: Duration) -> std::io::Result<()> {
+            self.1 = true;
+            self.0.send(bytes, wait)
+        }
+        fn discard_input(&mut self) -> std::io::Result<()> {
+            self.0.discard_input()
+        }
+    }
+    let peer = Peer::new(Faults::default());
+    let mut connect = peer.connect();
+    let late = move || Ok(Box::new(Late(connect()?, false)) as Box<dyn Transport>);
+    let client = Client::connect(Box::new(late), "scripted").unwrap();
+    client.set_timing(Timing { retries: 0, ..SHORT });
+    client.status().unwrap();
 }
 
 #[test]

@@ -9,33 +9,43 @@ use super::{Checkup, Found, failed, passed, passed_over};
 
 /// Questions that are asked to judge the line.
 const QUESTIONS: usize = 200;
+/// So often they are asked at most: one good time shows that the line is good, and that it was this computer that was late.
+const ROUNDS: usize = 3;
 /// A real board answers within this, nineteen times of twenty.
 const ANSWER: Duration = Duration::from_millis(50);
 
 pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
     let client = checkup.client();
-    let before = client.status()?.link;
-    let mut answers = Vec::with_capacity(QUESTIONS);
-    for _ in 0..QUESTIONS {
-        let begin = Instant::now();
-        client.status()?;
-        answers.push(begin.elapsed());
+    let mut round = 1;
+    loop {
+        let before = client.status()?.link;
+        let mut answers = Vec::with_capacity(QUESTIONS);
+        for _ in 0..QUESTIONS {
+            let begin = Instant::now();
+            client.status()?;
+            answers.push(begin.elapsed());
+        }
+        let after = client.status()?.link;
+        let bad = after.bad_frames - before.bad_frames;
+        let repeated = after.repeated - before.repeated;
+        answers.sort_unstable();
+        let [usual, slowest] = [QUESTIONS * 19 / 20, QUESTIONS - 1].map(|rank| answers[rank]);
+        let said = format!(
+            "{QUESTIONS} questions, {bad} broken frames, {repeated} asked again, 19 of 20 answers within {:.1} ms, the slowest {:.1} ms",
+            usual.as_secs_f64() * 1e3,
+            slowest.as_secs_f64() * 1e3
+        );
+        // A line that is slow is slow with most; with a few it is this computer, which had something else to do.
+        let late = repeated > 0 || (usual > ANSWER && !client.hello().emulated);
+        if bad == 0 && !late {
+            return passed(said);
+        }
+        if bad > 0 || round == ROUNDS {
+            return failed(format!("{said}: is the cable short and whole, is a hub in between?"));
+        }
+        checkup.say(&format!("{said}; once more, for it may be that this computer was late"));
+        round += 1;
     }
-    let after = client.status()?.link;
-    let bad = after.bad_frames - before.bad_frames;
-    let repeated = after.repeated - before.repeated;
-    answers.sort_unstable();
-    let [usual, slowest] = [QUESTIONS * 19 / 20, QUESTIONS - 1].map(|rank| answers[rank]);
-    let said = format!(
-        "{QUESTIONS} questions, {bad} broken frames, {repeated} asked again, 19 of 20 answers within {:.1} ms, the slowest {:.1} ms",
-        usual.as_secs_f64() * 1e3,
-        slowest.as_secs_f64() * 1e3
-    );
-    // A line that is slow is slow with most; with a few it is this computer, which had something else to do.
-    if bad > 0 || repeated > 0 || (usual > ANSWER && !client.hello().emulated) {
-        return failed(format!("{said}: is the cable short and whole, is a hub in between?"));
-    }
-    passed(said)
 }
 
 pub(super) fn identity(checkup: &mut Checkup<'_>) -> Found {
