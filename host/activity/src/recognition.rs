@@ -13,6 +13,7 @@ pub mod clip;
 pub mod codebook;
 pub mod experiment;
 pub mod frames;
+pub mod lengths;
 pub mod live;
 pub mod model;
 pub mod model_file;

@@ -4,6 +4,7 @@ use super::classifier::softmax::softmax;
 use super::classifier::{Classifier, ClassifierKind, largest};
 use super::clip::Track;
 use super::frames::Mode;
+use super::lengths::Lengths;
 use super::patterns::joined;
 use super::second_opinion::SecondOpinion;
 use super::self_training::{Labelled, self_trained};
@@ -64,6 +65,8 @@ pub struct Recogniser {
     pub second: Option<SecondOpinion>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
+    /// How long its clips last, by class; empty in models of older formats.
+    pub lengths: Vec<Lengths>,
 }
 
 /// An activity, and how sure that is.

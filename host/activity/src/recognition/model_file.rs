@@ -1,14 +1,15 @@
 //! Models as files: bytes with a version and a checksum.
 //!
 //! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
-//! little-endian, then the body (postcard), from version 3 on followed by the classes of its patterns, in version 4 by a second opinion, in
-//! version 5, which networks of several members have, by a second opinion or none. Anything that does not fit is refused by name, never guessed; a
-//! body that decodes is also checked part against part, so that a crafted file cannot make recognition panic.
+//! little-endian, then the body (postcard), the classes of its patterns, a second opinion or none, and how long clips last. Files of older
+//! versions, which end earlier, are read too. Anything that does not fit is refused by name, never guessed; a body that decodes is also
+//! checked part against part, so that a crafted file cannot make recognition panic.
 
 use super::classifier::Classifier;
 use super::clip::BOX_NUMBERS;
 use super::codebook::Codebook;
 use super::frames::Mode;
+use super::lengths::Lengths;
 use super::model::{ModelError, Recogniser, RecogniserSettings};
 use super::network::features::Features;
 use super::network::{Layers, Network};
@@ -24,14 +25,15 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Version of the file's format.
-pub const FORMAT_VERSION: u32 = 5;
-/// The version before, without networks of several members; models that have a second opinion and no such network are written so still.
+pub const FORMAT_VERSION: u32 = 6;
+/// The versions before, which are read: without lengths,
+const LENGTHLESS_VERSION: u32 = 5;
+/// with a second opinion in every file,
 const SECOND_VERSION: u32 = 4;
-/// The version before that, without a second opinion; models that have none are written so still.
+/// with one in none,
 const SINGLE_VERSION: u32 = 3;
-/// The version before that, which is read too: it has no labels.
+/// without the classes of patterns.
 const UNLABELLED_VERSION: u32 = 2;
-const READ: [u32; 4] = [UNLABELLED_VERSION, SINGLE_VERSION, SECOND_VERSION, FORMAT_VERSION];
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
@@ -75,18 +77,6 @@ struct OneMember {
     layers: Layers,
 }
 
-impl OneMember {
-    /// The network, if it has but one member.
-    fn of(network: &Network) -> Option<Box<Self>> {
-        let [layers] = network.members.as_slice() else { return None };
-        Some(Box::new(Self {
-            mean: network.mean.clone(),
-            spread: network.spread.clone(),
-            layers: layers.clone(),
-        }))
-    }
-}
-
 impl From<OneMember> for Network {
     fn from(OneMember { mean, spread, layers }: OneMember) -> Self {
         Self { mean, spread, members: vec![layers] }
@@ -98,13 +88,8 @@ impl SavedPattern {
         match pattern {
             Pattern::Thesis(grid) => Self::Thesis(grid.clone()),
             Pattern::Codebook(book) => Self::Codebook(book.clone()),
-            Pattern::Network(network) => {
-                OneMember::of(network).map_or_else(|| Self::Members(network.clone()), Self::Network)
-            }
-            Pattern::Features(features) => match OneMember::of(&features.network) {
-                Some(one) => Self::Features(one, features.mean.clone(), features.scale.clone()),
-                None => Self::FeaturesOfMembers(features.clone()),
-            },
+            Pattern::Network(network) => Self::Members(network.clone()),
+            Pattern::Features(features) => Self::FeaturesOfMembers(features.clone()),
         }
     }
 
@@ -120,23 +105,39 @@ impl SavedPattern {
             Self::FeaturesOfMembers(features) => Pattern::Features(features),
         }
     }
-
-    /// Whether programs of before know it.
-    fn is_old(&self) -> bool {
-        !matches!(self, Self::Members(_) | Self::FeaturesOfMembers(_))
-    }
 }
 
 /// A second opinion: the other recogniser's file, its profiles and limits.
 type SavedSecond = (Vec<u8>, Array2<f32>, Limits);
 
+/// A body's bytes behind their header.
+fn framed(version: u32, body: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER + body.len());
+    bytes.extend(MAGIC);
+    bytes.extend(version.to_le_bytes());
+    bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
+    bytes.extend((body.len() as u64).to_le_bytes());
+    bytes.extend(checksum(body).to_le_bytes());
+    bytes.extend(body);
+    bytes
+}
+
 impl Recogniser {
-    /// The model as a file's bytes, in the oldest format that has all it holds.
+    /// The model as a file's bytes.
     ///
     /// # Errors
     /// [`ModelError::Body`] if it cannot be encoded.
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
-        let body = Body {
+        let saved = |second: &SecondOpinion| -> Result<SavedSecond, ModelError> {
+            Ok((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
+        };
+        let second = self.second.as_ref().map(saved).transpose()?;
+        let encoded = postcard::to_stdvec(&(self.body(), &self.labels, second, &self.lengths));
+        Ok(framed(FORMAT_VERSION, &encoded.map_err(|error| ModelError::Body(error.to_string()))?))
+    }
+
+    fn body(&self) -> Body {
+        Body {
             settings: self.settings.clone(),
             activities: self.activities.clone(),
             views: self.views,
@@ -161,34 +162,7 @@ impl Recogniser {
             limits: self.limits.clone(),
             patterns: self.patterns.clone(),
             typical_frames: self.typical_frames as u64,
-        };
-        let second: Option<SavedSecond> = match &self.second {
-            None => None,
-            Some(second) => {
-                Some((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
-            }
-        };
-        let version = match &second {
-            _ if !body.pattern.is_old() => FORMAT_VERSION,
-            Some(_) => SECOND_VERSION,
-            None => SINGLE_VERSION,
-        };
-        let encoded = match second {
-            second if version == FORMAT_VERSION => postcard::to_stdvec(&(body, &self.labels, second)),
-            None => postcard::to_stdvec(&(body, &self.labels)),
-            Some((other, profiles, limits)) => {
-                postcard::to_stdvec(&(body, &self.labels, other, profiles, limits))
-            }
-        };
-        let body = encoded.map_err(|error| ModelError::Body(error.to_string()))?;
-        let mut bytes = Vec::with_capacity(HEADER + body.len());
-        bytes.extend(MAGIC);
-        bytes.extend(version.to_le_bytes());
-        bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
-        bytes.extend((body.len() as u64).to_le_bytes());
-        bytes.extend(checksum(&body).to_le_bytes());
-        bytes.extend(body);
-        Ok(bytes)
+        }
     }
 
     /// A model from a file's bytes.
@@ -207,7 +181,7 @@ impl Recogniser {
         }
         let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
         let version = word(8);
-        if !READ.contains(&version) {
+        if !(UNLABELLED_VERSION..=FORMAT_VERSION).contains(&version) {
             return Err(ModelError::Version { what: "format", found: version, expected: FORMAT_VERSION });
         }
         if word(12) != DESCRIPTOR_VERSION {
@@ -223,12 +197,16 @@ impl Recogniser {
         }
         let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
         let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
-        let (labels, second): (Vec<usize>, Option<SavedSecond>) = match version {
-            UNLABELLED_VERSION => (Vec::new(), None),
-            SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None),
+        let (labels, second, lengths): (Vec<usize>, Option<SavedSecond>, Vec<Lengths>) = match version {
+            UNLABELLED_VERSION => Default::default(),
+            SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None, Vec::new()),
             SECOND_VERSION => {
                 let (labels, other, profiles, limits) = postcard::from_bytes(rest).map_err(wrong)?;
-                (labels, Some((other, profiles, limits)))
+                (labels, Some((other, profiles, limits)), Vec::new())
+            }
+            LENGTHLESS_VERSION => {
+                let (labels, second) = postcard::from_bytes(rest).map_err(wrong)?;
+                (labels, second, Vec::new())
             }
             _ => postcard::from_bytes(rest).map_err(wrong)?,
         };
@@ -266,6 +244,7 @@ impl Recogniser {
             labels,
             second,
             typical_frames: body.typical_frames as usize,
+            lengths,
         };
         recogniser.checked()
     }
@@ -335,6 +314,9 @@ impl Recogniser {
         fits(self.labels.is_empty() || labelled, "the training patterns' activities")?;
         fits(self.limits.distances.len() == self.activities.len(), "the limits of what is known")?;
         fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
+        let measured =
+            self.lengths.len() == self.activities.len() && self.lengths.iter().all(Lengths::is_sound);
+        fits(self.lengths.is_empty() || measured, "how long clips last")?;
         let second = self.second.as_ref();
         let judges = second.is_none_or(|second| second.fits(self.activities.len(), self.uses_boxes()));
         fits(judges, "the second opinion")?;
@@ -365,32 +347,63 @@ mod tests {
             .expect("trained")
     }
 
+    /// As a model's file was in an older version.
+    fn written_before(model: &Recogniser, version: u32) -> Vec<u8> {
+        let mut body = model.body();
+        // In version 3 a network was its mean, spread and three layers, with no count before them.
+        if let (Pattern::Network(network), SINGLE_VERSION) = (&model.space.pattern, version) {
+            let [layers] = &network.members[..] else { panic!("one member") };
+            let (mean, spread) = (network.mean.clone(), network.spread.clone());
+            body.pattern =
+                SavedPattern::Network(Box::new(OneMember { mean, spread, layers: layers.clone() }));
+        }
+        let second = model.second.as_ref().map(|second| -> SavedSecond {
+            let other = written_before(&second.recogniser, LENGTHLESS_VERSION);
+            (other, second.profiles.clone(), second.limits.clone())
+        });
+        let labels = &model.labels;
+        let encoded = match (version, second) {
+            (UNLABELLED_VERSION, _) => postcard::to_stdvec(&body),
+            (SINGLE_VERSION, _) => postcard::to_stdvec(&(body, labels)),
+            (SECOND_VERSION, Some((other, profiles, limits))) => {
+                postcard::to_stdvec(&(body, labels, other, profiles, limits))
+            }
+            (_, second) => postcard::to_stdvec(&(body, labels, second)),
+        };
+        framed(version, &encoded.expect("encoded"))
+    }
+
+    fn with_second(of: &Recogniser, by: &Recogniser) -> Recogniser {
+        let limits = Limits::none(of.activities.len());
+        let profiles = Array2::zeros((of.activities.len(), by.activities.len()));
+        let second = SecondOpinion { recogniser: Arc::new(by.clone()), profiles, limits };
+        Recogniser { second: Some(second), ..of.clone() }
+    }
+
     #[test]
-    fn one_member_is_written_as_before_and_several_in_a_format_of_their_own() {
-        let version = |model: &Recogniser| {
-            let bytes = model.to_bytes().expect("encoded");
-            assert_eq!(&Recogniser::from_bytes(&bytes).expect("decoded"), model);
-            u32::from(bytes[8])
-        };
+    fn files_of_all_versions_are_read() {
+        let lengthless = |model: &Recogniser| Recogniser { lengths: Vec::new(), ..model.clone() };
         let (one, two) = (model(1), model(2));
-        assert_eq!([version(&one), version(&two)], [SINGLE_VERSION, FORMAT_VERSION]);
-        // As the file's format 3 has always had it: mean, spread, three layers, with no count before them.
-        let Pattern::Network(network) = &one.space.pattern else { panic!("a network") };
-        let saved = OneMember::of(network).expect("one member");
-        let [first, second, third] = &network.members[0];
-        assert_eq!(
-            postcard::to_stdvec(&saved),
-            postcard::to_stdvec(&(&network.mean, &network.spread, first, second, third))
-        );
-        let second = |of: &Recogniser, by: &Recogniser| {
-            let limits = Limits::none(of.activities.len());
-            let profiles = Array2::zeros((of.activities.len(), by.activities.len()));
-            let second = SecondOpinion { recogniser: Arc::new(by.clone()), profiles, limits };
-            Recogniser { second: Some(second), ..of.clone() }
-        };
-        assert_eq!(version(&second(&one, &two)), SECOND_VERSION);
-        assert_eq!(version(&second(&two, &two)), FORMAT_VERSION);
-        let nested = second(&two, &second(&two, &two)).to_bytes().expect("encoded");
+        let [one_before, two_before] = [&one, &two].map(lengthless);
+        let read = |bytes: &[u8]| Recogniser::from_bytes(bytes).expect("decoded");
+        for (model, version) in [
+            (&one_before, UNLABELLED_VERSION),
+            (&one_before, SINGLE_VERSION),
+            (&with_second(&one_before, &two_before), SECOND_VERSION),
+            (&two_before, LENGTHLESS_VERSION),
+            (&with_second(&two_before, &one_before), LENGTHLESS_VERSION),
+        ] {
+            assert_eq!(&read(&written_before(model, version)), model, "version {version}");
+        }
+        for model in [&one, &two, &with_second(&two, &one)] {
+            let bytes = model.to_bytes().expect("encoded");
+            assert_eq!((u32::from(bytes[8]), &read(&bytes)), (FORMAT_VERSION, model));
+        }
+        let nested = with_second(&two, &with_second(&two, &two)).to_bytes().expect("encoded");
         assert!(Recogniser::from_bytes(&nested).is_err(), "nested without end");
+        let short = Recogniser { lengths: two.lengths[..1].to_vec(), ..two.clone() };
+        let error =
+            Recogniser::from_bytes(&short.to_bytes().expect("encoded")).expect_err("a length is missing");
+        assert!(error.to_string().contains("how long clips last"), "{error}");
     }
 }

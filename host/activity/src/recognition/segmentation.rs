@@ -1,13 +1,14 @@
 //! Recordings that nobody cut: where one activity ends and the next begins.
 //!
 //! A recording is a row of segments, each with one activity: a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010) whose states
-//! last as long as clips do. A segment from frame a to b is worth
-//! `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - (ln((b - a) / typical))^2 / (2 spread^2)`: the probability of its most probable
-//! activity and how far it is from all that was learned, as the recogniser says of a whole clip, what a change costs, and how unusual
-//! its length is. The row that is worth most is found by dynamic programming over a grid of borders, which then move frame by frame to where
+//! last as long as an activity's clips do. A segment from frame a to b is worth
+//! `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - unlikely(b - a)`: the probability of an activity and how far the segment is from all
+//! that was learned, as the recogniser says of a whole clip, what a change costs, and how unlikely its length is ([`Lengths`]); the activity
+//! is the one with which it is worth most. The row that is worth most is found by dynamic programming over a grid of borders, which then move frame by frame to where
 //! both neighbours are worth most. O(frames / step x lengths) answers; frames are embedded once.
 
 use super::clip::Track;
+use super::lengths::Lengths;
 use super::live::Segment;
 use super::model::{Answer, ModelError, Recogniser};
 use super::nearest::Nearest;
@@ -23,15 +24,13 @@ pub struct Worth {
     pub change: f32,
     /// What being an outlier costs a frame, nats per unit of the outlier score.
     pub strange: f32,
-    /// Spread of the logarithm of lengths.
-    pub spread: f32,
     /// Shortest and longest segment, in typical clips.
     pub lengths: [f32; 2],
 }
 
 impl Default for Worth {
     fn default() -> Self {
-        Self { change: 2.0, strange: 1.5, spread: 0.6, lengths: [0.3, 2.5] }
+        Self { change: 5.0, strange: 3.0, lengths: [0.3, 2.5] }
     }
 }
 
@@ -63,11 +62,11 @@ struct Recording<'a> {
     worth: Worth,
 }
 
-/// A stretch's answer and what it is worth.
-#[derive(Clone)]
+/// What a stretch is worth, with the activity with which it is worth most, `None` = unknown.
 struct Valued {
     worth: f32,
-    answer: Answer,
+    activity: Option<String>,
+    confidence: f32,
 }
 
 impl Recording<'_> {
@@ -76,10 +75,26 @@ impl Recording<'_> {
         let answer = Answer::joint(&answers);
         let answer = if self.among.is_empty() { answer } else { answer.among(self.among) };
         let frames = (to - from) as f32;
-        let unusual = (frames / self.typical).ln() / self.worth.spread;
-        let strange = answer.outlier_score.min(5.0);
-        let each = answer.confidence.max(1e-6).ln() - self.worth.strange * strange;
-        Valued { worth: frames * each - self.worth.change - 0.5 * unusual * unusual, answer }
+        let strange = self.worth.strange * answer.outlier_score.min(5.0);
+        let worths = answer.probabilities.iter().map(|(activity, share)| {
+            let unlikely = self.lengths_of(activity).unlikely(frames);
+            (frames * (share.max(1e-6).ln() - strange) - self.worth.change - unlikely, activity, *share)
+        });
+        let best = worths.max_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or(
+            Valued { worth: f32::MIN, activity: None, confidence: 0.0 },
+            |(worth, activity, confidence)| Valued {
+                worth,
+                activity: answer.activity.is_some().then(|| activity.clone()),
+                confidence,
+            },
+        )
+    }
+
+    fn lengths_of(&self, activity: &str) -> Lengths {
+        let class = self.recogniser.activities.iter().position(|other| other == activity);
+        let known = class.and_then(|class| self.recogniser.lengths.get(class)).copied();
+        known.unwrap_or_else(|| Lengths::about(self.recogniser.typical_frames))
     }
 
     fn answer(&self, group: &[Embedded], from: usize, to: usize) -> Answer {
@@ -200,7 +215,7 @@ fn merged(recording: &Recording, borders: &[usize]) -> Vec<Segment> {
     let mut found: Vec<Segment> = Vec::new();
     for pair in borders.windows(2) {
         let (from, to) = (pair[0], pair[1]);
-        let Answer { activity, confidence, .. } = recording.valued(from, to).answer;
+        let Valued { activity, confidence, .. } = recording.valued(from, to);
         match found.last_mut().filter(|last| last.activity == activity) {
             Some(last) => {
                 let (own, all) = ((to - from) as f32, (to - last.from) as f32);

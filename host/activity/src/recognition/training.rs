@@ -5,6 +5,7 @@ use super::choice::{Chosen, Views, choose, names};
 use super::classifier::Classifier;
 use super::clip::Clip;
 use super::experiment::Experiment;
+use super::lengths::Lengths;
 use super::model::{ModelError, Recogniser, RecogniserSettings, nearest};
 use super::patterns::gathered;
 use super::second_opinion::SecondOpinion;
@@ -88,6 +89,7 @@ impl Recogniser {
                 mirror: experiment.mirror,
             },
             classifier: Classifier::train(kind, patterns.view(), &labels, activities.len()),
+            lengths: Lengths::of(clips, &activities),
             activities,
             views,
             space,

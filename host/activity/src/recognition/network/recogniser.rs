@@ -9,6 +9,7 @@ use crate::recognition::classifier::softmax::{Softmax, softmax};
 use crate::recognition::classifier::{Classifier, ClassifierKind};
 use crate::recognition::clip::{Clip, Track};
 use crate::recognition::codebook::Codebook;
+use crate::recognition::lengths::Lengths;
 use crate::recognition::model::{ModelError, Recogniser, RecogniserSettings};
 use crate::recognition::space::{Pattern, PatternKind, Space, SpaceSettings};
 use crate::recognition::unknown::Limits;
@@ -74,6 +75,7 @@ impl Recogniser {
             // Learning on from typical patterns made models worse on every set that was tried.
             labels: Vec::new(),
             second: None,
+            lengths: Lengths::of(clips, &activities),
             activities,
             views: 1,
             space,
