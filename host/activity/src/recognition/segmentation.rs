@@ -4,8 +4,8 @@
 //! last as long as an activity's clips do. A segment from frame a to b is worth
 //! `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - unlikely(b - a)`: the probability of an activity and how far the segment is from all
 //! that was learned, as the recogniser says of a whole clip, what a change costs, and how unlikely its length is ([`Lengths`]); the activity
-//! is the one with which it is worth most. The row that is worth most is found by dynamic programming over a grid of borders, which then move frame by frame to where
-//! both neighbours are worth most. O(frames / step x lengths) answers; frames are embedded once.
+//! is the one with which it is worth most. The row that is worth most is found by dynamic programming over a grid of borders, which then
+//! move frame by frame to where both neighbours are worth most. O(frames / step x lengths) answers; frames are embedded once.
 
 use super::clip::Track;
 use super::lengths::Lengths;
