@@ -113,7 +113,7 @@ pub fn list() -> Result<Vec<ModelFigures>> {
 }
 
 /// People and passes that the shipped models were made with.
-pub const PEOPLE: usize = 1500;
+pub const PEOPLE: usize = 3000;
 /// See [`PEOPLE`].
 pub const PASSES: usize = 6;
 
