@@ -210,10 +210,10 @@ impl Link {
         })
     }
 
-    /// The next good frame, if one comes before `until`. What has come by then is looked at, however late this thread gets to it: on a
-    /// crowded computer it may stand for longer than any answer takes.
+    /// The next good frame, if one comes before `until`. However late this thread gets to it, it looks once: on a crowded computer it may
+    /// stand for longer than any answer takes.
     pub(crate) fn receive(&mut self, until: Instant, during: &str) -> Result<Option<Packet>, ClientError> {
-        let mut late = false;
+        let mut looked = false;
         loop {
             for at in self.unread.by_ref() {
                 match self.decoder.push(self.buffer[at]) {
@@ -222,11 +222,11 @@ impl Link {
                     None => {}
                 }
             }
-            if late {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() && looked {
                 return Ok(None);
             }
-            let left = until.saturating_duration_since(Instant::now());
-            late = left.is_zero();
+            looked = true;
             let received = match &mut self.transport {
                 Some(transport) => transport.receive(&mut self.buffer, left),
                 None => Err(ErrorKind::NotConnected.into()),

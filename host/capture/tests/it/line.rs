@@ -1,6 +1,6 @@
 //! What the client makes of a bad line.
 
-use std::time::Duration;
+use std::{collections::VecDeque, time::Duration};
 
 use farnear_capture::{Client, ClientError, Timing, Transport};
 use farnear_protocol::{
@@ -57,27 +57,41 @@ fn what_an_earlier_program_left_on_the_line_is_not_believed() {
 
 #[test]
 fn an_answer_that_came_while_the_host_stood_still_is_not_asked_for_again() {
-    /// The first look for what came after a request ends when the wait is over, without what came meanwhile.
-    struct Late(Box<dyn Transport>, bool);
+    /// Gives one frame at a look. Before each answer the board says something else, and that comes at the last moment.
+    struct Late {
+        line: Box<dyn Transport>,
+        peer: Peer,
+        unread: VecDeque<u8>,
+        asked: bool,
+    }
     impl Transport for Late {
         fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
-            if std::mem::take(&mut self.1) {
+            if std::mem::take(&mut self.asked) {
                 std::thread::sleep(wait);
-                return Ok(0);
             }
-            self.0.receive(buffer, wait)
+            if self.unread.is_empty() {
+                let count = self.line.receive(buffer, wait)?;
+                self.unread.extend(&buffer[..count]);
+            }
+            let frame = self.unread.iter().position(|byte| *byte == 0).map_or(self.unread.len(), |at| at + 1);
+            self.unread.drain(..frame).zip(buffer).for_each(|(byte, slot)| *slot = byte);
+            Ok(frame)
         }
         fn send(&mut self, bytes: &[u8], wait: Duration) -> std::io::Result<()> {
-            self.1 = true;
-            self.0.send(bytes, wait)
+            self.asked = true;
+            self.peer.board().log(b"busy");
+            self.line.send(bytes, wait)
         }
         fn discard_input(&mut self) -> std::io::Result<()> {
-            self.0.discard_input()
+            self.line.discard_input()
         }
     }
     let peer = Peer::new(Faults::default());
     let mut connect = peer.connect();
-    let late = move || Ok(Box::new(Late(connect()?, false)) as Box<dyn Transport>);
+    let late = move || {
+        let (line, unread) = (connect()?, VecDeque::new());
+        Ok(Box::new(Late { line, peer: peer.clone(), unread, asked: false }) as Box<dyn Transport>)
+    };
     let client = Client::connect(Box::new(late), "scripted").unwrap();
     client.set_timing(Timing { retries: 0, ..SHORT });
     client.status().unwrap();
