@@ -21,18 +21,18 @@ fn models_that_come_with_the_program_need_nothing_else() {
     let (sheet, _) = succeeds(&mut farnear(&["activity", "models", "--sheet"]));
     assert!(sheet.contains("synthetic") && sheet.contains("UTKinect"), "{sheet}");
     for name in names {
-        let masks = people.masks("p00-crouch", 1);
+        let masks = people.masks("p00-walk", 1);
         let recognise = ["activity", "recognise", &masks, "--as", "masks", "--model", name, "--json"];
         let found = figures(&mut farnear(&recognise));
         assert_eq!(
             found["shares"].as_array().map(Vec::len),
             listed["model"][0]["activities"].as_array().map(Vec::len)
         );
-        // Two activities that cannot be told from each other any less, and nothing else can be.
-        let among = figures(farnear(&recognise).args(["--among", "crouch,jumping jack"]));
+        // Somebody who walks, however strangely, where nothing else can be but what is least alike.
+        let among = figures(farnear(&recognise).args(["--among", "walk,jumping jack"]));
         assert_eq!(among["shares"].as_array().map(Vec::len), Some(2), "{among}");
-        assert_eq!(among["shares"][0]["activity"], "crouch", "{among}");
-        assert!(among["shares"][0]["share"].as_f64() > Some(0.5), "{among}");
+        assert_eq!(among["shares"][1]["activity"], "walk", "{among}");
+        assert!(among["shares"][1]["share"].as_f64() > Some(0.9), "{among}");
     }
     let masks = people.masks("p00-walk", 1);
     let both = [
