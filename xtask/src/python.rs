@@ -13,6 +13,7 @@ use crate::{
     browser::Counts,
     limited,
     run::{ROOT, cargo, finish, succeeds, target_folder},
+    test_programs,
 };
 
 /// The package that only those compile who have Python.
@@ -23,10 +24,10 @@ const NEEDS: [&str; 5] =
 /// Says whether a Python is new enough and can make environments.
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
 
-/// Runs them, or says what is missing and counts them as skipped.
+/// Runs them with the module that [`build`] made, or says what is missing and counts them as skipped.
 ///
 /// # Errors
-/// A module that cannot be built, a Python that cannot be started though it is there.
+/// A Python that cannot be started though it is there.
 pub fn run(elf: &Path) -> Result<Counts> {
     let tests = ROOT.join("python/tests");
     let folder = target_folder().join("python-tests");
@@ -37,7 +38,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
             return Ok(Counts { skipped: written(&tests)?, ended_well: true, ..Counts::default() });
         }
     };
-    let built = build()?;
+    let built = target_folder().join("debug");
     lay_out(&folder.join("package/farnear"), &built)?;
     let said = limited::run(
         Command::new(python)
@@ -64,17 +65,17 @@ pub fn run(elf: &Path) -> Result<Counts> {
 
 /// The Python of an environment with what is needed, made where it is not there; else what is missing.
 pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
+    if !able() {
+        return Err(
+            "no python3 of at least 3.9 with venv; Debian's packages are python3 and python3-venv".into()
+        );
+    }
     let venv = folder.join("venv");
     let (python, whole) = (venv.join("bin/python"), folder.join("needs"));
     if fs::read_to_string(&whole).is_ok_and(|made| made == needs.join("\n"))
         && succeeds(Command::new(&python).arg("-V"))
     {
         return Ok(python);
-    }
-    if !succeeds(Command::new("python3").args(["-c", ABLE])) {
-        return Err(
-            "no python3 of at least 3.9 with venv; Debian's packages are python3 and python3-venv".into()
-        );
     }
     if !succeeds(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
         return Err("python3 -m venv makes no environment; Debian's package is python3-venv".into());
@@ -88,21 +89,26 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// The module and the programs that its tests run, in one call, so that all share what is compiled already; gives their folder.
-fn build() -> Result<PathBuf> {
-    let mut command = cargo([
-        "build",
-        "--locked",
-        "--package",
-        PACKAGE,
-        "--package",
-        "farnear",
-        "--package",
-        "farnear-sim",
-    ]);
+/// Builds the module and the programs that its tests run, in one call, so that all share what is compiled already; does nothing
+/// where no Python is able to run the tests.
+///
+/// # Errors
+/// What does not compile.
+pub fn build(elf: &Path) -> Result<()> {
+    if !able() {
+        return Ok(());
+    }
+    let packages = [PACKAGE, "farnear", "farnear-sim"].map(|name| ["--package", name]);
+    let mut command = cargo(["build", "--locked"]);
+    command.args(packages.as_flattened());
     // A module is not linked with Python, and one for every version asks none of them.
-    finish(command.env("PYO3_BUILD_EXTENSION_MODULE", "1").env("PYO3_NO_PYTHON", "1"))?;
-    Ok(target_folder().join("debug"))
+    command.env("PYO3_BUILD_EXTENSION_MODULE", "1").env("PYO3_NO_PYTHON", "1");
+    finish(test_programs::environment(&mut command, elf))
+}
+
+/// Whether there is a Python that can run the tests, once it has what they need.
+fn able() -> bool {
+    succeeds(Command::new("python3").args(["-c", ABLE]))
 }
 
 /// The package as it is when it is installed.

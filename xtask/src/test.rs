@@ -53,7 +53,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).env("RUSTDOCFLAGS", "--deny warnings"))?;
 
     step("compiling the tests on the host and on the emulated board");
+    // All of it before anything runs: a call of cargo beside the tests could replace what they are using.
     let programs = Programs::build(&elf)?;
+    python::build(&elf)?;
     step(
         "two lanes side by side: the tests' programs; the page in a browser, the vectors of 64-bit ARM, the Python package",
     );

@@ -124,7 +124,9 @@ impl Programs {
     }
 }
 
-fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
+/// Tells a call of cargo, or a test program, where the firmware is. Calls that are told different things compile anew what asks
+/// for it.
+pub fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
     command
         .env("FARNEAR_FIRMWARE", elf)
         .env("FARNEAR_REQUIRE_SIM", "1")
