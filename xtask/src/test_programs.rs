@@ -8,6 +8,7 @@ use std::{
     io::Read,
     path::{Path, PathBuf},
     process::Command,
+    time::SystemTime,
 };
 
 use anyhow::{Context, Result, bail};
@@ -15,7 +16,7 @@ use serde_json::Value;
 
 use crate::{
     limited, python,
-    run::{ROOT, cargo, output, target_folder},
+    run::{ROOT, cargo, finish, output, target_folder},
 };
 
 /// Packages whose tests run the programs or the firmware; those of the others depend on their own code and files alone.
@@ -96,12 +97,24 @@ impl Programs {
     /// # Errors
     /// What does not compile.
     pub fn build(elf: &Path) -> Result<Self> {
-        let mut command = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked"]);
-        command.args(["--no-run", "--message-format", "json-render-diagnostics"]);
-        let text = output(environment(&mut command, elf))?;
+        look_again()?;
+        let call = |how| {
+            let mut command =
+                cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--no-run", how]);
+            environment(&mut command, elf);
+            command
+        };
+        finish(&mut call("--quiet"))?;
+        let text = output(&mut call("--message-format=json-render-diagnostics"))?;
         let (mut tests, mut others) = (Vec::new(), Vec::new());
         for line in text.lines() {
             let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
+            if message["fresh"] == false {
+                bail!(
+                    "{} is compiled anew at every build: its build script watches what is missing",
+                    message["package_id"]
+                );
+            }
             let Some(executable) = message["executable"].as_str().map(PathBuf::from) else { continue };
             if message["profile"]["test"] == true {
                 let manifest = Path::new(message["manifest_path"].as_str().unwrap_or_default());
@@ -122,6 +135,26 @@ impl Programs {
         tests.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
         Ok(Self { tests, others })
     }
+}
+
+/// Has the build scripts that ask for data and programs look again where these have come or gone since the last tests: they watch
+/// nothing that was missing.
+fn look_again() -> Result<()> {
+    let record = target_folder().join("at-hand");
+    let now = farnear_test_data::at_hand();
+    if fs::read_to_string(&record).is_ok_and(|before| before != now) {
+        for package in fs::read_dir(ROOT.join("host"))? {
+            let script = package?.path().join("build.rs");
+            if script.is_file() {
+                fs::File::options()
+                    .append(true)
+                    .open(&script)
+                    .and_then(|file| file.set_modified(SystemTime::now()))
+                    .with_context(|| format!("cannot touch {}", script.display()))?;
+            }
+        }
+    }
+    fs::write(&record, now).with_context(|| format!("cannot write {}", record.display()))
 }
 
 /// Tells a call of cargo, or a test program, where the firmware is. Calls that are told different things compile anew what asks
