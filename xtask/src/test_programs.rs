@@ -111,7 +111,7 @@ impl Programs {
             let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
             if message["fresh"] == false {
                 bail!(
-                    "{} is compiled anew at every build: its build script watches what is missing",
+                    "{} was compiled twice: did a file change meanwhile, or does a build script watch what is missing? `cargo build -v` tells",
                     message["package_id"]
                 );
             }
