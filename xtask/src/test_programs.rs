@@ -98,14 +98,10 @@ impl Programs {
     /// What does not compile.
     pub fn build(elf: &Path) -> Result<Self> {
         look_again()?;
-        let call = |how| {
-            let mut command =
-                cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--no-run", how]);
-            environment(&mut command, elf);
-            command
-        };
-        finish(&mut call("--quiet"))?;
-        let text = output(&mut call("--message-format=json-render-diagnostics"))?;
+        let mut command =
+            cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--no-run"]);
+        finish(environment(&mut command, elf))?;
+        let text = output(command.arg("--message-format=json-render-diagnostics"))?;
         let (mut tests, mut others) = (Vec::new(), Vec::new());
         for line in text.lines() {
             let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
