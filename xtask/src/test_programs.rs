@@ -107,7 +107,7 @@ impl Programs {
             let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
             if message["fresh"] == false {
                 bail!(
-                    "{} was compiled twice: did a file change meanwhile, or does a build script watch what is missing? `cargo build -v` tells",
+                    "{} was compiled twice: has a file just changed, or does a build script watch what is missing?",
                     message["package_id"]
                 );
             }
