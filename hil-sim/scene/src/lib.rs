@@ -1,9 +1,4 @@
-//! What a camera would see: scenes, textures, lens, point spread functions, exposure and noise.
-//!
-//! This crate is the rig's eye when there is no camera, and the ground truth when there is one to be
-//! judged. It is written from the physics and shares no formula with the depth estimation it feeds:
-//! point spread functions live in space and are integrated over texture cells and pixels, so that a
-//! mistake in an optical transfer function elsewhere shows as a wrong depth instead of cancelling.
+#![doc = include_str!("../README.md")]
 //!
 //! # The model
 //!
@@ -18,20 +13,6 @@
 //!
 //! [`render()`] makes one exposure; [`Renderer`] keeps the texture for many. Everything is a function of its
 //! arguments and the seed: no clock, no thread count, no CPU feature enters.
-//!
-//! ```
-//! use farnear_scene::{Camera, Lens, Noise, OpticsFile, Psf, Scene, render, standard, truth};
-//!
-//! let optics = OpticsFile::parse(standard::OPTICS)?;
-//! let lens = Lens::from_optics(&optics)?;
-//! let scene: Scene = "plane:900".parse()?;
-//! let psf: Psf = "gaussian:k=0.4578".parse()?;
-//! let camera = Camera::new(64, 48, Noise::EightBit);
-//! let far = render(&scene, &lens, &psf, lens.sensor_far_mm, &camera, 1, 0)?;
-//! assert_eq!(far.dim(), (48, 64));
-//! assert_eq!(truth(&scene, &lens, &camera)[[24, 32]], 900.0);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 pub mod blur;
 pub mod camera;

@@ -1,7 +1,6 @@
 //! Behaviour of the crate through its public face, in one program, because each would be linked on its own.
 
 mod baselines;
-mod breakfast;
 mod calibrate;
 mod common;
 mod corrections;

@@ -10,6 +10,7 @@ mod bad_optics;
 mod bad_ports;
 mod bad_rigs;
 mod batch;
+mod breakfast;
 mod calibration;
 mod camera;
 mod captures;

@@ -1,5 +1,4 @@
 //! The pair that Watanabe & Nayar took, where it is present.
-#![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use std::path::Path;
 
