@@ -76,7 +76,7 @@ pub mod focus_stack;
 mod kept;
 pub mod lens_table;
 pub mod measure;
-mod operator_cache;
+pub mod operator_cache;
 pub mod operator_plot;
 pub mod operators;
 pub mod optics;

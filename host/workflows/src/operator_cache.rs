@@ -87,16 +87,23 @@ fn build() -> Option<String> {
     Some(format!("{} of {} bytes at {}", env!("CARGO_PKG_VERSION"), program.len(), written.as_nanos()))
 }
 
-/// Where programs of this user keep what can be made again.
+/// The user's cache folder.
 pub(crate) fn folder() -> Option<PathBuf> {
+    user_folder("XDG_CACHE_HOME", "Library/Caches", ".cache")
+}
+
+/// The user's data folder: where programs store files that no option gives a place to.
+pub fn data_folder() -> Option<PathBuf> {
+    user_folder("XDG_DATA_HOME", "Library/Application Support", ".local/share")
+}
+
+fn user_folder(variable: &str, mac: &str, other: &str) -> Option<PathBuf> {
     let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    absolute("XDG_CACHE_HOME").or_else(|| {
+    absolute(variable).or_else(|| {
         if cfg!(windows) {
             absolute("LOCALAPPDATA")
-        } else if cfg!(target_os = "macos") {
-            Some(absolute("HOME")?.join("Library/Caches"))
         } else {
-            Some(absolute("HOME")?.join(".cache"))
+            Some(absolute("HOME")?.join(if cfg!(target_os = "macos") { mac } else { other }))
         }
     })
 }

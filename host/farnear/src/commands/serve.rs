@@ -2,13 +2,14 @@
 
 use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 use farnear_protocol::Micros;
 use farnear_serve::{Listen, ServeSettings, Token, serve};
 use farnear_workflows::{
     rig::{RigAddress, camera::CameraSettings},
     simulator::Scenery,
+    operator_cache::data_folder,
 };
 
 use crate::{
@@ -37,9 +38,9 @@ pub struct Arguments {
     /// Scene before the emulated camera: plane:MM, staircase, slant, cone, sphere or a scene file [default: staircase].
     #[arg(long, value_parser = scene)]
     scene: Option<String>,
-    /// Folder of captures; made where it is missing.
-    #[arg(long, value_name = "DIR", default_value = "farnear-session")]
-    session: PathBuf,
+    /// Folder of captures, created if missing [default: farnear/session in the user's data folder].
+    #[arg(long, value_name = "DIR")]
+    session: Option<PathBuf>,
     /// The optics file to begin with [default: that of the session, else the 50 mm lens].
     #[arg(long, value_name = "FILE")]
     optics: Option<PathBuf>,
@@ -83,6 +84,13 @@ pub fn run(arguments: Arguments) -> Result<()> {
         }
         _ => Listen::Loopback { port: arguments.port },
     };
+    let session = match arguments.session {
+        Some(folder) => folder,
+        // Not the current folder: nobody asked for files there.
+        None => data_folder()
+            .ok_or_else(|| Usage("this user has no data folder; name a folder for captures with --session".into()))?
+            .join("farnear/session"),
+    };
     let settings = ServeSettings {
         rig,
         camera: CameraSettings {
@@ -91,7 +99,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             image_wait: Duration::from_secs(30),
             settings: arguments.set,
         },
-        session: arguments.session,
+        session,
         optics: arguments.optics,
         listen,
     };
@@ -100,21 +108,10 @@ pub fn run(arguments: Arguments) -> Result<()> {
         println!("{address}");
         eprintln!("the page is at {address}; Ctrl-C ends it and stops what moves");
         if arguments.open
-            && let Err(error) = open(address)
+            && let Err(error) = open::that_detached(address)
         {
-            eprintln!("warning: {error:#}");
+            eprintln!("warning: no browser can be started ({error}); open {address} yourself");
         }
     })?;
     Ok(())
-}
-
-/// Opens the page by what the desktop has for that.
-fn open(address: &str) -> Result<()> {
-    let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
-    std::process::Command::new(program)
-        .arg(address)
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .map(drop)
-        .with_context(|| format!("cannot open a browser by {program}; open {address} yourself"))
 }
