@@ -7,9 +7,9 @@ use clap::Args;
 use farnear_protocol::Micros;
 use farnear_serve::{Listen, ServeSettings, Token, serve};
 use farnear_workflows::{
+    operator_cache::data_folder,
     rig::{RigAddress, camera::CameraSettings},
     simulator::Scenery,
-    operator_cache::data_folder,
 };
 
 use crate::{
@@ -88,7 +88,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(folder) => folder,
         // Not the current folder: nobody asked for files there.
         None => data_folder()
-            .ok_or_else(|| Usage("this user has no data folder; name a folder for captures with --session".into()))?
+            .ok_or_else(|| {
+                Usage("this user has no data folder; name a folder for captures with --session".into())
+            })?
             .join("farnear/session"),
     };
     let settings = ServeSettings {
