@@ -5,9 +5,9 @@ use farnear_depth::{
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
-    real::{RealMethod, RealSettings, depth_of_real_pair},
+    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
     reason::Reason,
-    windowed::Window,
+    adaptive_window::Window,
 };
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::{exceptions::PyTypeError, prelude::*};
@@ -108,25 +108,25 @@ pub fn depth(
     }
     let designed;
     let method = match (method, operators) {
-        ("ro", Some(operators)) => RealMethod::Rational(&operators.0),
+        ("ro", Some(operators)) => DepthMethod::Rational(&operators.0),
         ("ro", None) => {
             designed = py.detach(|| operators::Operators::for_optics(&optics.0)).map_err(wrong)?;
-            RealMethod::Rational(&designed)
+            DepthMethod::Rational(&designed)
         }
-        ("whitened", None) => RealMethod::Whitened,
+        ("whitened", None) => DepthMethod::Whitened,
         (_, Some(_)) => return Err(FarnearError::new_err(format!("method {method:?} uses no operators"))),
-        (other, None) => RealMethod::Baseline(other.parse().map_err(|_| {
+        (other, None) => DepthMethod::Baseline(other.parse().map_err(|_| {
             let known = "ro, whitened, subbarao, subbarao-fourier or favaro";
             FarnearError::new_err(format!("there is no method {other:?}; expected {known}"))
         })?),
     };
     let window: Window = match window {
         Some(window) => window.to_string().parse().map_err(wrong)?,
-        None if matches!(method, RealMethod::Whitened) => Window::Adaptive,
+        None if matches!(method, DepthMethod::Whitened) => Window::Adaptive,
         None => Window::Fixed(7),
     };
     let smoothing_px = if let Window::Fixed(side) = window { side } else { 7 };
-    let settings = RealSettings {
+    let settings = MeasureSettings {
         prepare: PrepareSettings {
             align: align.parse::<Align>().map_err(wrong)?,
             balance: balance.parse::<Balance>().map_err(wrong)?,
@@ -139,15 +139,15 @@ pub fn depth(
     };
     let (far, near) = (far.view(), near.view());
     let found =
-        py.detach(|| depth_of_real_pair(far, near, &optics.0, method, None, &settings)).map_err(wrong)?;
-    let judgement = found.judgement;
+        py.detach(|| measure_pair_of_views(far, near, &optics.0, method, None, &settings)).map_err(wrong)?;
+    let validity = found.validity;
     Ok(DepthMap {
         depth_mm: found.map.depth_mm.into_pyarray(py).unbind(),
         confidence: found.map.confidence.into_pyarray(py).unbind(),
-        deviation_mm: judgement.deviation_mm.into_pyarray(py).unbind(),
-        reasons: judgement.reasons.into_pyarray(py).unbind(),
+        deviation_mm: validity.deviation_mm.into_pyarray(py).unbind(),
+        reasons: validity.reasons.into_pyarray(py).unbind(),
         findings: found.findings.iter().map(ToString::to_string).collect(),
-        valid_fraction: judgement.valid_fraction,
+        valid_fraction: validity.valid_fraction,
     })
 }
 

@@ -5,7 +5,7 @@ use std::{hint::black_box, time::Instant};
 use farnear_depth::{
     operators, pipeline,
     prepare::PrepareSettings,
-    real::{RealMethod, RealSettings, depth_of_real_pair},
+    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
 };
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -21,11 +21,11 @@ pub fn seconds_of_depth(
     repeats: usize,
 ) -> PyResult<Vec<f64>> {
     let operators = operators::Operators::for_optics(&optics.0).map_err(wrong)?;
-    let settings = RealSettings { prepare: PrepareSettings::default(), ..RealSettings::default() };
+    let settings = MeasureSettings { prepare: PrepareSettings::default(), ..MeasureSettings::default() };
     let run = |_| {
         let start = Instant::now();
-        let method = RealMethod::Rational(&operators);
-        let found = depth_of_real_pair(far.as_array(), near.as_array(), &optics.0, method, None, &settings);
+        let method = DepthMethod::Rational(&operators);
+        let found = measure_pair_of_views(far.as_array(), near.as_array(), &optics.0, method, None, &settings);
         black_box(found.map_err(wrong)?);
         Ok(start.elapsed().as_secs_f64())
     };

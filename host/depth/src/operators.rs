@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use self::linearise::Polynomial;
 use self::stored::RawOperators;
 use crate::kernel::Kernel;
-use crate::nir::{NirFit, first_non_monotonic, octant};
+use crate::normalised_ratio::{RatioFit, first_non_monotonic, octant};
 use crate::optics::Optics;
 
 pub use error::DesignError;
@@ -49,7 +49,7 @@ pub struct Operators {
     gp1: Kernel,
     gp2: Kernel,
     linearisation: Polynomial,
-    nir: NirFit,
+    normalised_ratio: RatioFit,
 }
 
 /// Designs operators.
@@ -66,12 +66,12 @@ pub fn design(request: &Request) -> Result<Operators, DesignError> {
         Family::Ro | Family::Gro | Family::Ggro => prefilter::target(&otf, max_blur_px, &grid)?,
     };
     let q = prefilter::fit(&target, &grid, kernel_size)?;
-    let nir = NirFit::new(&otf, max_blur_px, first_non_monotonic(&otf, max_blur_px));
+    let normalised_ratio = RatioFit::new(&otf, max_blur_px, first_non_monotonic(&otf, max_blur_px));
     let [gm1, gp1, gp2] = match (family, design) {
         (Family::Watanabe, _) => watanabe::design(&otf, max_blur_px, &q, &grid, kernel_size)?,
         (Family::Raj, _) => raj::design(&otf, max_blur_px, &q, &grid, kernel_size)?,
         (_, Design::Linear) => linear::design(&otf, max_blur_px, &q, &grid, kernel_size)?,
-        (_, Design::Thesis) => thesis::design(&otf, max_blur_px, &q, &nir, &grid, kernel_size)?,
+        (_, Design::Thesis) => thesis::design(&otf, max_blur_px, &q, &normalised_ratio, &grid, kernel_size)?,
     };
     let linearisation = match (family, design) {
         (Family::Ro | Family::Gro | Family::Ggro, Design::Linear) => {
@@ -88,13 +88,13 @@ pub fn design(request: &Request) -> Result<Operators, DesignError> {
     Ok(Operators {
         name,
         request: *request,
-        nir_rms: nir.total_rms(),
+        nir_rms: normalised_ratio.total_rms(),
         prefilter: q,
         gm1,
         gp1,
         gp2,
         linearisation,
-        nir,
+        normalised_ratio,
     })
 }
 
@@ -153,8 +153,8 @@ impl Operators {
     }
 
     /// Cubic fit of the NIR.
-    pub fn nir(&self) -> &NirFit {
-        &self.nir
+    pub fn normalised_ratio(&self) -> &RatioFit {
+        &self.normalised_ratio
     }
 
     /// Root-mean-square misfit of the cubic to the NIR over the frequencies below the first non-monotonic one.

@@ -6,7 +6,7 @@
 //!    1.9), borders reflected without repeating the edge pixel.
 //! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
 //! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 (`crate::cubic`), median, alpha to mm.
-//! 4. The rim, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`rim`).
+//! 4. The border, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`border_fill`).
 //! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`crate::confidence`]).
 //!
 //! Images may have any common gain and offset: they are normalised first. `I1` is the far-focused image.
@@ -17,7 +17,7 @@ mod processor;
 #[cfg(test)]
 mod reference;
 mod repair;
-mod rim;
+mod border_fill;
 
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
@@ -31,7 +31,7 @@ pub use crate::depth_map::{DepthMap, SwapEvidence, Warning};
 pub use crate::simd::Backend;
 pub(crate) use check::{after as warnings_after, check, check_windows};
 pub use processor::Processor;
-pub(crate) use rim::fill as fill_rim;
+pub(crate) use border_fill::fill as fill_border;
 
 /// Smallest width and height that can be processed: below, the operators see little but reflections.
 pub const MIN_SIDE_PX: usize = 16;

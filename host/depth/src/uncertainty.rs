@@ -79,7 +79,7 @@ pub fn standard_deviation_mm(
     settings: &Settings,
     noise: Noise,
 ) -> Result<Array2<f32>, RunError> {
-    // The run's own checks; its depth is of no use here, because alpha is needed before median and rim.
+    // The run's own checks; its depth is of no use here, because alpha is needed before median and border.
     Processor::new(operators, optics, settings)?.run(far, near)?;
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let filtered = |image: &Array2<f32>, kernel: &Kernel| {

@@ -13,13 +13,13 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 use farnear_depth::{
     corrections::Correction,
     fill::{FillBy, refill_as_thesis},
-    judge::{Judgement, Lost, lost_pixels},
+    validity::{Validity, Lost, lost_pixels},
     optics::Optics,
     pipeline::{DepthMap, Settings},
     prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
-    real::{RealSettings, depth_of_owned_pair},
+    measure::{MeasureSettings, measure_pair},
     reason::Reason,
-    windowed::Window,
+    adaptive_window::Window,
 };
 use ndarray::Array2;
 use serde::Serialize;
@@ -247,7 +247,7 @@ impl Inputs {
         let cancel = |during| context.cancel.check(during);
         cancel("reading the pair")?;
         let real = self.settings(settings);
-        let found = depth_of_owned_pair(
+        let found = measure_pair(
             [&mut self.pair.far, &mut self.pair.near].map(std::mem::take),
             &self.optics,
             self.method.as_real(),
@@ -256,7 +256,7 @@ impl Inputs {
         )
         .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
         cancel("computing depth")?;
-        let (mut map, judgement) = (found.map, found.judgement);
+        let (mut map, validity) = (found.map, found.validity);
         let deviation = settings
             .uncertainty
             .map(|noise| {
@@ -267,7 +267,7 @@ impl Inputs {
                     operators: self.method.operators().filter(|_| matches!(real.window, Window::Fixed(_))),
                     optics,
                     settings: &real.run,
-                    judged: &judgement.deviation_mm,
+                    judged: &validity.deviation_mm,
                 };
                 noise::deviation(noise, &source, &map, self.correction.as_deref())
             })
@@ -275,7 +275,7 @@ impl Inputs {
         cancel("computing its deviation")?;
         let mut image =
             if settings.write.show_image() { found.prepared.far } else { Array2::default((0, 0)) };
-        let Judgement { mut reasons, mut lost, .. } = judgement;
+        let Validity { mut reasons, mut lost, .. } = validity;
         let mut deviation = deviation;
         if let Some(cut) = &self.cut {
             [&mut map.depth_mm, &mut map.confidence, &mut image].into_iter().for_each(|map| cut.wanted(map));
@@ -298,7 +298,7 @@ impl Inputs {
     }
 
     /// As the library takes them.
-    fn settings(&self, settings: &DepthSettings) -> RealSettings {
+    fn settings(&self, settings: &DepthSettings) -> MeasureSettings {
         let usual = match settings.method {
             Method::Whitened => Window::Adaptive,
             Method::RationalOperators | Method::Baseline(_) => {
@@ -312,7 +312,7 @@ impl Inputs {
             Samples::Integer(_) => Some([0.0, 1.0]),
             Samples::Float => None,
         };
-        RealSettings {
+        MeasureSettings {
             prepare: PrepareSettings {
                 align: settings.align,
                 balance: settings.balance,

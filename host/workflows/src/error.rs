@@ -27,7 +27,7 @@ use farnear_depth::{
     optics::OpticsError,
     pipeline::RunError,
     prepare::{CameraError as CameraFramesError, PrepareError},
-    real::RealError,
+    measure::MeasureError,
 };
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,
@@ -292,13 +292,13 @@ impl From<PrepareError> for WorkflowError {
     }
 }
 
-impl From<RealError> for WorkflowError {
-    fn from(error: RealError) -> Self {
+impl From<MeasureError> for WorkflowError {
+    fn from(error: MeasureError) -> Self {
         match error {
-            RealError::Run(error) => Self::Depth(error),
-            RealError::Prepare(error) => error.into(),
-            RealError::Baseline(error) => Self::Baseline(error),
-            RealError::Design(error) => Self::Design(error),
+            MeasureError::Run(error) => Self::Depth(error),
+            MeasureError::Prepare(error) => error.into(),
+            MeasureError::Baseline(error) => Self::Baseline(error),
+            MeasureError::Design(error) => Self::Design(error),
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::{f64::consts::PI, path::Path};
 
-use farnear_depth::{nir, operators::Operators, psf::Otf};
+use farnear_depth::{normalised_ratio, operators::Operators, psf::Otf};
 use farnear_files::EncodeError;
 use plotters::{coord::Shift, prelude::*, style::register_font};
 
@@ -91,7 +91,7 @@ fn draw<B: DrawingBackend>(
     let (fitted, dots) = ratio_curves(operators, &otf);
     chart(&quarters[0], "NIR: optics (dots) and cubic fit", "alpha", -1.0..1.0, &fitted, &dots)?;
 
-    let fit = operators.nir();
+    let fit = operators.normalised_ratio();
     let over = |values: &[f64]| fit.frequency_rad_px.iter().copied().zip(values.iter().copied()).collect();
     let coefficients = [
         ("a1".to_owned(), COLOURS[0], over(&fit.linear)),
@@ -127,14 +127,14 @@ fn draw<B: DrawingBackend>(
 
 /// Fit and optics at some frequencies of the fit's table.
 fn ratio_curves(operators: &Operators, otf: &Otf) -> (Vec<Curve>, Vec<Curve>) {
-    let fit = operators.nir();
+    let fit = operators.normalised_ratio();
     let max_blur_px = operators.max_blur_px();
     let last = fit.frequency_rad_px.len().saturating_sub(1);
     let mut chosen: Vec<usize> = (1..=FREQUENCIES).map(|i| i * last / FREQUENCIES).collect();
     chosen.dedup();
     let curves = |index: &usize, points: &dyn Fn(f64, f64) -> f64, colour: RGBColor| -> Curve {
         let w = fit.frequency_rad_px[*index];
-        let alphas = nir::alphas();
+        let alphas = normalised_ratio::alphas();
         (format!("{w:.2} rad/px"), colour, alphas.iter().map(|alpha| (*alpha, points(w, *alpha))).collect())
     };
     let of_fit = chosen.iter().zip(COLOURS).map(|(index, colour)| {
@@ -144,7 +144,7 @@ fn ratio_curves(operators: &Operators, otf: &Otf) -> (Vec<Curve>, Vec<Curve>) {
     let of_optics = chosen
         .iter()
         .zip(COLOURS)
-        .map(|(index, colour)| curves(index, &|w, alpha| nir::nir(otf, max_blur_px, w, alpha), colour));
+        .map(|(index, colour)| curves(index, &|w, alpha| normalised_ratio::normalised_ratio(otf, max_blur_px, w, alpha), colour));
     (of_fit.collect(), of_optics.collect())
 }
 

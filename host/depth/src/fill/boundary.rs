@@ -90,9 +90,9 @@ mod tests {
             };
             for ((y, x), set) in shape.indexed_iter() {
                 let [sy, sx] = [y as isize, x as isize];
-                let rim = *set
+                let border = *set
                     && [(0, 1), (0, -1), (1, 0), (-1, 0)].iter().any(|(dy, dx)| outside(sy + dy, sx + dx));
-                assert_eq!(rim, boundary.contains(&(y, x)), "({x}, {y})");
+                assert_eq!(border, boundary.contains(&(y, x)), "({x}, {y})");
             }
         }
     }

@@ -22,7 +22,7 @@ const NEAR_PX: usize = 14;
 const PIXELS_PER_INDEPENDENT: f64 = 60.0;
 
 /// Number of places that stand for a boundary.
-const RIM_POINTS: usize = 48;
+const BORDER_POINTS: usize = 48;
 
 /// The regions of a map.
 pub(super) struct Regions {
@@ -40,11 +40,11 @@ impl Regions {
         let scale = texture_scale(texture);
         let grown = (GROWN_TEXTURE * scale).max(f32::MIN_POSITIVE);
         let mut mask = low;
-        let mut rim: Vec<(usize, usize)> =
+        let mut border: Vec<(usize, usize)> =
             mask.indexed_iter().filter(|(_, low)| **low).map(|(at, _)| at).collect();
         for _ in 0..reach_px {
             let mut next = Vec::new();
-            for at in rim {
+            for at in border {
                 for neighbour in neighbours(at, mask.dim()) {
                     if !mask[neighbour] && texture[neighbour] < grown {
                         mask[neighbour] = true;
@@ -52,7 +52,7 @@ impl Regions {
                     }
                 }
             }
-            rim = next;
+            border = next;
         }
         Self::of(mask, scale)
     }
@@ -91,7 +91,7 @@ impl Regions {
         let region = &self.regions[index];
         let radius_px = (region.len() as f64 / std::f64::consts::PI).sqrt();
         let width_px = ((WIDTH_PER_RADIUS * radius_px) as usize).clamp(MARGIN_PX[0], MARGIN_PX[1]);
-        let rim = self.rim(index);
+        let border = self.border(index);
         let range = |of: fn(&(usize, usize)) -> usize, n: usize| {
             let [low, high] =
                 [region.iter().map(of).min(), region.iter().map(of).max()].map(|v| v.unwrap_or(0));
@@ -114,7 +114,7 @@ impl Regions {
                     continue;
                 }
                 let distance = |[ry, rx]: &[f32; 2]| (ry - y as f32).abs().max((rx - x as f32).abs());
-                let distance_px = rim.iter().map(distance).fold(f32::INFINITY, f32::min) as usize;
+                let distance_px = border.iter().map(distance).fold(f32::INFINITY, f32::min) as usize;
                 let near = distance_px <= NEAR_PX;
                 if near || (coarse && distance_px <= width_px) {
                     let pixels = (if near { step * step } else { 4 * step * step }) as f64;
@@ -136,19 +136,19 @@ impl Regions {
         samples
     }
 
-    /// About [`RIM_POINTS`] places (row, column) on a region's outer boundary and on those of its islands.
-    fn rim(&self, index: usize) -> Vec<[f32; 2]> {
+    /// About [`BORDER_POINTS`] places (row, column) on a region's outer boundary and on those of its islands.
+    fn border(&self, index: usize) -> Vec<[f32; 2]> {
         let region = &self.regions[index];
-        let mut rim = trace_boundary(self.mask.view(), region[0]);
+        let mut border = trace_boundary(self.mask.view(), region[0]);
         let islands = |at: &(usize, usize)| {
             let (y, x) = *at;
             let inner = y > 0 && x > 0 && y + 1 < self.mask.nrows() && x + 1 < self.mask.ncols();
             inner && [(y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)].iter().any(|at| !self.mask[*at])
         };
         // The outer boundary comes twice, which does no harm.
-        rim.extend(region.iter().filter(|at| islands(at)));
-        let step = rim.len().div_ceil(RIM_POINTS);
-        rim.into_iter().step_by(step).map(|(y, x)| [y as f32, x as f32]).collect()
+        border.extend(region.iter().filter(|at| islands(at)));
+        let step = border.len().div_ceil(BORDER_POINTS);
+        border.into_iter().step_by(step).map(|(y, x)| [y as f32, x as f32]).collect()
     }
 }
 

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::DesignError;
 use super::least_squares::solve;
 use crate::kernel::{self, Kernel};
-use crate::nir::{GRID, GridPoint, alphas, sum_and_difference};
+use crate::normalised_ratio::{GRID, GridPoint, alphas, sum_and_difference};
 use crate::psf::Otf;
 
 /// Weight of the pull of Gp1 towards the band-pass.
@@ -61,13 +61,13 @@ pub fn design(
         let basis = kernel::basis_responses(size, p.u, p.v);
         for alpha in samples {
             let [sum, difference] = sum_and_difference(otf, max_blur_px, p.w, alpha);
-            let nir = difference / sum;
-            if !nir.is_finite() {
+            let normalised_ratio = difference / sum;
+            if !normalised_ratio.is_finite() {
                 // Both OTFs vanish: no image carries this frequency at this depth.
                 continue;
             }
             let scale = (weight / samples.len() as f64).sqrt();
-            let factors = [nir, -alpha, -alpha.powi(3)].map(|f| f * scale);
+            let factors = [normalised_ratio, -alpha, -alpha.powi(3)].map(|f| f * scale);
             rows.push((factors.iter().flat_map(|f| basis.iter().map(move |b| f * b)).collect(), 0.0));
         }
         let scale = (BAND_PASS_WEIGHT * p.multiplicity / multiplicities).sqrt();

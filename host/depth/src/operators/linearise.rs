@@ -17,7 +17,7 @@ use super::DesignError;
 use super::least_squares::solve;
 use crate::cubic::MAX_ALPHA;
 use crate::kernel::Kernel;
-use crate::nir::{GRID, GridPoint, sum_and_difference};
+use crate::normalised_ratio::{GRID, GridPoint, sum_and_difference};
 use crate::psf::Otf;
 
 /// Coefficients of alpha, alpha^3, alpha^5, alpha^7.

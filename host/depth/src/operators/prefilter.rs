@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::DesignError;
 use super::least_squares::solve;
 use crate::kernel::{self, Kernel};
-use crate::nir::{GridPoint, first_non_monotonic, smallest_slope};
+use crate::normalised_ratio::{GridPoint, first_non_monotonic, smallest_slope};
 use crate::psf::Otf;
 
 /// Added to the target to make the weights (Li 2014, section 5.2.4).

@@ -14,7 +14,7 @@ use super::least_squares::solve;
 use super::linear::band_pass;
 use super::samples::{Sample, Samples};
 use crate::kernel::{self, Kernel};
-use crate::nir::{GridPoint, first_non_monotonic};
+use crate::normalised_ratio::{GridPoint, first_non_monotonic};
 use crate::psf::Otf;
 
 /// Pre-filter target: 1 between 0 and the first non-monotonic frequency, else 0.
@@ -47,8 +47,8 @@ pub fn design(
     let gp1 = fit_band_pass(grid, size)?;
     let samples = Samples::new(otf, max_blur_px, prefilter, grid, &gp1);
     let first_order = |s: &Sample| samples.gp1[s.point] * s.alpha;
-    let gm1 = samples.fit(|s| s.nir, first_order)?;
+    let gm1 = samples.fit(|s| s.normalised_ratio, first_order)?;
     let gp2 =
-        samples.fit(|s| s.alpha.powi(3), |s| s.nir * samples.response(gm1.octant(), s) - first_order(s))?;
+        samples.fit(|s| s.alpha.powi(3), |s| s.normalised_ratio * samples.response(gm1.octant(), s) - first_order(s))?;
     Ok([gm1, gp1, gp2])
 }

@@ -6,7 +6,7 @@ use super::DesignError;
 use super::least_squares::solve;
 use super::linear::weights;
 use crate::kernel::{self, Kernel};
-use crate::nir::{GridPoint, alphas, nir};
+use crate::normalised_ratio::{GridPoint, alphas, normalised_ratio};
 use crate::psf::Otf;
 
 /// One grid point and depth: what both procedures are made of.
@@ -14,7 +14,7 @@ pub(super) struct Sample {
     /// Index of the point's basis responses.
     pub point: usize,
     pub alpha: f64,
-    pub nir: f64,
+    pub normalised_ratio: f64,
     /// Square root of the weight.
     pub weight: f64,
 }
@@ -41,12 +41,12 @@ impl Samples {
                 alphas().map(|alpha| Sample {
                     point,
                     alpha,
-                    nir: nir(otf, max_blur_px, p.w, alpha),
+                    normalised_ratio: normalised_ratio(otf, max_blur_px, p.w, alpha),
                     weight: weight.sqrt(),
                 })
             })
             // Where both OTFs vanish there is no image.
-            .filter(|sample| sample.nir.is_finite())
+            .filter(|sample| sample.normalised_ratio.is_finite())
             .collect();
         Self { size, basis, gp1: grid.iter().map(|p| gp1.response(p.u, p.v)).collect(), samples }
     }

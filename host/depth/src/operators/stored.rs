@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::linearise::Polynomial;
 use super::{Design, DesignError, FORMAT, Family, Operators, Request};
 use crate::kernel::Kernel;
-use crate::nir::NirFit;
+use crate::normalised_ratio::RatioFit;
 use crate::psf::Psf;
 
 /// Operators as stored.
@@ -25,7 +25,7 @@ pub(super) struct RawOperators {
     gm1: Kernel,
     gp1: Kernel,
     gp2: Kernel,
-    nir: NirFit,
+    normalised_ratio: RatioFit,
 }
 
 impl TryFrom<RawOperators> for Operators {
@@ -56,7 +56,7 @@ impl TryFrom<RawOperators> for Operators {
             gp1: raw.gp1,
             gp2: raw.gp2,
             linearisation: raw.linearisation,
-            nir: raw.nir,
+            normalised_ratio: raw.normalised_ratio,
         })
     }
 }
@@ -77,7 +77,7 @@ impl From<Operators> for RawOperators {
             gp1: o.gp1,
             gp2: o.gp2,
             linearisation: o.linearisation,
-            nir: o.nir,
+            normalised_ratio: o.normalised_ratio,
         }
     }
 }

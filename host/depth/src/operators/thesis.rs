@@ -19,7 +19,7 @@ use super::linear::band_pass;
 use super::minimise::{Misfit, minimise};
 use super::start::kernel_of_radial_response;
 use crate::kernel::{self, Kernel};
-use crate::nir::{ALPHA_SAMPLES, GridPoint, NirFit, alphas, nir};
+use crate::normalised_ratio::{ALPHA_SAMPLES, GridPoint, RatioFit, alphas, normalised_ratio};
 use crate::psf::Otf;
 
 /// Evaluations per unknown after which the minimisation ends where it is.
@@ -45,7 +45,7 @@ pub fn design(
     otf: &Otf,
     max_blur_px: f64,
     prefilter: &Kernel,
-    fit: &NirFit,
+    fit: &RatioFit,
     grid: &[GridPoint],
     size: usize,
 ) -> Result<[Kernel; 3], DesignError> {
@@ -62,7 +62,7 @@ pub fn design(
 }
 
 /// `[Gm1, Gp1, Gp2]` to start from.
-pub(super) fn starting_kernels(fit: &NirFit, size: usize) -> Result<[Kernel; 3], DesignError> {
+pub(super) fn starting_kernels(fit: &RatioFit, size: usize) -> Result<[Kernel; 3], DesignError> {
     // The cubic's coefficients at any frequency: linear between the table's, constant beyond.
     let at = |column: &[f64], w: f64| {
         let table = &fit.frequency_rad_px;
@@ -91,21 +91,21 @@ struct RatioError {
     /// Responses of the taps at each point, and the point's weight.
     points: Vec<(Vec<f64>, f64)>,
     /// NIR at each point and alpha.
-    nir: Vec<[f64; SAMPLES]>,
+    normalised_ratio: Vec<[f64; SAMPLES]>,
 }
 
 impl RatioError {
     fn new(otf: &Otf, max_blur_px: f64, prefilter: &Kernel, grid: &[GridPoint], size: usize) -> Self {
         let (mut points, mut ratios) = (Vec::new(), Vec::new());
         for p in grid.iter().filter(|p| p.w > 0.0) {
-            let ratio = depths().map(|a| nir(otf, max_blur_px, p.w, a));
+            let ratio = depths().map(|a| normalised_ratio(otf, max_blur_px, p.w, a));
             if ratio.iter().all(|r| r.is_finite()) {
                 let weight = p.multiplicity.sqrt() * prefilter.response(p.u, p.v);
                 points.push((kernel::basis_responses(size, p.u, p.v), weight));
                 ratios.push(ratio);
             }
         }
-        Self { points, nir: ratios }
+        Self { points, normalised_ratio: ratios }
     }
 }
 
@@ -119,7 +119,7 @@ impl Misfit for RatioError {
     fn residuals(&self, taps: &[f64]) -> DVector<f64> {
         let samples = depths();
         let mut residuals = Vec::with_capacity(self.points.len() * samples.len());
-        for ((basis, weight), ratios) in self.points.iter().zip(&self.nir) {
+        for ((basis, weight), ratios) in self.points.iter().zip(&self.normalised_ratio) {
             let [gm1, gp1, gp2] = responses(basis, taps);
             residuals.extend(
                 samples
@@ -154,7 +154,7 @@ impl Misfit for RatioError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nir::octant;
+    use crate::normalised_ratio::octant;
     use crate::operators::prefilter;
     use crate::psf::Psf;
 
@@ -164,7 +164,7 @@ mod tests {
         let otf = Psf::Gaussian { k: 0.4578 }.otf(rmax);
         let grid = octant();
         let q = prefilter::fit(&prefilter::target(&otf, rmax, &grid).unwrap(), &grid, 7).unwrap();
-        let fit = NirFit::new(&otf, rmax, f64::INFINITY);
+        let fit = RatioFit::new(&otf, rmax, f64::INFINITY);
         let misfit = RatioError::new(&otf, rmax, &q, &grid, 7);
         let at = starting_kernels(&fit, 7).unwrap().each_ref().map(Kernel::octant).concat();
         let jacobian = misfit.jacobian(&at);

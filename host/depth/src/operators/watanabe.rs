@@ -15,7 +15,7 @@ use super::minimise::{Misfit, minimise};
 use super::samples::{Sample, Samples};
 use super::{DesignError, raj};
 use crate::kernel::Kernel;
-use crate::nir::GridPoint;
+use crate::normalised_ratio::GridPoint;
 use crate::psf::Otf;
 
 /// Slope (the band-pass has peak 1) below which it is regularised.
@@ -55,7 +55,7 @@ impl DepthError {
         let (gm1, gp2) = taps.split_at(self.samples.taps());
         let [gm1, gp2] = [gm1, gp2].map(|taps| self.samples.response(taps, sample));
         let gp1 = self.samples.gp1[sample.point];
-        let misfit = gp1 * sample.alpha + gp2 * sample.alpha.powi(3) - sample.nir * gm1;
+        let misfit = gp1 * sample.alpha + gp2 * sample.alpha.powi(3) - sample.normalised_ratio * gm1;
         let slope = gp1 + 3.0 * gp2 * sample.alpha.powi(2);
         let divisor = slope * slope + SLOPE_FLOOR * SLOPE_FLOOR;
         [misfit, slope / divisor, (SLOPE_FLOOR * SLOPE_FLOOR - slope * slope) / (divisor * divisor)]
@@ -65,7 +65,7 @@ impl DepthError {
     fn row(&self, taps: &[f64], sample: &Sample) -> [f64; 3] {
         let [misfit, inverse, derivative] = self.parts(taps, sample);
         let weight = sample.weight * self.samples.gp1[sample.point];
-        let by_gm1 = -weight * sample.nir * inverse;
+        let by_gm1 = -weight * sample.normalised_ratio * inverse;
         let by_gp2 =
             weight * (inverse * sample.alpha.powi(3) + misfit * derivative * 3.0 * sample.alpha.powi(2));
         [by_gm1, by_gp2, weight * misfit * inverse]
@@ -131,7 +131,7 @@ impl Misfit for DepthError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nir::octant;
+    use crate::normalised_ratio::octant;
     use crate::operators::prefilter;
     use crate::psf::Psf;
 

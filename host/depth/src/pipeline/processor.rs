@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use super::fast::{Job, Maps, Tile};
-use super::{Backend, DepthMap, RunError, Settings, check, rim};
+use super::{Backend, DepthMap, RunError, Settings, check, border_fill};
 use crate::confidence;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::fill;
@@ -98,7 +98,7 @@ impl Processor {
                 confidence::withhold(texture, &invalid);
             }
         }
-        rim::fill(&mut self.map, self.operators.kernel_size());
+        border_fill::fill(&mut self.map, self.operators.kernel_size());
         if let Some(texture) = texture {
             let reach_px = check::reach_px(&self.operators, &self.settings);
             let pair = [far.view(), near.view()];

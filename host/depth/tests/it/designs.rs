@@ -97,7 +97,7 @@ fn kernels_have_the_responses_of_their_roles() {
         assert!(at(operators.gp1(), 1.2) > 2.0 * at(operators.gp1(), 0.2));
         assert!(at(operators.gp1(), 1.2) > 2.0 * at(operators.gp1(), 3.1));
         // The ratio of the kernels is the slope of the NIR (its linear coefficient).
-        let fit = operators.nir();
+        let fit = operators.normalised_ratio();
         let i = fit.frequency_rad_px.iter().position(|w| (*w - 0.785).abs() < 0.01).unwrap();
         let ratio =
             at(operators.gp1(), fit.frequency_rad_px[i]) / at(operators.gm1(), fit.frequency_rad_px[i]);

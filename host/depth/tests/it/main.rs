@@ -9,6 +9,6 @@ mod distortion;
 mod input;
 mod optics_files;
 mod planes;
-mod real;
+mod measure;
 mod stack;
 mod uncertainty;

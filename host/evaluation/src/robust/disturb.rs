@@ -8,8 +8,8 @@ use farnear_depth::{
     optics::Optics,
     pipeline::{Settings, depth_from_pair},
     prepare::{CameraFrames, PrepareSettings},
-    real::{Finding, RealDepth, RealError, RealMethod, RealSettings, depth_of_real_pair},
-    windowed::Window,
+    measure::{Finding, Measurement, MeasureError, DepthMethod, MeasureSettings, measure_pair_of_views},
+    adaptive_window::Window,
 };
 use farnear_scene::{Camera, Lens, Noise, Renderer, Scene, View, truth};
 use image::codecs::jpeg::JpegEncoder;
@@ -170,7 +170,7 @@ pub struct Outcome {
     /// What was said.
     pub said: Vec<String>,
     /// Depth and what is known of it, if there is any.
-    pub found: Option<RealDepth>,
+    pub found: Option<Measurement>,
 }
 
 impl Taken {
@@ -191,9 +191,9 @@ impl Taken {
     ) -> Outcome {
         let window = WAYS[way].1;
         let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() };
-        let settings = RealSettings { prepare, window, ..RealSettings::default() };
-        let method = if way == 0 { RealMethod::Rational(operators) } else { RealMethod::Whitened };
-        let found = depth_of_real_pair(self.far.view(), self.near.view(), optics, method, camera, &settings);
+        let settings = MeasureSettings { prepare, window, ..MeasureSettings::default() };
+        let method = if way == 0 { DepthMethod::Rational(operators) } else { DepthMethod::Whitened };
+        let found = measure_pair_of_views(self.far.view(), self.near.view(), optics, method, camera, &settings);
         match found {
             Ok(found) => {
                 let (error_mm, valid) = self.error(&found.map.depth_mm);
@@ -232,6 +232,6 @@ impl Taken {
     }
 }
 
-fn refused(error: &RealError) -> Outcome {
+fn refused(error: &MeasureError) -> Outcome {
     Outcome { error_mm: f64::NAN, valid: 0.0, said: vec![format!("error: {error}")], found: None }
 }

@@ -44,7 +44,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
                         if error.is_finite() {
                             valid += 1.0;
                             sure += f64::from(found.map.confidence[at]);
-                            let far_off = error > 3.0 * found.judgement.deviation_mm[at] && error > 1.5;
+                            let far_off = error > 3.0 * found.validity.deviation_mm[at] && error > 1.5;
                             wrong += f64::from(u8::from(far_off && found.map.confidence[at] >= CONFIDENT));
                         }
                     }

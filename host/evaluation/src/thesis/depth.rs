@@ -29,7 +29,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
          finds through it, and nothing else.",
     );
     rig_of_chapter_4(page)?;
-    nir(page)?;
+    normalised_ratio(page)?;
     let bench = Bench::new()?;
     bench.describe(page)?;
     let planes = planes::Planes::measure(&bench)?;
@@ -77,8 +77,8 @@ fn rig_of_chapter_4(page: &mut Page) -> Result<()> {
 }
 
 /// Fig. 5.2.
-fn nir(page: &mut Page) -> Result<()> {
-    use farnear_depth::nir::{first_non_monotonic, nir as ratio};
+fn normalised_ratio(page: &mut Page) -> Result<()> {
+    use farnear_depth::normalised_ratio::{first_non_monotonic, normalised_ratio as ratio};
     use farnear_depth::psf::Psf;
     page.subheading("The normalised image ratio (fig. 5.2)");
     let models = [

@@ -8,7 +8,7 @@ use farnear_depth::{
     fill::{FillBy, LowTexture},
     pipeline::{MAX_SMOOTHING_PX, Settings},
     prepare::{Align, Balance},
-    windowed::Window,
+    adaptive_window::Window,
 };
 use farnear_workflows::{
     depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs},

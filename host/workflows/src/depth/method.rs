@@ -2,7 +2,7 @@
 
 use std::{fmt, path::Path, str::FromStr, sync::Arc};
 
-use farnear_depth::{baselines, operators::Operators, optics::Optics, real::RealMethod};
+use farnear_depth::{baselines, operators::Operators, optics::Optics, measure::DepthMethod};
 
 use super::shared::Shared;
 use crate::error::{Result, WorkflowError};
@@ -99,11 +99,11 @@ impl Prepared {
     }
 
     /// As the library calls it.
-    pub fn as_real(&self) -> RealMethod<'_> {
+    pub fn as_real(&self) -> DepthMethod<'_> {
         match self {
-            Self::RationalOperators(operators) => RealMethod::Rational(operators),
-            Self::Whitened => RealMethod::Whitened,
-            Self::Baseline(method) => RealMethod::Baseline(*method),
+            Self::RationalOperators(operators) => DepthMethod::Rational(operators),
+            Self::Whitened => DepthMethod::Whitened,
+            Self::Baseline(method) => DepthMethod::Baseline(*method),
         }
     }
 }

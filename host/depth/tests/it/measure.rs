@@ -5,9 +5,9 @@ use crate::common::rig;
 use farnear_depth::operators::Operators;
 use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::prepare::{Align, Balance, PrepareError, PrepareSettings};
-use farnear_depth::real::{RealDepth, RealError, RealMethod, RealSettings, depth_of_real_pair};
+use farnear_depth::measure::{Measurement, MeasureError, DepthMethod, MeasureSettings, measure_pair_of_views};
 use farnear_depth::reason::Reason;
-use farnear_depth::windowed::Window;
+use farnear_depth::adaptive_window::Window;
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Renderer, Scene, View, standard, truth};
 use ndarray::Array2;
 
@@ -41,26 +41,26 @@ fn plain(scene: &str, seed: u64) -> Pair {
     pair(scene, PSF, Noise::EightBit, &lens(), View::default(), seed)
 }
 
-fn settings(window: Window) -> RealSettings {
+fn settings(window: Window) -> MeasureSettings {
     let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() };
-    RealSettings { prepare, window, ..RealSettings::default() }
+    MeasureSettings { prepare, window, ..MeasureSettings::default() }
 }
 
-fn measure(pair: &Pair, psf: &str, window: Window) -> Result<RealDepth, RealError> {
+fn measure(pair: &Pair, psf: &str, window: Window) -> Result<Measurement, MeasureError> {
     let optics = rig(psf);
     let (far, near) = (pair.far.view(), pair.near.view());
     if window == Window::Fixed(7) {
         let operators = Operators::for_optics(&optics).unwrap();
-        return depth_of_real_pair(
+        return measure_pair_of_views(
             far,
             near,
             &optics,
-            RealMethod::Rational(&operators),
+            DepthMethod::Rational(&operators),
             None,
             &settings(window),
         );
     }
-    depth_of_real_pair(far, near, &optics, RealMethod::Whitened, None, &settings(window))
+    measure_pair_of_views(far, near, &optics, DepthMethod::Whitened, None, &settings(window))
 }
 
 /// Root mean square error in the middle, and the part of it that has a depth.
@@ -92,13 +92,13 @@ fn adaptive_windows_take_most_of_the_noise() {
             for (sum, window) in all.iter_mut().zip([Window::Fixed(7), Window::Adaptive]) {
                 let found = measure(&pair, psf, window).unwrap();
                 let (mm, valid) = error(&found.map.depth_mm, &pair);
-                let deviation = found.judgement.deviation_mm[(120, 160)];
+                let deviation = found.validity.deviation_mm[(120, 160)];
                 println!(
                     "{psf} {depth} {window}: {mm:.3} mm, valid {valid:.4}, sd {deviation:.3}, {:?} left {:?}",
                     found.findings, found.report
                 );
                 *sum += mm * mm / 5.0;
-                let predicted = found.judgement.deviation_mm.iter().filter(|d| d.is_finite());
+                let predicted = found.validity.deviation_mm.iter().filter(|d| d.is_finite());
                 let (squares, n) =
                     predicted.fold((0.0, 0.0), |(s, n), d| (s + f64::from(*d).powi(2), n + 1.0));
                 ratios[usize::from(window == Window::Adaptive)] += (squares / n).sqrt() / mm / 5.0;
@@ -130,7 +130,7 @@ fn a_good_pair_goes_through_untouched() {
         let differ =
             found.map.depth_mm.iter().zip(&run.depth_mm).filter(|(a, b)| a.is_finite() && a != b).count();
         assert_eq!(differ, 0, "{scene}");
-        assert!(found.judgement.valid_fraction > 0.9, "{scene}: {:?}", found.judgement.lost);
+        assert!(found.validity.valid_fraction > 0.9, "{scene}: {:?}", found.validity.lost);
     }
 }
 
@@ -192,7 +192,7 @@ fn different_scenes_are_refused() {
     let (one, other) = (plain("staircase", 1), plain("staircase", 2));
     let mixed = Pair { near: other.near, ..one };
     let refused = measure(&mixed, PSF, Window::Fixed(7)).unwrap_err();
-    assert!(matches!(refused, RealError::Prepare(PrepareError::Unrelated { .. })), "{refused}");
+    assert!(matches!(refused, MeasureError::Prepare(PrepareError::Unrelated { .. })), "{refused}");
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn what_moved_has_no_depth() {
     let object = ndarray::s![80..160, 100..200];
     pair.near.slice_mut(object).assign(&moved.near.slice(object));
     let found = measure(&pair, PSF, Window::Fixed(7)).unwrap();
-    let marked = found.judgement.reasons.slice(object).iter().filter(|c| **c == Reason::Moved.code()).count();
+    let marked = found.validity.reasons.slice(object).iter().filter(|c| **c == Reason::Moved.code()).count();
     let (mm, valid) = error(&found.map.depth_mm, &pair);
     println!("{mm} {valid} {marked} {:?}", found.findings);
     assert!(marked > 80 * 100 * 8 / 10 && mm < 0.9 && valid > 0.6, "{mm} {valid} {marked}");
@@ -220,7 +220,7 @@ fn single_saturated_pixels_are_lost_alone() {
     }
     let found = measure(&pair, PSF, Window::Fixed(7)).unwrap();
     let (mm, valid) = error(&found.map.depth_mm, &pair);
-    println!("{mm} {valid} {:?}", found.judgement.lost);
+    println!("{mm} {valid} {:?}", found.validity.lost);
     assert!(mm < 0.75 && valid > 0.99, "{mm} {valid}");
 }
 
@@ -242,14 +242,14 @@ fn nothing_is_confident_outside_the_range() {
                 let off = (depth - pair.truth[at]).abs();
                 confidence += found.map.confidence[at];
                 wrong += usize::from(
-                    off > 3.0 * found.judgement.deviation_mm[at]
+                    off > 3.0 * found.validity.deviation_mm[at]
                         && off > 1.5
                         && found.map.confidence[at] >= 0.5,
                 );
             }
             let part = wrong as f64 / pair.truth.len() as f64;
             let (mm, valid) = error(&found.map.depth_mm, &pair);
-            let mean = confidence / (found.judgement.valid_fraction as f32 * pair.truth.len() as f32);
+            let mean = confidence / (found.validity.valid_fraction as f32 * pair.truth.len() as f32);
             println!(
                 "{depth} {window}: {mm:.2} mm, valid {valid:.3}, wrong {part:.4}, confidence {mean:.2}, {:?}",
                 found.findings.iter().map(ToString::to_string).collect::<Vec<_>>()
@@ -284,15 +284,15 @@ fn what_is_asked_for_is_done() {
     let operators = Operators::for_optics(&optics).unwrap();
     let prepare =
         PrepareSettings { align: Align::Optics, balance: Balance::Gain, ..PrepareSettings::default() };
-    let settings = RealSettings { prepare, least_confidence: 0.9999, ..RealSettings::default() };
-    let method = RealMethod::Rational(&operators);
+    let settings = MeasureSettings { prepare, least_confidence: 0.9999, ..MeasureSettings::default() };
+    let method = DepthMethod::Rational(&operators);
     let found =
-        depth_of_real_pair(pair.far.view(), pair.near.view(), &optics, method, None, &settings).unwrap();
+        measure_pair_of_views(pair.far.view(), pair.near.view(), &optics, method, None, &settings).unwrap();
     let aligned = found.report.aligned.unwrap();
     assert!((aligned.magnification - 1.00296).abs() < 1e-5, "{aligned:?}");
     assert!((found.report.balanced.unwrap().gain - 1.0).abs() < 2e-3);
     assert!(
-        found.judgement.valid_fraction == 0.0
-            && found.judgement.lost.iter().any(|l| l.reason == Reason::Unsure)
+        found.validity.valid_fraction == 0.0
+            && found.validity.lost.iter().any(|l| l.reason == Reason::Unsure)
     );
 }

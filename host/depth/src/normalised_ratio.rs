@@ -62,7 +62,7 @@ pub fn sum_and_difference(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> [f
 
 /// NIR at the radial frequency `w` (rad/px) and depth `alpha`. Near a common zero of both OTFs (pill-box only) it is
 /// unbounded; exactly there the result is not finite.
-pub fn nir(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 {
+pub fn normalised_ratio(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 {
     let [sum, difference] = sum_and_difference(otf, max_blur_px, w, alpha);
     difference / sum
 }
@@ -71,7 +71,7 @@ pub fn nir(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 {
 /// stands for more than one depth.
 pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     const STEPS: usize = 80;
-    let at = |i: usize| nir(otf, max_blur_px, w, -1.0 + 2.0 * i as f64 / STEPS as f64);
+    let at = |i: usize| normalised_ratio(otf, max_blur_px, w, -1.0 + 2.0 * i as f64 / STEPS as f64);
     // NIR is odd in alpha, so half the range suffices; a value that is not finite counts as no slope.
     let mut previous = at(STEPS / 2);
     let mut smallest = f64::INFINITY;
@@ -109,7 +109,7 @@ pub fn first_non_monotonic(otf: &Otf, max_blur_px: f64) -> f64 {
 
 /// The cubic fit of the NIR, one entry per radial frequency of the grid, ascending.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct NirFit {
+pub struct RatioFit {
     /// Radial frequencies, rad/px.
     pub frequency_rad_px: Vec<f64>,
     /// Coefficient a1 of alpha.
@@ -120,7 +120,7 @@ pub struct NirFit {
     pub rms: Vec<f64>,
 }
 
-impl NirFit {
+impl RatioFit {
     /// Fits the NIR at every radial frequency of the grid above 0 and below `up_to_rad_px`.
     pub fn new(otf: &Otf, max_blur_px: f64, up_to_rad_px: f64) -> Self {
         let mut radii: Vec<f64> =
@@ -147,7 +147,7 @@ impl NirFit {
 
 /// `[a1, a3, rms]` of the least-squares fit at one frequency: two normal equations, even moments of alpha.
 fn fit_cubic(otf: &Otf, max_blur_px: f64, w: f64) -> [f64; 3] {
-    let samples = alphas().map(|a| (a, nir(otf, max_blur_px, w, a)));
+    let samples = alphas().map(|a| (a, normalised_ratio(otf, max_blur_px, w, a)));
     let moment = |n: i32| samples.iter().map(|(a, _)| a.powi(n)).sum::<f64>();
     let product = |n: i32| samples.iter().map(|(a, y)| a.powi(n) * y).sum::<f64>();
     let [s2, s4, s6] = [2, 4, 6].map(moment);
@@ -178,9 +178,9 @@ mod tests {
         for psf in [Psf::PillBox, Psf::Gaussian { k: 0.4578 }] {
             let otf = psf.otf(RMAX);
             for w in [0.2, 0.6, 1.0] {
-                assert!(nir(&otf, RMAX, w, 0.0).abs() < 1e-12);
-                assert!((nir(&otf, RMAX, w, 0.7) + nir(&otf, RMAX, w, -0.7)).abs() < 1e-12);
-                assert!(nir(&otf, RMAX, w, 0.9) > nir(&otf, RMAX, w, 0.3));
+                assert!(normalised_ratio(&otf, RMAX, w, 0.0).abs() < 1e-12);
+                assert!((normalised_ratio(&otf, RMAX, w, 0.7) + normalised_ratio(&otf, RMAX, w, -0.7)).abs() < 1e-12);
+                assert!(normalised_ratio(&otf, RMAX, w, 0.9) > normalised_ratio(&otf, RMAX, w, 0.3));
             }
         }
     }
@@ -192,7 +192,7 @@ mod tests {
         let otf = Psf::Gaussian { k }.otf(RMAX);
         for (w, alpha) in [(0.5, 0.3), (1.5, -0.8), (3.0, 1.0)] {
             let expected = (0.25 * (k * RMAX * w).powi(2) * alpha).tanh();
-            assert!((nir(&otf, RMAX, w, alpha) - expected).abs() < 1e-12);
+            assert!((normalised_ratio(&otf, RMAX, w, alpha) - expected).abs() < 1e-12);
         }
     }
 
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn the_fit_is_good_where_the_nir_is_smooth() {
         let otf = Psf::Gaussian { k: 0.4578 }.otf(RMAX);
-        let fit = NirFit::new(&otf, RMAX, 1.2);
+        let fit = RatioFit::new(&otf, RMAX, 1.2);
         assert!(fit.total_rms() < 2e-3, "{}", fit.total_rms());
         assert!(fit.linear.windows(2).all(|w| w[1] > w[0]), "the slope rises with frequency");
         assert!(fit.cubic.iter().all(|c| *c < 0.0), "tanh bends down");

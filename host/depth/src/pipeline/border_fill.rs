@@ -1,29 +1,29 @@
-//! The rim of a map, where the kernels reach beyond the images.
+//! The border of a map, where the kernels reach beyond the images.
 //!
 //! Reflecting an image at its border supposes that the scene goes on as its own mirror image. The blur knows better:
 //! it mixed in what really lies beyond, by another amount in each of the two images, and depth within one kernel size of
-//! the border is off by millimetres even without noise. So rim pixels take the depth of the nearest pixel whose
-//! operators (pre-filter and kernel, half a kernel size each) saw nothing but image, at [`RIM_CONFIDENCE`] of its
+//! the border is off by millimetres even without noise. So border pixels take the depth of the nearest pixel whose
+//! operators (pre-filter and kernel, half a kernel size each) saw nothing but image, at [`BORDER_CONFIDENCE`] of its
 //! confidence. Pixels without a depth stay without.
 //!
-//! Cost: the rim's pixels once.
+//! Cost: the border's pixels once.
 
 use crate::depth_map::DepthMap;
 
 /// How far a value is trusted that belongs to a neighbour.
-const RIM_CONFIDENCE: f32 = 0.5;
+const BORDER_CONFIDENCE: f32 = 0.5;
 
-/// Fills the rim of `width_px` pixels; at most to the middle of a small map.
+/// Fills the border of `width_px` pixels; at most to the middle of a small map.
 pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     let (height, width) = map.depth_mm.dim();
-    let rim = |n: usize| width_px.min((n - 1) / 2);
+    let border = |n: usize| width_px.min((n - 1) / 2);
     let (Some(depths), Some(confidences)) = (map.depth_mm.as_slice_mut(), map.confidence.as_slice_mut())
     else {
         unreachable!("maps are made in standard layout");
     };
     // Top and bottom first: the rows they copy from are then still untouched.
-    let (first, last) = (rim(height), height - 1 - rim(height));
-    let (left, right) = (rim(width), width - 1 - rim(width));
+    let (first, last) = (border(height), height - 1 - border(height));
+    let (left, right) = (border(width), width - 1 - border(width));
     let inner = left..right + 1;
     let source_row = [first, last].map(|y| {
         let row = y * width..(y + 1) * width;
@@ -59,7 +59,7 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
 /// Gives a pixel that has a depth that of another one.
 fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence: f32) {
     let has = !depth.is_nan();
-    *confidence = if has { RIM_CONFIDENCE * from_confidence } else { *confidence };
+    *confidence = if has { BORDER_CONFIDENCE * from_confidence } else { *confidence };
     *depth = if has { from_depth } else { *depth };
 }
 

@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 use nalgebra::{DMatrix, DVector};
 
 use crate::kernel::{self, Kernel};
-use crate::nir::{GridPoint, octant};
+use crate::normalised_ratio::{GridPoint, octant};
 use crate::operators::{DesignError, least_squares};
 use crate::optics::Optics;
 use crate::psf::{Otf, Psf};

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use crate::baselines::{self, BaselineError};
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
-use crate::judge::{JudgeSettings, Judgement, Lost, judge};
+use crate::validity::{Lost, Validity, ValiditySettings, assess};
 use crate::operators::{DesignError, Operators};
 use crate::optics::Optics;
-use crate::pipeline::{RunError, Settings, depth_from_pair, fill_rim, warnings_after};
+use crate::pipeline::{RunError, Settings, depth_from_pair, fill_border, warnings_after};
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
 use crate::reason::Reason;
-use crate::windowed::{Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth};
+use crate::adaptive_window::{Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth};
 
 /// Part of the pixels without depth for one reason from which it is said.
 const WORTH_SAYING: f64 = 0.002;
@@ -34,7 +34,7 @@ const BASELINE_OVER_WHITENED: f32 = 2.5;
 
 /// By what depth is found.
 #[derive(Debug, Clone, Copy)]
-pub enum RealMethod<'a> {
+pub enum DepthMethod<'a> {
     /// Rational operators.
     Rational(&'a Operators),
     /// Operators with a white residual.
@@ -45,7 +45,7 @@ pub enum RealMethod<'a> {
 
 /// How the whole way is gone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RealSettings {
+pub struct MeasureSettings {
     /// Geometry, brightness, the camera's limits.
     pub prepare: PrepareSettings,
     /// Over how many pixels evidence is summed.
@@ -56,7 +56,7 @@ pub struct RealSettings {
     pub least_confidence: f32,
 }
 
-impl Default for RealSettings {
+impl Default for MeasureSettings {
     fn default() -> Self {
         Self {
             prepare: PrepareSettings::default(),
@@ -69,7 +69,7 @@ impl Default for RealSettings {
 
 /// Why there is no depth.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RealError {
+pub enum MeasureError {
     /// The pair is none.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
@@ -151,11 +151,11 @@ impl fmt::Display for Finding {
 
 /// Depth of a real pair with all that is known of it.
 #[derive(Debug, Clone)]
-pub struct RealDepth {
+pub struct Measurement {
     /// Depth and confidence: the probability that the depth is off by less than three of its standard deviations.
     pub map: DepthMap,
     /// Reasons and standard deviations.
-    pub judgement: Judgement,
+    pub validity: Validity,
     /// What was done to the pair.
     pub report: Report,
     /// What a user should know.
@@ -169,61 +169,61 @@ pub struct RealDepth {
 }
 
 /// Depth of a pair of any common scale, (height, width), with everything that [`prepare`](crate::prepare) and
-/// [`judge`](crate::judge) do.
+/// [`judge`](crate::validity) do.
 ///
 /// # Errors
-/// [`RealError`].
-pub fn depth_of_real_pair(
+/// [`MeasureError`].
+pub fn measure_pair_of_views(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
     optics: &Optics,
-    method: RealMethod<'_>,
+    method: DepthMethod<'_>,
     camera: Option<&CameraFrames>,
-    settings: &RealSettings,
-) -> Result<RealDepth, RealError> {
+    settings: &MeasureSettings,
+) -> Result<Measurement, MeasureError> {
     // As they came: what is clipped everywhere is constant, and not full of holes.
     check_pair(far, near)?;
     let images = [far, near].map(|image| image.as_standard_layout().into_owned());
-    depth_of_owned_pair(images, optics, method, camera, settings)
+    measure_pair(images, optics, method, camera, settings)
 }
 
-/// As [`depth_of_real_pair`], of the images `[far, near]` themselves. Memory: some 30 bytes a pixel at its peak, the images'
+/// As [`measure_pair_of_views`], of the images `[far, near]` themselves. Memory: some 30 bytes a pixel at its peak, the images'
 /// eight included.
 ///
 /// # Errors
-/// [`RealError`].
-pub fn depth_of_owned_pair(
+/// [`MeasureError`].
+pub fn measure_pair(
     images: [Array2<f32>; 2],
     optics: &Optics,
-    method: RealMethod<'_>,
+    method: DepthMethod<'_>,
     camera: Option<&CameraFrames>,
-    settings: &RealSettings,
-) -> Result<RealDepth, RealError> {
+    settings: &MeasureSettings,
+) -> Result<Measurement, MeasureError> {
     check_pair(images[0].view(), images[1].view())?;
     let prepared = prepare_owned(images, optics, camera, &settings.prepare)?;
     let (mut map, estimate) = measure(&prepared, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
     let (left_over, excess) = (estimate.left_over, estimate.excess);
-    let judging = JudgeSettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
-    let judgement = judge(&mut map, &prepared, estimate, optics, &judging);
+    let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
+    let validity = assess(&mut map, &prepared, estimate, optics, &judging);
     let lost =
-        judgement.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
+        validity.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
     findings.extend(lost.copied().map(Finding::Lost));
-    if judgement.valid_fraction < TELLING {
+    if validity.valid_fraction < TELLING {
         // Where nearly nothing has a depth, what the model leaves says nothing of the lens.
         findings.retain(|finding| !matches!(finding, Finding::Unexplained { .. }));
     }
     map.warnings.clear();
     let report = prepared.report;
-    Ok(RealDepth { map, judgement, report, findings, left_over, excess, prepared })
+    Ok(Measurement { map, validity, report, findings, left_over, excess, prepared })
 }
 
 fn measure(
     prepared: &Prepared,
     optics: &Optics,
-    method: RealMethod<'_>,
-    settings: &RealSettings,
-) -> Result<(DepthMap, Estimate), RealError> {
+    method: DepthMethod<'_>,
+    settings: &MeasureSettings,
+) -> Result<(DepthMap, Estimate), MeasureError> {
     let (far, near) = (prepared.far.view(), prepared.near.view());
     let of_windows = WindowSettings {
         window: settings.window,
@@ -236,35 +236,35 @@ fn measure(
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
     // The map first: what it is judged by needs no depth of its own, and maps are large.
     let (map, mut judging) = match (method, settings.window) {
-        (RealMethod::Whitened, _) => {
+        (DepthMethod::Whitened, _) => {
             let mut judging = estimate(far, near, &white, optics, &of_windows)?;
             let depth_mm = std::mem::take(&mut judging.depth_mm);
             (of_estimate(depth_mm, &judging.deviation_mm, prepared, &white, optics, settings), judging)
         }
         (method, window) => {
             let map = match (method, window) {
-                (RealMethod::Rational(operators), Window::Fixed(side)) => {
+                (DepthMethod::Rational(operators), Window::Fixed(side)) => {
                     depth_from_pair(far, near, operators, optics, &run(side))?
                 }
-                (RealMethod::Rational(operators), _) => {
+                (DepthMethod::Rational(operators), _) => {
                     let bank = Bank::rational(operators);
                     let Estimate { depth_mm, deviation_mm, .. } =
                         estimate(far, near, &bank, optics, &of_windows)?;
                     of_estimate(depth_mm, &deviation_mm, prepared, &bank, optics, settings)
                 }
-                (RealMethod::Baseline(method), window) => {
+                (DepthMethod::Baseline(method), window) => {
                     let side = if let Window::Fixed(side) = window { side } else { 7 };
                     baselines::depth_from_pair(method, far, near, optics, &run(side))?
                 }
-                (RealMethod::Whitened, _) => unreachable!("above"),
+                (DepthMethod::Whitened, _) => unreachable!("above"),
             };
             (map, estimate_without_depth(far, near, &white, optics, &of_windows)?)
         }
     };
     let noisier = match method {
-        RealMethod::Whitened => 1.0,
-        RealMethod::Rational(_) => RATIONAL_OVER_WHITENED,
-        RealMethod::Baseline(_) => BASELINE_OVER_WHITENED,
+        DepthMethod::Whitened => 1.0,
+        DepthMethod::Rational(_) => RATIONAL_OVER_WHITENED,
+        DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
     judging.deviation_mm *= noisier;
     let estimate = judging;
@@ -304,7 +304,7 @@ fn of_estimate(
     prepared: &Prepared,
     bank: &Bank,
     optics: &Optics,
-    settings: &RealSettings,
+    settings: &MeasureSettings,
 ) -> DepthMap {
     let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
     // Evidence: the variance's reciprocal, which is what texture energy is to the run time.
@@ -312,7 +312,7 @@ fn of_estimate(
     let evidence = settings.run.fill.then(|| confidence.clone());
     confidence.mapv_inplace(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
     let mut map = DepthMap { depth_mm, confidence, low_texture_fraction: 0.0, warnings: Vec::new() };
-    fill_rim(&mut map, bank.reach_px() + 1);
+    fill_border(&mut map, bank.reach_px() + 1);
     if let Some(evidence) = evidence {
         let pair = [prepared.far.view(), prepared.near.view()];
         fill::fill(&mut map, evidence.view(), pair, bank.reach_px() + 3, settings.run.filling());

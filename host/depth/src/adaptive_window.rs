@@ -12,7 +12,7 @@
 //! The work is done in bands of rows, so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
 //! five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
 
-mod band;
+mod rows;
 mod bank;
 mod whitened;
 
@@ -27,7 +27,7 @@ use crate::optics::Optics;
 use crate::pipeline::{MAX_SMOOTHING_PX, RunError};
 use crate::prepare::noise::PairNoise;
 use crate::simd::Backend;
-use band::{Band, Scales};
+use rows::{Band, Scales};
 
 pub use bank::Bank;
 
@@ -166,7 +166,7 @@ fn estimate_into(
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let scales = Scales::new(far, near, settings.noise);
     let mut maps = [(); 2].map(|()| Array2::<f32>::zeros(size));
-    let rows = band::rows(size);
+    let rows = rows::rows(size);
     let [deviation, misfit] = &mut maps;
     let of_depth: Vec<Option<ArrayViewMut2<'_, f32>>> = match depth_mm {
         Some(depth_mm) => depth_mm.axis_chunks_iter_mut(Axis(0), rows).map(Some).collect(),

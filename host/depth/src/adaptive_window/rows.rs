@@ -14,7 +14,7 @@ const ROWS: usize = 128;
 /// Rows and columns over which the misfit is averaged.
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Rim in which filters and windows see reflections, which no model explains, px.
-const RIM_PX: usize = 14;
+const BORDER_PX: usize = 14;
 /// How far windows must agree, in standard deviations.
 const GAMMA: f32 = 2.0;
 /// Part of the energy that counts as evidence at least.
@@ -347,8 +347,8 @@ impl Band<'_> {
             let brightness = source.products[5].as_ref().map_or(0.0, |b| b[at]);
             let noise = (constant + per_unit * brightness).max(least);
             let gain = polynomial(gain, a * a);
-            let inside = (RIM_PX..height.saturating_sub(RIM_PX)).contains(&(from + y))
-                && (RIM_PX..width.saturating_sub(RIM_PX)).contains(&x);
+            let inside = (BORDER_PX..height.saturating_sub(BORDER_PX)).contains(&(from + y))
+                && (BORDER_PX..width.saturating_sub(BORDER_PX)).contains(&x);
             if inside && own.contains(&y) && wide.is_none_or(|wide| !wide[at]) {
                 let of_pixel = [left * left, gain * noise, rho[1] * rho[1]];
                 sums.iter_mut().zip(of_pixel).for_each(|(sum, value)| *sum += f64::from(value));

@@ -14,7 +14,7 @@ use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::prepare::Prepared;
 use crate::reason::Reason;
-use crate::windowed::Estimate;
+use crate::adaptive_window::Estimate;
 
 /// Largest |alpha| that is believed: a tenth beyond either focus the operators still hold to 1 mm.
 pub const LARGEST_ALPHA: f64 = 1.1;
@@ -27,7 +27,7 @@ const SEARCH_PX: usize = 24;
 
 /// What a pair is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct JudgeSettings {
+pub struct ValiditySettings {
     /// Confidence below which a depth is taken away.
     pub least_confidence: f32,
     /// Whether regions without texture were filled; what was filled is kept.
@@ -36,7 +36,7 @@ pub struct JudgeSettings {
 
 /// What was found.
 #[derive(Debug, Clone)]
-pub struct Judgement {
+pub struct Validity {
     /// For each pixel the code of the [`Reason`] why it has no depth, 0 where it has one.
     pub reasons: Array2<u8>,
     /// Standard deviation of each depth, mm; NaN where there is none.
@@ -59,14 +59,14 @@ pub struct Lost {
 }
 
 /// Judges a map: takes depths away that cannot be believed, sets each confidence to its probability. `estimate` is of the same
-/// prepared pair; its deviations become the judgement's.
-pub fn judge(
+/// prepared pair; its deviations become the validity's.
+pub fn assess(
     map: &mut DepthMap,
     prepared: &Prepared,
     estimate: Estimate,
     optics: &Optics,
-    settings: &JudgeSettings,
-) -> Judgement {
+    settings: &ValiditySettings,
+) -> Validity {
     let size = map.depth_mm.dim();
     let mut reasons = prepared.reasons.clone();
     let Estimate { mut deviation_mm, misfit, .. } = estimate;
@@ -103,7 +103,7 @@ pub fn judge(
     let valid = map.depth_mm.iter().filter(|depth| depth.is_finite()).count();
     map.low_texture_fraction =
         lost.iter().find(|lost| lost.reason == Reason::NoTexture).map_or(0.0, |lost| lost.fraction);
-    Judgement { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
+    Validity { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
 }
 
 /// How many pixels have no depth, by reason, from the map of reasons.
