@@ -1,13 +1,13 @@
 //! Depth of pairs.
 
 use farnear_depth::{
+    adaptive_window::Window,
     fill::{FillBy, LowTexture},
+    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
-    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
     reason::Reason,
-    adaptive_window::Window,
 };
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::{exceptions::PyTypeError, prelude::*};

@@ -3,9 +3,9 @@
 use std::{hint::black_box, time::Instant};
 
 use farnear_depth::{
+    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
     operators, pipeline,
     prepare::PrepareSettings,
-    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
 };
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -25,7 +25,8 @@ pub fn seconds_of_depth(
     let run = |_| {
         let start = Instant::now();
         let method = DepthMethod::Rational(&operators);
-        let found = measure_pair_of_views(far.as_array(), near.as_array(), &optics.0, method, None, &settings);
+        let found =
+            measure_pair_of_views(far.as_array(), near.as_array(), &optics.0, method, None, &settings);
         black_box(found.map_err(wrong)?);
         Ok(start.elapsed().as_secs_f64())
     };

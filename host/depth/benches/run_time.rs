@@ -10,6 +10,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use farnear_depth::adaptive_window::{Bank, Window, WindowSettings, estimate};
 use farnear_depth::fill::fill_low_texture;
 use farnear_depth::filter::convolve;
 use farnear_depth::kernel::Kernel;
@@ -18,7 +19,6 @@ use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, Senso
 use farnear_depth::pipeline::{Backend, Processor, Settings};
 use farnear_depth::prepare::{Align, Balance, PrepareSettings, prepare};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
-use farnear_depth::adaptive_window::{Bank, Window, WindowSettings, estimate};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

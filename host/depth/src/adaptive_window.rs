@@ -12,8 +12,8 @@
 //! The work is done in bands of rows, so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
 //! five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
 
-mod rows;
 mod bank;
+mod rows;
 mod whitened;
 
 use std::fmt;

@@ -30,6 +30,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod adaptive_window;
 pub mod baselines;
 mod border;
 pub mod calibrate;
@@ -44,8 +45,8 @@ pub mod focus_measure;
 pub mod focus_stack;
 pub mod fourier;
 pub mod hankel;
-pub mod validity;
 pub mod kernel;
+pub mod measure;
 pub mod metrics;
 pub mod normalised_ratio;
 pub mod operators;
@@ -53,8 +54,7 @@ pub mod optics;
 pub mod pipeline;
 pub mod prepare;
 pub mod psf;
-pub mod measure;
 pub mod reason;
 mod simd;
 pub mod uncertainty;
-pub mod adaptive_window;
+pub mod validity;

@@ -5,17 +5,19 @@ use std::fmt;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
+use crate::adaptive_window::{
+    Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth,
+};
 use crate::baselines::{self, BaselineError};
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
-use crate::validity::{Lost, Validity, ValiditySettings, assess};
 use crate::operators::{DesignError, Operators};
 use crate::optics::Optics;
 use crate::pipeline::{RunError, Settings, depth_from_pair, fill_border, warnings_after};
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
 use crate::reason::Reason;
-use crate::adaptive_window::{Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth};
+use crate::validity::{Lost, Validity, ValiditySettings, assess};
 
 /// Part of the pixels without depth for one reason from which it is said.
 const WORTH_SAYING: f64 = 0.002;

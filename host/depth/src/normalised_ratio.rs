@@ -179,7 +179,10 @@ mod tests {
             let otf = psf.otf(RMAX);
             for w in [0.2, 0.6, 1.0] {
                 assert!(normalised_ratio(&otf, RMAX, w, 0.0).abs() < 1e-12);
-                assert!((normalised_ratio(&otf, RMAX, w, 0.7) + normalised_ratio(&otf, RMAX, w, -0.7)).abs() < 1e-12);
+                assert!(
+                    (normalised_ratio(&otf, RMAX, w, 0.7) + normalised_ratio(&otf, RMAX, w, -0.7)).abs()
+                        < 1e-12
+                );
                 assert!(normalised_ratio(&otf, RMAX, w, 0.9) > normalised_ratio(&otf, RMAX, w, 0.3));
             }
         }

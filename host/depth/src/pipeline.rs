@@ -11,13 +11,13 @@
 //!
 //! Images may have any common gain and offset: they are normalised first. `I1` is the far-focused image.
 
+mod border_fill;
 mod check;
 mod fast;
 mod processor;
 #[cfg(test)]
 mod reference;
 mod repair;
-mod border_fill;
 
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
@@ -29,9 +29,9 @@ use crate::optics::Optics;
 pub use crate::cubic::MAX_ALPHA;
 pub use crate::depth_map::{DepthMap, SwapEvidence, Warning};
 pub use crate::simd::Backend;
+pub(crate) use border_fill::fill as fill_border;
 pub(crate) use check::{after as warnings_after, check, check_windows};
 pub use processor::Processor;
-pub(crate) use border_fill::fill as fill_border;
 
 /// Smallest width and height that can be processed: below, the operators see little but reflections.
 pub const MIN_SIDE_PX: usize = 16;

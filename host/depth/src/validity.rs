@@ -8,13 +8,13 @@
 use ndarray::{Array2, Zip};
 use serde::{Deserialize, Serialize};
 
+use crate::adaptive_window::Estimate;
 use crate::depth_map::DepthMap;
 use crate::fill::FILLED_CONFIDENCE;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::prepare::Prepared;
 use crate::reason::Reason;
-use crate::adaptive_window::Estimate;
 
 /// Largest |alpha| that is believed: a tenth beyond either focus the operators still hold to 1 mm.
 pub const LARGEST_ALPHA: f64 = 1.1;

@@ -11,15 +11,15 @@ mod shared;
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use farnear_depth::{
+    adaptive_window::Window,
     corrections::Correction,
     fill::{FillBy, refill_as_thesis},
-    validity::{Validity, Lost, lost_pixels},
+    measure::{MeasureSettings, measure_pair},
     optics::Optics,
     pipeline::{DepthMap, Settings},
     prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
-    measure::{MeasureSettings, measure_pair},
     reason::Reason,
-    adaptive_window::Window,
+    validity::{Lost, Validity, lost_pixels},
 };
 use ndarray::Array2;
 use serde::Serialize;

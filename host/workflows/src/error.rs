@@ -22,12 +22,12 @@ use farnear_depth::{
     calibrate::CalibrationError,
     corrections::CorrectionError,
     focus_stack::StackError,
+    measure::MeasureError,
     metrics::CompareError,
     operators::DesignError,
     optics::OpticsError,
     pipeline::RunError,
     prepare::{CameraError as CameraFramesError, PrepareError},
-    measure::MeasureError,
 };
 use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,

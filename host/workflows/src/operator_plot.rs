@@ -141,10 +141,9 @@ fn ratio_curves(operators: &Operators, otf: &Otf) -> (Vec<Curve>, Vec<Curve>) {
         let [a1, a3] = [fit.linear[*index], fit.cubic[*index]];
         curves(index, &|_, alpha| a1 * alpha + a3 * alpha.powi(3), colour)
     });
-    let of_optics = chosen
-        .iter()
-        .zip(COLOURS)
-        .map(|(index, colour)| curves(index, &|w, alpha| normalised_ratio::normalised_ratio(otf, max_blur_px, w, alpha), colour));
+    let of_optics = chosen.iter().zip(COLOURS).map(|(index, colour)| {
+        curves(index, &|w, alpha| normalised_ratio::normalised_ratio(otf, max_blur_px, w, alpha), colour)
+    });
     (of_fit.collect(), of_optics.collect())
 }
 

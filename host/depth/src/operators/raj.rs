@@ -48,7 +48,9 @@ pub fn design(
     let samples = Samples::new(otf, max_blur_px, prefilter, grid, &gp1);
     let first_order = |s: &Sample| samples.gp1[s.point] * s.alpha;
     let gm1 = samples.fit(|s| s.normalised_ratio, first_order)?;
-    let gp2 =
-        samples.fit(|s| s.alpha.powi(3), |s| s.normalised_ratio * samples.response(gm1.octant(), s) - first_order(s))?;
+    let gp2 = samples.fit(
+        |s| s.alpha.powi(3),
+        |s| s.normalised_ratio * samples.response(gm1.octant(), s) - first_order(s),
+    )?;
     Ok([gm1, gp1, gp2])
 }

@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 use super::fast::{Job, Maps, Tile};
-use super::{Backend, DepthMap, RunError, Settings, check, border_fill};
+use super::{Backend, DepthMap, RunError, Settings, border_fill, check};
 use crate::confidence;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::fill;

@@ -6,11 +6,11 @@
 use ndarray::Array2;
 
 use super::Backend;
+use crate::adaptive_window::{Bank, Window, WindowSettings, estimate};
 use crate::operators::Operators;
 use crate::optics::{Optics, OpticsFile};
 use crate::pipeline::{Settings, depth_from_pair};
 use crate::prepare::noise::PairNoise;
-use crate::adaptive_window::{Bank, Window, WindowSettings, estimate};
 
 /// Depth in mm and confidence by the operators, and depth in mm by adaptive windows, at every place of [`places`].
 const BY_AVX2: [[f32; 3]; 12] = [

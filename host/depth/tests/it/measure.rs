@@ -2,12 +2,14 @@
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::rig;
+use farnear_depth::adaptive_window::Window;
+use farnear_depth::measure::{
+    DepthMethod, MeasureError, MeasureSettings, Measurement, measure_pair_of_views,
+};
 use farnear_depth::operators::Operators;
 use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::prepare::{Align, Balance, PrepareError, PrepareSettings};
-use farnear_depth::measure::{Measurement, MeasureError, DepthMethod, MeasureSettings, measure_pair_of_views};
 use farnear_depth::reason::Reason;
-use farnear_depth::adaptive_window::Window;
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Renderer, Scene, View, standard, truth};
 use ndarray::Array2;
 

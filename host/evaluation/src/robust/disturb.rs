@@ -4,12 +4,12 @@ use std::io::Cursor;
 
 use anyhow::Result;
 use farnear_depth::{
+    adaptive_window::Window,
+    measure::{DepthMethod, Finding, MeasureError, MeasureSettings, Measurement, measure_pair_of_views},
     operators::Operators,
     optics::Optics,
     pipeline::{Settings, depth_from_pair},
     prepare::{CameraFrames, PrepareSettings},
-    measure::{Finding, Measurement, MeasureError, DepthMethod, MeasureSettings, measure_pair_of_views},
-    adaptive_window::Window,
 };
 use farnear_scene::{Camera, Lens, Noise, Renderer, Scene, View, truth};
 use image::codecs::jpeg::JpegEncoder;
@@ -193,7 +193,8 @@ impl Taken {
         let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() };
         let settings = MeasureSettings { prepare, window, ..MeasureSettings::default() };
         let method = if way == 0 { DepthMethod::Rational(operators) } else { DepthMethod::Whitened };
-        let found = measure_pair_of_views(self.far.view(), self.near.view(), optics, method, camera, &settings);
+        let found =
+            measure_pair_of_views(self.far.view(), self.near.view(), optics, method, camera, &settings);
         match found {
             Ok(found) => {
                 let (error_mm, valid) = self.error(&found.map.depth_mm);

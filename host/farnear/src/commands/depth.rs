@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use farnear_depth::{
+    adaptive_window::Window,
     fill::{FillBy, LowTexture},
     pipeline::{MAX_SMOOTHING_PX, Settings},
     prepare::{Align, Balance},
-    adaptive_window::Window,
 };
 use farnear_workflows::{
     depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs},

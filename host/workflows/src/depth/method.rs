@@ -2,7 +2,7 @@
 
 use std::{fmt, path::Path, str::FromStr, sync::Arc};
 
-use farnear_depth::{baselines, operators::Operators, optics::Optics, measure::DepthMethod};
+use farnear_depth::{baselines, measure::DepthMethod, operators::Operators, optics::Optics};
 
 use super::shared::Shared;
 use crate::error::{Result, WorkflowError};

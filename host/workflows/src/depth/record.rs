@@ -1,6 +1,8 @@
 //! `depth.toml`: what made a map.
 
-use farnear_depth::{validity::Lost, operators::Operators, optics::Optics, pipeline::Settings, prepare::Report};
+use farnear_depth::{
+    operators::Operators, optics::Optics, pipeline::Settings, prepare::Report, validity::Lost,
+};
 use farnear_files::map::Scale;
 use serde::Serialize;
 
