@@ -48,7 +48,7 @@ pub fn run() -> Result<()> {
     step("depth from the pair");
     let (far, near) = (path("far.png"), path("near.png"));
     // A wider median than the default: the images are noisy 8-bit ones.
-    let depth = ["depth", &far, &near, "--optics", optics, "--median", "5", "--out", &path(""), "--json"];
+    let depth = ["depth", &far, &near, "--optics", optics, "--median-px", "5", "--out", &path(""), "--json"];
     output(&mut farnear(&depth))?;
 
     step("compare with what the camera really saw");

@@ -1,4 +1,4 @@
-//! One file per command: its flags, what it does, its figures.
+//! Commands that need more than their request; the others run by [`Run`](crate::run::Run).
 
 pub mod activity;
 pub mod batch;
@@ -6,8 +6,6 @@ pub mod calibrate;
 pub mod camera;
 pub mod compare;
 pub mod completions;
-pub mod correct;
-pub mod depth;
 pub mod doctor;
 pub mod focus_stack;
 pub mod man;

@@ -10,13 +10,16 @@ mod commands;
 mod hints;
 mod render;
 mod report;
+mod run;
 mod scene;
 mod terminal;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use farnear_workflows::WorkflowError;
+use farnear_workflows::{WorkflowError, correct::CorrectRequest, depth::DepthRequest};
+
+use run::Run;
 
 /// Depth from defocus: design operators, compute depth, drive the rig.
 #[derive(Parser)]
@@ -37,11 +40,11 @@ struct Arguments {
 enum Command {
     Optics(commands::optics::Arguments),
     Operators(commands::operators::Arguments),
-    Depth(commands::depth::Arguments),
+    Depth(Run<DepthRequest>),
     FocusStack(commands::focus_stack::Arguments),
     Calibrate(commands::calibrate::Arguments),
     Camera(commands::camera::Arguments),
-    Correct(commands::correct::Arguments),
+    Correct(Run<CorrectRequest>),
     Compare(commands::compare::Arguments),
     Render(commands::render::Arguments),
     Rig(commands::rig::Arguments),
@@ -63,11 +66,11 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Optics(arguments) => commands::optics::run(arguments),
         Command::Operators(arguments) => commands::operators::run(arguments),
-        Command::Depth(arguments) => commands::depth::run(arguments),
+        Command::Depth(task) => task.run(),
         Command::FocusStack(arguments) => commands::focus_stack::run(arguments),
         Command::Calibrate(arguments) => commands::calibrate::run(arguments),
         Command::Camera(arguments) => commands::camera::run(arguments),
-        Command::Correct(arguments) => commands::correct::run(arguments),
+        Command::Correct(task) => task.run(),
         Command::Compare(arguments) => commands::compare::run(arguments),
         Command::Render(arguments) => commands::render::run(arguments),
         Command::Rig(arguments) => commands::rig::run(arguments),
@@ -109,7 +112,54 @@ fn message(error: &anyhow::Error) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use clap::CommandFactory;
+
     use super::*;
+
+    /// Options of the command line only.
+    const ONLY_HERE: [&str; 3] = ["json", "help", "version"];
+
+    #[test]
+    fn options_of_commands_are_the_fields_of_their_requests() {
+        let command = Arguments::command();
+        for task in farnear_workflows::request::TASKS {
+            let find = |command: &clap::Command, word: &str| command.find_subcommand(word).cloned();
+            let found = task.name.split(' ').try_fold(command.clone(), |command, word| find(&command, word));
+            let mut found = found.unwrap_or_else(|| panic!("no command for the task {}", task.name));
+            found.build();
+            let options: BTreeMap<_, _> = found
+                .get_arguments()
+                .filter(|option| !ONLY_HERE.contains(&option.get_id().as_str()))
+                .map(|option| (option.get_id().to_string(), option))
+                .collect();
+            let schema = (task.schema)();
+            let fields = schema["properties"].as_object().expect("a struct");
+            let names = |keys: Vec<&String>| keys.into_iter().cloned().collect::<BTreeSet<_>>();
+            assert_eq!(names(options.keys().collect()), names(fields.keys().collect()), "{}", task.name);
+            for (name, option) in options {
+                let field = &fields[&name];
+                let help = option.get_long_help().or(option.get_help()).map(ToString::to_string);
+                let help = help.unwrap_or_else(|| panic!("{}: {name} has no help", task.name));
+                let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+                let about = words(field["description"].as_str().unwrap_or_default());
+                assert_eq!(words(&help), about.trim_end_matches('.'), "{}: {name}", task.name);
+                let default = option.get_default_values().first().map(|value| value.to_string_lossy());
+                let Some(default) = default.filter(|_| option.get_num_args().is_some_and(|n| n.takes_values()))
+                else {
+                    continue;
+                };
+                let text = match &field["default"] {
+                    serde_json::Value::String(text) => text.clone(),
+                    other => other.to_string(),
+                };
+                let number = |text: &str| text.parse::<f64>().ok();
+                let same_number = number(&default).is_some_and(|given| number(&text) == Some(given));
+                assert!(default == text || same_number, "{}: {name} = {text}, {default} here", task.name);
+            }
+        }
+    }
 
     #[test]
     fn causes_are_said_once() {

@@ -66,7 +66,7 @@ pub fn context() -> Result<Context<'static>> {
         let _ = CANCEL.set(cancel); // there is one thread that starts workflows
     }
     let cancel = CANCEL.get().cloned().unwrap_or_default();
-    Ok(Context { progress: &PLAIN, questions: &PLAIN, cancel })
+    Ok(Context::new(&PLAIN, &PLAIN, cancel))
 }
 
 /// The same with counts that rise on a line of their own, where stderr is a terminal and `json` is not asked for.

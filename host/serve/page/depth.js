@@ -10,7 +10,7 @@ import * as measure from "./measure.js";
 const LAYERS = [["depth", "Depth"], ["confidence", "Confidence"], ["deviation", "Deviation"], ["far", "Far image"], ["near", "Near image"], ["surface", "3-D"]];
 const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "uncertainty.npy", far: "far.png", near: "near.png" };
 const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "" };
-const METHODS = [["ro", "Rational operators"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
+const METHODS = [["ro", "Rational operators"], ["whitened", "Whitened (noise limit)"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
 
 /** Makes the view. `open(name)` shows a capture. */
 export function make(host, remember) {
@@ -243,19 +243,21 @@ function counts({ data }, [low, high]) {
 /** The panel that computes depth anew, beside the capture's own map or in its place. */
 function compute(name, done) {
   const method = choice(METHODS, "ro", () => {});
-  const smooth = h("input", { type: "number", value: 7, min: 1, max: 63, step: 2 });
+  const smooth = h("input", { type: "number", placeholder: "default", min: 1, max: 63, step: 2 });
   const median = choice([["1", "none"], ["3", "3 × 3"], ["5", "5 × 5"], ["7", "7 × 7"]], "3", () => {});
   const filled = h("input", { type: "checkbox" });
   const corrected = h("input", { type: "checkbox" });
   const keep = h("input", { type: "checkbox" });
   const start = async () => {
     if (!name()) return;
-    const wish = { method: method.value, smooth_px: Number(smooth.value), median_px: Number(median.value), fill: filled.checked, corrected: corrected.checked };
-    if (keep.checked) wish.variant = `${method.value}-${smooth.value}-${median.value}${filled.checked ? "-filled" : ""}${corrected.checked ? "-corrected" : ""}`;
+    const wish = { method: method.value, median_px: Number(median.value), fill: filled.checked ? "surface" : null, corrected: corrected.checked };
+    if (smooth.value) wish.window = smooth.value;
+    if (["ro", "whitened"].includes(method.value)) wish.uncertainty = "estimated";
+    if (keep.checked) wish.variant = `${method.value}-${smooth.value || "default"}-${median.value}${filled.checked ? "-filled" : ""}${corrected.checked ? "-corrected" : ""}`;
     const begun = await act(`/api/captures/${name()}/depth`, wish);
     if (begun && (await ended("computation", begun.job)).phase === "done") done();
   };
-  return panel("Compute", field("Method", method), field("Smoothing", smooth, "px"), field("Median", median),
+  return panel("Compute", field("Method", method), field("Window", smooth, "px"), field("Median", median),
     h("label", { class: "check" }, filled, "fill low texture"), h("label", { class: "check" }, corrected, "correction of this session"),
     h("label", { class: "check" }, keep, "keep beside, to compare"),
     button("Compute depth", start));

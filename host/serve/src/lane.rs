@@ -185,7 +185,7 @@ fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
     let Begun { job, cancel, work } = begun;
     app.note(job.title.clone());
     let face = Face { app, place, counted: Mutex::default() };
-    let context = Context { progress: &face, questions: &face, cancel };
+    let context = Context::new(&face, &face, cancel);
     let ended = work(app, &context);
     // The rig may have told of the stop before the work saw the wish.
     let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();

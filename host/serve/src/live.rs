@@ -37,7 +37,7 @@ pub fn look(app: &App) {
     if rig.is_none() && !app.has_camera_alone() {
         return;
     }
-    let context = Context { progress: &Nobody, questions: &Nobody, cancel: live.cancel.clone() };
+    let context = Context::new(&Nobody, &Nobody, live.cancel.clone());
     let rate = Rate::default();
     let ended = match (live.mode, rig) {
         (LiveMode::Off, _) => return,

@@ -64,7 +64,8 @@ fn connect(app: &App) {
         state.rig.error = None;
     });
     app.set_rig(None);
-    let context = Context { progress: &ToLog(app), questions: &Nobody, cancel: Cancel::default() };
+    let log = ToLog(app);
+    let context = Context::new(&log, &Nobody, Cancel::default());
     let opened =
         GivenOptics::read(&app.optics_file()).and_then(|optics| OpenRig::open(address, &optics, &context));
     match opened {

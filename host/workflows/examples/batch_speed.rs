@@ -10,12 +10,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_depth::pipeline::Settings;
 use farnear_files::image_file::encode_png;
 use farnear_workflows::{
     Context,
     batch::{self, BatchSettings},
-    depth::{self, DepthSettings, Shared},
+    depth::DepthRequest,
+    request::Request,
 };
 use ndarray::Array2;
 
@@ -39,15 +39,15 @@ fn main() -> Result<()> {
     fs::write(root.join("optics.toml"), OPTICS)?;
     (0..pairs).try_for_each(|number| pair(&root, number))?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let shared = Shared::default();
+    let context = Context::unattended();
     // Operators are designed, files are in the system's cache.
-    one.install(|| by_loop(&root, 0..BLOCK.min(pairs), &shared, "warm"))?;
+    one.install(|| by_loop(&root, 0..BLOCK.min(pairs), &context, "warm"))?;
     let (mut of_batch, mut of_loop) = (Vec::new(), Vec::new());
     for begin in (0..pairs).step_by(BLOCK) {
         let block = begin..(begin + BLOCK).min(pairs);
         let count = block.len() as f64;
         let start = processor_seconds()?;
-        one.install(|| by_loop(&root, block.clone(), &shared, "loop"))?;
+        one.install(|| by_loop(&root, block.clone(), &context, "loop"))?;
         let middle = processor_seconds()?;
         by_batch(&root, block)?;
         of_loop.push((middle - start) / count);
@@ -84,31 +84,20 @@ fn pair(root: &Path, number: usize) -> Result<()> {
 fn by_loop(
     root: &Path,
     numbers: std::ops::Range<usize>,
-    shared: &Shared,
+    context: &Context<'_>,
     to: &str,
 ) -> farnear_workflows::Result<()> {
-    let context = Context::unattended();
     for number in numbers {
-        let settings = DepthSettings {
+        let request = DepthRequest {
             far: root.join(format!("far{number}.png")),
             near: root.join(format!("near{number}.png")),
             optics: Some(root.join("optics.toml")),
-            psf: None,
-            operators: None,
-            method: Default::default(),
-            computation: Settings::default(),
-            window: None,
-            align: Default::default(),
-            balance: Default::default(),
-            region: None,
-            camera: None,
-            min_confidence: 0.0,
-            correction: None,
-            uncertainty: None,
+            threads: 1,
             write: WRITE.parse().unwrap_or_default(),
             out: Some(root.join(to).join(number.to_string())),
+            ..DepthRequest::default()
         };
-        depth::compute_sharing(&settings, shared, &context)?;
+        request.run(context)?;
     }
     Ok(())
 }

@@ -32,16 +32,12 @@ use self::{
     tally::Tally,
 };
 use crate::{
-    activity::recognition::Model,
+    cache::Cache,
     context::{Cancel, Context, Nobody, Progress},
-    depth,
     error::Result,
     figures::rounded,
-    kept::{Kept, Stamp},
 };
 
-/// Models of activities that are kept from job to job.
-const MODELS: usize = 2;
 /// Warnings of one job that are reported.
 const WARNINGS_MAX: usize = 20;
 
@@ -158,31 +154,6 @@ pub struct BatchFigures {
     pub seconds: f64,
 }
 
-/// What jobs have in common.
-#[derive(Default)]
-struct Shared {
-    depth: depth::Shared,
-    sums: Sums,
-    models: Models,
-}
-
-/// By path, and by what lies there; nothing does where the path is the name of a model that comes with the program.
-struct Models(Kept<(PathBuf, Option<Stamp>), Model>);
-
-impl Default for Models {
-    fn default() -> Self {
-        Self(Kept::new(MODELS))
-    }
-}
-
-impl Shared {
-    /// As [`Model::read`].
-    fn model(&self, path: &Path) -> Result<Arc<Model>> {
-        let stamp = Model::file(path).map(|path| Stamp::of("the model", path)).transpose()?;
-        self.models.0.get((path.into(), stamp), || Model::read(path))
-    }
-}
-
 /// Does the jobs of a manifest; `on_job` is told of each as it ends, one at a time.
 ///
 /// # Errors
@@ -202,7 +173,8 @@ pub fn run(
         begun: SystemTime::now(),
         base: settings.manifest.parent().unwrap_or(Path::new("")).to_path_buf(),
         manifest: Mutex::new(Manifest::open(&settings.manifest)?),
-        shared: Shared::default(),
+        sums: Sums::default(),
+        cache: Arc::clone(&context.cache),
         tally: &tally,
         cancel: &context.cancel,
         stop: Cancel::default(),
@@ -237,7 +209,8 @@ struct Work<'a> {
     begun: SystemTime,
     base: PathBuf,
     manifest: Mutex<Manifest>,
-    shared: Shared,
+    sums: Sums,
+    cache: Arc<Cache>,
     tally: &'a Tally<'a>,
     cancel: &'a Cancel,
     /// One thread's wish that the others stop.
@@ -301,7 +274,8 @@ impl Work<'_> {
             Err(error) => (String::new(), Fields::default(), Some(error)),
         };
         let warnings = Warnings::default();
-        let context = Context { progress: &warnings, questions: &Nobody, cancel: self.cancel.clone() };
+        let cache = Arc::clone(&self.cache);
+        let context = Context { cache, ..Context::new(&warnings, &Nobody, self.cancel.clone()) };
         let out = fields.optional_text("out").ok().flatten();
         let ended = match unreadable {
             Some(error) => Err(error.into()),
@@ -324,15 +298,17 @@ impl Work<'_> {
 
     fn job(&self, kind: &str, fields: &mut Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
         let kind = jobs::kind(kind)?;
+        let wanted = fields.clone();
+        let out = fields.path("out")?;
         let work = (kind.work)(fields)?;
         fields.all_taken()?;
-        let input = self.shared.sums.of(&work.inputs(), &self.base)?;
-        let wanted = Provenance::new(kind.name, fields, input);
-        let place = Place::new(fields.path("out")?, kind.makes_file);
+        let input = self.sums.of(&work.inputs(), &self.base)?;
+        let wanted = Provenance::new(kind.name, &wanted, input);
+        let place = Place::new(out, kind.makes_file);
         match place.look(&wanted, self.begun, self.settings.verify)? {
             Found::Done => Ok((State::Already, None)),
             Found::ToDo => {
-                let figures = place.fill(wanted, |out| work.run(out, &self.shared, context))?;
+                let figures = place.fill(wanted, |out| work.run(out, context))?;
                 Ok((State::Done, Some(figures)))
             }
         }

@@ -11,7 +11,10 @@ use std::{
     time::Duration,
 };
 
-use crate::error::{Result, WorkflowError};
+use crate::{
+    cache::Cache,
+    error::{Result, WorkflowError},
+};
 
 /// Told what is being done.
 pub trait Progress: Sync {
@@ -77,11 +80,18 @@ pub struct Context<'a> {
     pub progress: &'a dyn Progress,
     /// Asked what only a person can tell or do.
     pub questions: &'a dyn Questions,
-    /// The wish to stop.
+    /// Cancellation.
     pub cancel: Cancel,
+    /// Operators, corrections and models that tasks share.
+    pub cache: Arc<Cache>,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// A context with an empty cache.
+    pub fn new(progress: &'a dyn Progress, questions: &'a dyn Questions, cancel: Cancel) -> Self {
+        Self { progress, questions, cancel, cache: Arc::default() }
+    }
+
     /// A step in words.
     pub fn say(&self, what: &str) {
         self.progress.say(what);
@@ -105,7 +115,7 @@ impl Questions for Nobody {
 impl Context<'static> {
     /// For work that nobody watches.
     pub fn unattended() -> Self {
-        Self { progress: &Nobody, questions: &Nobody, cancel: Cancel::default() }
+        Self::new(&Nobody, &Nobody, Cancel::default())
     }
 }
 

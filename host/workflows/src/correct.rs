@@ -6,26 +6,53 @@ use farnear_files::{
     map::{self, Format},
     staging,
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     context::Context,
     correction_file,
     error::{Result, WorkflowError},
     figures::rounded,
+    request::{PathKind, Request},
 };
 
-/// What is corrected, with what, and where it goes.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct CorrectSettings {
-    /// The depth map in mm, `.npy` or float TIFF.
+/// Correct a depth map with what `farnear calibrate correction` learned.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear correct depth.npy --correction correction.toml --out corrected.npy")
+)]
+#[serde(default)]
+pub struct CorrectRequest {
+    /// The depth map in mm, .npy or float .tiff.
     pub depth: PathBuf,
-    /// The file of the correction.
+    /// The correction.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub correction: PathBuf,
-    /// Where the corrected map goes: `.npy` or `.tiff`.
+    /// The corrected map: .npy or .tiff.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEPTH"))]
     pub out: PathBuf,
-    /// Whether to calculate in the board's fixed-point arithmetic.
+    /// Compute in the board's fixed-point arithmetic, bit for bit (corrections that the board has only).
+    #[cfg_attr(feature = "clap", arg(long))]
     pub as_board: bool,
+}
+
+impl Request for CorrectRequest {
+    const NAME: &'static str = "correct";
+    const REQUIRED: &'static [&'static str] = &["depth", "correction", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("depth", PathKind::Input), ("correction", PathKind::Input), ("out", PathKind::OutputFile)];
+    type Figures = CorrectFigures;
+
+    fn check(&self) -> Result<()> {
+        format_of(&self.out).map(|_| ())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<CorrectFigures> {
+        apply(self, context)
+    }
 }
 
 /// What the correction did.
@@ -53,7 +80,7 @@ pub fn format_of(out: &Path) -> Result<Format> {
 /// # Errors
 /// [`WorkflowError::Parameter`] for a place with another ending; correction and map that cannot be read or do not belong
 /// together.
-pub fn apply(settings: &CorrectSettings, context: &Context<'_>) -> Result<CorrectFigures> {
+pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<CorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;
     let depth = map::read(&settings.depth)?;

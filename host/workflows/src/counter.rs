@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn counts_rise_by_one_whoever_counts() {
         let heard = Heard::default();
-        let context = Context { progress: &heard, questions: &Nobody, cancel: Cancel::default() };
+        let context = Context::new(&heard, &Nobody, Cancel::default());
         let counter = Counter::new(&context, "clips");
         (0..100).into_par_iter().for_each(|_| counter.one(Some(100)));
         let expected: Vec<_> = (1..=100).map(|done| (done, Some(100))).collect();

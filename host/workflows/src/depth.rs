@@ -6,14 +6,13 @@ pub mod output;
 mod pair;
 pub mod part;
 mod record;
-mod shared;
 
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use farnear_depth::{
     adaptive_window::Window,
     corrections::Correction,
-    fill::{FillBy, refill_as_thesis},
+    fill::{FillBy, LowTexture, refill_as_thesis},
     measure::{MeasureSettings, measure_pair},
     optics::Optics,
     pipeline::{DepthMap, Settings},
@@ -22,7 +21,9 @@ use farnear_depth::{
     validity::{Lost, Validity, lost_pixels},
 };
 use ndarray::Array2;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
     context::Context,
@@ -31,6 +32,7 @@ use crate::{
     measure::Rectangle,
     optics,
     psf::PsfSource,
+    request::{self, PathKind, Request},
 };
 use farnear_files::image_file::Samples;
 use method::{Method, Prepared};
@@ -39,115 +41,151 @@ use output::{Outputs, Results};
 use pair::Pair;
 use part::{AROUND_PX, Cut};
 
-pub use shared::Shared;
-
-/// What depth is computed from, how, and where it goes.
-#[derive(Clone, Debug)]
-pub struct DepthSettings {
-    /// The far-focused image: PNG, TIFF (8, 16 bit, float), JPEG or PGM.
+/// Compute a depth map from a far- and a near-focused image.
+///
+/// Writes depth.npy and depth.tiff (mm, NaN = no value), depth.png (16 bit), confidence.npy (0 to 1), mesh.ply, view.png
+/// (a picture with a scale), reason.png (0 = a depth, else why there is none, as listed in depth.toml), depth.toml (settings and
+/// origin of the map) and, with --uncertainty, uncertainty.npy (mm).
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear depth far.png near.png --optics optics.toml --out depth/")
+)]
+#[serde(default)]
+pub struct DepthRequest {
+    /// The image focused on the far plane: PNG, TIFF (8, 16 bit, float), JPEG or PGM.
     pub far: PathBuf,
-    /// The near-focused image.
+    /// The image focused on the near plane.
     pub near: PathBuf,
-    /// The optics file; without it what `capture.toml` or `optics.toml` beside the far image says.
+    /// The optics file [default: capture.toml or optics.toml in the folder of the far image].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: Option<PathBuf>,
-    /// Point spread function in place of that of the optics.
+    /// Point spread function, instead of the optics file's: pillbox, gaussian:k=K, generalised:p=P,k=K, ring:inner=I, or an
+    /// image of the PSF or of a coded aperture: FILE.png, .tiff or .npy; FILE,radius=PX if the blur radius is not half its
+    /// shorter side.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PSF|FILE"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
     pub psf: Option<PsfSource>,
-    /// Name (family:design) or file of the operators; without it they are designed for the optics.
+    /// Rational operators: a name such as gro:linear (family:design), or a file saved by `farnear operators`
+    /// [default: designed for the optics].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME|FILE"))]
     pub operators: Option<PathBuf>,
-    /// How.
+    /// Method: ro (rational operators), whitened (operators at the noise limit), or for comparison subbarao, subbarao-fourier or
+    /// favaro.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
     pub method: Method,
-    /// Windows, filling and threads.
-    pub computation: Settings,
-    /// Over how many pixels evidence is summed; without it adaptive windows for whitened operators, and the computation's
-    /// smoothing for the others.
+    /// Window over which evidence is summed: an odd number of pixels from 1 to 63, adaptive (the largest of 7, 13 and 21 that agrees
+    /// with the smaller ones), or safe (the smallest of 9, 13 and 21 that is certain enough)
+    /// [default: adaptive for whitened, 7 otherwise].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX|adaptive|safe"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
     pub window: Option<Window>,
-    /// How the near image is laid on the far one.
+    /// Side of the median window in pixels: 1, 3, 5 or 7.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().median_px))]
+    pub median_px: usize,
+    /// Registration of the near image to the far one: auto (a similarity if a significant one is found), none, optics (the
+    /// magnification of a lens that is not telecentric), shift, similarity or affine.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "METHOD", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
     pub align: Align,
-    /// How both are brought to one brightness.
+    /// Brightness matching of the two images: auto (a gain, or one that varies over the image, if significant), none, gain or local.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "METHOD", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
     pub balance: Balance,
-    /// The part of the images whose depth is wanted; without it all of them.
+    /// Part of the images: column, row, width and height in pixels. Maps have its size; depth.toml gives its position.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "X,Y,W,H"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
     pub region: Option<Rectangle>,
-    /// Folder with the camera's dark and flat frames.
-    pub camera: Option<PathBuf>,
-    /// Confidence, 0 to 1, below which a depth is taken away.
+    /// Folder with the camera's dark and flat frames, from `farnear calibrate camera`.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
+    pub camera_frames: Option<PathBuf>,
+    /// Remove depths with a lower confidence, 0 to 1. Confidence is the probability that a depth is off by less than three
+    /// of its standard deviations.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "C", default_value_t = Self::default().min_confidence))]
     pub min_confidence: f32,
-    /// The file of a correction that the map goes through.
+    /// Correction saved by `farnear calibrate correction`, applied to the map.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub correction: Option<PathBuf>,
-    /// Whether the standard deviation of each depth is wanted, and from what noise.
+    /// Fill regions of low texture: surface (interpolate what surrounds them), or for comparison thesis (one region after the other
+    /// and after any --correction, each with a polynomial fitted to the rectangle around it).
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "METHOD", num_args = 0..=1, require_equals = true, default_missing_value = "surface")
+    )]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub fill: Option<FillBy>,
+    /// Criterion of low texture for --fill: energy (less than a twentieth of the median), or for comparison the thesis'
+    /// variance:T (the variance of (far - near) / (far + near) over the window is below T; without :T 0.0144).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CRITERION", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub low_texture: LowTexture,
+    /// Write uncertainty.npy: the standard deviation of each depth in mm for noise that is estimated from the pair, or for
+    /// the camera's noise, --uncertainty=camera:full_well_e=20000,read_noise_e=12 (add bits=12 if the file has more bits). Methods ro
+    /// and whitened only.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "NOISE", num_args = 0..=1, require_equals = true, default_missing_value = "estimated")
+    )]
+    #[serde_as(as = "Option<DisplayFromStr>")]
     pub uncertainty: Option<CameraNoise>,
-    /// What is written.
+    /// Threads; 0 = all cores.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().threads))]
+    pub threads: usize,
+    /// Outputs, comma separated: npy, tiff, png, mesh, view and exr (depth.exr: OpenEXR with depth Z in mm, confidence, standard
+    /// deviation).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "LIST", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
     pub write: Outputs,
-    /// Folder for the results; without it the folder of a capture, else `depth` beside the far image.
+    /// Folder for the results [default: the folder of a capture, else depth/ in the folder of the far image].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: Option<PathBuf>,
 }
 
-/// What there is to say of a map.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct DepthFigures {
-    /// For the depth, its deviation and its correction, without reading and writing.
-    pub seconds: f64,
-    /// Pixels across.
-    pub width: usize,
-    /// Pixels down.
-    pub height: usize,
-    /// Median of the depths that there are; NaN where there are none.
-    pub median_mm: f64,
-    /// Part of the pixels with too little texture.
-    pub low_texture_fraction: f64,
-    /// Part of the pixels that have a depth.
-    pub valid_fraction: f64,
-    /// Figures of the standard deviation, where it was wanted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uncertainty: Option<Uncertainty>,
-    /// What the user was warned of.
-    pub warnings: Vec<String>,
-}
-
-/// Computes a depth map and writes it; the folder gets all files or, after a failure or a cancellation, none.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for what contradicts itself, before anything is read; then optics, images, operators,
-/// correction, computation, files.
-pub fn compute(settings: &DepthSettings, context: &Context<'_>) -> Result<DepthFigures> {
-    compute_sharing(settings, &Shared::default(), context)
-}
-
-/// The same for one of many maps, which share what they are computed with.
-///
-/// # Errors
-/// As [`compute`].
-pub fn compute_sharing(
-    settings: &DepthSettings,
-    shared: &Shared,
-    context: &Context<'_>,
-) -> Result<DepthFigures> {
-    settings.check()?;
-    let mut inputs = Inputs::read(settings, shared, context)?;
-    let start = Instant::now();
-    let computed = inputs.compute(settings, context)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let warnings = pair::warnings(computed.findings.clone(), &settings.far, &settings.near);
-    for warning in &warnings {
-        context.progress.warn(warning);
+impl Default for DepthRequest {
+    fn default() -> Self {
+        Self {
+            far: PathBuf::new(),
+            near: PathBuf::new(),
+            optics: None,
+            psf: None,
+            operators: None,
+            method: Method::default(),
+            window: None,
+            median_px: 3,
+            align: Align::default(),
+            balance: Balance::default(),
+            region: None,
+            camera_frames: None,
+            min_confidence: 0.0,
+            correction: None,
+            fill: None,
+            low_texture: LowTexture::default(),
+            uncertainty: None,
+            threads: 0,
+            write: Outputs::default(),
+            out: None,
+        }
     }
-    let out = settings.out.clone().unwrap_or_else(|| pair::default_folder(&settings.far));
-    Results::new(settings, &inputs, &computed, &warnings)?.write(&out, context)?;
-    context.say(&format!("wrote {}", out.display()));
-    let (height, width) = computed.map.depth_mm.dim();
-    Ok(DepthFigures {
-        seconds: rounded(seconds, 6),
-        width,
-        height,
-        median_mm: rounded(median(&computed.map.depth_mm), 3),
-        low_texture_fraction: rounded(computed.map.low_texture_fraction, 6),
-        valid_fraction: rounded(valid_fraction(&computed.map.depth_mm), 6),
-        uncertainty: computed.deviation.map(|(_, found)| found),
-        warnings,
-    })
 }
 
-impl DepthSettings {
-    /// Finds what contradicts itself.
+impl Request for DepthRequest {
+    const NAME: &'static str = "depth";
+    const REQUIRED: &'static [&'static str] = &["far", "near"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[
+        ("far", PathKind::Input),
+        ("near", PathKind::Input),
+        ("optics", PathKind::Input),
+        ("operators", PathKind::InputOrName),
+        ("psf", PathKind::InputOrName),
+        ("correction", PathKind::Input),
+        ("camera_frames", PathKind::Input),
+        ("out", PathKind::OutputFolder),
+    ];
+    type Figures = DepthFigures;
+
     fn check(&self) -> Result<()> {
         if !(0.0..=1.0).contains(&self.min_confidence) {
             return Err(WorkflowError::parameter(
@@ -155,6 +193,13 @@ impl DepthSettings {
                 self.min_confidence,
                 "a probability, 0 to 1",
             ));
+        }
+        if ![1, 3, 5, 7].contains(&self.median_px) {
+            return Err(WorkflowError::parameter("median-px", self.median_px, "1, 3, 5 or 7 pixels"));
+        }
+        if self.fill.is_none() && self.low_texture != LowTexture::default() {
+            let expected = "it defines the regions that `fill` fills: give `fill` too";
+            return Err(WorkflowError::parameter("low-texture", self.low_texture, expected));
         }
         if let (Method::Whitened, Some(asked)) = (self.method, &self.operators) {
             return Err(WorkflowError::parameter("operators", asked.display(), "method whitened uses none"));
@@ -185,6 +230,110 @@ impl DepthSettings {
         }
         Ok(())
     }
+
+    fn run(&self, context: &Context<'_>) -> Result<DepthFigures> {
+        compute(self, context)
+    }
+
+    fn inputs(&self) -> Vec<PathBuf> {
+        let mut inputs = request::inputs(self);
+        if self.optics.is_none() {
+            inputs.extend(optics::file_of_pair(None, &self.far));
+        }
+        inputs
+    }
+}
+
+/// What there is to say of a map.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct DepthFigures {
+    /// For the depth, its deviation and its correction, without reading and writing.
+    pub seconds: f64,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Median of the depths that there are; NaN where there are none.
+    pub median_mm: f64,
+    /// Part of the pixels with too little texture.
+    pub low_texture_fraction: f64,
+    /// Part of the pixels that have a depth.
+    pub valid_fraction: f64,
+    /// Figures of the standard deviation, where it was wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
+    /// What the user was warned of.
+    pub warnings: Vec<String>,
+}
+
+/// Computes a depth map and writes it; the folder gets all files or, after a failure or a cancellation, none.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for what contradicts itself, before anything is read; then optics, images, operators,
+/// correction, computation, files.
+pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
+    settings.check()?;
+    let mut inputs = Inputs::read(settings, context)?;
+    let start = Instant::now();
+    let computed = inputs.compute(settings, context)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let warnings = pair::warnings(computed.findings.clone(), &settings.far, &settings.near);
+    for warning in &warnings {
+        context.progress.warn(warning);
+    }
+    let out = settings.out.clone().unwrap_or_else(|| pair::default_folder(&settings.far));
+    Results::new(settings, &inputs, &computed, &warnings)?.write(&out, context)?;
+    context.say(&format!("wrote {}", out.display()));
+    let (height, width) = computed.map.depth_mm.dim();
+    Ok(DepthFigures {
+        seconds: rounded(seconds, 6),
+        width,
+        height,
+        median_mm: rounded(median(&computed.map.depth_mm), 3),
+        low_texture_fraction: rounded(computed.map.low_texture_fraction, 6),
+        valid_fraction: rounded(valid_fraction(&computed.map.depth_mm), 6),
+        uncertainty: computed.deviation.map(|(_, found)| found),
+        warnings,
+    })
+}
+
+impl DepthRequest {
+    /// Windows, filling and threads as the library takes them.
+    pub fn computation(&self) -> Settings {
+        let usual = Settings::default();
+        Settings {
+            smoothing_px: match self.window {
+                Some(Window::Fixed(side)) => side,
+                _ => usual.smoothing_px,
+            },
+            median_px: self.median_px,
+            fill: self.fill.is_some(),
+            fill_by: self.fill.unwrap_or_default(),
+            low_texture: self.low_texture,
+            threads: self.threads,
+            ..usual
+        }
+    }
+
+    fn prepare(&self) -> PrepareSettings {
+        PrepareSettings { align: self.align, balance: self.balance, ..PrepareSettings::default() }
+    }
+
+    /// What [`measure_pair`] takes, for images whose limits and noise are not known.
+    pub fn measure(&self) -> MeasureSettings {
+        let run = self.computation();
+        let usual = match self.method {
+            Method::Whitened => Window::Adaptive,
+            Method::RationalOperators | Method::Baseline(_) => Window::Fixed(run.smoothing_px),
+        };
+        MeasureSettings {
+            prepare: self.prepare(),
+            window: self.window.unwrap_or(usual),
+            run,
+            least_confidence: self.min_confidence,
+        }
+    }
+
 }
 
 /// What was read and checked.
@@ -216,7 +365,7 @@ struct Computed {
 }
 
 impl Inputs {
-    fn read(settings: &DepthSettings, shared: &Shared, context: &Context<'_>) -> Result<Self> {
+    fn read(settings: &DepthRequest, context: &Context<'_>) -> Result<Self> {
         let (optics, doubts) = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
         let (optics, doubts) = match &settings.psf {
             // What there is to doubt then is that there was none.
@@ -229,12 +378,12 @@ impl Inputs {
         let mut pair = Pair::read(&settings.far, &settings.near)?;
         let around = optics.distortion().is_none().then_some(AROUND_PX);
         let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
-        let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, shared)?;
-        let correction = settings.correction.as_deref().map(|file| shared.correction(file)).transpose()?;
+        let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, &context.cache)?;
+        let correction = settings.correction.as_deref().map(|file| context.cache.correction(file)).transpose()?;
         if let Some(correction) = &correction {
             correction.check_range(&optics.working_range())?;
         }
-        let camera = settings.camera.as_deref().map(|folder| shared.camera(folder)).transpose()?;
+        let camera = settings.camera_frames.as_deref().map(|folder| context.cache.camera(folder)).transpose()?;
         let camera = match (camera, &cut) {
             (Some(frames), Some(cut)) => Some(Arc::new(cut.frames(&frames)?)),
             (camera, _) => camera,
@@ -243,7 +392,7 @@ impl Inputs {
     }
 
     /// Takes the images, which nothing needs afterwards.
-    fn compute(&mut self, settings: &DepthSettings, context: &Context<'_>) -> Result<Computed> {
+    fn compute(&mut self, settings: &DepthRequest, context: &Context<'_>) -> Result<Computed> {
         let cancel = |during| context.cancel.check(during);
         cancel("reading the pair")?;
         let real = self.settings(settings);
@@ -297,33 +446,13 @@ impl Inputs {
         Ok(Computed { map, deviation, reasons, lost, image, report, window: real.window, findings })
     }
 
-    /// As the library takes them.
-    fn settings(&self, settings: &DepthSettings) -> MeasureSettings {
-        let usual = match settings.method {
-            Method::Whitened => Window::Adaptive,
-            Method::RationalOperators | Method::Baseline(_) => {
-                Window::Fixed(settings.computation.smoothing_px)
-            }
-        };
-        let window = settings.window.unwrap_or(usual);
-        let smoothing_px =
-            if let Window::Fixed(side) = window { side } else { settings.computation.smoothing_px };
+    fn settings(&self, request: &DepthRequest) -> MeasureSettings {
         let limits = match self.pair.samples {
             Samples::Integer(_) => Some([0.0, 1.0]),
             Samples::Float => None,
         };
-        MeasureSettings {
-            prepare: PrepareSettings {
-                align: settings.align,
-                balance: settings.balance,
-                limits,
-                trust: false,
-                noise: settings.uncertainty.and_then(|noise| noise.of_camera(self.pair.samples)),
-            },
-            window,
-            run: Settings { smoothing_px, ..settings.computation },
-            least_confidence: settings.min_confidence,
-        }
+        let noise = request.uncertainty.and_then(|noise| noise.of_camera(self.pair.samples));
+        MeasureSettings { prepare: PrepareSettings { limits, noise, ..request.prepare() }, ..request.measure() }
     }
 }
 
@@ -370,7 +499,7 @@ mod tests {
                           [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
 
     /// A pair whose names contradict its order, so that a warning stands between computing and writing.
-    fn settings(folder: &Path) -> DepthSettings {
+    fn settings(folder: &Path) -> DepthRequest {
         fs::write(folder.join("optics.toml"), OPTICS).unwrap();
         for (name, spread) in [("near.png", 1), ("far.png", 2)] {
             // A texture, and the mean of it over some pixels.
@@ -381,25 +510,7 @@ mod tests {
             });
             fs::write(folder.join(name), encode_png(pixels.view(), 8).unwrap()).unwrap();
         }
-        DepthSettings {
-            far: folder.join("near.png"),
-            near: folder.join("far.png"),
-            optics: None,
-            psf: None,
-            operators: None,
-            method: Method::default(),
-            computation: Settings::default(),
-            window: None,
-            align: Align::default(),
-            balance: Balance::default(),
-            region: None,
-            camera: None,
-            min_confidence: 0.0,
-            correction: None,
-            uncertainty: None,
-            write: Outputs::default(),
-            out: None,
-        }
+        DepthRequest { far: folder.join("near.png"), near: folder.join("far.png"), ..DepthRequest::default() }
     }
 
     fn names(folder: &Path) -> Vec<String> {
@@ -428,7 +539,7 @@ mod tests {
         early.cancel.cancel();
         let late = Cancel::default();
         let impatient = Impatient(late.clone());
-        let late = Context { progress: &impatient, questions: &Nobody, cancel: late };
+        let late = Context::new(&impatient, &Nobody, late);
         for (context, stage) in [(&early, "reading the pair"), (&late, "writing the results")] {
             let error = compute(&settings, context).unwrap_err();
             assert!(matches!(&error, WorkflowError::Cancelled { during } if during == stage), "{error}");
@@ -442,10 +553,10 @@ mod tests {
     fn what_a_method_has_no_use_for_is_bad_usage() {
         let folder = tempfile::tempdir().unwrap();
         let other = Method::Baseline(farnear_depth::baselines::Method::Subbarao);
-        let settings = DepthSettings { method: other, ..settings(folder.path()) };
+        let settings = DepthRequest { method: other, ..settings(folder.path()) };
         for settings in [
-            DepthSettings { operators: Some("gro".into()), ..settings.clone() },
-            DepthSettings { uncertainty: Some(CameraNoise::Estimated), ..settings },
+            DepthRequest { operators: Some("gro".into()), ..settings.clone() },
+            DepthRequest { uncertainty: Some(CameraNoise::Estimated), ..settings },
         ] {
             let error = compute(&settings, &Context::unattended()).unwrap_err();
             assert!(error.is_usage(), "{error}");

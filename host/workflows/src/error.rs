@@ -50,6 +50,9 @@ pub enum WorkflowError {
         /// What was expected.
         expected: String,
     },
+    /// A field of a request.
+    #[error(transparent)]
+    Request(#[from] crate::request::RequestError),
     /// A file that does not hold what it should.
     #[error("{} does not hold {expected}: {reason}", path.display())]
     File {
@@ -340,7 +343,7 @@ impl WorkflowError {
     /// Whether what was asked for was wrong, and not the world: nothing has been done.
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Parameter { .. } => true,
+            Self::Parameter { .. } | Self::Request(_) => true,
             Self::About { source, .. } => source.is_usage(),
             _ => false,
         }

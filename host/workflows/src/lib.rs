@@ -45,7 +45,7 @@
 //! let face = Face::default();
 //! // Whoever holds a clone of `cancel` can stop the rig, from any thread.
 //! let cancel = Cancel::default();
-//! let context = Context { progress: &face, questions: &Nobody, cancel: cancel.clone() };
+//! let context = Context::new(&face, &Nobody, cancel.clone());
 //! let moved = rig::motion::move_to(&settings, &context)?;
 //! assert!(matches!(moved, rig::motion::MoveFigures::One(lens) if lens.measured_um == 1_000.125));
 //! assert!(face.0.lock().expect("one thread").iter().any(|said| said.starts_with("homing the lens stage")));
@@ -59,6 +59,7 @@
 
 pub mod activity;
 pub mod batch;
+pub mod cache;
 pub mod calibrate;
 pub mod camera;
 pub mod camera_frames;
@@ -73,7 +74,6 @@ pub mod doctor;
 pub mod error;
 pub mod figures;
 pub mod focus_stack;
-mod kept;
 pub mod lens_table;
 pub mod measure;
 pub mod operator_cache;
@@ -84,6 +84,7 @@ mod parameters;
 pub mod picture;
 pub mod psf;
 pub mod report;
+pub mod request;
 pub mod rig;
 pub mod sessions;
 pub mod shadow;

@@ -77,6 +77,12 @@ pub struct Rectangle {
 #[error("expected column, row, width and height in pixels, such as 100,80,320,240")]
 pub struct NoRectangle;
 
+impl std::fmt::Display for Rectangle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{},{},{},{}", self.x, self.y, self.width, self.height)
+    }
+}
+
 impl std::str::FromStr for Rectangle {
     type Err = NoRectangle;
 

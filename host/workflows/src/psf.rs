@@ -54,24 +54,19 @@ impl std::str::FromStr for PsfSource {
     }
 }
 
+impl std::fmt::Display for PsfSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Named(psf) => psf.fmt(f),
+            Self::Image { file, radius_px } => {
+                file.display().fmt(f)?;
+                radius_px.map_or(Ok(()), |radius| write!(f, ",radius={radius}"))
+            }
+        }
+    }
+}
+
 impl PsfSource {
-    /// The file that is read, if one is.
-    pub fn file(&self) -> Option<&Path> {
-        match self {
-            Self::Named(_) => None,
-            Self::Image { file, .. } => Some(file),
-        }
-    }
-
-    /// The same with its file beside `base`, unless its path is absolute.
-    #[must_use]
-    pub fn relative_to(self, base: &Path) -> Self {
-        match self {
-            Self::Image { file, radius_px } => Self::Image { file: base.join(file), radius_px },
-            named => named,
-        }
-    }
-
     /// The point spread function. What is not round in an image is averaged over the circle, with a warning where that is
     /// much.
     ///

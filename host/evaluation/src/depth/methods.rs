@@ -122,7 +122,7 @@ fn noise_against_support(page: &mut Page) -> Result<()> {
     const WINDOWS_PX: [usize; 4] = [7, 11, 15, 21];
     page.paragraph(
         "Favaro's method is the better one under noise with a window of 7 px: each of its 7x7 patches is projected as a whole, and it was taught textures like \
-         these. What a wider window (`--smooth`) buys, Gaussian PSF, 6 planes and the cone, clean / 8-bit (`ro` needs 5 to 10 ms for a pair, `favaro` about a second):",
+         these. What a wider window (`--window`) buys, Gaussian PSF, 6 planes and the cone, clean / 8-bit (`ro` needs 5 to 10 ms for a pair, `favaro` about a second):",
     );
     let lens = rig::lens(false)?;
     let prepared = Prepared::new(PSF)?;

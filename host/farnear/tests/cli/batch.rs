@@ -51,7 +51,7 @@ fn pairs(folder: &Folder, jobs: usize) -> String {
     succeeds(farnear(&["render", "--optics", rig_optics(), "--out", &folder.text("pair")]).args(size));
     let mut text = String::from("[depth]\nfar = 'pair/far.png'\nnear = 'pair/near.png'\nwrite = 'npy'\n");
     for job in 0..jobs {
-        text += &format!("[[job]]\ndo = 'depth'\nsmooth = {}\nout = 'maps/{job}'\n", 2 * (job % 8) + 3);
+        text += &format!("[[job]]\ndo = 'depth'\nwindow = {}\nout = 'maps/{job}'\n", 2 * (job % 8) + 3);
     }
     folder.file("pairs.toml", text)
 }
@@ -99,12 +99,12 @@ fn a_bad_job_does_not_stop_the_others() {
     let wrong: [(&str, &[&str]); 7] = [
         ("do = 'depth'\nnear = 'gone.png'\nout = 'maps/a'", &["gone.png"]),
         ("do = 'magic'\nout = 'maps/b'", &["magic", "depth, correct"]),
-        ("do = 'depth'\nsmoth = 3\nout = 'maps/c'", &["smoth", "smooth"]),
+        ("do = 'depth'\nwindo = 3\nout = 'maps/c'", &["windo", "window"]),
         ("do = 'depth'\nout = ", &["line"]),
         ("do = 'depth'\nout = 'mine'", &["mine", "no batch made it"]),
-        ("do = 'depth'\nsmooth = 4\nout = 'maps/d'", &["4 px", "odd"]),
+        ("do = 'depth'\nwindow = 4\nout = 'maps/d'", &["window", "odd"]),
         // The first job's place.
-        ("do = 'depth'\nsmooth = 9\nout = 'maps/0'", &["another job", "maps/0"]),
+        ("do = 'depth'\nwindow = 9\nout = 'maps/0'", &["another job", "maps/0"]),
     ];
     let bad: String = wrong.iter().map(|(job, _)| format!("[[job]]\n{job}\n")).collect();
     fs::write(&manifest, good.clone() + &bad).expect("a writable folder");
@@ -143,7 +143,7 @@ fn what_has_changed_is_done_again_and_nothing_else() {
         assert!(text.contains(from));
         fs::write(&manifest, text.replace(from, to)).expect("a writable folder");
     };
-    edit("smooth = 5", "smooth = 7");
+    edit("window = 5", "window = 7");
     assert_eq!(again(), ["already", "done"], "a setting");
     // A pixel of the far image: both were made from it.
     let far = folder.path("pair/far.png");

@@ -74,7 +74,7 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
         assert!(number(&figures, "pair_ms") <= 60.0, "{figures}");
         let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("{name}/{file}")));
         // Without --out the maps go into the capture's own folder.
-        succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--median", "5"]));
+        succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--median-px", "5"]));
         maps.push(content(&folder, name));
     }
     let names: Vec<_> = maps[0].iter().map(|(name, _)| name.as_str()).collect();

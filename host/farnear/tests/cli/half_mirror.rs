@@ -44,7 +44,7 @@ fn one_trigger_gives_a_pair_and_its_depth() {
     }
 
     let [far, near] = ["far.png", "near.png"].map(|file| format!("{pair}/{file}"));
-    succeeds(&mut farnear(&["depth", &far, &near, "--median", "5"]));
+    succeeds(&mut farnear(&["depth", &far, &near, "--median-px", "5"]));
     let scene = folder.text("scene");
     succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
     let (map, truth) = (format!("{pair}/depth.npy"), format!("{scene}/truth.npy"));

@@ -38,7 +38,7 @@ fn a_rendered_pair_gives_back_its_depth() {
     let [far, near, optics, truth] =
         ["far.png", "near.png", "optics.toml", "truth.npy"].map(|name| format!("{scene}/{name}"));
     let map = folder.text("map");
-    let depth = ["depth", &far, &near, "--optics", &optics, "--median", "5", "--out", &map, "--json"];
+    let depth = ["depth", &far, &near, "--optics", &optics, "--median-px", "5", "--out", &map, "--json"];
     let found = figures(&mut farnear(&depth));
     assert_eq!((number(&found, "width"), number(&found, "height")), (640.0, 480.0));
     assert!(number(&found, "seconds") > 0.0 && number(&found, "low_texture_fraction") < 0.01, "{found}");
@@ -170,7 +170,7 @@ fn a_real_pair_gives_the_reference_depths() {
     let data = farnear_test_data::path("breakfast");
     let folder = Folder::new();
     succeeds(
-        farnear(&["depth", "--smooth", "7", "--median", "5", "--out", &folder.text("out"), "--optics"])
+        farnear(&["depth", "--window", "7", "--median-px", "5", "--out", &folder.text("out"), "--optics"])
             .arg(data.join("optics.toml"))
             .args([data.join("breakfast_far.png"), data.join("breakfast_near.png")]),
     );

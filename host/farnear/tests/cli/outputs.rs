@@ -51,7 +51,7 @@ fn depth_maps() {
         commands: &[
             "depth pair/far.png pair/near.png",
             "depth pair/far.png pair/near.png --optics rig.toml --uncertainty --out map --json",
-            "depth pair/far.png pair/near.png --operators gro --smooth 5 --median 5 --threads 1 --fill --out filled",
+            "depth pair/far.png pair/near.png --operators gro --window 5 --median-px 5 --threads 1 --fill --out filled",
             "depth pair/far.png pair/near.png --uncertainty=camera:full_well_e=20000,read_noise_e=12 --out camera",
             "depth pair/near.png pair/far.png --out swapped --json",
             "depth pair/far.png pair/near.png --method subbarao --out subbarao --json",

@@ -121,10 +121,10 @@ fn a_camera_is_calibrated_and_used() {
         let measured = figures(&mut farnear(&["measure", "plane", &format!("{out}/depth.npy"), "--json"]));
         number(&measured, "rms_mm")
     };
-    let (before, after) = (rms("before", &[]), rms("after", &["--camera", &camera]));
+    let (before, after) = (rms("before", &[]), rms("after", &["--camera-frames", &camera]));
     assert!(after < 0.8 * before, "{after} {before}");
     let absent = folder.text("absent");
-    let pair = ["depth", &far, &near, "--optics", rig_optics(), "--out", &absent, "--camera", &absent];
+    let pair = ["depth", &far, &near, "--optics", rig_optics(), "--out", &absent, "--camera-frames", &absent];
     fails(&mut farnear(&pair), 1, &["absent", "camera's frames"]);
     assert!(!folder.path("absent").exists());
 }

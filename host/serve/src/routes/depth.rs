@@ -6,21 +6,17 @@ use axum::{
     http::{HeaderMap, StatusCode},
     response::{IntoResponse, Response},
 };
-use farnear_depth::{
-    fill::{FillBy, LowTexture, UnknownCriterion, UnknownFilling},
-    pipeline::Settings,
-    prepare::{Align, Balance},
-};
 use farnear_files::{map, npy};
 use farnear_workflows::{
     Context, WorkflowError,
-    depth::{self, DepthSettings, method::Method, noise::CameraNoise, output::Outputs},
+    depth::DepthRequest,
     measure::{self, Measured, Rectangle},
+    request::{self, Paths, Request},
     sessions,
 };
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value, json};
 
 use super::{Body, Shared, aside, calibrate, seated};
 use crate::{
@@ -35,44 +31,35 @@ use crate::{
 /// Most points of a surface that a page turns: 4 MB, and some ten frames a second without a graphics card.
 const MESH_PIXELS: usize = 100_000;
 
-/// How depth is computed; what is not named is as `farnear depth` has it.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct DepthWish {
-    /// `ro`, `favaro`, `subbarao` or `subbarao-fourier`.
-    pub method: String,
-    /// Name of the operators, as `gro:linear`.
-    pub operators: Option<String>,
-    /// Side of the smoothing window, odd.
-    pub smooth_px: usize,
-    /// Side of the median window: 1, 3, 5 or 7.
-    pub median_px: usize,
-    /// Whether regions of low texture are filled.
-    pub fill: bool,
-    /// How: `surface`, or in the thesis' order as `thesis`; only with `fill`.
-    pub fill_by: Option<String>,
-    /// What counts as low texture: `energy`, or the thesis' `variance:T`; only with `fill`.
-    pub low_texture: Option<String>,
+/// A depth request without its files, and where the map is kept.
+#[derive(Deserialize)]
+pub struct CaptureDepthRequest {
     /// Whether the correction that the session has learned is applied.
-    pub corrected: bool,
-    /// Name of the capture's folder within which another map is kept; without it the capture's own.
-    pub variant: Option<String>,
+    #[serde(default)]
+    corrected: bool,
+    /// Folder within the capture for the map, instead of the capture's own.
+    variant: Option<String>,
+    /// The options of `farnear depth` that name no file, and `operators` as FAMILY:DESIGN.
+    #[serde(flatten)]
+    options: Map<String, Value>,
 }
 
-impl Default for DepthWish {
-    fn default() -> Self {
-        let Settings { smoothing_px, median_px, fill, .. } = Settings::default();
-        Self {
-            method: "ro".into(),
-            operators: None,
-            smooth_px: smoothing_px,
-            median_px,
-            fill,
-            fill_by: None,
-            low_texture: None,
-            corrected: false,
-            variant: None,
+impl JsonSchema for CaptureDepthRequest {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "CaptureDepthRequest".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let mut schema = request::schema_without_paths::<DepthRequest>();
+        if let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) {
+            let about = "Whether the correction that the session has learned is applied.";
+            properties.insert("corrected".into(), json!({"type": "boolean", "default": false, "description": about}));
+            let about = "Folder within the capture for the map, instead of the capture's own.";
+            properties.insert("variant".into(), json!({"type": ["string", "null"], "description": about}));
+            let about = "Name of the rational operators: FAMILY:DESIGN.";
+            properties.insert("operators".into(), json!({"type": ["string", "null"], "description": about}));
         }
+        schema.try_into().unwrap_or_default()
     }
 }
 
@@ -109,7 +96,7 @@ pub struct Figures {
 
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
-    api.post::<DepthWish, Begun, _, _>(
+    api.post::<CaptureDepthRequest, Begun, _, _>(
         "/api/captures/{capture}/depth",
         For::Seated,
         "Computes the depth of a pair, with its standard deviation.",
@@ -141,73 +128,46 @@ pub fn routes(api: Api) -> Api {
     )
 }
 
-/// The way of filling, and by what it is told what to fill.
-fn filling(wish: &DepthWish) -> Result<(FillBy, LowTexture), Failure> {
-    let refused = |message: String| Failure::new(StatusCode::BAD_REQUEST, message);
-    if !wish.fill && (wish.fill_by.is_some() || wish.low_texture.is_some()) {
-        return Err(refused("fill_by and low_texture say how to fill: give fill = true too".into()));
-    }
-    let by = wish.fill_by.as_deref().map(str::parse).transpose();
-    let low = wish.low_texture.as_deref().map(str::parse).transpose();
-    Ok((
-        by.map_err(|error: UnknownFilling| refused(error.to_string()))?.unwrap_or_default(),
-        low.map_err(|error: UnknownCriterion| refused(error.to_string()))?.unwrap_or_default(),
-    ))
-}
-
 async fn compute(
     State(app): Shared,
     Path(name): Path<String>,
     headers: HeaderMap,
-    Body(wish): Body<DepthWish>,
+    Body(asked): Body<CaptureDepthRequest>,
 ) -> Result<Json<Begun>, Failure> {
     seated(&app, &headers)?;
     let folder = sessions::folder_of(&app.session, &name)?;
-    let method: Method = wish.method.parse().map_err(|error: depth::method::UnknownMethod| {
-        Failure::new(StatusCode::BAD_REQUEST, format!("method {:?}: {error}", wish.method))
-    })?;
-    let (fill_by, low_texture) = filling(&wish)?;
+    let CaptureDepthRequest { corrected, variant, mut options } = asked;
+    let operators = options.remove("operators").filter(|value| !value.is_null());
+    let refused = |message: String| Failure::new(StatusCode::BAD_REQUEST, message);
+    let options: DepthRequest =
+        request::parse(options, Paths::Refused).map_err(|error| refused(error.to_string()))?;
     // A path would let the page read any file as operators.
-    let named = |text: &String| text.chars().all(|c| c.is_ascii_alphanumeric() || ":-".contains(c));
-    if let Some(operators) = wish.operators.as_ref().filter(|text| !named(text)) {
-        return Err(Failure::new(
-            StatusCode::BAD_REQUEST,
-            format!("operators {operators:?}: expected FAMILY:DESIGN"),
-        ));
-    }
-    let out = match &wish.variant {
+    let is_name = |text: &&str| text.chars().all(|c| c.is_ascii_alphanumeric() || ":-".contains(c));
+    let operators = match operators {
+        None => None,
+        Some(value) => Some(
+            value
+                .as_str()
+                .filter(is_name)
+                .ok_or_else(|| refused(format!("operators {value}: expected FAMILY:DESIGN")))?
+                .into(),
+        ),
+    };
+    let out = match &variant {
         Some(variant) => sessions::folder_of(&folder, variant)?,
         None => folder.clone(),
     };
-    let settings = DepthSettings {
+    let request = DepthRequest {
         far: folder.join("far.png"),
         near: folder.join("near.png"),
-        optics: None,
-        psf: None,
-        operators: wish.operators.map(Into::into),
-        method,
-        computation: Settings {
-            smoothing_px: wish.smooth_px,
-            median_px: wish.median_px,
-            fill: wish.fill,
-            fill_by,
-            low_texture,
-            threads: 0,
-            ..Settings::default()
-        },
-        window: None,
-        align: Align::default(),
-        balance: Balance::default(),
-        region: None,
-        camera: None,
-        min_confidence: 0.0,
-        correction: wish.corrected.then(|| app.session.join(calibrate::CORRECTION)),
-        uncertainty: (method == Method::RationalOperators).then_some(CameraNoise::Estimated),
-        write: Outputs::default(),
+        operators,
+        correction: corrected.then(|| app.session.join(calibrate::CORRECTION)),
         out: Some(out),
+        ..options
     };
+    request.check()?;
     let work = move |app: &App, context: &Context<'_>| {
-        let computed = depth::compute(&settings, context)?;
+        let computed = request.run(context)?;
         app.change(|state| state.captures += 1);
         figures(computed)
     };
@@ -274,35 +234,4 @@ async fn mesh(State(app): Shared, Path(name): Path<String>) -> Result<Response, 
     let folder = sessions::folder_of(&app.session, &name)?;
     let bytes = aside(move || Ok(measure::mesh(&folder, MESH_PIXELS)?)).await?;
     Ok(bytes.into_response())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn asked(json: &str) -> Result<(FillBy, LowTexture), String> {
-        let wish: DepthWish = serde_json::from_str(json).expect("a wish");
-        filling(&wish).map_err(|failure| failure.error)
-    }
-
-    #[test]
-    fn filling_is_asked_for_in_the_command_line_s_words() {
-        assert_eq!(asked("{}"), Ok((FillBy::Surface, LowTexture::Energy)));
-        assert_eq!(asked(r#"{"fill": true}"#), Ok((FillBy::Surface, LowTexture::Energy)));
-        assert_eq!(
-            asked(r#"{"fill": true, "fill_by": "thesis", "low_texture": "variance:0.02"}"#),
-            Ok((FillBy::Thesis, LowTexture::Variance { below: 0.02 }))
-        );
-    }
-
-    #[test]
-    fn words_that_nobody_knows_and_words_without_filling_are_refused() {
-        for (json, phrase) in [
-            (r#"{"fill": true, "fill_by": "magic"}"#, "magic"),
-            (r#"{"fill": true, "low_texture": "dull"}"#, "dull"),
-            (r#"{"low_texture": "variance"}"#, "fill = true"),
-        ] {
-            assert!(asked(json).is_err_and(|said| said.contains(phrase)), "{json}");
-        }
-    }
 }

@@ -68,7 +68,7 @@ impl Served {
         let (cancel, (sender, address)) = (Cancel::default(), channel());
         let wish = cancel.clone();
         let thread = std::thread::spawn(move || {
-            let context = Context { progress: &Nobody, questions: &Nobody, cancel: wish };
+            let context = Context::new(&Nobody, &Nobody, wish);
             serve(settings, &context, |address| sender.send(address.to_owned()).unwrap()).unwrap();
         });
         let address = address.recv_timeout(PATIENCE).unwrap();

@@ -7,6 +7,8 @@ use std::{
     str::FromStr,
 };
 
+use serde_json::{Map, Value};
+
 use super::BatchError;
 
 /// The names of fields and their values; a list has several.
@@ -56,6 +58,19 @@ impl Fields {
     pub fn remove(&mut self, name: &str) {
         self.values.remove(name);
         self.taken.remove(name);
+    }
+
+    /// Takes all fields.
+    pub fn take_all(&mut self) -> Map<String, Value> {
+        let all = std::mem::take(&mut self.values).into_iter();
+        all.map(|(name, values)| {
+            let value = match <[String; 1]>::try_from(values) {
+                Ok([one]) => Value::from(one),
+                Err(several) => Value::from(several),
+            };
+            (name, value)
+        })
+        .collect()
     }
 
     /// All fields but one, as they were written, in the order of their names.

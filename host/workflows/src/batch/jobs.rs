@@ -1,7 +1,6 @@
 //! The kinds of jobs: a new one is a line in the table and a function that makes a workflow's settings of fields.
 
 mod campaign;
-mod depth;
 mod evaluate;
 mod people;
 
@@ -9,11 +8,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{BatchError, Shared, fields::Fields};
+use super::{BatchError, fields::Fields};
 use crate::{
     context::Context,
-    correct::{self, CorrectSettings},
+    correct::CorrectRequest,
+    depth::DepthRequest,
     error::{Result, WorkflowError},
+    request::{Job, PathKind, Request, Task},
 };
 
 /// A kind of job.
@@ -23,13 +24,13 @@ pub(super) struct Kind {
     /// Whether its result is one file and not a folder.
     pub makes_file: bool,
     /// What is to be done, by the fields.
-    pub work: fn(&mut Fields) -> Result<Box<dyn Work>>,
+    pub work: fn(&mut Fields) -> Result<Box<dyn Job>>,
 }
 
 #[rustfmt::skip]
 const KINDS: &[Kind] = &[
-    Kind { name: "depth", makes_file: false, work: depth::work },
-    Kind { name: "correct", makes_file: true, work: correct_work },
+    Kind::of::<DepthRequest>(),
+    Kind::of::<CorrectRequest>(),
     Kind { name: "silhouettes-video", makes_file: false, work: people::video },
     Kind { name: "silhouettes-markers", makes_file: false, work: people::markers },
     Kind { name: "shadow-remove", makes_file: false, work: people::shadow },
@@ -38,13 +39,18 @@ const KINDS: &[Kind] = &[
     Kind { name: "campaign", makes_file: false, work: campaign::work },
 ];
 
-/// A job that is understood: everything but where its result goes.
-pub(super) trait Work {
-    /// The files, and folders of files, that the result depends on.
-    fn inputs(&self) -> Vec<PathBuf>;
-
-    /// Makes the result at `out`, which is not there yet, and gives its figures.
-    fn run(&self, out: &Path, shared: &Shared, context: &Context<'_>) -> Result<Value>;
+impl Kind {
+    /// The task of a request.
+    const fn of<R: Request>() -> Self {
+        Self {
+            name: R::NAME,
+            makes_file: matches!(Task::of::<R>().output(), Some((_, PathKind::OutputFile))),
+            work: |fields| {
+                let base = fields.base().to_path_buf();
+                (Task::of::<R>().job)(fields.take_all(), &base)
+            },
+        }
+    }
 }
 
 /// The kind of this name.
@@ -68,16 +74,16 @@ pub(super) fn names() -> Vec<&'static str> {
 struct Call<S> {
     settings: S,
     inputs: Vec<PathBuf>,
-    run: fn(&S, &Path, &Shared, &Context<'_>) -> Result<Value>,
+    run: fn(&S, &Path, &Context<'_>) -> Result<Value>,
 }
 
-impl<S> Work for Call<S> {
+impl<S: Send> Job for Call<S> {
     fn inputs(&self) -> Vec<PathBuf> {
         self.inputs.clone()
     }
 
-    fn run(&self, out: &Path, shared: &Shared, context: &Context<'_>) -> Result<Value> {
-        (self.run)(&self.settings, out, shared, context)
+    fn run(&self, out: &Path, context: &Context<'_>) -> Result<Value> {
+        (self.run)(&self.settings, out, context)
     }
 }
 
@@ -86,20 +92,4 @@ pub(super) fn value(figures: impl serde::Serialize) -> Result<Value> {
     serde_json::to_value(figures).map_err(|error| {
         WorkflowError::parameter("figures", error, "figures that JSON can hold") // they are plain structs: not met
     })
-}
-
-fn correct_work(fields: &mut Fields) -> Result<Box<dyn Work>> {
-    let (depth, correction) = (fields.path("depth")?, fields.path("correction")?);
-    let out = fields.path("out")?;
-    correct::format_of(&out)?;
-    let as_board = fields.flag("as_board")?;
-    let inputs = vec![depth.clone(), correction.clone()];
-    let settings = CorrectSettings { depth, correction, out, as_board };
-    Ok(Box::new(Call {
-        settings,
-        inputs,
-        run: |settings, out, _, context| {
-            value(correct::apply(&CorrectSettings { out: out.into(), ..settings.clone() }, context)?)
-        },
-    }))
 }

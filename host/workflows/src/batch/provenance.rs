@@ -14,7 +14,7 @@ use super::{BatchError, fields::Fields};
 use crate::{
     MADE_BY,
     error::Result,
-    kept::{Kept, Stamp},
+    cache::{FileVersion, LeastRecentlyUsed},
 };
 
 /// Version of the record.
@@ -48,11 +48,11 @@ pub(super) struct Summed {
 }
 
 /// Sums of files, of which those that many jobs read are kept.
-pub(super) struct Sums(Kept<Stamp, Summed>);
+pub(super) struct Sums(LeastRecentlyUsed<FileVersion, Summed>);
 
 impl Default for Sums {
     fn default() -> Self {
-        Self(Kept::new(SUMS))
+        Self(LeastRecentlyUsed::new(SUMS))
     }
 }
 
@@ -70,7 +70,7 @@ impl Sums {
         let sum = |file: &PathBuf| {
             // By the manifest's own word for it, so that the whole may be moved.
             let name = file.strip_prefix(base).unwrap_or(file).display().to_string();
-            let summed = self.0.get(Stamp::of("the input", file)?, || Ok(sum(file, &name)?))?;
+            let summed = self.0.get(FileVersion::of("the input", file)?, || Ok(sum(file, &name)?))?;
             Ok(Summed { file: name, ..Summed::clone(&summed) })
         };
         files.iter().map(sum).collect()

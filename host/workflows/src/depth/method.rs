@@ -4,8 +4,10 @@ use std::{fmt, path::Path, str::FromStr, sync::Arc};
 
 use farnear_depth::{baselines, measure::DepthMethod, operators::Operators, optics::Optics};
 
-use super::shared::Shared;
-use crate::error::{Result, WorkflowError};
+use crate::{
+    cache::Cache,
+    error::{Result, WorkflowError},
+};
 
 /// How depth is computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -66,10 +68,10 @@ impl Prepared {
     ///
     /// # Errors
     /// [`WorkflowError::Parameter`]; why there are no such operators.
-    pub fn new(method: Method, asked: Option<&Path>, optics: &Optics, shared: &Shared) -> Result<Self> {
+    pub fn new(method: Method, asked: Option<&Path>, optics: &Optics, cache: &Cache) -> Result<Self> {
         match (method, asked) {
             (Method::RationalOperators, asked) => {
-                Ok(Self::RationalOperators(shared.operators(asked, optics)?))
+                Ok(Self::RationalOperators(cache.operators(asked, optics)?))
             }
             (Method::Whitened | Method::Baseline(_), Some(asked)) => Err(WorkflowError::parameter(
                 "operators",

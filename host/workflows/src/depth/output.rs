@@ -21,7 +21,7 @@ use farnear_files::{
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
-use super::{Computed, DepthSettings, Inputs, record::record};
+use super::{Computed, DepthRequest, Inputs, record::record};
 use crate::{MADE_BY, context::Context, error::Result};
 
 /// A file being written.
@@ -123,7 +123,7 @@ impl fmt::Display for Outputs {
 
 /// All that is written.
 pub(super) struct Results<'a> {
-    settings: &'a DepthSettings,
+    settings: &'a DepthRequest,
     inputs: &'a Inputs,
     computed: &'a Computed,
     /// How depth.png's codes stand for mm, where that is written.
@@ -134,7 +134,7 @@ pub(super) struct Results<'a> {
 
 impl<'a> Results<'a> {
     pub(super) fn new(
-        settings: &'a DepthSettings,
+        settings: &'a DepthRequest,
         inputs: &'a Inputs,
         computed: &'a Computed,
         warnings: &[String],

@@ -7,7 +7,7 @@ use farnear_files::map::Scale;
 use serde::Serialize;
 
 use super::{
-    Computed, DepthSettings, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part,
+    Computed, DepthRequest, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part,
 };
 use crate::{MADE_BY, error::Result};
 
@@ -56,7 +56,7 @@ struct Record<'a> {
 
 /// The record as TOML. `png` is the scale of depth.png, where that is written.
 pub fn record(
-    settings: &DepthSettings,
+    settings: &DepthRequest,
     inputs: &Inputs,
     computed: &Computed,
     warnings: &[String],
@@ -77,13 +77,13 @@ pub fn record(
         correction: settings.correction.as_deref().map(name_of),
         align: settings.align.to_string(),
         balance: settings.balance.to_string(),
-        camera: settings.camera.as_deref().map(name_of),
+        camera: settings.camera_frames.as_deref().map(name_of),
         min_confidence: settings.min_confidence,
         part: inputs.cut.map(|cut| cut.part()),
         prepared: computed.report,
         no_depth: &computed.lost,
         // The number of threads changes nothing in the result.
-        settings: Settings { threads: Settings::default().threads, ..settings.computation },
+        settings: Settings { threads: Settings::default().threads, ..settings.computation() },
         uncertainty: computed.deviation.as_ref().map(|(_, found)| found),
         optics: inputs.optics,
         operators: inputs.method.operators(),

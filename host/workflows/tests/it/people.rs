@@ -36,7 +36,7 @@ impl Listener {
     }
 
     fn context(&self) -> Context<'_> {
-        Context { progress: self, questions: &Nobody, cancel: self.cancel.clone() }
+        Context::new(self, &Nobody, self.cancel.clone())
     }
 
     fn note(&self, what: String) {

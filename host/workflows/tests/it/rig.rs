@@ -20,7 +20,7 @@ struct Face {
 
 impl Face {
     fn context(&self) -> Context<'_> {
-        Context { progress: self, questions: self, cancel: Cancel::default() }
+        Context::new(self, self, Cancel::default())
     }
 
     fn heard(&self, phrase: &str) -> bool {

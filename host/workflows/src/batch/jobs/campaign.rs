@@ -9,7 +9,7 @@ use std::{
 
 use serde_json::Value;
 
-use super::{BatchError, Call, Fields, Shared, Work};
+use super::{BatchError, Call, Fields, Job};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -29,7 +29,7 @@ struct Seeds {
     firmware: Option<PathBuf>,
 }
 
-pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
+pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
     fields.path("out")?;
     let program = simulator::find()?;
     let settings = Seeds {
@@ -45,7 +45,7 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
 }
 
 /// Plays them, one after the other. One that breaks a property is a result and no failure.
-fn played(settings: &Seeds, out: &Path, _: &Shared, context: &Context<'_>) -> Result<Value> {
+fn played(settings: &Seeds, out: &Path, context: &Context<'_>) -> Result<Value> {
     let folder = |source| WorkflowError::Folder { folder: out.into(), source };
     fs::create_dir_all(out).map_err(folder)?;
     let figures = out.join(FIGURES);

@@ -8,7 +8,7 @@ use std::{
 use farnear_activity::recognition::{choice::Views, classifier::Family, frames::Mode, self_training::ROUNDS};
 use serde_json::Value;
 
-use super::{BatchError, Call, Fields, Shared, Work, value};
+use super::{BatchError, Call, Fields, Job, value};
 use crate::{
     activity::{
         evaluation::{self, EvaluationSettings, LearnFrom},
@@ -25,7 +25,7 @@ use crate::{
 /// Name of the figures beside the pictures.
 const FIGURES: &str = "figures.json";
 
-pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
+pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let samples = fields.path("samples")?;
     fields.path("out")?;
     let views = fields.optional::<Views>("views")?;
@@ -66,7 +66,7 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Work>> {
     Ok(Box::new(Call {
         inputs,
         settings,
-        run: |settings, out, _, context| {
+        run: |settings, out, context| {
             let settings = EvaluationSettings { out: Some(out.into()), ..settings.clone() };
             kept(value(evaluation::evaluate(&settings, context)?)?, out)
         },
@@ -90,10 +90,9 @@ fn same(text: &str) -> Result<(String, String), BatchError> {
 fn judged(
     (model, settings): &(PathBuf, JudgingSettings),
     out: &Path,
-    shared: &Shared,
     context: &Context<'_>,
 ) -> Result<Value> {
-    let model = shared.model(model)?;
+    let model = context.cache.model(model)?;
     let settings = JudgingSettings { out: Some(out.into()), ..settings.clone() };
     kept(value(judging::judge(&model, &settings, context)?)?, out)
 }

@@ -11,7 +11,7 @@ use farnear_activity::{
 use farnear_files::staging::Staging;
 use serde_json::Value;
 
-use super::{BatchError, Call, Fields, Shared, Work, value};
+use super::{BatchError, Call, Fields, Job, value};
 use crate::{
     activity::{
         recognition::{Model, Recognition, RecognitionSettings},
@@ -27,7 +27,7 @@ use crate::{
     sun::Moment,
 };
 
-pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Work>> {
+pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let detector = fields.optional::<shadow_detectors::Method>("shadow_detector")?;
     let settings = VideoSettings {
         video: fields.path("video")?,
@@ -51,13 +51,13 @@ pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Work>> {
     Ok(Box::new(Call {
         inputs: vec![settings.video.clone()],
         settings,
-        run: |settings, out, _, context| {
+        run: |settings, out, context| {
             value(video::extract(&VideoSettings { out: out.into(), ..settings.clone() }, context)?)
         },
     }))
 }
 
-pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Work>> {
+pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let template = fields.name_or_file("template")?.ok_or(BatchError::MissingField { name: "template" })?;
     let settings = MarkersSettings {
         file: fields.path("file")?,
@@ -84,7 +84,7 @@ pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Work>> {
     Ok(Box::new(Call {
         inputs,
         settings,
-        run: |settings, out, _, context| {
+        run: |settings, out, context| {
             value(markers::draw(&MarkersSettings { out: out.into(), ..settings.clone() }, context)?)
         },
     }))
@@ -100,7 +100,7 @@ fn up(fields: &mut Fields) -> Result<Option<Up>, BatchError> {
     }
 }
 
-pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Work>> {
+pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let light = light(fields)?;
     let settings = RemovalSettings {
         masks: fields.path("masks")?,
@@ -113,7 +113,7 @@ pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Work>> {
     Ok(Box::new(Call {
         inputs: vec![settings.masks.clone(), settings.camera.clone()],
         settings,
-        run: |settings, out, _, context| {
+        run: |settings, out, context| {
             value(removal::remove_from_masks(
                 &RemovalSettings { out: out.into(), ..settings.clone() },
                 context,
@@ -149,7 +149,7 @@ struct Recognising {
     window: Option<usize>,
 }
 
-pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Work>> {
+pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let settings = Recognising {
         model: fields.name_or_file("model")?.ok_or(BatchError::MissingField { name: "model" })?,
         views: fields.paths("views")?,
@@ -170,8 +170,8 @@ pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Work>> {
 }
 
 /// Writes `answers.jsonl`, an answer a frame, and `recognition.json`, that for the whole.
-fn recognised(settings: &Recognising, out: &Path, shared: &Shared, context: &Context<'_>) -> Result<Value> {
-    let model = shared.model(&settings.model)?;
+fn recognised(settings: &Recognising, out: &Path, context: &Context<'_>) -> Result<Value> {
+    let model = context.cache.model(&settings.model)?;
     let view = |path: &PathBuf| -> Result<View> {
         let kind = settings.kind.map_or_else(|| ViewKind::guess(path), Ok)?;
         Ok(View { path: path.clone(), kind })

@@ -48,7 +48,7 @@ fn go_through(board: Peer, port: String, hands: bool, resting_only: bool) -> (Ch
     let images = tempfile::tempdir().unwrap();
     board.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().unwrap();
     let person = Person { board, face: Face::default() };
-    let context = Context { progress: &person, questions: &person, cancel: Cancel::default() };
+    let context = Context::new(&person, &person, Cancel::default());
     let rig = RigAddress::Port(port);
     let settings = CheckSettings { rig, camera: camera(images.path()), resting_only, hands };
     let list = check::check(&settings, &context).unwrap();

@@ -1,0 +1,414 @@
+//! One description per task: the request struct that the command line, the page, batch and Python share.
+//!
+//! A request's fields are the command's options, the page's JSON, a batch job's fields and Python's keywords. Its doc comments are
+//! the help text and its [`Default`] holds the defaults. [`parse`] reads fields from any of these sources.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
+
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+/// A task that a user can run, with everything that it needs to know.
+pub trait Request: Clone + Default + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static {
+    /// The words of the command: `depth`, `rig capture`.
+    const NAME: &'static str;
+    /// Fields without a usable default.
+    const REQUIRED: &'static [&'static str];
+    /// Fields that hold paths.
+    const PATHS: &'static [(&'static str, PathKind)];
+    /// The task's result, as printed.
+    type Figures: Serialize;
+
+    /// Finds contradictions between fields without reading or moving anything.
+    ///
+    /// # Errors
+    /// [`WorkflowError::Parameter`].
+    fn check(&self) -> Result<()> {
+        Ok(())
+    }
+
+    /// Runs the task, after [`Self::check`].
+    ///
+    /// # Errors
+    /// Depends on the task.
+    fn run(&self, context: &Context<'_>) -> Result<Self::Figures>;
+
+    /// Files and folders that the result depends on.
+    fn inputs(&self) -> Vec<PathBuf> {
+        inputs(self)
+    }
+}
+
+/// Files and folders that a request names as inputs.
+pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
+    let is_input = |(kind, path): &(PathKind, PathBuf)| match kind {
+        PathKind::Input => true,
+        PathKind::InputOrName => path.exists(),
+        PathKind::OutputFile | PathKind::OutputFolder => false,
+    };
+    paths_of(request).into_iter().filter(is_input).map(|(_, path)| path).collect()
+}
+
+/// What a field with a path refers to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PathKind {
+    /// A file or folder that is read.
+    Input,
+    /// The name of something built in, or a file; text after a comma is not part of the path.
+    InputOrName,
+    /// The file that is written.
+    OutputFile,
+    /// The folder that is written.
+    OutputFolder,
+}
+
+/// Whether a source of fields may name files.
+#[derive(Clone, Copy, Debug)]
+pub enum Paths<'a> {
+    /// Relative to this folder.
+    RelativeTo(&'a Path),
+    /// Refused: the caller sets them itself.
+    Refused,
+}
+
+/// A field that cannot be used.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum RequestError {
+    /// The task has no such field.
+    #[error("{task} has no field `{name}`; expected some of {}", known.join(", "))]
+    UnknownField {
+        /// The task.
+        task: &'static str,
+        /// The field.
+        name: String,
+        /// Fields of the task.
+        known: Vec<String>,
+    },
+    /// A required field is missing.
+    #[error("{task} needs the field `{name}`")]
+    MissingField {
+        /// The task.
+        task: &'static str,
+        /// The field.
+        name: &'static str,
+    },
+    /// The value does not fit.
+    #[error("{field}: {reason}")]
+    Value {
+        /// The field.
+        field: String,
+        /// The value and what was expected.
+        reason: String,
+    },
+}
+
+/// Reads a request from named values. Names may use `-` or `_`. Texts are converted to numbers, booleans and lists (separated by `;`)
+/// where the field asks for these, so that a row of CSV and a TOML table give the same request.
+///
+/// # Errors
+/// [`RequestError`] for unknown and missing fields and for values that do not fit.
+pub fn parse<R: Request>(fields: Map<String, Value>, paths: Paths<'_>) -> Result<R, RequestError> {
+    let schema = schema::<R>();
+    let is_path = |name: &str| R::PATHS.iter().any(|(path, _)| *path == name);
+    let usable = |name: &&String| matches!(paths, Paths::RelativeTo(_)) || !is_path(name);
+    let mut accepted = Map::new();
+    for (name, value) in fields {
+        let name = name.trim().replace('-', "_");
+        let property = property(&schema, &name).filter(|_| usable(&&name));
+        let Some(property) = property else {
+            let known = properties(&schema).keys().filter(usable).cloned().collect();
+            return Err(RequestError::UnknownField { task: R::NAME, name, known });
+        };
+        accepted.insert(name, coerce(value, property, &schema));
+    }
+    for name in R::REQUIRED {
+        let given_elsewhere = is_path(name) && matches!(paths, Paths::Refused);
+        if !given_elsewhere && !accepted.contains_key(*name) {
+            return Err(RequestError::MissingField { task: R::NAME, name });
+        }
+    }
+    if let Paths::RelativeTo(base) = paths {
+        for (name, kind) in R::PATHS {
+            if let Some(value) = accepted.get_mut(*name) {
+                rebase(value, *kind, base);
+            }
+        }
+    }
+    serde_path_to_error::deserialize(Value::Object(accepted)).map_err(|error| RequestError::Value {
+        field: error.path().to_string(),
+        reason: error.into_inner().to_string(),
+    })
+}
+
+/// The JSON schema of a request: names, types, defaults and help of its fields.
+pub fn schema<R: Request>() -> Value {
+    schemars::SchemaGenerator::default().into_root_schema_for::<R>().to_value()
+}
+
+/// The schema without the fields that hold paths, for callers that may not name files.
+pub fn schema_without_paths<R: Request>() -> Value {
+    let mut schema = schema::<R>();
+    if let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) {
+        properties.retain(|name, _| R::PATHS.iter().all(|(path, _)| path != name));
+    }
+    schema
+}
+
+/// All tasks that are described by a request.
+pub const TASKS: &[Task] =
+    &[Task::of::<crate::depth::DepthRequest>(), Task::of::<crate::correct::CorrectRequest>()];
+
+/// A task by its name, for callers that know it at run time only.
+pub struct Task {
+    /// The words of the command.
+    pub name: &'static str,
+    /// JSON schema of its request.
+    pub schema: fn() -> Value,
+    /// Fields that must be given.
+    pub required: &'static [&'static str],
+    /// Fields that hold paths.
+    pub paths: &'static [(&'static str, PathKind)],
+    /// Reads its request for [`Job::run`].
+    pub job: fn(Map<String, Value>, &Path) -> Result<Box<dyn Job>>,
+}
+
+impl Task {
+    /// The task of a request.
+    pub const fn of<R: Request>() -> Self {
+        Self {
+            name: R::NAME,
+            schema: schema::<R>,
+            required: R::REQUIRED,
+            paths: R::PATHS,
+            job: |fields, base| {
+                let request: R = parse(fields.clone(), Paths::RelativeTo(base))?;
+                request.check()?;
+                Ok(Box::new(Parsed { request, fields, base: base.to_path_buf() }))
+            },
+        }
+    }
+
+    /// The field and kind of its result; none where it writes nothing.
+    pub const fn output(&self) -> Option<(&'static str, PathKind)> {
+        let mut index = 0;
+        while index < self.paths.len() {
+            if let (_, PathKind::OutputFile | PathKind::OutputFolder) = self.paths[index] {
+                return Some(self.paths[index]);
+            }
+            index += 1;
+        }
+        None
+    }
+}
+
+/// A parsed request whose output can be redirected.
+pub trait Job: Send {
+    /// See [`Request::inputs`].
+    fn inputs(&self) -> Vec<PathBuf>;
+
+    /// Runs the task with its result at `out`.
+    ///
+    /// # Errors
+    /// Those of the task.
+    fn run(&self, out: &Path, context: &Context<'_>) -> Result<Value>;
+}
+
+struct Parsed<R> {
+    request: R,
+    fields: Map<String, Value>,
+    base: PathBuf,
+}
+
+impl<R: Request> Job for Parsed<R> {
+    fn inputs(&self) -> Vec<PathBuf> {
+        self.request.inputs()
+    }
+
+    fn run(&self, out: &Path, context: &Context<'_>) -> Result<Value> {
+        let mut fields = self.fields.clone();
+        if let Some((name, _)) = Task::of::<R>().output() {
+            // Relative paths are relative to the base; this one is complete.
+            let out = std::path::absolute(out).map_err(WorkflowError::read("the result's folder", out))?;
+            fields.insert(name.into(), out.display().to_string().into());
+        }
+        let request: R = parse(fields, Paths::RelativeTo(&self.base))?;
+        serde_json::to_value(request.run(context)?)
+            .map_err(|error| WorkflowError::parameter("figures", error, "figures that JSON can hold"))
+    }
+}
+
+fn paths_of<R: Request>(request: &R) -> Vec<(PathKind, PathBuf)> {
+    let Ok(Value::Object(fields)) = serde_json::to_value(request) else { return Vec::new() };
+    let mut found = Vec::new();
+    for (name, kind) in R::PATHS {
+        let texts = match fields.get(*name) {
+            Some(Value::String(text)) => vec![text.as_str()],
+            Some(Value::Array(list)) => list.iter().filter_map(Value::as_str).collect(),
+            _ => Vec::new(),
+        };
+        found.extend(texts.into_iter().map(|text| (*kind, Path::new(file_part(text, *kind)).to_path_buf())));
+    }
+    found
+}
+
+/// The part of a value that can be a path.
+fn file_part(text: &str, kind: PathKind) -> &str {
+    match kind {
+        PathKind::InputOrName => text.split(',').next().unwrap_or(text),
+        _ => text,
+    }
+}
+
+fn rebase(value: &mut Value, kind: PathKind, base: &Path) {
+    match value {
+        Value::String(text) => {
+            let joined = base.join(&*text);
+            let is_name = kind == PathKind::InputOrName && !base.join(file_part(text, kind)).exists();
+            if !is_name {
+                *text = joined.display().to_string();
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(|item| rebase(item, kind, base)),
+        _ => {}
+    }
+}
+
+fn properties(schema: &Value) -> Map<String, Value> {
+    schema.get("properties").and_then(Value::as_object).cloned().unwrap_or_default()
+}
+
+fn property<'a>(schema: &'a Value, name: &str) -> Option<&'a Value> {
+    schema.get("properties")?.get(name)
+}
+
+/// Whether a property accepts values of a JSON type.
+fn accepts(property: &Value, kind: &str, schema: &Value) -> bool {
+    if let Some(target) = property.get("$ref").and_then(Value::as_str) {
+        let target = target.trim_start_matches('#');
+        return schema.pointer(target).is_some_and(|target| accepts(target, kind, schema));
+    }
+    if let Some(kinds) = property.get("type") {
+        return kinds == kind || kinds.as_array().is_some_and(|kinds| kinds.iter().any(|one| one == kind));
+    }
+    if property.get("const").or_else(|| property.get("enum")).is_some() {
+        return kind == "string";
+    }
+    let alternatives = ["anyOf", "oneOf"].iter().filter_map(|name| property.get(name)?.as_array());
+    alternatives.flatten().any(|one| accepts(one, kind, schema))
+}
+
+fn coerce(value: Value, property: &Value, schema: &Value) -> Value {
+    let accepts = |kind: &str| accepts(property, kind, schema);
+    match value {
+        Value::String(text) if accepts("array") && !accepts("string") => {
+            let parts = text.split(';').map(str::trim).filter(|part| !part.is_empty());
+            let item = property.get("items").cloned().unwrap_or(Value::Bool(true));
+            Value::Array(parts.map(|part| coerce(part.into(), &item, schema)).collect())
+        }
+        Value::String(text) if !accepts("string") => {
+            let plain = text.trim();
+            let boolean = plain.parse::<bool>().ok().filter(|_| accepts("boolean")).map(Value::Bool);
+            let integer = plain.parse::<i64>().ok().map(Value::from);
+            let number = || plain.parse::<f64>().ok().map(Value::from);
+            boolean.or(integer).or_else(number).unwrap_or(Value::String(text))
+        }
+        Value::Number(number) if accepts("string") && !accepts("number") && !accepts("integer") => {
+            Value::String(number.to_string())
+        }
+        single @ (Value::Number(_) | Value::Bool(_)) if accepts("array") => Value::Array(vec![single]),
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZero;
+
+    use serde::Deserialize;
+    use serde_json::json;
+
+    use super::*;
+
+    #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+    #[serde(default)]
+    struct Sample {
+        file: PathBuf,
+        views: Vec<PathBuf>,
+        psf: Option<String>,
+        count: Option<NonZero<u32>>,
+        share: f64,
+        fill: bool,
+        out: PathBuf,
+    }
+
+    impl Request for Sample {
+        const NAME: &'static str = "sample";
+        const REQUIRED: &'static [&'static str] = &["file"];
+        const PATHS: &'static [(&'static str, PathKind)] = &[
+            ("file", PathKind::Input),
+            ("views", PathKind::Input),
+            ("psf", PathKind::InputOrName),
+            ("out", PathKind::OutputFolder),
+        ];
+        type Figures = String;
+
+        fn run(&self, _: &Context<'_>) -> Result<String> {
+            Ok(self.out.display().to_string())
+        }
+    }
+
+    fn read(fields: Value, paths: Paths<'_>) -> Result<Sample, RequestError> {
+        let Value::Object(fields) = fields else { panic!("fields are an object") };
+        parse(fields, paths)
+    }
+
+    #[test]
+    fn texts_and_typed_values_give_the_same_request() {
+        let base = Paths::RelativeTo(Path::new("/base"));
+        let typed = json!({"file": "a", "views": ["b", "/c"], "count": 3, "share": 0.5, "fill": true, "psf": "gaussian:k=0.4,n=1"});
+        let texts = json!({"file": "a", "views": "b; /c", "count": "3", "share": "0.5", "fill": "true", "psf": "gaussian:k=0.4,n=1"});
+        let request = read(typed, base).expect("a request");
+        assert_eq!(request, read(texts, base).expect("a request"));
+        assert_eq!(request.file, Path::new("/base/a"));
+        assert_eq!(request.views, [Path::new("/base/b"), Path::new("/c")]);
+        assert_eq!(request.psf.as_deref(), Some("gaussian:k=0.4,n=1"));
+        assert_eq!(request.inputs(), ["/base/a", "/base/b", "/c"].map(PathBuf::from));
+    }
+
+    #[test]
+    fn rejects_unknown_missing_and_wrong_fields_by_name() {
+        let base = Paths::RelativeTo(Path::new(""));
+        for (fields, phrases) in [
+            (json!({"file": "a", "fil": 1}), ["`fil`", "views"]),
+            (json!({"share": 1}), ["needs", "`file`"]),
+            (json!({"file": "a", "share": "wide"}), ["share", "wide"]),
+            (json!({"file": "a", "count": 0}), ["count", "0"]),
+        ] {
+            let error = read(fields, base).expect_err("refused").to_string();
+            assert!(phrases.iter().all(|phrase| error.contains(phrase)), "{error}");
+        }
+    }
+
+    #[test]
+    fn refuses_paths_where_the_caller_sets_them() {
+        assert!(read(json!({"share": 1}), Paths::Refused).is_ok());
+        assert!(read(json!({"file": "/etc/passwd"}), Paths::Refused).is_err());
+        let schema = schema_without_paths::<Sample>();
+        assert!(property(&schema, "file").is_none() && property(&schema, "share").is_some());
+    }
+
+    #[test]
+    fn a_job_writes_where_it_is_sent() {
+        let Value::Object(fields) = json!({"file": "a", "out": "there"}) else { panic!("an object") };
+        let task = Task::of::<Sample>();
+        assert_eq!(task.output(), Some(("out", PathKind::OutputFolder)));
+        let job = (task.job)(fields, Path::new("/base")).expect("a job");
+        assert_eq!(job.run(Path::new("/else"), &Context::unattended()).expect("a result"), json!("/else"));
+    }
+}
