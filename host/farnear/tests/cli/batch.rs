@@ -243,7 +243,7 @@ fn each_kind_gives_what_its_command_gives() {
     let manifest = folder.file(
         "all.csv",
         "do,far,near,depth,file,video,masks,views,method,out,fill,correction,learn_first,centred,template,camera,lat,lon,time,model,among\n\
-         depth,pair/far.png,pair/near.png,,,,,,whitened,b/depth,true,,,,,,,,,,\n\
+         depth,pair/far.png,pair/near.png,,,,,,whitened,b/depth,surface,,,,,,,,,,\n\
          correct,,,a.npy,,,,,,b/corrected.npy,,learned.toml,,,,,,,,,\n\
          silhouettes-video,,,,,video,,,,b/video,,,true,true,,,,,,,\n\
          silhouettes-markers,,,,walk.csv,,,2,,b/markers,,,,,suit.toml,,,,,,\n\
