@@ -146,7 +146,8 @@ mod tests {
                 let about = words(field["description"].as_str().unwrap_or_default());
                 assert_eq!(words(&help), about.trim_end_matches('.'), "{}: {name}", task.name);
                 let default = option.get_default_values().first().map(|value| value.to_string_lossy());
-                let Some(default) = default.filter(|_| option.get_num_args().is_some_and(|n| n.takes_values()))
+                let Some(default) =
+                    default.filter(|_| option.get_num_args().is_some_and(|n| n.takes_values()))
                 else {
                     continue;
                 };

@@ -142,12 +142,13 @@ mod tests {
         let cache = LeastRecentlyUsed::new(2);
         let made = Mutex::new(Vec::new());
         let get = |key: u32| {
-            cache.get(key, || {
-                made.lock().unwrap_or_else(PoisonError::into_inner).push(key);
-                Ok(key * 10)
-            })
-            .map(|value| *value)
-            .expect("nothing fails")
+            cache
+                .get(key, || {
+                    made.lock().unwrap_or_else(PoisonError::into_inner).push(key);
+                    Ok(key * 10)
+                })
+                .map(|value| *value)
+                .expect("nothing fails")
         };
         for key in [1, 2, 1, 3, 1, 2] {
             assert_eq!(get(key), key * 10);

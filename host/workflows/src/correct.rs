@@ -22,7 +22,9 @@ use crate::{
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(
     feature = "clap",
-    command(after_help = "Example: farnear correct depth.npy --correction correction.toml --out corrected.npy")
+    command(
+        after_help = "Example: farnear correct depth.npy --correction correction.toml --out corrected.npy"
+    )
 )]
 #[serde(default)]
 pub struct CorrectRequest {

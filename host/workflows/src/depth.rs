@@ -333,7 +333,6 @@ impl DepthRequest {
             least_confidence: self.min_confidence,
         }
     }
-
 }
 
 /// What was read and checked.
@@ -379,11 +378,13 @@ impl Inputs {
         let around = optics.distortion().is_none().then_some(AROUND_PX);
         let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
         let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, &context.cache)?;
-        let correction = settings.correction.as_deref().map(|file| context.cache.correction(file)).transpose()?;
+        let correction =
+            settings.correction.as_deref().map(|file| context.cache.correction(file)).transpose()?;
         if let Some(correction) = &correction {
             correction.check_range(&optics.working_range())?;
         }
-        let camera = settings.camera_frames.as_deref().map(|folder| context.cache.camera(folder)).transpose()?;
+        let camera =
+            settings.camera_frames.as_deref().map(|folder| context.cache.camera(folder)).transpose()?;
         let camera = match (camera, &cut) {
             (Some(frames), Some(cut)) => Some(Arc::new(cut.frames(&frames)?)),
             (camera, _) => camera,
@@ -452,7 +453,10 @@ impl Inputs {
             Samples::Float => None,
         };
         let noise = request.uncertainty.and_then(|noise| noise.of_camera(self.pair.samples));
-        MeasureSettings { prepare: PrepareSettings { limits, noise, ..request.prepare() }, ..request.measure() }
+        MeasureSettings {
+            prepare: PrepareSettings { limits, noise, ..request.prepare() },
+            ..request.measure()
+        }
     }
 }
 

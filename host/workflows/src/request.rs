@@ -15,7 +15,9 @@ use crate::{
 };
 
 /// A task that a user can run, with everything that it needs to know.
-pub trait Request: Clone + Default + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static {
+pub trait Request:
+    Clone + Default + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static
+{
     /// The words of the command: `depth`, `rig capture`.
     const NAME: &'static str;
     /// Fields without a usable default.

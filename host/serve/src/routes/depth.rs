@@ -53,7 +53,10 @@ impl JsonSchema for CaptureDepthRequest {
         let mut schema = request::schema_without_paths::<DepthRequest>();
         if let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) {
             let about = "Whether the correction that the session has learned is applied.";
-            properties.insert("corrected".into(), json!({"type": "boolean", "default": false, "description": about}));
+            properties.insert(
+                "corrected".into(),
+                json!({"type": "boolean", "default": false, "description": about}),
+            );
             let about = "Folder within the capture for the map, instead of the capture's own.";
             properties.insert("variant".into(), json!({"type": ["string", "null"], "description": about}));
             let about = "Name of the rational operators: FAMILY:DESIGN.";

@@ -13,8 +13,8 @@ use sha2::{Digest, Sha256};
 use super::{BatchError, fields::Fields};
 use crate::{
     MADE_BY,
-    error::Result,
     cache::{FileVersion, LeastRecentlyUsed},
+    error::Result,
 };
 
 /// Version of the record.

@@ -6,9 +6,7 @@ use farnear_depth::{
 use farnear_files::map::Scale;
 use serde::Serialize;
 
-use super::{
-    Computed, DepthRequest, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part,
-};
+use super::{Computed, DepthRequest, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part};
 use crate::{MADE_BY, error::Result};
 
 /// Version of the record.
