@@ -1,6 +1,6 @@
 //! Isomap and the map that embeds new samples.
 
-use farnear_activity::embedding::{isomap::isomap as lay_out, neighbours::Neighbourhood, rbf};
+use farnear_recognition::embedding::{isomap::isomap as lay_out, neighbours::Neighbourhood, rbf};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 

@@ -1,10 +1,8 @@
 //! Sun, shadow and what the embedding sees of a silhouette.
 
-use farnear_activity::{
-    embedding::descriptor::{self, Scaling},
-    shadow::{self, CameraFile, Method},
-    sun::{self, Model, Place, SunPosition},
-};
+use farnear_recognition::embedding::descriptor::{self, Scaling};
+use farnear_shadow::sun::{self, Model, Place, SunPosition};
+use farnear_shadow::{self as shadow, CameraFile, Method};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 

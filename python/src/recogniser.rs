@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_activity::{mask::centre::SIDE_PX, recognition::clip::Track};
+use farnear_recognition::clip::Track;
+use farnear_silhouettes::mask::centre::SIDE_PX;
 use farnear_workflows::activity::recognition::Model;
 use pyo3::{
     prelude::*,

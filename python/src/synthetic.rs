@@ -1,10 +1,8 @@
 //! Silhouettes of people made by a program.
 
-use farnear_activity::{
-    mask::Mask,
-    silhouette::view::{Canvas, View, draw, extent},
-    synthetic::activities::{ACTIVITIES, performance},
-};
+use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
+use farnear_silhouettes::mask::Mask;
+use farnear_silhouettes::silhouette::view::{Canvas, View, draw, extent};
 use ndarray::{Array3, Axis};
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;

@@ -10,12 +10,14 @@ use anyhow::Result;
 use crate::run::{cargo, finish, step};
 
 /// Crates whose tests read what others send: frames, requests, files.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 9] = [
     "farnear-protocol",
     "farnear-rig",
     "farnear-capture",
     "farnear-scene",
-    "farnear-activity",
+    "farnear-recognition",
+    "farnear-shadow",
+    "farnear-silhouettes",
     "farnear-files",
     "farnear-workflows",
 ];

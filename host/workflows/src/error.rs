@@ -3,15 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_activity::{
-    background::BackgroundError,
-    evaluation::leave_one_out::EvaluationError,
-    recognition::model::ModelError,
-    shadow::{ShadowError, camera::CameraError as CameraFileError, uncertainty::UncertaintyError},
-    shadow_detectors::ImagesError,
-    shadow_score::ShapeError,
-    sun::SunError,
-};
 use farnear_capture::{
     ClientError, board_correction::BoardCorrectionError, camera::CameraError, expose::CaptureError,
     focus::FocusSearchError, log_stream::LogEnded, plan::PlanError, record::RecordError,
@@ -33,6 +24,15 @@ use farnear_files::{
     EncodeError, image_file::ImageError, map::MapError, masks::MaskError, staging::StagingError,
     video::VideoError,
 };
+use farnear_recognition::evaluation::leave_one_out::EvaluationError;
+use farnear_recognition::model::ModelError;
+use farnear_shadow::ShadowError;
+use farnear_shadow::camera::CameraError as CameraFileError;
+use farnear_shadow::detectors::ImagesError;
+use farnear_shadow::score::ShapeError;
+use farnear_shadow::sun::SunError;
+use farnear_shadow::uncertainty::UncertaintyError;
+use farnear_silhouettes::background::BackgroundError;
 
 /// What a workflow gives.
 pub type Result<T, E = WorkflowError> = std::result::Result<T, E>;

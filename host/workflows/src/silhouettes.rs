@@ -10,17 +10,15 @@ pub mod video;
 
 use std::{ops::RangeInclusive, path::PathBuf};
 
-use farnear_activity::{
-    background::Frame,
-    mask::{
-        Mask,
-        centre::{SIDE_PX, centred},
-    },
-    readers::{recording::RecordingError, skeletons::SkeletonError},
-    shadow_detectors::Method,
-    silhouette::template::TemplateError,
-};
 use farnear_files::video::Pixels;
+use farnear_shadow::detectors::Method;
+use farnear_silhouettes::background::Frame;
+use farnear_silhouettes::mask::{
+    Mask,
+    centre::{SIDE_PX, centred},
+};
+use farnear_silhouettes::readers::{recording::RecordingError, skeletons::SkeletonError};
+use farnear_silhouettes::silhouette::template::TemplateError;
 
 /// Views round a subject.
 pub(crate) const VIEWS: RangeInclusive<usize> = 1..=72;

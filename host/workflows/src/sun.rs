@@ -3,8 +3,8 @@
 use std::str::FromStr;
 
 use chrono::{DateTime, Utc};
-use farnear_activity::sun::{self, Model, Place, SunError};
 use farnear_maths::{angle::BinaryAngle, sun as board};
+use farnear_shadow::sun::{self, Model, Place, SunError};
 use serde::Serialize;
 
 use crate::{error::Result, figures::rounded};

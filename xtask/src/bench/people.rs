@@ -1,4 +1,4 @@
-//! Times of host/activity: from video and masks to embedded points, beside Isomap and the RBF map of scikit-learn.
+//! Times of host/recognition: from video and masks to embedded points, beside Isomap and the RBF map of scikit-learn.
 //!
 //! The peer runs on the same 1500 descriptors, which our bench writes, once before and once after our benches.
 
@@ -15,7 +15,7 @@ use super::{Row, modules, rows};
 use crate::run::{ROOT, cargo, finish, output, step, target_folder};
 
 /// The project's own peer.
-const PEER_SCRIPT: &str = "host/activity/benches/peer_isomap.py";
+const PEER_SCRIPT: &str = "host/recognition/benches/peer_isomap.py";
 /// What a peer is compared in: the name of our figure and of its own.
 const COMPARED: [(&str, &str); 3] = [
     ("isomap_1500", "isomap_ms"),
@@ -40,7 +40,8 @@ pub fn run(peers: bool, more: &[PathBuf]) -> Result<String> {
             Err(error) => eprintln!("{PEER_SCRIPT} is left out: {error}"),
         }
     }
-    let bench = |name: &'static str| ["bench", "--locked", "--package", "farnear-activity", "--bench", name];
+    let bench =
+        |name: &'static str| ["bench", "--locked", "--package", "farnear-recognition", "--bench", name];
     let features = target_folder().join("peers/features.npy");
     if !scripts.is_empty() {
         step("descriptors for the peers");
@@ -51,18 +52,18 @@ pub fn run(peers: bool, more: &[PathBuf]) -> Result<String> {
         if scripts.is_empty() {
             return Ok(Vec::new());
         }
-        step(&format!("peers of host/activity, {when} our own benches"));
+        step(&format!("peers of host/recognition, {when} our own benches"));
         scripts.iter().map(|script| time_peer(script, &features)).collect()
     };
     let before = all("before")?;
-    step("host/activity");
+    step("host/recognition");
     let mut found = Vec::new();
     for name in ["embedding", "background"] {
         let text = output(cargo(bench(name)).env("FARNEAR_JSON", "1"))?;
         found.extend(rows(&text)?);
     }
     if found.is_empty() {
-        bail!("the benches of host/activity printed no figures");
+        bail!("the benches of host/recognition printed no figures");
     }
     let after = all("after")?;
     let peers: Vec<Peer> = before.into_iter().zip(after).map(|(a, b)| better(a, b)).collect();

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use farnear_activity::readers::matlab::{self, Array};
 use farnear_depth::{
     fill::{FillBy, LowTexture},
     focus_stack::{StackMap, StackSettings, USUAL_RELIABILITY, depth_from_stack},
@@ -11,6 +10,7 @@ use farnear_depth::{
     pipeline::{Settings, depth_from_pair},
 };
 use farnear_files::image_file::read_grey;
+use farnear_silhouettes::readers::matlab::{self, Array};
 use ndarray::{Array2, ShapeBuilder, Zip};
 use rayon::prelude::*;
 

@@ -1,13 +1,17 @@
 //! From one set to another: trained on one laboratory's clips, tested on another's.
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    evaluation::{confusion::wilson, leave_one_out::train_on_others},
-    recognition::{
-        alignment::Alignment, choice::Views, classifier::Family, clip::Clip, experiment::Experiment,
-        frames::Mode, model::Recogniser, self_training::ROUNDS, space::SpaceSettings, watch::Unwatched,
-    },
-};
+use farnear_recognition::alignment::Alignment;
+use farnear_recognition::choice::Views;
+use farnear_recognition::classifier::Family;
+use farnear_recognition::clip::Clip;
+use farnear_recognition::evaluation::{confusion::wilson, leave_one_out::train_on_others};
+use farnear_recognition::experiment::Experiment;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::model::Recogniser;
+use farnear_recognition::self_training::ROUNDS;
+use farnear_recognition::space::SpaceSettings;
+use farnear_recognition::watch::Unwatched;
 
 use super::{data::Data, sets};
 use crate::page::Page;
@@ -63,16 +67,16 @@ const MODES: [(Mode, &str, [&[u8]; 2]); 2] = [
         Mode::Ordered,
         "ordered",
         [
-            include_bytes!("../../../activity/models/everyday.fnm"),
-            include_bytes!("../../../activity/models/everyday-cut-out.fnm"),
+            include_bytes!("../../../recognition/models/everyday.fnm"),
+            include_bytes!("../../../recognition/models/everyday-cut-out.fnm"),
         ],
     ),
     (
         Mode::OrderFree,
         "order-free",
         [
-            include_bytes!("../../../activity/models/everyday-order-free.fnm"),
-            include_bytes!("../../../activity/models/everyday-order-free-cut-out.fnm"),
+            include_bytes!("../../../recognition/models/everyday-order-free.fnm"),
+            include_bytes!("../../../recognition/models/everyday-order-free-cut-out.fnm"),
         ],
     ),
 ];

@@ -1,16 +1,14 @@
 //! Pictures of the thesis' chapter 7 once more: silhouettes from markers (fig. 7.6) and of ten activities from eight sides (fig. 7.10).
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    mask::{Mask, centre::centred},
-    readers::{self, recording::Choices},
-    silhouette::{
-        parts,
-        raster::{Point, fill_discs_hull},
-        template::Template,
-        view::{Canvas, View, draw, extent, views_round},
-    },
-    synthetic::activities::{ACTIVITIES, performance},
+use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
+use farnear_silhouettes::mask::{Mask, centre::centred};
+use farnear_silhouettes::readers::{self, recording::Choices};
+use farnear_silhouettes::silhouette::{
+    parts,
+    raster::{Point, fill_discs_hull},
+    template::Template,
+    view::{Canvas, View, draw, extent, views_round},
 };
 use ndarray::Array2;
 
@@ -126,7 +124,7 @@ fn from_eight_sides(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-fn seen(body: &[farnear_activity::silhouette::capsule::Capsule], view: &View) -> Option<Mask> {
+fn seen(body: &[farnear_silhouettes::silhouette::capsule::Capsule], view: &View) -> Option<Mask> {
     const MM_PER_PX: f64 = 8.0;
     let canvas = Canvas::fitting(&extent(body, view), MM_PER_PX, 2)?;
     Some(draw(body, view, &canvas))

@@ -2,20 +2,16 @@
 //! learned from synthetic people only.
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    embedding::descriptor::{Scaling, centroid_distance},
-    mask::{
-        Mask,
-        bits::BitMask,
-        regions::{Connectivity, regions},
-    },
-    recognition::{
-        clip::{Clip, Track},
-        frames::Mode,
-        model::{Recogniser, RecogniserSettings},
-        space::SpaceSettings,
-    },
-    synthetic::activities::clips,
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::{Scaling, centroid_distance};
+use farnear_recognition::frames::Mode;
+use farnear_recognition::model::{Recogniser, RecogniserSettings};
+use farnear_recognition::space::SpaceSettings;
+use farnear_recognition::synthetic::activities::clips;
+use farnear_silhouettes::mask::{
+    Mask,
+    bits::BitMask,
+    regions::{Connectivity, regions},
 };
 use rayon::prelude::*;
 
@@ -130,7 +126,7 @@ fn read(folder: &std::path::Path, person: &str) -> Result<Vec<Passage>> {
         }
         previous = Some(number);
         if let Some(passage) =
-            passages.last_mut().filter(|_| farnear_activity::mask::area(mask.view()) >= LEAST_PX)
+            passages.last_mut().filter(|_| farnear_silhouettes::mask::area(mask.view()) >= LEAST_PX)
         {
             passage.masks.push(mask);
         }

@@ -2,17 +2,13 @@
 //! are made of it (fig. 9.6).
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    embedding::descriptor::Scaling,
-    mask::{Mask, centre::centred},
-    recognition::{
-        clip::{Clip, Track},
-        occupancy::OccupancyGrid,
-        space::{Space, SpaceSettings},
-    },
-    silhouette::view::{Canvas, draw, extent, views_round},
-    synthetic::activities::{ACTIVITIES, performance},
-};
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_recognition::occupancy::OccupancyGrid;
+use farnear_recognition::space::{Space, SpaceSettings};
+use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
+use farnear_silhouettes::mask::{Mask, centre::centred};
+use farnear_silhouettes::silhouette::view::{Canvas, draw, extent, views_round};
 use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
 
 use super::sets::RATE_HZ;

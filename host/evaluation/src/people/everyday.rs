@@ -3,25 +3,21 @@
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    embedding::descriptor::Scaling,
-    evaluation::{
-        calibration::Reliability,
-        confusion::{Confusion, wilson},
-        leave_one_out::EvaluationError,
-        open_set::open_set,
-    },
-    recognition::{
-        choice::names,
-        classifier::Classifier,
-        clip::{Clip, Track},
-        experiment::Experiment,
-        frames::Mode,
-        model::{Answer, Recogniser},
-        space::SpaceSettings,
-        watch::Unwatched,
-    },
+use farnear_recognition::choice::names;
+use farnear_recognition::classifier::Classifier;
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_recognition::evaluation::{
+    calibration::Reliability,
+    confusion::{Confusion, wilson},
+    leave_one_out::EvaluationError,
+    open_set::open_set,
 };
+use farnear_recognition::experiment::Experiment;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::model::{Answer, Recogniser};
+use farnear_recognition::space::SpaceSettings;
+use farnear_recognition::watch::Unwatched;
 use ndarray::Axis;
 use rayon::prelude::*;
 
@@ -30,10 +26,10 @@ use crate::page::Page;
 
 /// Mode, kind of silhouettes, and the model.
 const MODELS: [(&str, &str, &[u8]); 4] = [
-    ("ordered", "full frames", include_bytes!("../../../activity/models/everyday.fnm")),
-    ("ordered", "100x100", include_bytes!("../../../activity/models/everyday-cut-out.fnm")),
-    ("order-free", "full frames", include_bytes!("../../../activity/models/everyday-order-free.fnm")),
-    ("order-free", "100x100", include_bytes!("../../../activity/models/everyday-order-free-cut-out.fnm")),
+    ("ordered", "full frames", include_bytes!("../../../recognition/models/everyday.fnm")),
+    ("ordered", "100x100", include_bytes!("../../../recognition/models/everyday-cut-out.fnm")),
+    ("order-free", "full frames", include_bytes!("../../../recognition/models/everyday-order-free.fnm")),
+    ("order-free", "100x100", include_bytes!("../../../recognition/models/everyday-order-free-cut-out.fnm")),
 ];
 
 /// What the sets call an activity, and the models.
@@ -106,7 +102,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     for (name, clips) in all.iter().filter(|(_, clips)| activities(clips).len() > 2) {
         for (mode_name, mode) in [("ordered", Mode::Ordered), ("order-free", Mode::OrderFree)] {
             for (by, of) in BY {
-                let whole = second_opinion(clips)?;
+                let whole = auxiliary_model(clips)?;
                 let experiment = |left_out: &str| Experiment {
                     second: of(&whole, left_out).map(Arc::new),
                     ..Experiment::codebook(SpaceSettings { mode, ..SpaceSettings::default() })
@@ -149,7 +145,7 @@ const BY: [(&str, Second); 3] = [
 ];
 
 /// `everyday` for full frames or cut-out silhouettes, as clips are.
-fn second_opinion(clips: &[Clip]) -> Result<Recogniser> {
+fn auxiliary_model(clips: &[Clip]) -> Result<Recogniser> {
     let cut_out = clips.iter().flat_map(|clip| &clip.views).any(|view| view.boxes.is_none());
     let (_, _, bytes) = MODELS[usize::from(cut_out)];
     Recogniser::from_bytes(bytes).context("a model that comes with the program")

@@ -1,18 +1,17 @@
 //! Pictures of the thesis' chapters 8 and 9 once more: figs. 8.6 and 9.2.
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    embedding::descriptor::{Scaling, centroid_distance},
-    mask::{BoundingBox, Mask},
-    shadow::{Method as Cutter, remove},
-    shadow_detectors::{Detector, Images, Method},
-    shadow_score::Truth,
-    synthetic::{
-        damage::{Damage, damaged},
-        pictures::colour_in,
-        scene::{Kind, Scene, scene},
-    },
+use farnear_recognition::embedding::descriptor::{Scaling, centroid_distance};
+use farnear_shadow::Method as Cutter;
+use farnear_shadow::detectors::{Detector, Images, Method};
+use farnear_shadow::remove;
+use farnear_shadow::score::Truth;
+use farnear_shadow::synthetic::{
+    pictures::colour_in,
+    scene::{Kind, Scene, scene},
 };
+use farnear_silhouettes::mask::{BoundingBox, Mask};
+use farnear_silhouettes::synthetic::damage::{Damage, damaged};
 use ndarray::Array2;
 
 use crate::{

@@ -2,10 +2,10 @@
 //! beside the whole; like Li 2014, section 9.3.1.
 
 use anyhow::Result;
-use farnear_activity::embedding::{
+use farnear_recognition::embedding::{
     descriptor::Scaling, isomap::isomap, landmark::landmark_isomap, neighbours::Neighbourhood, pca::Pca,
 };
-use farnear_activity::synthetic::activities::clips;
+use farnear_recognition::synthetic::activities::clips;
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 use rayon::prelude::*;
 

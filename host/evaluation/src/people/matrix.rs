@@ -1,7 +1,7 @@
 //! Confusion matrices as PNG: rows are what was done, columns what was answered, in per cent of the row.
 
 use anyhow::{Result, anyhow};
-use farnear_activity::evaluation::confusion::Confusion;
+use farnear_recognition::evaluation::confusion::Confusion;
 use plotters::{
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},

@@ -3,19 +3,15 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    evaluation::{
-        confusion::{Confusion, wilson},
-        leave_one_out::{Choice, Outcome, leave_one_subject_out},
-    },
-    recognition::{
-        choice::Views,
-        classifier::Family,
-        experiment::{Experiment, Sweep},
-        frames::Mode,
-        space::{Layout, PatternKind, SpaceSettings},
-    },
+use farnear_recognition::choice::Views;
+use farnear_recognition::classifier::Family;
+use farnear_recognition::evaluation::{
+    confusion::{Confusion, wilson},
+    leave_one_out::{Choice, Outcome, leave_one_subject_out},
 };
+use farnear_recognition::experiment::{Experiment, Sweep};
+use farnear_recognition::frames::Mode;
+use farnear_recognition::space::{Layout, PatternKind, SpaceSettings};
 
 use super::{
     data::Data,

@@ -6,21 +6,15 @@
 use std::collections::BTreeSet;
 
 use anyhow::Result;
-use farnear_activity::{
-    embedding::descriptor::Scaling,
-    evaluation::confusion::Confusion,
-    recognition::{
-        clip::{Clip, Track},
-        frames::Mode,
-        model::{Recogniser, RecogniserSettings},
-        space::SpaceSettings,
-    },
-    silhouette::view::{Canvas, View, draw, extent, views_round},
-    synthetic::{
-        activities::{ACTIVITIES, performance},
-        damage::{Damage, damaged},
-    },
-};
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_recognition::evaluation::confusion::Confusion;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::model::{Recogniser, RecogniserSettings};
+use farnear_recognition::space::SpaceSettings;
+use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
+use farnear_silhouettes::silhouette::view::{Canvas, View, draw, extent, views_round};
+use farnear_silhouettes::synthetic::damage::{Damage, damaged};
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -213,7 +207,7 @@ mod tests {
     #[test]
     fn unchanged_clips_are_those_of_the_synthetic_set() {
         let own = clips(Change::Nothing, 1);
-        let set = farnear_activity::synthetic::activities::clips(PEOPLE, 1, RATE_HZ, Scaling::default());
+        let set = farnear_recognition::synthetic::activities::clips(PEOPLE, 1, RATE_HZ, Scaling::default());
         assert_eq!(own[13], set[13]);
     }
 }

@@ -1,11 +1,9 @@
 //! The sets of clips that recognition is measured on.
 
 use anyhow::Result;
-use farnear_activity::{
-    embedding::descriptor::Scaling,
-    recognition::clip::{Clip, Track},
-    synthetic::activities,
-};
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_recognition::synthetic::activities;
 use rayon::prelude::*;
 
 use super::{

@@ -2,16 +2,15 @@
 //! the detectors that look at colour and texture; like Li 2014, tables 8.1 and 8.2.
 
 use anyhow::{Context, Result, ensure};
-use farnear_activity::{
-    background::{BackgroundModel, Frame, Label, Settings},
-    shadow::{Method as Cutter, remove},
-    shadow_detectors::{Detector, Images, Method},
-    shadow_score::{ShadowScore, Truth},
-    synthetic::{
-        pictures::colour_in,
-        scene::{Kind, scene},
-    },
+use farnear_shadow::Method as Cutter;
+use farnear_shadow::detectors::{Detector, Images, Method};
+use farnear_shadow::remove;
+use farnear_shadow::score::{ShadowScore, Truth};
+use farnear_shadow::synthetic::{
+    pictures::colour_in,
+    scene::{Kind, scene},
 };
+use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
 use image::DynamicImage;
 use ndarray::{Array2, ArrayView3};
 use rayon::prelude::*;

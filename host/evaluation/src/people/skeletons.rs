@@ -1,14 +1,12 @@
 //! Clips of skeleton data sets: joints dressed with capsules, drawn from views round the subject, described.
 
-use farnear_activity::{
-    embedding::descriptor::Scaling,
-    readers::skeletons::{
-        FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, SkeletonError,
-        UTKINECT_ACTIVITIES, dress, read_cells,
-    },
-    recognition::clip::{Clip, Track},
-    silhouette::{capsule::Capsule, view::views_round},
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_silhouettes::readers::skeletons::{
+    FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, SkeletonError, UTKINECT_ACTIVITIES,
+    dress, read_cells,
 };
+use farnear_silhouettes::silhouette::{capsule::Capsule, view::views_round};
 use rayon::prelude::*;
 
 /// The clips of UTKinect-Action3D (a MAT-file's bytes) in `views` views.

@@ -5,7 +5,7 @@
 //! pixels need less evidence.
 
 use anyhow::{Context, Result, ensure};
-use farnear_activity::mask::{
+use farnear_silhouettes::mask::{
     Mask,
     bits::BitMask,
     regions::{Connectivity, regions},

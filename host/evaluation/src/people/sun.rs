@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result};
 use chrono::{DateTime, TimeDelta, Utc};
-use farnear_activity::sun::{Model, Place, SunPosition, parse_time, position};
 use farnear_maths::{angle::BinaryAngle, sun as board};
+use farnear_shadow::sun::{Model, Place, SunPosition, parse_time, position};
 
 use super::data::Data;
 use crate::page::Page;

@@ -1,18 +1,14 @@
 //! Chapters 7 to 9 of the thesis once more: its tables beside ours on the data at hand.
 
 use anyhow::{Context, Result};
-use farnear_activity::{
-    evaluation::{
-        confusion::{Confusion, wilson},
-        leave_one_out::leave_one_subject_out,
-    },
-    recognition::{
-        classifier::ClassifierKind,
-        experiment::{Experiment, Sweep},
-        frames::Mode,
-        space::{Layout, PatternKind, SpaceSettings},
-    },
+use farnear_recognition::classifier::ClassifierKind;
+use farnear_recognition::evaluation::{
+    confusion::{Confusion, wilson},
+    leave_one_out::leave_one_subject_out,
 };
+use farnear_recognition::experiment::{Experiment, Sweep};
+use farnear_recognition::frames::Mode;
+use farnear_recognition::space::{Layout, PatternKind, SpaceSettings};
 
 use super::{
     bodies, broken,
@@ -86,7 +82,7 @@ fn tables_8(page: &mut Page) -> Result<()> {
     for (title, wrong) in [("Removed (8.1), %", false), ("Wrongly removed (8.2), %", true)] {
         let mut rows = Vec::new();
         for (method, scores) in &scenes {
-            let share = |score: &farnear_activity::shadow_score::ShadowScore| {
+            let share = |score: &farnear_shadow::score::ShadowScore| {
                 let found = if wrong { score.wrongly_removed_percent() } else { score.removed_percent() };
                 found.unwrap_or(f64::NAN)
             };
@@ -198,7 +194,7 @@ fn table_9_1(page: &mut Page) -> Result<()> {
     ));
     let whole = sets::synthetic();
     let mut clips = whole.clips;
-    let people = farnear_activity::recognition::choice::names(clips.iter().map(|clip| &clip.subject));
+    let people = farnear_recognition::choice::names(clips.iter().map(|clip| &clip.subject));
     clips.retain(|clip| people.iter().take(PEOPLE).any(|name| *name == clip.subject));
     compared(page, &Set { clips, ..whole }, &TABLE_9_1, 78.8)?;
     page.paragraph(

@@ -1,15 +1,13 @@
 //! Recordings that nobody cut: clips of one person one after the other, cut again by the recogniser.
 
 use anyhow::Result;
-use farnear_activity::recognition::{
-    choice::names,
-    clip::{Clip, Track},
-    frames::Mode,
-    live::{self, Segment, segments, windows},
-    model::{Recogniser, RecogniserSettings},
-    segmentation::{Worth, segmented},
-    space::SpaceSettings,
-};
+use farnear_recognition::choice::names;
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::frames::Mode;
+use farnear_recognition::live::{self, Segment, segments, windows};
+use farnear_recognition::model::{Recogniser, RecogniserSettings};
+use farnear_recognition::segmentation::{Worth, segmented};
+use farnear_recognition::space::SpaceSettings;
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use chrono::{DateTime, Utc};
 use clap::Args;
-use farnear_activity::sun::{self, Place};
+use farnear_shadow::sun::{self, Place};
 use farnear_workflows::sun::{Formula, Moment, position};
 
 use crate::report;

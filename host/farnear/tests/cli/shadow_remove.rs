@@ -1,9 +1,7 @@
 //! `farnear shadow remove` on seeded scenes whose shadow is known, and what it refuses or flags.
 
-use farnear_activity::{
-    mask::Mask,
-    synthetic::scene::{Kind, Scene, scene},
-};
+use farnear_shadow::synthetic::scene::{Kind, Scene, scene};
+use farnear_silhouettes::mask::Mask;
 use image::{GrayImage, Luma};
 
 use crate::common::{Folder, fails, farnear, figures, number};
@@ -21,7 +19,7 @@ fn save_mask(folder: &Folder, name: &str, mask: &Mask) {
 /// A place, a time and a camera azimuth that put the sun where the scene has it: Warwick at midsummer offers every elevation of
 /// the scenes below its noon, and the camera is turned to make up for the azimuth.
 fn camera_and_time(scene: &Scene) -> (String, String) {
-    use farnear_activity::sun::{Model, Place, parse_time, position};
+    use farnear_shadow::sun::{Model, Place, parse_time, position};
     let place = Place { latitude_deg: 10.0, longitude_deg: 0.0 };
     let best = (360..720)
         .map(|minute| format!("2014-06-23T{:02}:{:02}:00Z", minute / 60, minute % 60))
@@ -31,7 +29,7 @@ fn camera_and_time(scene: &Scene) -> (String, String) {
         })
         .min_by(|(_, a), (_, b)| {
             let off =
-                |s: &farnear_activity::sun::SunPosition| (s.elevation_deg - scene.sun.elevation_deg).abs();
+                |s: &farnear_shadow::sun::SunPosition| (s.elevation_deg - scene.sun.elevation_deg).abs();
             off(a).total_cmp(&off(b))
         });
     let (time, sun) = best.expect("a minute");

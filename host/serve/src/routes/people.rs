@@ -9,11 +9,9 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use farnear_activity::{
-    shadow::{CameraFile, camera},
-    sun::Model as SunModel,
-};
 use farnear_files::staging::write_file;
+use farnear_shadow::sun::Model as SunModel;
+use farnear_shadow::{CameraFile, camera};
 use farnear_workflows::{
     Context, WorkflowError,
     activity::{recognition::Model, running},

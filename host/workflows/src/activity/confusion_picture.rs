@@ -2,8 +2,8 @@
 
 use std::io::Cursor;
 
-use farnear_activity::evaluation::confusion::Confusion;
 use farnear_files::{EncodeError, text::Writer};
+use farnear_recognition::evaluation::confusion::Confusion;
 use image::{ImageFormat, Rgb, RgbImage, imageops};
 
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);

@@ -5,23 +5,19 @@ use std::{
     time::Instant,
 };
 
-use farnear_activity::{
-    evaluation::{
-        confusion::Confusion,
-        leave_one_out::{Choice, EvaluationError, Outcome, train_on_others},
-        open_set::{self, OpenSet},
-    },
-    mask::Mask,
-    recognition::{
-        choice::{Views, names},
-        clip::{Clip, Track},
-        experiment::Experiment,
-        model::Recogniser,
-        unknown::Limits,
-        watch::Unwatched,
-    },
-};
 use farnear_files::{masks, staging::Staging};
+use farnear_recognition::choice::{Views, names};
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::evaluation::{
+    confusion::Confusion,
+    leave_one_out::{Choice, EvaluationError, Outcome, train_on_others},
+    open_set::{self, OpenSet},
+};
+use farnear_recognition::experiment::Experiment;
+use farnear_recognition::model::Recogniser;
+use farnear_recognition::unknown::Limits;
+use farnear_recognition::watch::Unwatched;
+use farnear_silhouettes::mask::Mask;
 use serde::Serialize;
 
 use super::{

@@ -2,18 +2,14 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use farnear_activity::{
-    mask::{
-        Mask,
-        subject::Flag,
-        tracking::{Followed, Sight, Tracker, TrackingSettings},
-    },
-    recognition::{
-        clip::Track,
-        live::{Live, joined},
-        model::{Answer, Recogniser},
-        segmentation::{Worth, segmented},
-    },
+use farnear_recognition::clip::Track;
+use farnear_recognition::live::{Live, joined};
+use farnear_recognition::model::{Answer, Recogniser};
+use farnear_recognition::segmentation::{Worth, segmented};
+use farnear_silhouettes::mask::{
+    Mask,
+    subject::Flag,
+    tracking::{Followed, Sight, Tracker, TrackingSettings},
 };
 use serde::Serialize;
 
@@ -223,7 +219,7 @@ impl<'m> Everybody<'m> {
     fn answered(
         &mut self,
         followed: Followed,
-    ) -> Result<PersonInFrame, farnear_activity::recognition::model::ModelError> {
+    ) -> Result<PersonInFrame, farnear_recognition::model::ModelError> {
         let Followed { person, sight, parted } = followed;
         while self.people.len() < person {
             self.people.push(Somebody {

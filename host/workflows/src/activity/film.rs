@@ -2,11 +2,9 @@
 
 use std::{io::Cursor, path::Path};
 
-use farnear_activity::{
-    mask::{Mask, bits::BitMask},
-    recognition::model::Answer,
-};
 use farnear_files::{EncodeError, staging::Staging, text::Writer, video::Pixels};
+use farnear_recognition::model::Answer;
+use farnear_silhouettes::mask::{Mask, bits::BitMask};
 use image::{ImageFormat, Rgb, RgbImage, imageops};
 
 use crate::error::Result;

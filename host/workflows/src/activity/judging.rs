@@ -2,17 +2,13 @@
 
 use std::path::PathBuf;
 
-use farnear_activity::{
-    evaluation::{
-        calibration::{Reliability, area_under_roc},
-        confusion::{Confusion, wilson},
-    },
-    recognition::{
-        clip::{Clip, Track},
-        model::{Answer, Recogniser},
-    },
-};
 use farnear_files::staging::Staging;
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::evaluation::{
+    calibration::{Reliability, area_under_roc},
+    confusion::{Confusion, wilson},
+};
+use farnear_recognition::model::{Answer, Recogniser};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
-use farnear_activity::recognition::{
-    alignment::Alignment, classifier::Family, experiment::Experiment, frames::Mode, space::SpaceSettings,
-};
+use farnear_recognition::alignment::Alignment;
+use farnear_recognition::classifier::Family;
+use farnear_recognition::experiment::Experiment;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::space::SpaceSettings;
 
 use super::shipped::{self, Shipped};
 use crate::error::Result;
@@ -71,7 +73,7 @@ impl Method {
         // The thesis knows no unknown.
         let second = match self.pattern {
             Pattern::Thesis => None,
-            _ => Some(Arc::new(shipped::second_opinion(full_frames)?)),
+            _ => Some(Arc::new(shipped::auxiliary_model(full_frames)?)),
         };
         let experiment = Experiment { second, ..experiment };
         Ok(if self.search { experiment } else { experiment.fixed() })

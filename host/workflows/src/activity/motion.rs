@@ -6,18 +6,16 @@ use std::{
     str::FromStr,
 };
 
-use farnear_activity::{
-    readers::{
-        recording::{Choices, Recording},
-        skeletons::{
-            FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, UTKINECT_ACTIVITIES, dress,
-            read_cells,
-        },
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::synthetic::recorded::{self, Bodies};
+use farnear_silhouettes::readers::{
+    recording::{Choices, Recording},
+    skeletons::{
+        FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, SkeletonClip, UTKINECT_ACTIVITIES, dress,
+        read_cells,
     },
-    recognition::clip::{Clip, Track},
-    silhouette::template::Template,
-    synthetic::recorded::{self, Bodies},
 };
+use farnear_silhouettes::silhouette::template::Template;
 
 use super::samples::SCALING;
 use crate::{

@@ -6,17 +6,13 @@ use std::{
     time::Instant,
 };
 
-use farnear_activity::{
-    mask::{Mask, centre::SIDE_PX, subject::Flag},
-    recognition::{
-        clip::Track,
-        live::{Live, joined, windows},
-        model::Recogniser,
-        segmentation::{Worth, segmented},
-        self_training::ROUNDS,
-    },
-};
 use farnear_files::masks;
+use farnear_recognition::clip::Track;
+use farnear_recognition::live::{Live, joined, windows};
+use farnear_recognition::model::Recogniser;
+use farnear_recognition::segmentation::{Worth, segmented};
+use farnear_recognition::self_training::ROUNDS;
+use farnear_silhouettes::mask::{Mask, centre::SIDE_PX, subject::Flag};
 use serde::Serialize;
 
 use super::{

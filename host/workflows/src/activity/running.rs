@@ -3,20 +3,16 @@
 
 use std::{path::Path, time::Instant};
 
-use farnear_activity::{
-    mask::{
-        Mask,
-        extractor::{Extractor, ExtractorSettings},
-        subject::Flag,
-    },
-    recognition::{
-        clip::Track,
-        live::{Live, joined},
-        model::{Answer, Recogniser},
-    },
-};
 use farnear_capture::camera::Image;
 use farnear_files::video::{Pixels, Video, VideoFrame};
+use farnear_recognition::clip::Track;
+use farnear_recognition::live::{Live, joined};
+use farnear_recognition::model::{Answer, Recogniser};
+use farnear_silhouettes::mask::{
+    Mask,
+    extractor::{Extractor, ExtractorSettings},
+    subject::Flag,
+};
 use ndarray::{Array2, Axis};
 use serde::Serialize;
 

@@ -9,12 +9,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_activity::{
-    embedding::descriptor::Scaling,
-    mask::{Mask, centre::SIDE_PX},
-    recognition::clip::{Clip, Track},
-};
 use farnear_files::masks;
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_silhouettes::mask::{Mask, centre::SIDE_PX};
 use rayon::prelude::*;
 use serde::Deserialize;
 

@@ -2,13 +2,13 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use farnear_activity::{
-    recognition::{
-        clip::Clip, frames::Mode, model::Recogniser, network::training::NetworkSettings, space::SpaceSettings,
-    },
-    synthetic::everyday,
-};
 use farnear_files::staging::Staging;
+use farnear_recognition::clip::Clip;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::model::Recogniser;
+use farnear_recognition::network::training::NetworkSettings;
+use farnear_recognition::space::SpaceSettings;
+use farnear_recognition::synthetic::everyday;
 use serde::Serialize;
 
 use super::{samples::SCALING, watched};
@@ -32,14 +32,14 @@ pub const MODELS: &[Shipped] = &[
     Shipped {
         name: "everyday",
         about: "everyday activities from one view or several, from any side; the order of frames counts",
-        bytes: include_bytes!("../../../activity/models/everyday.fnm"),
-        cut_out: include_bytes!("../../../activity/models/everyday-cut-out.fnm"),
+        bytes: include_bytes!("../../../recognition/models/everyday.fnm"),
+        cut_out: include_bytes!("../../../recognition/models/everyday-cut-out.fnm"),
     },
     Shipped {
         name: "everyday-order-free",
         about: "the same where the order of frames does not count",
-        bytes: include_bytes!("../../../activity/models/everyday-order-free.fnm"),
-        cut_out: include_bytes!("../../../activity/models/everyday-order-free-cut-out.fnm"),
+        bytes: include_bytes!("../../../recognition/models/everyday-order-free.fnm"),
+        cut_out: include_bytes!("../../../recognition/models/everyday-order-free-cut-out.fnm"),
     },
 ];
 
@@ -48,13 +48,13 @@ pub const MODELS: &[Shipped] = &[
 ///
 /// # Errors
 /// As [`Shipped::recognisers`].
-pub fn second_opinion(full_frames: bool) -> Result<Recogniser> {
+pub fn auxiliary_model(full_frames: bool) -> Result<Recogniser> {
     let [full, cut_out] = MODELS[0].recognisers()?;
     Ok(if full_frames { full } else { cut_out })
 }
 
 /// What they were trained on and tested on, and where they fail.
-pub const SHEET: &str = include_str!("../../../activity/models/README.md");
+pub const SHEET: &str = include_str!("../../../recognition/models/README.md");
 
 impl std::fmt::Debug for Shipped {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

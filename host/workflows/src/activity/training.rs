@@ -2,13 +2,11 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use farnear_activity::recognition::{
-    choice::names,
-    clip::{Clip, Track},
-    model::Recogniser,
-    space::{Map, PatternKind},
-};
 use farnear_files::staging;
+use farnear_recognition::choice::names;
+use farnear_recognition::clip::{Clip, Track};
+use farnear_recognition::model::Recogniser;
+use farnear_recognition::space::{Map, PatternKind};
 use serde::Serialize;
 
 use super::{

@@ -1,6 +1,7 @@
 //! What is said of a recording or of one of the people in it, in the form in which all faces give it.
 
-use farnear_activity::recognition::{live::Segment, model::Answer};
+use farnear_recognition::live::Segment;
+use farnear_recognition::model::Answer;
 use serde::Serialize;
 
 use crate::figures::rounded;

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_activity::mask::{
+use farnear_files::{
+    masks::{self, MaskError},
+    video::{Pixels, Video, VideoFrame, pictures},
+};
+use farnear_silhouettes::mask::{
     Mask,
     centre::SIDE_PX,
     extractor::{Extractor, ExtractorSettings},
     subject::{Flag, SubjectChooser, SubjectSettings},
-};
-use farnear_files::{
-    masks::{self, MaskError},
-    video::{Pixels, Video, VideoFrame, pictures},
 };
 
 use crate::{error::Result, silhouettes::frame_of};

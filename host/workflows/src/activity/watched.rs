@@ -5,7 +5,7 @@ use std::{
     time::Instant,
 };
 
-use farnear_activity::recognition::watch::Watch;
+use farnear_recognition::watch::Watch;
 
 use crate::{
     context::Context,

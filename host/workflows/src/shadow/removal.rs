@@ -7,18 +7,16 @@ use std::{
 };
 
 use chrono::TimeDelta;
-use farnear_activity::{
-    mask::{
-        Mask,
-        subject::{Flag, SubjectChooser, SubjectSettings},
-    },
-    shadow::{
-        CameraFile, CutReport, Lamp, Light, Method, cut::SIDEWAYS, projection::ShadowError, remove,
-        subject_of, uncertainty::propagate,
-    },
-    sun::{Model, position},
-};
 use farnear_files::{masks, staging::Staging};
+use farnear_shadow::cut::SIDEWAYS;
+use farnear_shadow::projection::ShadowError;
+use farnear_shadow::sun::{Model, position};
+use farnear_shadow::uncertainty::propagate;
+use farnear_shadow::{CameraFile, CutReport, Lamp, Light, Method, remove, subject_of};
+use farnear_silhouettes::mask::{
+    Mask,
+    subject::{Flag, SubjectChooser, SubjectSettings},
+};
 use serde::Serialize;
 
 use super::stages::{Stage, Stages};

@@ -7,11 +7,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_activity::shadow_score::{ShadowScore, Truth};
 use farnear_files::{
     masks::{self, listed},
     video::pictures,
 };
+use farnear_shadow::score::{ShadowScore, Truth};
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 

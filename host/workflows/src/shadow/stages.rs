@@ -3,13 +3,12 @@
 
 use std::{io::Cursor, path::Path};
 
-use farnear_activity::{
-    mask::{BoundingBox, Mask},
-    shadow::{
-        CameraFile, CutReport, Light, Method, cast::explain, envelope::Outline, uncertainty::Uncertainty,
-    },
-};
 use farnear_files::{EncodeError, staging::Staging, text::Writer};
+use farnear_shadow::cast::explain;
+use farnear_shadow::envelope::Outline;
+use farnear_shadow::uncertainty::Uncertainty;
+use farnear_shadow::{CameraFile, CutReport, Light, Method};
+use farnear_silhouettes::mask::{BoundingBox, Mask};
 use image::{ImageFormat, Rgb, RgbImage, imageops};
 
 use crate::error::Result;

@@ -3,14 +3,12 @@
 
 use std::{fs, path::PathBuf};
 
-use farnear_activity::{
-    background,
-    shadow::{CameraFile, Method},
-};
 use farnear_files::{
     staging,
     video::{Video, VideoError},
 };
+use farnear_shadow::{CameraFile, Method};
+use farnear_silhouettes::background;
 use serde::Serialize;
 
 use super::removal::{self, LightSource, RemovalFigures, RemovalSettings};

@@ -12,19 +12,17 @@ use std::{
     time::Instant,
 };
 
-use farnear_activity::{
-    readers::{
-        self,
-        recording::{Choices, Recording},
-    },
-    silhouette::{
-        capsule::Point3,
-        parts::Fill,
-        template::Template,
-        view::{View, views_round},
-    },
-};
 use farnear_files::staging::Staging;
+use farnear_silhouettes::readers::{
+    self,
+    recording::{Choices, Recording},
+};
+use farnear_silhouettes::silhouette::{
+    capsule::Point3,
+    parts::Fill,
+    template::Template,
+    view::{View, views_round},
+};
 use serde::Serialize;
 
 use self::{drawing::Job, missing::MissingParts};

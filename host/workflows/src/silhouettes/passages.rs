@@ -2,11 +2,11 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use farnear_activity::mask::{Mask, area};
 use farnear_files::{
     masks::{self, MaskError},
     staging::Staging,
 };
+use farnear_silhouettes::mask::{Mask, area};
 use serde::Serialize;
 
 use super::{SilhouettesError, markers::Performer, performances::samples_entry};

@@ -6,11 +6,11 @@ use std::{
     time::Instant,
 };
 
-use farnear_activity::silhouette::{
+use farnear_files::{masks, staging::Staging};
+use farnear_silhouettes::silhouette::{
     capsule::Capsule,
     view::{Canvas, View, draw, extent, views_round},
 };
-use farnear_files::{masks, staging::Staging};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use std::{fs, path::PathBuf};
 
-use farnear_activity::readers::skeletons::{
+use farnear_silhouettes::readers::skeletons::{
     FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, UTKINECT_ACTIVITIES, dress, read_cells,
 };
 

@@ -1,6 +1,6 @@
 //! Silhouettes of seeded synthetic people at the ten activities of Li 2014, table 7.1.
 
-use farnear_activity::synthetic::activities::{ACTIVITIES, performance};
+use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
 
 use super::performances::{self, Drawing, Performance, PerformancesFigures};
 use crate::{

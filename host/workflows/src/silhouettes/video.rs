@@ -5,19 +5,17 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use farnear_activity::{
-    background::Label,
-    mask::{
-        Mask,
-        extractor::{Extracted, Extractor, ExtractorSettings},
-        subject::Flag,
-    },
-    shadow_detectors::{Detector, Images, Method},
-};
 use farnear_files::{
     masks,
     staging::Staging,
     video::{Pixels, Video, VideoError, VideoFrame},
+};
+use farnear_shadow::detectors::{Detector, Images, Method};
+use farnear_silhouettes::background::Label;
+use farnear_silhouettes::mask::{
+    Mask,
+    extractor::{Extracted, Extractor, ExtractorSettings},
+    subject::Flag,
 };
 use ndarray::{Array3, Axis};
 use serde::Serialize;

@@ -7,7 +7,8 @@ use std::{
     time::Duration,
 };
 
-use farnear_activity::recognition::{classifier::Family, frames::Mode};
+use farnear_recognition::classifier::Family;
+use farnear_recognition::frames::Mode;
 use farnear_workflows::{
     Cancel, Context, Nobody, Progress, Result, WorkflowError,
     activity::{

@@ -2,10 +2,8 @@
 
 use std::{fs, path::Path};
 
-use farnear_activity::{
-    mask::Mask,
-    shadow::{Lamp, Method},
-};
+use farnear_shadow::{Lamp, Method};
+use farnear_silhouettes::mask::Mask;
 use farnear_workflows::{
     Context, WorkflowError,
     shadow::removal::{LightSource, RemovalSettings, remove_from_masks},

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use farnear_activity::{
-    evaluation::confusion::Confusion,
-    recognition::{alignment::Alignment, choice::Views, self_training::ROUNDS},
-};
+use farnear_recognition::alignment::Alignment;
+use farnear_recognition::choice::Views;
+use farnear_recognition::evaluation::confusion::Confusion;
+use farnear_recognition::self_training::ROUNDS;
 use farnear_workflows::activity::{
     evaluation::{self, EvaluationSettings, LearnFrom},
     judging::{self, JudgingSettings},

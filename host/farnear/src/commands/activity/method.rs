@@ -6,7 +6,8 @@ use clap::{
     Args, ValueEnum,
     builder::{PossibleValuesParser, TypedValueParser},
 };
-use farnear_activity::recognition::{classifier::Family, frames::Mode};
+use farnear_recognition::classifier::Family;
+use farnear_recognition::frames::Mode;
 use farnear_workflows::activity::{
     method::{Method, Pattern},
     shipped::{MODELS, Shipped},

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use farnear_activity::readers::recording::{Choices, Unit, Up};
+use farnear_silhouettes::readers::recording::{Choices, Unit, Up};
 use farnear_workflows::activity::{
     motion::{MotionFile, MotionSettings},
     shipped::{self, SyntheticTraining},

@@ -5,10 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use chrono::{DateTime, Utc};
 use clap::Args;
-use farnear_activity::{
-    shadow::{Lamp, Method},
-    sun::{Place, parse_time},
-};
+use farnear_shadow::sun::{Place, parse_time};
+use farnear_shadow::{Lamp, Method};
 use farnear_workflows::{
     shadow::removal::{self, LightSource, RemovalSettings},
     sun::Moment,

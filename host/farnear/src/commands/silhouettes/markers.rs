@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use farnear_activity::{
-    readers::recording::{Choices, Unit, Up},
-    silhouette::parts::Fill,
-};
+use farnear_silhouettes::readers::recording::{Choices, Unit, Up};
+use farnear_silhouettes::silhouette::parts::Fill;
 use farnear_workflows::silhouettes::markers::{self, MarkersSettings, Performer};
 
 use crate::{report, terminal};

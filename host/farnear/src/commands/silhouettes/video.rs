@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_activity::shadow_detectors::Method;
+use farnear_shadow::detectors::Method;
 use farnear_workflows::silhouettes::video::{self, ShadowTreatment, VideoSettings};
 
 use crate::{report, terminal};

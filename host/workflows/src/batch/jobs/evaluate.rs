@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_activity::recognition::{choice::Views, classifier::Family, frames::Mode, self_training::ROUNDS};
+use farnear_recognition::choice::Views;
+use farnear_recognition::classifier::Family;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::self_training::ROUNDS;
 use serde_json::Value;
 
 use super::{BatchError, Call, Fields, Job, value};

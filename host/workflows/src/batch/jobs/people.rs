@@ -2,13 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_activity::{
-    readers::recording::{Choices, Up},
-    shadow, shadow_detectors,
-    silhouette::parts::Fill,
-    sun::{self, Place},
-};
 use farnear_files::staging::Staging;
+use farnear_shadow::sun::{self, Place};
+use farnear_shadow::{self as shadow, detectors};
+use farnear_silhouettes::readers::recording::{Choices, Up};
+use farnear_silhouettes::silhouette::parts::Fill;
 use serde_json::Value;
 
 use super::{BatchError, Call, Fields, Job, value};
@@ -28,7 +26,7 @@ use crate::{
 };
 
 pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Job>> {
-    let detector = fields.optional::<shadow_detectors::Method>("shadow_detector")?;
+    let detector = fields.optional::<detectors::Method>("shadow_detector")?;
     let settings = VideoSettings {
         video: fields.path("video")?,
         out: fields.path("out")?,

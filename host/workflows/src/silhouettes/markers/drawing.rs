@@ -2,20 +2,18 @@
 
 use std::collections::HashMap;
 
-use farnear_activity::{
-    mask::{
-        Mask,
-        centre::{SIDE_PX, centred},
-    },
-    silhouette::{
-        capsule::Point3,
-        parts,
-        redundant::remove_redundant,
-        template::Template,
-        view::{Canvas, View},
-    },
-};
 use farnear_files::{masks, staging::Staging};
+use farnear_silhouettes::mask::{
+    Mask,
+    centre::{SIDE_PX, centred},
+};
+use farnear_silhouettes::silhouette::{
+    capsule::Point3,
+    parts,
+    redundant::remove_redundant,
+    template::Template,
+    view::{Canvas, View},
+};
 use rayon::prelude::*;
 
 use super::{

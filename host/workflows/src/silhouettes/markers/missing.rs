@@ -2,10 +2,8 @@
 
 use std::collections::HashMap;
 
-use farnear_activity::{
-    readers::recording::Recording,
-    silhouette::{capsule::Point3, template::Template},
-};
+use farnear_silhouettes::readers::recording::Recording;
+use farnear_silhouettes::silhouette::{capsule::Point3, template::Template};
 
 use super::Flagged;
 

@@ -1,0 +1,253 @@
+//! Leave one subject out, all parameters chosen on the others.
+//!
+//! Per left-out subject: the space (gallery, layout, RBF map, codebook) is learned from the other subjects' clips; its
+//! parameters, sharpness and the classifier's parameter are chosen by cross-validation over those subjects
+//! ([`crate::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
+//! left-out subject is ever seen before.
+
+use super::confusion::Confusion;
+use crate::alignment::{Alignment, Statistics};
+use crate::choice::{Views, choose, names};
+use crate::classifier::{ClassifierKind, largest};
+use crate::clip::Clip;
+use crate::embedding::EmbeddingError;
+use crate::experiment::Experiment;
+use crate::patterns::{gathered, patterns_of, vectors_of};
+use crate::self_training::{Labelled, self_trained};
+use crate::space::SpaceSettings;
+use crate::watch::{Unwatched, Watch};
+use ndarray::Array2;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Right and wrong answers over all left-out subjects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Every view by itself, all views' answers counted together.
+    pub each: Confusion,
+    /// All views fused.
+    pub fused: Confusion,
+    /// What was chosen in every fold.
+    pub chosen: Vec<Choice>,
+}
+
+/// What was chosen in one fold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Choice {
+    /// Who was left out.
+    pub left_out: Vec<String>,
+    /// Whether views were recognised one by one or together.
+    pub views: Views,
+    /// How frames were embedded and clips became patterns.
+    pub space: SpaceSettings,
+    /// Sharpness of the codebook's soft assignments.
+    pub sharpness: f32,
+    /// The classifier and its parameter.
+    pub classifier: ClassifierKind,
+    /// Accuracy over the inner folds, 0 to 1.
+    pub inner_accuracy: Option<f64>,
+    /// Condition number of the RBF system, if there is one.
+    pub condition: Option<f64>,
+}
+
+impl Outcome {
+    fn empty(classes: &[String]) -> Self {
+        let none = Confusion::new(classes.to_vec());
+        Self { each: none.clone(), fused: none, chosen: Vec::new() }
+    }
+}
+
+/// Why an evaluation could not be done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EvaluationError {
+    /// Leaving one out needs two.
+    #[error("leave-one-subject-out needs at least 3 subjects, the samples have {0}")]
+    Subjects(usize),
+    /// Two halves of subjects, each enough to say what is usual.
+    #[error("an open set needs at least 4 subjects, the samples have {0}")]
+    OpenSetSubjects(usize),
+    /// Two activities are taught when one is left out.
+    #[error("an open set needs at least 3 activities, the samples have {0}")]
+    Activities(usize),
+    /// What is unknown has no limit.
+    #[error(
+        "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
+         with fewer nothing can be called unknown at a stated share of false alarms; evaluate more people or clips"
+    )]
+    OpenSetClips {
+        /// Clips taught when one of the activities is left out on one of the halves.
+        found: usize,
+        /// Clips wanted.
+        fewest: usize,
+    },
+    /// A model could not be made or used.
+    #[error(transparent)]
+    Model(Box<crate::model::ModelError>),
+    /// A clip was seen from another number of views than the first.
+    #[error(
+        "clip {clip} has {found} views, the first has {expected}: fused views need the same in all clips"
+    )]
+    Views {
+        /// Index of the clip.
+        clip: usize,
+        /// Views of that clip.
+        found: usize,
+        /// Views of the first clip.
+        expected: usize,
+    },
+    /// A space could not be learned.
+    #[error(transparent)]
+    Embedding(#[from] EmbeddingError),
+}
+
+/// Runs the experiment over all subjects. `change` alters the left-out subject's clips before they are recognised (speed, shuffling,
+/// damage); training is never altered.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn leave_one_subject_out(
+    clips: &[Clip],
+    experiment: &Experiment,
+    change: impl Fn(&Clip) -> Clip + Sync,
+) -> Result<Outcome, EvaluationError> {
+    let changed: Vec<Clip> = clips.iter().map(change).collect();
+    let subjects = names(clips.iter().map(|clip| &clip.subject));
+    if subjects.len() < 3 {
+        return Err(EvaluationError::Subjects(subjects.len()));
+    }
+    train_on_others(clips, &changed, experiment, &[Views::Each, Views::Fused], &Unwatched)
+}
+
+/// Recognises the clips of every subject of `test`, trained on the clips of all OTHER subjects of `train` (which may be the same
+/// people: clean clips for damaged ones, say). Only the asked arrangements of views are computed; others stay empty.
+/// `watch` hears of every fold, and may stop the work.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn train_on_others(
+    train: &[Clip],
+    test: &[Clip],
+    experiment: &Experiment,
+    arrangements: &[Views],
+    watch: &dyn Watch,
+) -> Result<Outcome, EvaluationError> {
+    let classes = names(train.iter().chain(test).map(|clip| &clip.activity));
+    let views = train.first().map_or(0, |clip| clip.views.len());
+    if let Some((clip, found)) =
+        train.iter().chain(test).enumerate().find(|(_, clip)| clip.views.len() != views)
+    {
+        return Err(EvaluationError::Views { clip, found: found.views.len(), expected: views });
+    }
+    let subjects = names(test.iter().map(|clip| &clip.subject));
+    // Where training and test share nobody, one training does for all.
+    let shared = |subject: &String| train.iter().any(|clip| clip.subject == *subject);
+    let (left_out, strangers): (Vec<&String>, Vec<&String>) = subjects.iter().partition(|s| shared(s));
+    let mut groups: Vec<Vec<&String>> = left_out.into_iter().map(|subject| vec![subject]).collect();
+    if !strangers.is_empty() {
+        groups.push(strangers);
+    }
+    watch.folds_begin(groups.len(), experiment.spaces());
+    let folds: Result<Vec<Outcome>, EvaluationError> = groups
+        .par_iter()
+        .map(|tested| {
+            let kept: Vec<&Clip> = train.iter().filter(|clip| !tested.contains(&&clip.subject)).collect();
+            let others = names(kept.iter().map(|clip| &clip.subject)).len();
+            if others == 0 {
+                return Err(EvaluationError::Subjects(1));
+            }
+            let mirrors: Vec<Clip> =
+                if experiment.mirror { kept.iter().map(|c| c.mirrored()).collect() } else { Vec::new() };
+            let training: Vec<&Clip> = kept.into_iter().chain(&mirrors).collect();
+            let held: Vec<&Clip> = test.iter().filter(|clip| tested.contains(&&clip.subject)).collect();
+            let fold = one_fold(&training, &held, &classes, views, experiment, arrangements, watch)?;
+            watch.fold_done(groups.len());
+            Ok(fold)
+        })
+        .collect();
+    let mut outcome = Outcome::empty(&classes);
+    for fold in folds? {
+        outcome.each.add(&fold.each);
+        outcome.fused.add(&fold.fused);
+        outcome.chosen.extend(fold.chosen);
+    }
+    Ok(outcome)
+}
+
+fn one_fold(
+    train: &[&Clip],
+    test: &[&Clip],
+    classes: &[String],
+    views: usize,
+    experiment: &Experiment,
+    arrangements: &[Views],
+    watch: &dyn Watch,
+) -> Result<Outcome, EvaluationError> {
+    let label = |clip: &&Clip| classes.iter().position(|class| *class == clip.activity).unwrap_or(0);
+    let (train_labels, test_labels): (Vec<usize>, Vec<usize>) =
+        (train.iter().map(label).collect(), test.iter().map(label).collect());
+    let mut outcome = Outcome::empty(classes);
+    let doubled = |&arrangement: &Views| {
+        arrangement == Views::Fused && views == 1 && arrangements.contains(&Views::Each)
+    };
+    let asked: Vec<Views> =
+        arrangements.iter().copied().filter(|arrangement| !doubled(arrangement)).collect();
+    let chosen = choose(train, classes, experiment, &asked, watch)?;
+    // What a network was taught mirrors for gives a second opinion of every clip.
+    let mirrors: Vec<Clip> = if experiment.features.is_some() {
+        test.iter().map(|clip| clip.mirrored()).collect()
+    } else {
+        Vec::new()
+    };
+    let all: Vec<&Clip> = test.iter().copied().chain(&mirrors).collect();
+    let seen = vectors_of(&chosen.space, &all)?;
+    let seen = match experiment.align {
+        Alignment::None => seen,
+        align => aligned(align, seen, &vectors_of(&chosen.space, train)?),
+    };
+    let tested = patterns_of(&chosen.space, &seen, chosen.sharpness);
+    for arrangement in asked {
+        let confusion = if arrangement == Views::Each { &mut outcome.each } else { &mut outcome.fused };
+        for joint in arrangement.arrangements(views) {
+            let training = gathered(&chosen.patterns, &joint);
+            let labelled =
+                Labelled { patterns: training.view(), labels: &train_labels, classes: classes.len() };
+            let rows = gathered(&tested, &joint);
+            let classifier = self_trained(chosen.classifier, labelled, rows.view(), experiment.self_training);
+            let opinions: Vec<Vec<f32>> =
+                rows.rows().into_iter().map(|row| classifier.probabilities(row)).collect();
+            for (clip, &truth) in test_labels.iter().enumerate() {
+                let mut joint = opinions[clip].clone();
+                if let Some(second) = opinions.get(test.len() + clip) {
+                    joint.iter_mut().zip(second).for_each(|(first, second)| *first *= second);
+                }
+                confusion.count(truth, largest(&joint).0);
+            }
+        }
+        outcome.chosen.push(Choice {
+            left_out: names(test.iter().map(|clip| &clip.subject)),
+            views: arrangement,
+            space: chosen.space.settings.clone(),
+            sharpness: chosen.sharpness,
+            classifier: chosen.classifier,
+            inner_accuracy: chosen.inner_accuracy,
+            condition: chosen.condition(),
+        });
+    }
+    // One view by itself is all of its views.
+    if views == 1 && arrangements.contains(&Views::Each) {
+        outcome.fused = outcome.each.clone();
+    }
+    Ok(outcome)
+}
+
+/// Frame vectors `[clip][view]` brought to those that were learned from.
+fn aligned(
+    align: Alignment,
+    seen: Vec<Vec<Array2<f32>>>,
+    learned: &[Vec<Array2<f32>>],
+) -> Vec<Vec<Array2<f32>>> {
+    let of = |clips: &[Vec<Array2<f32>>]| Statistics::of(clips.iter().flatten());
+    let (Some(own), Some(wanted)) = (of(&seen), of(learned)) else { return seen };
+    let brought = own.to(&wanted, align);
+    seen.iter().map(|views| views.iter().map(|view| brought.apply(view)).collect()).collect()
+}

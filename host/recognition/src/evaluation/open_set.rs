@@ -1,0 +1,131 @@
+//! Activities that nobody has taught: are they called unknown, and what is known not?
+//!
+//! Each activity in turn is left out of the training, on half of the subjects; the other half does all activities, and the other way round.
+
+use super::calibration::area_under_roc;
+use super::leave_one_out::EvaluationError;
+use crate::choice::names;
+use crate::clip::Clip;
+use crate::embedding::{EmbeddingError, descriptor::Scaling};
+use crate::experiment::Experiment;
+use crate::model::{ModelError, Recogniser};
+use crate::unknown::Limits;
+use crate::watch::{Unwatched, Watch};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// How what is strange was told from what is known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OpenSet {
+    /// The activity that nobody taught; in a mean over all of them, `None`.
+    pub left_out: Option<String>,
+    /// Clips of activities that were taught.
+    pub known: usize,
+    /// Share of those that was called unknown.
+    pub unknown_of_known: f64,
+    /// Clips of the activity that was not.
+    pub strangers: usize,
+    /// Share of those that was called unknown.
+    pub unknown_of_strangers: f64,
+    /// Area under the ROC curve of the outlier score.
+    pub auroc: f64,
+}
+
+/// Outlier scores of a round.
+#[derive(Default)]
+struct Scores {
+    known: Vec<f32>,
+    strange: Vec<f32>,
+}
+
+/// Leaves every activity out in turn; `experiment` is told which. An experiment's first settings are taken; all views are fused. Gives a
+/// row per activity and their mean last.
+///
+/// # Errors
+/// Fewer than 4 subjects or 3 activities, too few clips for a limit; see [`EvaluationError`].
+pub fn open_set(
+    clips: &[Clip],
+    experiment: impl Fn(&str) -> Experiment + Sync,
+    scaling: Scaling,
+    watch: &dyn Watch,
+) -> Result<Vec<OpenSet>, EvaluationError> {
+    let activities = names(clips.iter().map(|clip| &clip.activity));
+    let subjects = names(clips.iter().map(|clip| &clip.subject));
+    if subjects.len() < 4 {
+        return Err(EvaluationError::OpenSetSubjects(subjects.len()));
+    }
+    if activities.len() < 3 {
+        return Err(EvaluationError::Activities(activities.len()));
+    }
+    let half = |clip: &Clip| subjects.iter().position(|subject| *subject == clip.subject).unwrap_or(0) % 2;
+    let taught = |left_out: &str, tested: usize| {
+        let is_taught = |clip: &&Clip| half(clip) != tested && clip.activity != left_out;
+        clips.iter().filter(is_taught).collect::<Vec<_>>()
+    };
+    let counts = activities.iter().flat_map(|left_out| [0, 1].map(|tested| taught(left_out, tested).len()));
+    let (found, fewest) = (counts.min().unwrap_or(0), Limits::fewest(Limits::FALSE_ALARMS));
+    if found < fewest {
+        return Err(EvaluationError::OpenSetClips { found, fewest });
+    }
+    let rows: Result<Vec<OpenSet>, EvaluationError> = activities
+        .par_iter()
+        .map(|left_out| {
+            let mut scores = Scores::default();
+            let fixed = experiment(left_out).fixed();
+            for tested in 0..2 {
+                if watch.is_stopped() {
+                    return Err(EmbeddingError::Stopped.into());
+                }
+                let taught: Vec<Clip> = taught(left_out, tested).into_iter().cloned().collect();
+                let (model, _) =
+                    Recogniser::train_searched(&taught, &fixed, scaling, &Unwatched).map_err(of_model)?;
+                for clip in clips.iter().filter(|clip| half(clip) == tested) {
+                    let score = model.recognise(&clip.views).map_err(of_model)?.outlier_score;
+                    let known = clip.activity != *left_out;
+                    if known { scores.known.push(score) } else { scores.strange.push(score) }
+                }
+            }
+            watch.fold_done(activities.len());
+            Ok(scores.row(left_out))
+        })
+        .collect();
+    let mut rows = rows?;
+    rows.push(mean(&rows));
+    Ok(rows)
+}
+
+/// Models are made of what evaluation was given.
+fn of_model(error: ModelError) -> EvaluationError {
+    match error {
+        ModelError::Embedding(error) => error.into(),
+        other => EvaluationError::Model(Box::new(other)),
+    }
+}
+
+impl Scores {
+    fn row(&self, left_out: &str) -> OpenSet {
+        let unknown = |scores: &[f32]| {
+            scores.iter().filter(|score| **score > 1.0).count() as f64 / scores.len().max(1) as f64
+        };
+        OpenSet {
+            left_out: Some(left_out.into()),
+            known: self.known.len(),
+            unknown_of_known: unknown(&self.known),
+            strangers: self.strange.len(),
+            unknown_of_strangers: unknown(&self.strange),
+            auroc: area_under_roc(&self.known, &self.strange),
+        }
+    }
+}
+
+fn mean(rows: &[OpenSet]) -> OpenSet {
+    let over = |value: fn(&OpenSet) -> f64| rows.iter().map(value).sum::<f64>() / rows.len().max(1) as f64;
+    OpenSet {
+        left_out: None,
+        known: rows.iter().map(|row| row.known).sum(),
+        unknown_of_known: over(|row| row.unknown_of_known),
+        strangers: rows.iter().map(|row| row.strangers).sum(),
+        unknown_of_strangers: over(|row| row.unknown_of_strangers),
+        auroc: over(|row| row.auroc),
+    }
+}

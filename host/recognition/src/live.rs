@@ -1,0 +1,230 @@
+//! Recognition while frames come in: a running answer over the last frames, and windows over a long recording.
+
+use super::clip::Track;
+use super::model::{Answer, ModelError, Recogniser};
+use super::nearest::Nearest;
+use super::patterns::joined as in_order;
+use farnear_silhouettes::mask::Mask;
+use ndarray::{Array1, Array2, Axis, concatenate};
+use std::collections::VecDeque;
+
+/// Keeps the last frames of every view and answers for them. Every frame is embedded once, and the nearest of all training patterns is
+/// found by an index: a frame costs what its window's pattern costs.
+#[derive(Debug)]
+pub struct Live<'a> {
+    recogniser: &'a Recogniser,
+    nearest: Nearest<'a>,
+    window: usize,
+    full_frames: bool,
+    frames: VecDeque<Moment>,
+}
+
+/// What is known of a moment: `[opinion][view]`, as [`Recogniser::opinions`].
+type Moment = Vec<Vec<Seen>>;
+
+/// A frame of a view, embedded; no row where nobody is seen.
+#[derive(Debug)]
+struct Seen {
+    points: Array2<f32>,
+    boxes: Option<Array2<f32>>,
+}
+
+impl<'a> Live<'a> {
+    /// Watches the last `window` frames (at least one).
+    pub fn new(recogniser: &'a Recogniser, window: usize, full_frames: bool) -> Self {
+        let nearest = Nearest::new(recogniser.patterns.view());
+        Self { recogniser, nearest, window: window.max(1), full_frames, frames: VecDeque::new() }
+    }
+
+    /// Takes the masks of one moment, one per view, and answers for the window that ends with it. Empty masks are left out, so a moment
+    /// without anybody changes nothing but pushes old frames out.
+    ///
+    /// # Errors
+    /// Another number of views than the model's.
+    pub fn push(&mut self, masks: &[Mask]) -> Result<Answer, ModelError> {
+        let scaling = self.recogniser.settings.scaling;
+        let moment =
+            masks.iter().map(|mask| Track::from_masks(std::slice::from_ref(mask), scaling, self.full_frames));
+        self.push_described(moment.collect())
+    }
+
+    /// As [`Self::push`], for masks that are described already: one track of a single frame per view.
+    ///
+    /// # Errors
+    /// Another number of views than the model's.
+    pub fn push_described(&mut self, moment: Vec<Track>) -> Result<Answer, ModelError> {
+        self.recogniser.check(&moment)?;
+        let boxed = self.recogniser.uses_boxes();
+        let seen = |view: Track| -> Result<Seen, ModelError> {
+            Ok(Seen { points: self.recogniser.space.points(&view)?, boxes: view.boxes.filter(|_| boxed) })
+        };
+        let opinions = self.recogniser.opinions(&moment).into_iter();
+        let moment: Result<Moment, ModelError> =
+            opinions.map(|views| views.into_iter().map(seen).collect()).collect();
+        self.frames.push_back(moment?);
+        if self.frames.len() > self.window {
+            self.frames.pop_front();
+        }
+        let opinions = self.frames.back().map_or(0, Vec::len);
+        let answers: Vec<Answer> = (0..opinions).filter_map(|opinion| self.answer(opinion)).collect();
+        Ok(if answers.is_empty() {
+            Answer::nobody(&self.recogniser.activities)
+        } else if let [one] = answers.as_slice() {
+            one.clone()
+        } else {
+            Answer::joint(&answers)
+        })
+    }
+
+    /// The answer of one opinion for the window; `None` where nobody is seen in it.
+    fn answer(&self, opinion: usize) -> Option<Answer> {
+        let Recogniser { space, settings, .. } = self.recogniser;
+        let frames: Vec<&Vec<Seen>> = self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();
+        let views = frames.last()?.len();
+        let mut seen = false;
+        let patterns: Vec<Array1<f32>> = (0..views)
+            .map(|view| {
+                let of_view = || frames.iter().filter_map(|moment| moment.get(view));
+                let points: Vec<_> = of_view().map(|frame| frame.points.view()).collect();
+                let boxes: Option<Vec<_>> =
+                    of_view().map(|frame| frame.boxes.as_ref().map(|boxes| boxes.view())).collect();
+                let points = concatenate(Axis(0), &points).unwrap_or_default();
+                let boxes = boxes.and_then(|boxes| concatenate(Axis(0), &boxes).ok());
+                seen |= points.nrows() > 0;
+                let vectors = space.vectors_of(points.view(), boxes.as_ref().map(|boxes| boxes.view()));
+                space.pattern_of(vectors.view(), settings.sharpness)
+            })
+            .collect();
+        let pattern = in_order(&patterns, &(0..views).collect::<Vec<_>>());
+        let distance = self.nearest.squared_distance(pattern.view());
+        seen.then(|| self.recogniser.answer_by(pattern.view(), distance))
+    }
+
+    /// Forgets all frames.
+    pub fn clear(&mut self) {
+        self.frames.clear();
+    }
+}
+
+/// Tracks one after the other.
+pub fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
+    let parts: Vec<&Track> = parts.collect();
+    let empty_frames = parts.iter().map(|part| part.empty_frames).sum();
+    let descriptors: Vec<_> = parts.iter().map(|part| part.descriptors.view()).collect();
+    let cells: Vec<_> = parts.iter().map(|part| part.cells.view()).collect();
+    let boxes: Option<Vec<_>> = parts.iter().map(|part| part.boxes.as_ref().map(|b| b.view())).collect();
+    Track {
+        descriptors: concatenate(Axis(0), &descriptors).unwrap_or_default(),
+        cells: concatenate(Axis(0), &cells).unwrap_or_default(),
+        boxes: boxes.and_then(|boxes| concatenate(Axis(0), &boxes).ok()),
+        empty_frames,
+    }
+}
+
+/// A recording cut where the answer changes: every frame goes to the window whose middle is nearest, neighbours with one answer
+/// become one stretch, whose confidence is the mean.
+pub fn segments(windows: &[Stretch]) -> Vec<Segment> {
+    let mut found: Vec<Segment> = Vec::new();
+    let mut merged = 0.0;
+    for (index, window) in windows.iter().enumerate() {
+        let border = |a: &Stretch, b: &Stretch| (a.from + a.to + b.from + b.to).div_ceil(4);
+        let from = if index == 0 { window.from } else { border(&windows[index - 1], window) };
+        let to = windows.get(index + 1).map_or(window.to, |next| border(window, next));
+        match found.last_mut().filter(|last| last.activity == window.answer.activity) {
+            Some(last) => {
+                last.to = to;
+                merged += 1.0;
+                last.confidence += (window.answer.confidence - last.confidence) / merged;
+            }
+            None => {
+                merged = 1.0;
+                found.push(Segment {
+                    from,
+                    to,
+                    activity: window.answer.activity.clone(),
+                    confidence: window.answer.confidence,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// A part of a recording with one answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// First frame, counted from 0.
+    pub from: usize,
+    /// One past the last frame.
+    pub to: usize,
+    /// The activity, `None` = unknown.
+    pub activity: Option<String>,
+    /// Mean confidence of its windows, 0 to 1.
+    pub confidence: f32,
+}
+
+/// What was recognised in a stretch of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// First frame, counted from 0.
+    pub from: usize,
+    /// One past the last frame.
+    pub to: usize,
+    /// The answer for it.
+    pub answer: Answer,
+}
+
+/// Recognises a long recording window by window: `length` frames every `step`. The last window is shorter if it has to be.
+///
+/// # Errors
+/// Another number of views than the model's.
+pub fn windows(
+    recogniser: &Recogniser,
+    views: &[Track],
+    length: usize,
+    step: usize,
+) -> Result<Vec<Stretch>, ModelError> {
+    let frames = views.iter().map(Track::frames).min().unwrap_or(0);
+    let mut found = Vec::new();
+    let mut from = 0;
+    loop {
+        let to = (from + length.max(1)).min(frames);
+        let part: Vec<Track> =
+            views.iter().map(|view| view.select(&(from..to).collect::<Vec<_>>())).collect();
+        found.push(Stretch { from, to, answer: recogniser.recognise(&part)? });
+        if to >= frames {
+            return Ok(found);
+        }
+        from += step.max(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_with_one_answer_become_one_segment() {
+        let window = |from: usize, activity: Option<&str>, confidence: f32| Stretch {
+            from,
+            to: from + 20,
+            answer: Answer {
+                activity: activity.map(str::to_owned),
+                confidence,
+                probabilities: Vec::new(),
+                outlier_score: 0.5,
+            },
+        };
+        let windows = [
+            window(0, Some("walk"), 0.5),
+            window(10, Some("walk"), 0.75),
+            window(20, None, 0.25),
+            window(30, Some("dig"), 1.0),
+        ];
+        let found = segments(&windows);
+        let spans: Vec<_> = found.iter().map(|s| (s.from, s.to, s.activity.as_deref())).collect();
+        assert_eq!(spans, [(0, 25, Some("walk")), (25, 35, None), (35, 50, Some("dig"))]);
+        assert!((found[0].confidence - 0.625).abs() < 1e-6);
+        assert!(segments(&[]).is_empty());
+    }
+}

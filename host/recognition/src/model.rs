@@ -1,0 +1,352 @@
+//! A trained recogniser as one value, and what it answers; [`super::training`] makes it, [`super::model_file`] saves and reads it.
+
+use super::auxiliary_model::SecondOpinion;
+use super::classifier::softmax::softmax;
+use super::classifier::{Classifier, ClassifierKind, largest};
+use super::clip::Track;
+use super::frames::Mode;
+use super::lengths::Lengths;
+use super::patterns::joined;
+use super::self_training::{Labelled, self_trained};
+use super::space::{Map, Pattern, Space, SpaceSettings};
+use super::unknown::Limits;
+use crate::embedding::{EmbeddingError, descriptor::Scaling, squared_distance};
+use ndarray::{Array1, Array2, ArrayView1};
+use serde::{Deserialize, Serialize};
+
+/// Everything that is chosen for a recogniser.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecogniserSettings {
+    /// How masks are scaled before they are described.
+    pub scaling: Scaling,
+    /// How frames are embedded and clips become patterns.
+    pub space: SpaceSettings,
+    /// Sharpness of the codebook's soft assignments.
+    pub sharpness: f32,
+    /// Which classifier, with its parameter.
+    pub classifier: ClassifierKind,
+    /// Whether the training clips' mirrors train too.
+    pub mirror: bool,
+}
+
+impl Default for RecogniserSettings {
+    fn default() -> Self {
+        Self {
+            scaling: Scaling::default(),
+            space: SpaceSettings::default(),
+            sharpness: 2.0,
+            classifier: ClassifierKind::Svc(5.0),
+            mirror: true,
+        }
+    }
+}
+
+/// A trained recogniser.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recogniser {
+    /// How it was trained.
+    pub settings: RecogniserSettings,
+    /// Activities by class.
+    pub activities: Vec<String>,
+    /// Views that are fused, in order.
+    pub views: usize,
+    /// The learned space.
+    pub space: Space,
+    /// The classifier, trained on the patterns.
+    pub classifier: Classifier,
+    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown where there is no second opinion.
+    pub limits: Limits,
+    /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
+    pub patterns: Array2<f32>,
+    /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
+    pub labels: Vec<usize>,
+    /// What another recogniser says, from which clips and windows are called unknown.
+    pub second: Option<SecondOpinion>,
+    /// Frames of a training clip, median: what a window over a long recording should hold.
+    pub typical_frames: usize,
+    /// How long its clips last, by class; empty in models of older formats.
+    pub lengths: Vec<Lengths>,
+}
+
+/// An activity, and how sure that is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The activity, `None` = unknown: too far from all training data, or nothing to see.
+    pub activity: Option<String>,
+    /// Probability of the best activity, 0 to 1.
+    pub confidence: f32,
+    /// Probability of every activity.
+    pub probabilities: Vec<(String, f32)>,
+    /// How far the clip is from what was learned over the largest such distance at which the activity still counts as known: above 1
+    /// is unknown. The distance is that of a second opinion from what it said of the activity's training clips, or the squared one
+    /// to the nearest training pattern.
+    pub outlier_score: f32,
+}
+
+impl Answer {
+    /// The answer where nobody was seen.
+    pub(super) fn nobody(activities: &[String]) -> Self {
+        let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
+        Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
+    }
+
+    /// One answer from those of several views: probabilities by their geometric mean, the outlier score by its mean.
+    pub(super) fn joint(answers: &[Self]) -> Self {
+        let n = answers.len().max(1) as f32;
+        let mut values: Vec<f32> = (0..answers[0].probabilities.len())
+            .map(|k| answers.iter().map(|answer| answer.probabilities[k].1.max(1e-9).ln()).sum::<f32>() / n)
+            .collect();
+        softmax(&mut values);
+        let names = answers[0].probabilities.iter().map(|(name, _)| name.clone());
+        let outlier_score = answers.iter().map(|answer| answer.outlier_score).sum::<f32>() / n;
+        Self::of(names.zip(values).collect(), outlier_score)
+    }
+
+    /// The answer if only some activities can be: their probabilities, which add up to 1 again.
+    #[must_use]
+    pub fn among(&self, activities: &[String]) -> Self {
+        let mut kept: Vec<(String, f32)> =
+            self.probabilities.iter().filter(|(name, _)| activities.contains(name)).cloned().collect();
+        let total: f32 = kept.iter().map(|(_, share)| share).sum();
+        kept.iter_mut().for_each(|(_, share)| *share /= total.max(f32::MIN_POSITIVE));
+        Self::of(kept, self.outlier_score)
+    }
+
+    /// The most probable activity (the first of equals), also where it is called unknown.
+    pub fn best(&self) -> Option<&String> {
+        most_probable(&self.probabilities).map(|(name, _)| name)
+    }
+
+    fn of(probabilities: Vec<(String, f32)>, outlier_score: f32) -> Self {
+        let best = most_probable(&probabilities);
+        let (activity, confidence) = best.map_or((None, 0.0), |(name, share)| (Some(name.clone()), *share));
+        Self { activity: activity.filter(|_| outlier_score <= 1.0), confidence, probabilities, outlier_score }
+    }
+}
+
+fn most_probable(probabilities: &[(String, f32)]) -> Option<&(String, f32)> {
+    probabilities.iter().fold(None, |best, next| match best {
+        Some((_, share)) if *share >= next.1 => best,
+        _ => Some(next),
+    })
+}
+
+/// Why a model could not be made, read or used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// Not a model.
+    #[error("not a farnear activity model: {0}")]
+    NotAModel(&'static str),
+    /// Made by another version of the program.
+    #[error("the model has {what} version {found}, this program reads {expected}: train it again")]
+    Version {
+        /// The part of the file that has versions: format or descriptor.
+        what: &'static str,
+        /// In the file.
+        found: u32,
+        /// Read by this program.
+        expected: u32,
+    },
+    /// Some of the body's bytes have changed.
+    #[error("the model is damaged: checksum {found:#010x}, expected {expected:#010x}")]
+    Checksum {
+        /// Of the body.
+        found: u32,
+        /// In the header.
+        expected: u32,
+    },
+    /// The body cannot be read.
+    #[error("the model's body cannot be read: {0}")]
+    Body(String),
+    /// The parts of the body do not belong together.
+    #[error("the model's parts do not belong together: {0}")]
+    Parts(&'static str),
+    /// The clip does not fit the model.
+    #[error("the clip has {found} views{boxes}, the model was trained on {expected}{expected_boxes}", boxes = with(*.found_boxes), expected_boxes = with(*.expected_boxes))]
+    Clip {
+        /// Views of the clip.
+        found: usize,
+        /// Whether it has box motion.
+        found_boxes: bool,
+        /// Views of the model.
+        expected: usize,
+        /// Whether the model uses box motion.
+        expected_boxes: bool,
+    },
+    /// A model without the patterns of its training clips.
+    #[error(
+        "the model keeps no training clips of its own to learn on with (those that come with the program do not, for learning on made them \
+         worse): train one on labelled samples, with this model's features if they are few"
+    )]
+    Unlabelled,
+    /// The other recogniser in a model's file.
+    #[error("the model's second opinion: {0}")]
+    Second(Box<ModelError>),
+    /// Nothing to train on.
+    #[error("a model needs clips of at least two activities, found {0}")]
+    Activities(usize),
+    /// A space could not be learned or used.
+    #[error(transparent)]
+    Embedding(#[from] EmbeddingError),
+}
+
+fn with(boxes: bool) -> &'static str {
+    if boxes { " of full frames" } else { " of cut-out silhouettes" }
+}
+
+impl Recogniser {
+    /// Recognises one clip.
+    ///
+    /// A model of one view takes any number of views: the answers of all that see somebody count together. Whether the clip is unknown
+    /// says the second opinion, where the model has one.
+    ///
+    /// # Errors
+    /// A clip with other views than the model's, or with cut-out silhouettes where the model knows full frames.
+    pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
+        self.check(views)?;
+        let mut answers = self
+            .groups(views)
+            .iter()
+            .map(|group| Ok(self.answer(self.pattern(group)?.view())))
+            .collect::<Result<Vec<Answer>, ModelError>>()?;
+        let answer = match answers.len() {
+            0 => return Ok(Answer::nobody(&self.activities)),
+            1 => answers.swap_remove(0),
+            _ => Answer::joint(&answers),
+        };
+        let Some(second) = &self.second else { return Ok(answer) };
+        let strangeness = second.strangeness(&second.recogniser.recognise(views)?, &answer);
+        Ok(Answer::of(answer.probabilities, strangeness))
+    }
+
+    /// Whether views fit the model.
+    pub(super) fn check(&self, views: &[Track]) -> Result<(), ModelError> {
+        let boxes = self.uses_boxes();
+        let found_boxes = views.iter().all(|view| view.boxes.is_some());
+        let any_view = self.views == 1 && views.len() > 1;
+        if !(views.len() == self.views || any_view) || (boxes && !found_boxes) {
+            return Err(ModelError::Clip {
+                found: views.len(),
+                found_boxes,
+                expected: self.views,
+                expected_boxes: boxes,
+            });
+        }
+        Ok(())
+    }
+
+    /// The views of which each group has an answer of its own, those that see somebody.
+    pub(super) fn groups(&self, views: &[Track]) -> Vec<Vec<Track>> {
+        let mut groups = self.opinions(views);
+        groups.retain(|group| group.iter().any(|view| view.frames() > 0));
+        groups
+    }
+
+    /// The views of which each group has an answer of its own: all of them together, or for a model of one view each, a network's with
+    /// its mirror.
+    pub(super) fn opinions(&self, views: &[Track]) -> Vec<Vec<Track>> {
+        if self.views > 1 {
+            return vec![views.to_vec()];
+        }
+        // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
+        let mirrors = matches!(self.space.pattern, Pattern::Network(_) | Pattern::Features(_));
+        let both = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
+        views.iter().flat_map(both).map(|view| vec![view]).collect()
+    }
+
+    /// The answer for a pattern.
+    pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
+        self.answer_by(pattern, self.distance(pattern))
+    }
+
+    /// The answer for a pattern whose squared distance to the nearest of what was learned is known.
+    pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
+        let probabilities = self.classifier.probabilities(pattern);
+        let (best, confidence) = largest(&probabilities);
+        let outlier_score = self.limits.score(best, squared_distance);
+        Answer {
+            activity: (outlier_score <= 1.0).then(|| self.activities[best].clone()),
+            confidence,
+            probabilities: self.activities.iter().cloned().zip(probabilities).collect(),
+            outlier_score,
+        }
+    }
+
+    /// The pattern of views that fit the model. A model of cut-out silhouettes looks at shapes only, also in full frames.
+    pub(super) fn pattern(&self, views: &[Track]) -> Result<Array1<f32>, ModelError> {
+        if self.uses_boxes() || views.iter().all(|view| view.boxes.is_none()) {
+            return pattern(&self.space, views, self.settings.sharpness);
+        }
+        let shapes: Vec<Track> = views.iter().map(|view| Track { boxes: None, ..view.clone() }).collect();
+        pattern(&self.space, &shapes, self.settings.sharpness)
+    }
+
+    /// The same recogniser for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled: its classifier is trained on
+    /// with its surest answers for them ([`super::self_training`]). What counts as unknown stays.
+    ///
+    /// # Errors
+    /// Clips that do not fit; [`ModelError::Unlabelled`].
+    pub fn adapted(&self, clips: &[Vec<Track>], rounds: usize) -> Result<Self, ModelError> {
+        if self.labels.is_empty() || self.labels.len() != self.patterns.nrows() {
+            return Err(ModelError::Unlabelled);
+        }
+        let mut rows = Vec::new();
+        for views in clips {
+            self.check(views)?;
+            for group in self.groups(views) {
+                rows.push(self.pattern(&group)?);
+            }
+        }
+        let others = Array2::from_shape_fn((rows.len(), self.patterns.ncols()), |(i, k)| rows[i][k]);
+        let labelled =
+            Labelled { patterns: self.patterns.view(), labels: &self.labels, classes: self.activities.len() };
+        Ok(Self {
+            classifier: self_trained(self.settings.classifier, labelled, others.view(), rounds),
+            ..self.clone()
+        })
+    }
+
+    /// Squared distance of a pattern to the nearest of what was learned.
+    pub(super) fn distance(&self, pattern: ArrayView1<f32>) -> f32 {
+        nearest(self.patterns.rows().into_iter(), pattern)
+    }
+
+    /// Whether the box's motion is part of what was learned.
+    pub fn uses_boxes(&self) -> bool {
+        let dimensions = match &self.space.map {
+            Map::Rbf(rbf) => rbf.dimensions(),
+            Map::Pca(pca) => pca.directions.nrows(),
+        };
+        let repeats = if self.settings.space.mode == Mode::Ordered { 3 } else { 2 };
+        match &self.space.pattern {
+            Pattern::Thesis(_) => false,
+            Pattern::Codebook(book) => book.centres.ncols() > repeats * dimensions,
+            Pattern::Network(network) => network.mean.len() > repeats * dimensions,
+            Pattern::Features(features) => features.network.mean.len() > repeats * dimensions,
+        }
+    }
+}
+
+/// All views' patterns, one after the other.
+pub(super) fn pattern(space: &Space, views: &[Track], sharpness: f32) -> Result<Array1<f32>, ModelError> {
+    let patterns: Result<Vec<Array1<f32>>, EmbeddingError> =
+        views.iter().map(|view| Ok(space.pattern_of(space.vectors(view)?.view(), sharpness))).collect();
+    let patterns = patterns?;
+    Ok(joined(&patterns, &(0..patterns.len()).collect::<Vec<_>>()))
+}
+
+/// Squared distance to the nearest of some patterns.
+pub(super) fn nearest<'a>(
+    patterns: impl Iterator<Item = ArrayView1<'a, f32>>,
+    query: ArrayView1<f32>,
+) -> f32 {
+    patterns.map(|row| squared_between(row, query)).fold(f32::INFINITY, f32::min)
+}
+
+/// Squared distance of two patterns.
+fn squared_between(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
+    match (a.as_slice(), b.as_slice()) {
+        (Some(a), Some(b)) => squared_distance(a, b),
+        _ => a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum(),
+    }
+}

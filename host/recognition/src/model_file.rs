@@ -1,0 +1,411 @@
+//! Models as files: bytes with a version and a checksum.
+//!
+//! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
+//! little-endian, then the body (postcard), the classes of its patterns, a second opinion or none, and how long clips last. Files of older
+//! versions, which end earlier, are read too. Anything that does not fit is refused by name, never guessed; a body that decodes is also
+//! checked part against part, so that a crafted file cannot make recognition panic.
+
+use super::auxiliary_model::SecondOpinion;
+use super::classifier::Classifier;
+use super::clip::BOX_NUMBERS;
+use super::codebook::Codebook;
+use super::frames::Mode;
+use super::lengths::Lengths;
+use super::model::{ModelError, Recogniser, RecogniserSettings};
+use super::network::features::Features;
+use super::network::{Layers, Network};
+use super::occupancy::OccupancyGrid;
+use super::space::{Map, Pattern, Space};
+use super::unknown::Limits;
+use crate::embedding::{
+    descriptor::{ANGLES, CELLS, DESCRIPTOR_VERSION},
+    pca::Pca,
+    rbf::Rbf,
+};
+use ndarray::{Array1, Array2};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Version of the file's format.
+pub const FORMAT_VERSION: u32 = 6;
+/// The versions before, which are read: without lengths,
+const LENGTHLESS_VERSION: u32 = 5;
+/// with a second opinion in every file,
+const SECOND_VERSION: u32 = 4;
+/// with one in none,
+const SINGLE_VERSION: u32 = 3;
+/// without the classes of patterns.
+const UNLABELLED_VERSION: u32 = 2;
+const MAGIC: &[u8; 8] = b"farnearA";
+const HEADER: usize = 28;
+
+/// The body of a file: plain values only.
+#[derive(Serialize, Deserialize)]
+struct Body {
+    settings: RecogniserSettings,
+    activities: Vec<String>,
+    views: usize,
+    map: SavedMap,
+    spread: f32,
+    neighbours: usize,
+    pattern: SavedPattern,
+    classifier: Classifier,
+    limits: Limits,
+    patterns: Array2<f32>,
+    typical_frames: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+enum SavedMap {
+    Rbf { centres: Array2<f32>, weights: Array2<f32>, gamma: f32, ridge: f64, condition: f64 },
+    Pca { mean: Array1<f32>, directions: Array2<f32>, variances: Vec<f64> },
+}
+
+#[derive(Serialize, Deserialize)]
+enum SavedPattern {
+    Thesis(OccupancyGrid),
+    Codebook(Codebook),
+    Network(Box<OneMember>),
+    Features(Box<OneMember>, Array1<f32>, Array1<f32>),
+    Members(Box<Network>),
+    FeaturesOfMembers(Box<Features>),
+}
+
+/// A network of one member, as files had it when there were no others.
+#[derive(Serialize, Deserialize)]
+struct OneMember {
+    mean: Array1<f32>,
+    spread: Array1<f32>,
+    layers: Layers,
+}
+
+impl From<OneMember> for Network {
+    fn from(OneMember { mean, spread, layers }: OneMember) -> Self {
+        Self { mean, spread, members: vec![layers] }
+    }
+}
+
+impl SavedPattern {
+    fn of(pattern: &Pattern) -> Self {
+        match pattern {
+            Pattern::Thesis(grid) => Self::Thesis(grid.clone()),
+            Pattern::Codebook(book) => Self::Codebook(book.clone()),
+            Pattern::Network(network) => Self::Members(network.clone()),
+            Pattern::Features(features) => Self::FeaturesOfMembers(features.clone()),
+        }
+    }
+
+    fn read(self) -> Pattern {
+        match self {
+            Self::Thesis(grid) => Pattern::Thesis(grid),
+            Self::Codebook(book) => Pattern::Codebook(book),
+            Self::Network(one) => Pattern::Network(Box::new((*one).into())),
+            Self::Features(one, mean, scale) => {
+                Pattern::Features(Box::new(Features { network: (*one).into(), mean, scale }))
+            }
+            Self::Members(network) => Pattern::Network(network),
+            Self::FeaturesOfMembers(features) => Pattern::Features(features),
+        }
+    }
+}
+
+/// A second opinion: the other recogniser's file, its profiles and limits.
+type SavedSecond = (Vec<u8>, Array2<f32>, Limits);
+
+/// A body's bytes behind their header.
+fn framed(version: u32, body: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER + body.len());
+    bytes.extend(MAGIC);
+    bytes.extend(version.to_le_bytes());
+    bytes.extend(DESCRIPTOR_VERSION.to_le_bytes());
+    bytes.extend((body.len() as u64).to_le_bytes());
+    bytes.extend(checksum(body).to_le_bytes());
+    bytes.extend(body);
+    bytes
+}
+
+impl Recogniser {
+    /// The model as a file's bytes.
+    ///
+    /// # Errors
+    /// [`ModelError::Body`] if it cannot be encoded.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
+        let saved = |second: &SecondOpinion| -> Result<SavedSecond, ModelError> {
+            Ok((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
+        };
+        let second = self.second.as_ref().map(saved).transpose()?;
+        let encoded = postcard::to_stdvec(&(self.body(), &self.labels, second, &self.lengths));
+        Ok(framed(FORMAT_VERSION, &encoded.map_err(|error| ModelError::Body(error.to_string()))?))
+    }
+
+    fn body(&self) -> Body {
+        Body {
+            settings: self.settings.clone(),
+            activities: self.activities.clone(),
+            views: self.views,
+            map: match &self.space.map {
+                Map::Rbf(rbf) => SavedMap::Rbf {
+                    centres: rbf.centres.clone(),
+                    weights: rbf.weights.clone(),
+                    gamma: rbf.gamma,
+                    ridge: rbf.ridge,
+                    condition: rbf.condition,
+                },
+                Map::Pca(pca) => SavedMap::Pca {
+                    mean: pca.mean.clone(),
+                    directions: pca.directions.clone(),
+                    variances: pca.variances.clone(),
+                },
+            },
+            spread: self.space.spread,
+            neighbours: self.space.neighbours,
+            pattern: SavedPattern::of(&self.space.pattern),
+            classifier: self.classifier.clone(),
+            limits: self.limits.clone(),
+            patterns: self.patterns.clone(),
+            typical_frames: self.typical_frames as u64,
+        }
+    }
+
+    /// A model from a file's bytes.
+    ///
+    /// # Errors
+    /// Anything that is not a whole, undamaged model of this version and this descriptor.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
+        Self::read(bytes, true)
+    }
+
+    /// A model; who says something of another has nobody behind it, or a file might nest without end.
+    fn read(bytes: &[u8], may_have_second: bool) -> Result<Self, ModelError> {
+        let header = bytes.get(..HEADER).ok_or(ModelError::NotAModel("shorter than its header"))?;
+        if &header[..8] != MAGIC {
+            return Err(ModelError::NotAModel("it does not start with `farnearA`"));
+        }
+        let word = |at: usize| u32::from_le_bytes(header[at..at + 4].try_into().unwrap_or_default());
+        let version = word(8);
+        if !(UNLABELLED_VERSION..=FORMAT_VERSION).contains(&version) {
+            return Err(ModelError::Version { what: "format", found: version, expected: FORMAT_VERSION });
+        }
+        if word(12) != DESCRIPTOR_VERSION {
+            let (found, expected) = (word(12), DESCRIPTOR_VERSION);
+            return Err(ModelError::Version { what: "descriptor", found, expected });
+        }
+        let body = &bytes[HEADER..];
+        if body.len() as u64 != u64::from_le_bytes(header[16..24].try_into().unwrap_or_default()) {
+            return Err(ModelError::NotAModel("its length is not what its header says (cut short?)"));
+        }
+        if checksum(body) != word(24) {
+            return Err(ModelError::Checksum { found: checksum(body), expected: word(24) });
+        }
+        let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
+        let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
+        let (labels, second, lengths): (Vec<usize>, Option<SavedSecond>, Vec<Lengths>) = match version {
+            UNLABELLED_VERSION => Default::default(),
+            SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None, Vec::new()),
+            SECOND_VERSION => {
+                let (labels, other, profiles, limits) = postcard::from_bytes(rest).map_err(wrong)?;
+                (labels, Some((other, profiles, limits)), Vec::new())
+            }
+            LENGTHLESS_VERSION => {
+                let (labels, second) = postcard::from_bytes(rest).map_err(wrong)?;
+                (labels, second, Vec::new())
+            }
+            _ => postcard::from_bytes(rest).map_err(wrong)?,
+        };
+        let second = match second {
+            None => None,
+            Some(_) if !may_have_second => return Err(ModelError::Parts("the second opinion")),
+            Some((other, profiles, limits)) => {
+                let other = Self::read(&other, false).map_err(|error| ModelError::Second(Box::new(error)))?;
+                Some(SecondOpinion { recogniser: Arc::new(other), profiles, limits })
+            }
+        };
+        let map = match body.map {
+            SavedMap::Rbf { centres, weights, gamma, ridge, condition } => {
+                Map::Rbf(Rbf::assemble(centres, weights, gamma, ridge, condition))
+            }
+            SavedMap::Pca { mean, directions, variances } => Map::Pca(Pca { mean, directions, variances }),
+        };
+        let pattern = body.pattern.read();
+        let space = Space {
+            settings: body.settings.space.clone(),
+            map,
+            spread: body.spread,
+            pattern,
+            neighbours: body.neighbours,
+            brought: None,
+        };
+        let recogniser = Self {
+            settings: body.settings,
+            activities: body.activities,
+            views: body.views,
+            space,
+            classifier: body.classifier,
+            limits: body.limits,
+            patterns: body.patterns,
+            labels,
+            second,
+            typical_frames: body.typical_frames as usize,
+            lengths,
+        };
+        recogniser.checked()
+    }
+}
+
+/// CRC-32 as in zip files.
+fn checksum(body: &[u8]) -> u32 {
+    crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(body)
+}
+
+impl Recogniser {
+    /// Checks that all parts have the sizes that recognition relies on.
+    fn checked(self) -> Result<Self, ModelError> {
+        let fits =
+            |holds: bool, what: &'static str| if holds { Ok(()) } else { Err(ModelError::Parts(what)) };
+        fits(self.activities.len() >= 2 && self.views >= 1, "activities or views are missing")?;
+        let dimensions = match &self.space.map {
+            Map::Rbf(rbf) => {
+                let sizes = rbf.centres.ncols() == ANGLES && rbf.weights.nrows() == rbf.centres.nrows();
+                fits(sizes && rbf.weights.ncols() > 0, "centres and weights of the RBF map")?;
+                rbf.dimensions()
+            }
+            Map::Pca(pca) => {
+                let width = pca.mean.len();
+                let sizes = [ANGLES, ANGLES + CELLS].contains(&width) && pca.directions.ncols() == width;
+                fits(sizes && pca.directions.nrows() > 0, "mean and directions of the principal components")?;
+                pca.directions.nrows()
+            }
+        };
+        fits(self.space.spread > 0.0, "the gallery's spread")?;
+        let ordered = self.settings.space.mode == Mode::Ordered;
+        let width = |boxes: usize| 2 * dimensions + boxes + if ordered { dimensions + boxes } else { 0 };
+        let of_frame = |found: usize| found == width(0) || found == width(BOX_NUMBERS);
+        let of_view = match &self.space.pattern {
+            Pattern::Thesis(grid) => {
+                let sizes = [grid.low.len(), grid.range.len()] == [grid.bins.len(); 2];
+                fits(
+                    sizes && grid.bins.len() <= dimensions && !grid.bins.contains(&0),
+                    "the grid's dimensions",
+                )?;
+                grid.bins.iter().try_fold(1_usize, |product, &bins| product.checked_mul(bins))
+            }
+            Pattern::Network(network) => {
+                let found = network.mean.len();
+                fits(of_frame(found) && network.fits(found), "the network's layers")?;
+                Some(network.width())
+            }
+            Pattern::Features(features) => {
+                let found = features.network.mean.len();
+                fits(of_frame(found) && features.fits(found), "the network's layers and its features")?;
+                Some(features.network.width())
+            }
+            Pattern::Codebook(book) => {
+                let found = book.centres.ncols();
+                fits(of_frame(found), "the codebook's width")?;
+                if let Some(residual) = &book.residual {
+                    let same = residual.centres.ncols() == found && residual.residual.is_none();
+                    fits(same, "the width of the residuals' centres")?;
+                }
+                book.pattern_width(self.settings.space.mode)
+            }
+        };
+        let width = of_view.and_then(|width| width.checked_mul(self.views)).unwrap_or(usize::MAX);
+        fits(self.patterns.ncols() == width, "the training patterns' width")?;
+        let labelled = self.labels.len() == self.patterns.nrows()
+            && self.labels.iter().all(|label| *label < self.activities.len());
+        fits(self.labels.is_empty() || labelled, "the training patterns' activities")?;
+        fits(self.limits.distances.len() == self.activities.len(), "the limits of what is known")?;
+        fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
+        let measured =
+            self.lengths.len() == self.activities.len() && self.lengths.iter().all(Lengths::is_sound);
+        fits(self.lengths.is_empty() || measured, "how long clips last")?;
+        let second = self.second.as_ref();
+        let judges = second.is_none_or(|second| second.fits(self.activities.len(), self.uses_boxes()));
+        fits(judges, "the second opinion")?;
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embedding::descriptor::Scaling;
+    use crate::network::training::NetworkSettings;
+    use crate::space::SpaceSettings;
+    use crate::synthetic::everyday;
+    use crate::watch::Unwatched;
+
+    /// A small model of two activities.
+    fn model(members: usize) -> Recogniser {
+        let clips = |first: usize, people: usize| {
+            let mut clips = everyday::clips(first, people, Scaling::default());
+            clips.retain(|clip| ["walk", "lie down"].contains(&clip.activity.as_str()));
+            clips
+        };
+        let space = SpaceSettings { dimensions: 4, gallery: 100, ..SpaceSettings::default() };
+        let network = NetworkSettings { widths: [4, 5, 6], passes: 1, members, ..NetworkSettings::default() };
+        let (people, others) = (clips(0, 3), clips(9, 2));
+        Recogniser::train_network(&people, &others, &space, &network, Scaling::default(), &Unwatched)
+            .expect("trained")
+    }
+
+    /// As a model's file was in an older version.
+    fn written_before(model: &Recogniser, version: u32) -> Vec<u8> {
+        let mut body = model.body();
+        // In version 3 a network was its mean, spread and three layers, with no count before them.
+        if let (Pattern::Network(network), SINGLE_VERSION) = (&model.space.pattern, version) {
+            let [layers] = &network.members[..] else { panic!("one member") };
+            let (mean, spread) = (network.mean.clone(), network.spread.clone());
+            body.pattern =
+                SavedPattern::Network(Box::new(OneMember { mean, spread, layers: layers.clone() }));
+        }
+        let second = model.second.as_ref().map(|second| -> SavedSecond {
+            let other = written_before(&second.recogniser, LENGTHLESS_VERSION);
+            (other, second.profiles.clone(), second.limits.clone())
+        });
+        let labels = &model.labels;
+        let encoded = match (version, second) {
+            (UNLABELLED_VERSION, _) => postcard::to_stdvec(&body),
+            (SINGLE_VERSION, _) => postcard::to_stdvec(&(body, labels)),
+            (SECOND_VERSION, Some((other, profiles, limits))) => {
+                postcard::to_stdvec(&(body, labels, other, profiles, limits))
+            }
+            (_, second) => postcard::to_stdvec(&(body, labels, second)),
+        };
+        framed(version, &encoded.expect("encoded"))
+    }
+
+    fn with_second(of: &Recogniser, by: &Recogniser) -> Recogniser {
+        let limits = Limits::none(of.activities.len());
+        let profiles = Array2::zeros((of.activities.len(), by.activities.len()));
+        let second = SecondOpinion { recogniser: Arc::new(by.clone()), profiles, limits };
+        Recogniser { second: Some(second), ..of.clone() }
+    }
+
+    #[test]
+    fn files_of_all_versions_are_read() {
+        let lengthless = |model: &Recogniser| Recogniser { lengths: Vec::new(), ..model.clone() };
+        let (one, two) = (model(1), model(2));
+        let [one_before, two_before] = [&one, &two].map(lengthless);
+        let read = |bytes: &[u8]| Recogniser::from_bytes(bytes).expect("decoded");
+        for (model, version) in [
+            (&one_before, UNLABELLED_VERSION),
+            (&one_before, SINGLE_VERSION),
+            (&with_second(&one_before, &two_before), SECOND_VERSION),
+            (&two_before, LENGTHLESS_VERSION),
+            (&with_second(&two_before, &one_before), LENGTHLESS_VERSION),
+        ] {
+            assert_eq!(&read(&written_before(model, version)), model, "version {version}");
+        }
+        for model in [&one, &two, &with_second(&two, &one)] {
+            let bytes = model.to_bytes().expect("encoded");
+            assert_eq!((u32::from(bytes[8]), &read(&bytes)), (FORMAT_VERSION, model));
+        }
+        let nested = with_second(&two, &with_second(&two, &two)).to_bytes().expect("encoded");
+        assert!(Recogniser::from_bytes(&nested).is_err(), "nested without end");
+        let short = Recogniser { lengths: two.lengths[..1].to_vec(), ..two.clone() };
+        let error =
+            Recogniser::from_bytes(&short.to_bytes().expect("encoded")).expect_err("a length is missing");
+        assert!(error.to_string().contains("how long clips last"), "{error}");
+    }
+}

@@ -1,0 +1,413 @@
+//! The learned part before the classifier: how frames are embedded and clips become patterns.
+
+use super::alignment::Brought;
+use super::clip::{Clip, Track};
+use super::codebook::{Codebook, stacked};
+use super::frames::{self, Mode, Weights};
+use super::network::Network;
+use super::network::features::{Features, values};
+use super::occupancy::OccupancyGrid;
+use crate::embedding::{
+    EmbeddingError,
+    descriptor::{ANGLES, CELLS},
+    isomap::isomap,
+    landmark::landmark_isomap,
+    neighbours::Neighbourhood,
+    pca::Pca,
+    rbf::Rbf,
+};
+use ndarray::{Array1, Array2, ArrayView2, s};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How the gallery is laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// Isomap with at least this many neighbours: doubled until the graph holds together.
+    Isomap(usize),
+    /// Principal components (PCA), which need no neighbours.
+    Pca,
+}
+
+/// How a clip becomes a pattern.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PatternKind {
+    /// Visited cells of a grid, exactly as in Li 2014: members per dimension.
+    Thesis(Vec<usize>),
+    /// Square-rooted mean soft assignments to a codebook of this size.
+    Codebook(usize),
+    /// What a network gives that has learned the activities' names; made by [`Recogniser::train_network`](super::model::Recogniser). Its
+    /// principal components see coarse silhouettes beside centroid distances.
+    Network,
+}
+
+/// Everything that is chosen before patterns exist.
+///
+/// The default lays frames out by twenty principal components: they need no neighbour graph that could fall apart.
+/// [`SpaceSettings::thesis`] keeps Isomap. Accuracies are to be reported for settings that were chosen on other subjects
+/// ([`super::experiment::Experiment::searched`]), not for these defaults.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpaceSettings {
+    /// How the gallery is laid out.
+    pub layout: Layout,
+    /// Dimensions of the embedding.
+    pub dimensions: usize,
+    /// Silhouettes in the gallery at most.
+    pub gallery: usize,
+    /// Coefficient of the RBF map.
+    pub gamma: f32,
+    /// Ridge of the RBF map.
+    pub ridge: f64,
+    /// How a clip becomes a pattern.
+    pub pattern: PatternKind,
+    /// Centres whose residuals a codebook's patterns hold too; 0 for none, without effect on the thesis' grid.
+    pub residuals: usize,
+    /// Whether the order of frames counts.
+    pub mode: Mode,
+    /// Parts of a frame's vector against one another.
+    pub weights: Weights,
+    /// Seed of the clustering.
+    pub seed: u64,
+}
+
+impl Default for SpaceSettings {
+    fn default() -> Self {
+        Self {
+            layout: Layout::Pca,
+            dimensions: 20,
+            gallery: 1500,
+            gamma: 0.1,
+            ridge: 1e-3,
+            pattern: PatternKind::Codebook(200),
+            residuals: 32,
+            mode: Mode::OrderFree,
+            weights: Weights::default(),
+            seed: 1,
+        }
+    }
+}
+
+impl SpaceSettings {
+    /// The thesis' choices: three dimensions, 15 x 9 x 9 cells.
+    pub fn thesis() -> Self {
+        Self {
+            layout: Layout::Isomap(12),
+            dimensions: 3,
+            pattern: PatternKind::Thesis(vec![15, 9, 9]),
+            ..Self::default()
+        }
+    }
+}
+
+/// How new silhouettes are embedded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Map {
+    /// By radial basis functions on the gallery.
+    Rbf(Rbf),
+    /// By projection on the principal components.
+    Pca(Pca),
+}
+
+/// How embedded clips become patterns.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pattern {
+    /// The thesis' grid.
+    Thesis(OccupancyGrid),
+    /// A codebook of frame vectors.
+    Codebook(Codebook),
+    /// A network over frame vectors.
+    Network(Box<Network>),
+    /// What a network gives, as features for another classifier.
+    Features(Box<Features>),
+}
+
+/// The learned space of frames and patterns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Space {
+    /// What it was learned with.
+    pub settings: SpaceSettings,
+    /// How silhouettes are embedded.
+    pub map: Map,
+    /// Spread of the gallery along the first dimension; embedded points are divided by it.
+    pub spread: f32,
+    /// How clips become patterns.
+    pub pattern: Pattern,
+    /// Neighbours that the Isomap graph needed, 0 for PCA.
+    pub neighbours: usize,
+    /// What brings frame vectors to those of the training clips, where clips come from elsewhere; not saved.
+    pub brought: Option<Brought>,
+}
+
+impl Space {
+    /// Learns from the training clips, all of their views together.
+    ///
+    /// # Errors
+    /// Too few silhouettes, or a gallery that cannot be laid out.
+    pub fn train(clips: &[&Clip], settings: &SpaceSettings) -> Result<Self, EmbeddingError> {
+        Galleries::default().space(clips, settings).map(|(space, _)| space)
+    }
+
+    /// Embeds the frames of a track: frames x D, over the gallery's spread.
+    ///
+    /// # Errors
+    /// Descriptors of another length.
+    pub fn points(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
+        self.map.points(track, self.spread)
+    }
+
+    /// Frame vectors of a track: what the codebook sees.
+    ///
+    /// # Errors
+    /// Descriptors of another length.
+    pub fn vectors(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
+        let points = self.points(track)?;
+        Ok(self.vectors_of(points.view(), track.boxes.as_ref().map(|boxes| boxes.view())))
+    }
+
+    /// The same from frames that are embedded already, and their boxes.
+    pub fn vectors_of(&self, points: ArrayView2<f32>, boxes: Option<ArrayView2<f32>>) -> Array2<f32> {
+        let vectors = match self.settings.pattern {
+            PatternKind::Thesis(_) => points.to_owned(),
+            PatternKind::Codebook(_) | PatternKind::Network => {
+                frames::vectors(points, boxes, self.settings.mode, self.settings.weights)
+            }
+        };
+        match &self.brought {
+            Some(brought) => brought.apply(&vectors),
+            None => vectors,
+        }
+    }
+
+    /// The same space with its network's values as features, by their statistics over clips; other spaces as they are.
+    ///
+    /// # Errors
+    /// Descriptors of another length.
+    pub fn with_features(&self, clips: &[&Clip]) -> Result<Self, EmbeddingError> {
+        let network = match &self.pattern {
+            Pattern::Network(network) => network,
+            Pattern::Features(features) => &features.network,
+            Pattern::Thesis(_) | Pattern::Codebook(_) => return Ok(self.clone()),
+        };
+        let vectors: Result<Vec<Array2<f32>>, EmbeddingError> =
+            clips.par_iter().flat_map_iter(|clip| &clip.views).map(|view| self.vectors(view)).collect();
+        let features = Features::fitted(network.clone(), values(network, &vectors?).view());
+        Ok(Self { pattern: Pattern::Features(Box::new(features)), ..self.clone() })
+    }
+
+    /// The pattern of frame vectors.
+    pub fn pattern_of(&self, vectors: ArrayView2<f32>, sharpness: f32) -> Array1<f32> {
+        match &self.pattern {
+            Pattern::Thesis(grid) => grid.pattern(vectors),
+            Pattern::Codebook(book) => book.pattern(vectors, self.settings.mode, sharpness),
+            Pattern::Network(network) => network.pattern(vectors),
+            Pattern::Features(features) => features.pattern(vectors),
+        }
+    }
+}
+
+/// What an embedding of `width` numbers sees of at most `count` frames, evenly spread over all of the tracks'.
+fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
+    let frames: Vec<(&Track, usize)> =
+        tracks.iter().flat_map(|track| (0..track.frames()).map(|frame| (*track, frame))).collect();
+    let n = frames.len();
+    let kept = n.min(count);
+    let mut rows = Array2::zeros((kept, width));
+    for (i, row) in rows.rows_mut().into_iter().enumerate() {
+        let (track, frame) = frames[(2 * i + 1) * n / (2 * kept)];
+        track.seen(frame, row);
+    }
+    rows
+}
+
+/// Galleries above this size are laid out by landmarks.
+const LARGE: usize = 4000;
+
+/// A gallery laid out: what spaces share that differ in their RBF map, weights or patterns only.
+#[derive(Debug)]
+struct Gallery {
+    key: (Layout, usize, usize, usize),
+    samples: Array2<f32>,
+    coordinates: Array2<f32>,
+    pca: Option<Pca>,
+    neighbours: usize,
+}
+
+/// Frame vectors of clips, `[clip][view]`.
+type FrameVectors = Vec<Vec<Array2<f32>>>;
+
+/// Galleries of one set of clips, each laid out once, and the clips' frames in each of their maps, embedded once.
+#[derive(Debug, Default)]
+pub struct Galleries {
+    galleries: Vec<Gallery>,
+    embedded: Vec<Embedded>,
+}
+
+impl Galleries {
+    /// The space of `settings` for the clips, all of their views together, and its frame vectors of them, `[clip][view]`; always ask with the same clips.
+    ///
+    /// # Errors
+    /// Too few silhouettes, or a gallery that cannot be laid out.
+    pub fn space(
+        &mut self,
+        clips: &[&Clip],
+        settings: &SpaceSettings,
+    ) -> Result<(Space, FrameVectors), EmbeddingError> {
+        let at = self.embedded(clips, settings)?;
+        let embedded = &self.embedded[at];
+        let gallery = &self.galleries[embedded.gallery];
+        let mut space = Space {
+            settings: settings.clone(),
+            map: embedded.map.clone(),
+            spread: embedded.spread,
+            pattern: Pattern::Thesis(OccupancyGrid { low: Vec::new(), range: Vec::new(), bins: Vec::new() }),
+            neighbours: gallery.neighbours,
+            brought: None,
+        };
+        let vectors: FrameVectors = clips
+            .par_iter()
+            .zip(&embedded.points)
+            .map(|(clip, points)| {
+                let boxes = clip.views.iter().map(|track| track.boxes.as_ref().map(|boxes| boxes.view()));
+                points
+                    .iter()
+                    .zip(boxes)
+                    .map(|(points, boxes)| space.vectors_of(points.view(), boxes))
+                    .collect()
+            })
+            .collect();
+        match &settings.pattern {
+            // Learned afterwards, with the activities' names.
+            PatternKind::Network => {}
+            PatternKind::Thesis(bins) => {
+                let coordinates = &gallery.coordinates / embedded.spread;
+                space.pattern = Pattern::Thesis(OccupancyGrid::new(coordinates.view(), bins));
+            }
+            PatternKind::Codebook(size) => {
+                let frames = stacked(vectors.iter().flatten().map(|v| v.view()));
+                let book = Codebook::train(frames.view(), *size, settings.seed);
+                let book = book.with_residuals(frames.view(), settings.residuals, settings.seed);
+                space.pattern = Pattern::Codebook(book);
+            }
+        }
+        Ok((space, vectors))
+    }
+
+    /// The place of the clips embedded by these settings' map: weights and patterns do not change it.
+    fn embedded(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
+        let gallery = self.gallery(clips, settings)?;
+        let key = match settings.layout {
+            Layout::Isomap(_) => [f64::from(settings.gamma), settings.ridge],
+            Layout::Pca => [0.0; 2],
+        };
+        let known = |embedded: &Embedded| embedded.gallery == gallery && embedded.key == key;
+        if let Some(index) = self.embedded.iter().position(known) {
+            return Ok(index);
+        }
+        let laid_out = &self.galleries[gallery];
+        let map = laid_out.map(settings)?;
+        let spread = laid_out.spread();
+        let points: Result<Vec<Vec<Array2<f32>>>, EmbeddingError> = clips
+            .par_iter()
+            .map(|clip| clip.views.iter().map(|track| map.points(track, spread)).collect())
+            .collect();
+        self.embedded.push(Embedded { gallery, key, map, spread, points: points? });
+        Ok(self.embedded.len() - 1)
+    }
+
+    /// The place of the gallery that these settings ask for.
+    fn gallery(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
+        // Codebooks keep to the distances: with coarse silhouettes too they know the people of their own set a little better (fused, 0 to 3
+        // points on two public sets), and those of another one mostly worse (by up to 15).
+        let width = if settings.pattern == PatternKind::Network { ANGLES + CELLS } else { ANGLES };
+        let key = (settings.layout, settings.dimensions, settings.gallery, width);
+        if let Some(index) = self.galleries.iter().position(|gallery| gallery.key == key) {
+            return Ok(index);
+        }
+        let tracks: Vec<&Track> = clips.iter().flat_map(|clip| &clip.views).collect();
+        let samples = evenly(&tracks, settings.gallery, width);
+        self.galleries.push(Gallery::new(samples, settings, key)?);
+        Ok(self.galleries.len() - 1)
+    }
+}
+
+/// Clips in a map.
+#[derive(Debug)]
+struct Embedded {
+    /// Place of the gallery.
+    gallery: usize,
+    /// Coefficient and ridge of an RBF map.
+    key: [f64; 2],
+    map: Map,
+    spread: f32,
+    /// `[clip][view]`, frames x dimensions.
+    points: Vec<Vec<Array2<f32>>>,
+}
+
+impl Map {
+    /// Every frame of a track in the map, in units of the spread.
+    fn points(&self, track: &Track, spread: f32) -> Result<Array2<f32>, EmbeddingError> {
+        let points = match self {
+            Self::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,
+            Self::Pca(pca) if pca.mean.len() == ANGLES => pca.transform(track.descriptors.view())?,
+            Self::Pca(pca) => pca.transform(evenly(&[track], track.frames(), pca.mean.len()).view())?,
+        };
+        Ok(points / spread)
+    }
+}
+
+impl Gallery {
+    fn new(
+        samples: Array2<f32>,
+        settings: &SpaceSettings,
+        key: (Layout, usize, usize, usize),
+    ) -> Result<Self, EmbeddingError> {
+        let Layout::Isomap(least) = settings.layout else {
+            let pca = Pca::fit(samples.view(), settings.dimensions)?;
+            let coordinates = pca.transform(samples.view())?;
+            return Ok(Self { key, samples, coordinates, pca: Some(pca), neighbours: 0 });
+        };
+        let mut neighbours = least.clamp(1, samples.nrows().saturating_sub(1).max(1));
+        let coordinates = loop {
+            let near = Neighbourhood::Nearest(neighbours);
+            let tried = if samples.nrows() > LARGE {
+                landmark_isomap(samples.view(), near, 500, settings.dimensions)
+                    .map(|laid_out| laid_out.coordinates)
+            } else {
+                isomap(samples.view(), near, settings.dimensions).map(|laid_out| laid_out.coordinates)
+            };
+            match tried {
+                Err(EmbeddingError::Disconnected { .. }) if 2 * neighbours < samples.nrows() => {
+                    neighbours *= 2
+                }
+                other => break other?,
+            }
+        };
+        Ok(Self { key, samples, coordinates, pca: None, neighbours })
+    }
+
+    /// Standard deviation of the first dimension.
+    fn spread(&self) -> f32 {
+        let first = self.coordinates.column(0);
+        let count = first.len().max(1) as f32;
+        let mean = first.sum() / count;
+        (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count).sqrt().max(1e-6)
+    }
+
+    /// The map that embeds new silhouettes.
+    fn map(&self, settings: &SpaceSettings) -> Result<Map, EmbeddingError> {
+        if let Some(pca) = &self.pca {
+            return Ok(Map::Pca(pca.clone()));
+        }
+        // Landmark placement is for all samples; the map's centres stay few enough to embed a frame in microseconds.
+        let step = self.samples.nrows().div_ceil(LARGE).max(1);
+        let rbf = Rbf::train(
+            self.samples.slice(s![..;step, ..]),
+            self.coordinates.slice(s![..;step, ..]),
+            settings.gamma,
+            settings.ridge,
+        )?;
+        Ok(Map::Rbf(rbf))
+    }
+}

@@ -1,0 +1,204 @@
+//! Recognition through the public face: synthetic people, order, speed, damage, models and live use.
+
+use farnear_recognition::auxiliary_model::SecondOpinion;
+use farnear_recognition::choice::names;
+use farnear_recognition::classifier::ClassifierKind;
+use farnear_recognition::clip::Clip;
+use farnear_recognition::embedding::descriptor::Scaling;
+use farnear_recognition::evaluation::leave_one_out::leave_one_subject_out;
+use farnear_recognition::experiment::Experiment;
+use farnear_recognition::frames::Mode;
+use farnear_recognition::live::{Live, windows};
+use farnear_recognition::model::{ModelError, Recogniser, RecogniserSettings};
+use farnear_recognition::space::{PatternKind, SpaceSettings};
+use farnear_recognition::synthetic::activities::{clips, performance};
+use farnear_recognition::unknown::Limits;
+use farnear_silhouettes::mask::Mask;
+use farnear_silhouettes::silhouette::view::{Canvas, draw, extent, views_round};
+use ndarray::Array2;
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use std::sync::{Arc, OnceLock};
+
+/// A small space: enough to recognise, quick to train.
+fn small(mode: Mode) -> SpaceSettings {
+    SpaceSettings { gallery: 500, pattern: PatternKind::Codebook(80), mode, ..SpaceSettings::default() }
+}
+
+fn experiment(mode: Mode) -> Experiment {
+    Experiment {
+        sharpness: vec![2.0],
+        classifiers: vec![ClassifierKind::Svc(5.0)],
+        ..Experiment::codebook(small(mode))
+    }
+}
+
+/// Shares of right answers for the clips as they are and changed in several ways, every subject left out once; training is the same
+/// for all changes and done once.
+fn right(people: &[Clip], mode: Mode, changes: &[fn(&Clip) -> Clip]) -> Vec<f64> {
+    let settings = RecogniserSettings { space: small(mode), ..RecogniserSettings::default() };
+    let mut right = vec![0_u32; changes.len()];
+    for subject in names(people.iter().map(|clip| &clip.subject)) {
+        let (held, kept): (Vec<Clip>, Vec<Clip>) =
+            people.iter().cloned().partition(|clip| clip.subject == subject);
+        let recogniser = Recogniser::train(&kept, &settings).expect("trained");
+        for clip in &held {
+            for (right, change) in right.iter_mut().zip(changes) {
+                let answer = recogniser.recognise(&change(clip).views).expect("fits");
+                let best = answer.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+                *right += u32::from(best.is_some_and(|(activity, _)| *activity == clip.activity));
+            }
+        }
+    }
+    right.into_iter().map(|right| f64::from(right) / people.len() as f64).collect()
+}
+
+#[test]
+fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
+    let people = clips(6, 1, 8.0, Scaling::KeepAspect);
+    let changes: [fn(&Clip) -> Clip; 4] = [
+        Clone::clone,
+        |clip| clip.select(|n| (0..n).map(|i| (i * 7919 + 3) % n).collect()),
+        |clip| clip.select(|n| (0..n).rev().collect()),
+        |clip| clip.select(|n| (0..2 * n).map(|i| i / 2).collect()),
+    ];
+    let found = right(&people, Mode::OrderFree, &changes);
+    let [plain, shuffled, reversed, slow] = found[..] else { panic!("four changes: {found:?}") };
+    println!("plain {plain:.3}, shuffled {shuffled:.3}, reversed {reversed:.3}, half speed {slow:.3}");
+    assert!(plain > 0.75, "{plain}");
+    assert_eq!(plain, reversed, "reversing changes nothing");
+    assert!((plain - slow).abs() <= 0.05, "{plain} {slow}");
+    assert!((shuffled - plain).abs() < 0.2);
+    let evaluated = |mode: Mode| {
+        leave_one_subject_out(&people, &experiment(mode), Clone::clone).expect("an outcome").each.accuracy()
+    };
+    // The same trainings and clips: only probabilities that round to a tie could differ, one clip of sixty.
+    let free = evaluated(Mode::OrderFree);
+    assert!((free - plain).abs() < 0.02, "{free} {plain}");
+    let ordered = evaluated(Mode::Ordered);
+    assert!(ordered > 0.75, "{ordered}");
+}
+
+/// Clips and what was trained on them, once for all tests.
+fn trained() -> &'static (Vec<Clip>, Recogniser) {
+    static TRAINED: OnceLock<(Vec<Clip>, Recogniser)> = OnceLock::new();
+    TRAINED.get_or_init(|| {
+        let people = clips(4, 1, 8.0, Scaling::KeepAspect);
+        let settings = RecogniserSettings { space: small(Mode::OrderFree), ..RecogniserSettings::default() };
+        let recogniser = Recogniser::train(&people, &settings).expect("trained");
+        (people, recogniser)
+    })
+}
+
+#[test]
+fn models_come_back_from_bytes_and_damage_is_refused() {
+    let (people, recogniser) = trained();
+    let bytes = recogniser.to_bytes().expect("encoded");
+    let back = Recogniser::from_bytes(&bytes).expect("decoded");
+    for clip in people.iter().take(12) {
+        let (a, b) =
+            (recogniser.recognise(&clip.views).expect("fits"), back.recognise(&clip.views).expect("fits"));
+        assert_eq!(a, b);
+    }
+    let mut damaged = bytes.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    assert!(matches!(Recogniser::from_bytes(&damaged), Err(ModelError::Checksum { .. })));
+    assert!(Recogniser::from_bytes(&bytes[..bytes.len() - 1]).is_err());
+    assert!(Recogniser::from_bytes(b"nonsense").is_err());
+    let mut newer = bytes.clone();
+    newer[12] = 9;
+    let error = Recogniser::from_bytes(&newer).expect_err("another descriptor");
+    assert!(error.to_string().contains("descriptor version 9"), "{error}");
+}
+
+#[test]
+fn clips_that_do_not_fit_are_refused_and_strange_ones_unknown() {
+    let (people, recogniser) = trained();
+    let mut cut_out = people[0].clone();
+    cut_out.views[0].boxes = None;
+    assert!(matches!(recogniser.recognise(&cut_out.views), Err(ModelError::Clip { found_boxes: false, .. })));
+    assert!(matches!(recogniser.recognise(&[]), Err(ModelError::Clip { found: 0, .. })));
+    let blank = vec![Mask::default((60, 60)); 20];
+    let nothing = farnear_recognition::clip::Track::from_masks(&blank, Scaling::KeepAspect, true);
+    assert_eq!(nothing.empty_frames, 20);
+    assert_eq!(recogniser.recognise(&[nothing]).expect("an answer").activity, None);
+    // A lying slab that pulses is not a person.
+    let slabs: Vec<Mask> = (0..20)
+        .map(|i| {
+            Mask::from_shape_fn((200, 300), |(y, x)| (90..100 + 3 * i).contains(&y) && (20..280).contains(&x))
+        })
+        .collect();
+    let slab = farnear_recognition::clip::Track::from_masks(&slabs, Scaling::KeepAspect, true);
+    let answer = recogniser.recognise(&[slab]).expect("an answer");
+    assert_eq!(answer.activity, None, "{answer:?}");
+}
+
+#[test]
+fn live_answers_settle_on_what_is_done_and_windows_cover_a_recording() {
+    let (people, recogniser) = trained();
+    let digging = performance(1, 9, 0, 8.0);
+    let view = {
+        let mut view = views_round(1, 0.0)[0];
+        view.gamma_deg += 45.0;
+        view
+    };
+    let mut live = Live::new(recogniser, 60, true);
+    let reach: Vec<_> = digging.iter().flat_map(|body| extent(body, &view)).collect();
+    let canvas = Canvas::fitting(&reach, 10.0, 2).expect("finite");
+    let mut last = None;
+    for body in &digging {
+        let answer = live.push(&[draw(body, &view, &canvas)]).expect("one view");
+        assert!((0.0..=1.0).contains(&answer.confidence));
+        last = answer.activity;
+    }
+    assert_eq!(last.as_deref(), Some("dig"));
+    assert!(live.push(&[]).is_err());
+    let track = &people[0].views;
+    let stretches = windows(recogniser, track, 16, 8).expect("windows");
+    assert_eq!((stretches[0].from, stretches.last().map(|s| s.to)), (0, Some(track[0].frames())));
+}
+
+/// A model whose body was changed at some places, with a checksum that holds again.
+fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
+    const HEADER: usize = 28;
+    let mut bytes = bytes.to_vec();
+    for &(at, value) in places {
+        let at = HEADER + at % (bytes.len() - HEADER);
+        bytes[at] = value;
+    }
+    let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes[HEADER..]);
+    bytes[24..28].copy_from_slice(&sum.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn crafted_models_with_good_checksums_are_refused_or_answer_but_never_panic() {
+    let (people, recogniser) = trained();
+    let classes = recogniser.activities.len();
+    let second = SecondOpinion {
+        recogniser: Arc::new(recogniser.clone()),
+        profiles: Array2::from_elem((classes, classes), (1.0 / classes as f32).sqrt()),
+        limits: Limits::none(classes),
+    };
+    let judged = Recogniser { second: Some(second), ..recogniser.clone() };
+    let files = [recogniser, &judged].map(|model| model.to_bytes().expect("encoded"));
+    assert!(files.iter().all(|bytes| Recogniser::from_bytes(bytes).is_ok()));
+    let mut runner = TestRunner::new(ProptestConfig {
+        failure_persistence: None,
+        ..ProptestConfig::with_cases(crate::cases(150))
+    });
+    // Settings, names and lengths stand at the front, where most damage goes.
+    let place = prop_oneof![3 => 0..200_usize, 1 => 0..files[1].len()];
+    let damage = proptest::collection::vec((place, any::<u8>()), 1..6);
+    runner
+        .run(&damage, |places| {
+            for bytes in &files {
+                if let Ok(model) = Recogniser::from_bytes(&tampered(bytes, &places)) {
+                    let _ = model.recognise(&people[0].views);
+                }
+            }
+            Ok(())
+        })
+        .expect("no panic");
+}

@@ -1,0 +1,309 @@
+//! Cutting the shadow off a silhouette: `thesis` (Li 2014, section 8.2.4) and `hybrid`, the default.
+//!
+//! - `thesis`: the run-point cut at angles from beta minus to beta plus its standard deviation, at most 10 degrees apart, the longest run wins; shadows that point
+//!   straight down are cut by length. It removes much and takes a good part of the person with it when the run is broken by the legs.
+//! - `hybrid`: where the light's place is known the silhouette is explained as a body and the shadow that it throws ([`super::cast`]), and what is not the body goes;
+//!   where the shadow lies sideways the run-point cut over +-3 degrees takes off what is left. Where nothing explains the silhouette, and for a
+//!   direction measured in the picture, it is by angles alone: shadows that lie sideways (|sin eta| < 0.45) get the run-point cut over +-3 degrees, and a half-plane through the
+//!   feet where that would take more than 60 % of the silhouette; others get the half-plane at once. The half-plane's edge is the
+//!   bisector of body and shadow; where the shadow points away only a strip of ground as wide as a person is cut. A shadow behind
+//!   the person cannot be told apart without colour: such frames are cut as well as it goes and flagged.
+//!
+//! Angles are tried on the outline ([`super::envelope`]), so that a cut by angles on 640 x 480 costs a fraction of a millisecond; an
+//! explanation some milliseconds.
+
+use super::camera::CameraFile;
+use super::cast;
+use super::envelope::{Outline, clear_left_of, row_extent};
+use super::light::Light;
+use super::projection::{self, ImageShadow, ShadowError, Subject};
+use farnear_silhouettes::mask::Mask;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::str::FromStr;
+
+/// A way to cut, by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// The body that explains silhouette and shadow, by angles where none does.
+    #[default]
+    Hybrid,
+    /// As printed in Li 2014.
+    Thesis,
+}
+
+impl FromStr for Method {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "hybrid" => Ok(Self::Hybrid),
+            "thesis" => Ok(Self::Thesis),
+            other => Err(format!("unknown shadow method `{other}`: expected hybrid or thesis")),
+        }
+    }
+}
+
+/// How a silhouette was cut, and how far the result can be trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CutReport {
+    /// Angle of the cut that was made, radians (thesis' beta).
+    pub beta_rad: f64,
+    /// Share of the silhouette removed, 0 to 1.
+    pub removed_fraction: f64,
+    /// Whether the half-plane through the feet was used in place of the run point.
+    pub half_plane: bool,
+    /// Where the straight edge lies that was cut along, pixels: beyond it `x cos beta - y sin beta` is less, x counted from the right in mirrored
+    /// pictures; `None` where the body that explains the silhouette alone decided.
+    pub edge_px: Option<f64>,
+    /// Share of the silhouette that body and shadow together leave unexplained, 0 to 1; `None` where the cut went by angles alone.
+    pub unexplained: Option<f64>,
+    /// The shadow found for this silhouette.
+    pub shadow: ImageShadow,
+    /// The subject as estimated from the silhouette.
+    pub subject: Subject,
+    /// False when more than half of the silhouette went or the shadow points away, where cutting is guesswork: look at the frame.
+    pub trustworthy: bool,
+}
+
+/// The straight edge that a cut goes along.
+struct Edge {
+    beta_rad: f64,
+    /// [`CutReport::edge_px`].
+    limit: Option<f32>,
+    half_plane: bool,
+}
+
+/// Sine of eta up to which a shadow counts as lying sideways.
+pub const SIDEWAYS: f64 = 0.45;
+/// Smoothing window of the lower edge's gradient, columns.
+const GRADIENT_WINDOW: usize = 9;
+
+/// Distance and offset of the subject in a mask, from its head's width and row.
+///
+/// # Errors
+/// Empty masks, a mask of another shape than the camera's.
+pub fn subject_of(mask: &Mask, file: &CameraFile) -> Result<Subject, ShadowError> {
+    let outline = checked_outline(mask, file)?;
+    Ok(estimate_subject(mask, &outline, file))
+}
+
+fn checked_outline(mask: &Mask, file: &CameraFile) -> Result<Outline, ShadowError> {
+    let (mask_height, mask_width) = mask.dim();
+    let (camera_height, camera_width) = (file.camera.height_px, file.camera.width_px);
+    if (mask_height, mask_width) != (camera_height, camera_width) {
+        return Err(ShadowError::Shape { mask_height, mask_width, camera_height, camera_width });
+    }
+    Outline::new(mask).ok_or(ShadowError::EmptyMask)
+}
+
+/// Removes the shadow of the one subject in `mask`, with the camera and the light known, mostly the sun's position.
+///
+/// `beta_sd_rad` is the standard deviation of the cutting angle ([`super::uncertainty`]); only `thesis` uses it.
+///
+/// # Errors
+/// Empty masks, a mask of another shape than the camera's, a sun below [`projection::LOWEST_SUN_DEG`], a lamp below the head.
+pub fn remove(
+    mask: &Mask,
+    file: &CameraFile,
+    light: impl Into<Light>,
+    beta_sd_rad: f64,
+    method: Method,
+) -> Result<(Mask, CutReport), ShadowError> {
+    let camera = &file.camera;
+    let outline = checked_outline(mask, file)?;
+    let light = light.into();
+    let explained = match method {
+        Method::Thesis => None,
+        Method::Hybrid => cast::explain(mask, file, light)?,
+    };
+    let subject = match &explained {
+        Some(found) => found.subject,
+        None => estimate_subject(mask, &outline, file),
+    };
+    let reach_px = |foot_px, eta_rad| reach_px(mask, &outline, foot_px, eta_rad);
+    let shadow = light.shadow_of(subject, camera, reach_px)?;
+    let mut out = mask.clone();
+    let edge = match (method, &explained) {
+        (Method::Thesis, _) => thesis(mask, &mut out, &outline, &shadow, beta_sd_rad),
+        (Method::Hybrid, None) => hybrid(mask, &mut out, &outline, &shadow),
+        (Method::Hybrid, Some(found)) => explained_cut(mask, &mut out, &outline, &shadow, found),
+    };
+    let left = farnear_silhouettes::mask::area(out.view());
+    let removed_fraction = 1.0 - left as f64 / outline.area as f64;
+    let away = shadow.eta_rad.sin() < -SIDEWAYS;
+    Ok((
+        out,
+        CutReport {
+            beta_rad: edge.beta_rad,
+            removed_fraction,
+            half_plane: edge.half_plane,
+            edge_px: edge.limit.map(f64::from),
+            unexplained: explained.map(|found| found.unexplained),
+            shadow,
+            subject,
+            trustworthy: removed_fraction <= 0.6 && !away && !shadow.shortened,
+        },
+    ))
+}
+
+/// How far the silhouette reaches from the feet in the direction that was measured, pixels: so long is the shadow at most.
+fn reach_px(mask: &Mask, outline: &Outline, foot_px: [f64; 2], eta_rad: f64) -> f64 {
+    let (sin, cos) = eta_rad.sin_cos();
+    let (top, bottom, left, right) = outline.bounds;
+    let set = (top..=bottom).flat_map(|y| (left..=right).map(move |x| [y, x])).filter(|place| mask[*place]);
+    set.map(|[y, x]| (x as f64 - foot_px[0]) * cos + (y as f64 - foot_px[1]) * sin).fold(0.0, f64::max)
+}
+
+/// Distance and offset of the subject from its silhouette: the head's width (8.17) and the head's row, weighted by how sure each is.
+fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subject {
+    let (top, bottom, _, _) = outline.bounds;
+    // The head is the top seventh or so; the widest row of the top tenth is a head's width, or less where hair is thin.
+    let rows = ((bottom - top) / 12).max(2);
+    let (mut widest, mut centre) = (1.0_f64, outline.bounds.2 as f64);
+    for y in top..=(top + rows).min(bottom) {
+        let row = mask.row(y);
+        let Some((first, last)) = row.as_slice().and_then(row_extent) else {
+            continue;
+        };
+        let width = (last - first + 1) as f64;
+        if width > widest {
+            (widest, centre) = (width, 0.5 * (first + last) as f64);
+        }
+    }
+    let sd = &file.standard_deviations;
+    let by_width = projection::distance_from_head_m(file, widest);
+    let width_weight =
+        (sd.head_width_m / file.subject.head_width_m).hypot((sd.head_width_px + 1.0) / widest).powi(-2);
+    let (mut sum, mut weights) = (width_weight / by_width, width_weight);
+    if let Some(by_row) = projection::distance_from_head_row_m(file, top as f64 - 0.5) {
+        let above = (file.subject.height_m - file.camera.height_m).abs();
+        let weight = (sd.subject_height_m.hypot(sd.camera_height_m) / above).powi(-2);
+        sum += weight / by_row;
+        weights += weight;
+    }
+    let distance_m = file.subject.distance_m.unwrap_or(weights / sum);
+    let slope = (centre - file.camera.principal_point()[0]) / file.camera.focal_px();
+    Subject { distance_m, offset_m: slope * distance_m, height_m: file.subject.height_m }
+}
+
+/// The printed method.
+fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, sd_rad: f64) -> Edge {
+    /// The largest step over beta's range (10 degrees).
+    const STEP_RAD: f64 = 10.0 * PI / 180.0;
+    /// "Close to 90 degrees": the shadow is cut by length.
+    const VERTICAL_RAD: f64 = 10.0 * PI / 180.0;
+    if (shadow.eta_rad - FRAC_PI_2).abs() < VERTICAL_RAD {
+        let bottom = outline.bounds.1 as f64;
+        let limit = -(bottom - shadow.m_px[1].max(0.0)) as f32;
+        clear_left_of(mask.view(), out, FRAC_PI_2 as f32, limit, false);
+        return Edge { beta_rad: FRAC_PI_2, limit: Some(limit), half_plane: true };
+    }
+    let flip = shadow.mirrored.then_some(mask.ncols() as f32);
+    let sd_rad = sd_rad.abs().min(FRAC_PI_2);
+    // Also where the step is larger than the range: its middle and both ends.
+    let steps = (sd_rad / STEP_RAD).ceil().max(1.0) as i32;
+    let angles = (-steps..=steps).map(|i| shadow.beta_rad + sd_rad * f64::from(i) / f64::from(steps));
+    let Some((beta_rad, limit)) = longest_run(outline, flip, angles) else {
+        return Edge { beta_rad: shadow.beta_rad, limit: None, half_plane: false };
+    };
+    clear_left_of(mask.view(), out, beta_rad as f32, limit, shadow.mirrored);
+    Edge { beta_rad, limit: Some(limit), half_plane: false }
+}
+
+/// The angle at which the run of negative slope is longest, and where it ends there. Beta lies in [pi/2, pi] (8.20); of equals the angle nearest to the
+/// middle of those tried is taken.
+fn longest_run(
+    outline: &Outline,
+    flip: Option<f32>,
+    angles: impl Iterator<Item = f64>,
+) -> Option<(f64, f32)> {
+    let clamped = angles.map(|beta| beta.clamp(FRAC_PI_2, PI));
+    let found: Vec<(f64, (usize, f32))> = clamped
+        .map(|beta| (beta, outline.lower_edge(beta as f32, flip).rotation_point(GRADIENT_WINDOW)))
+        .collect();
+    let middle = found.len() / 2;
+    let from_middle =
+        found.iter().enumerate().max_by_key(|(i, (_, (run, _)))| (*run, usize::MAX - i.abs_diff(middle)));
+    from_middle.map(|(_, &(beta, (_, limit)))| (beta, limit))
+}
+
+/// The angle and up to 3 degrees beside it.
+fn degrees_about(beta_rad: f64) -> impl Iterator<Item = f64> {
+    (-3..=3).map(move |i| beta_rad + f64::from(i).to_radians())
+}
+
+/// Clears what lies beyond the run point of a shadow that lies sideways, and gives the edge; `None` where it lies otherwise, and
+/// where that would take more than 60 % of the silhouette.
+fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Option<Edge> {
+    if shadow.eta_rad.sin().abs() >= SIDEWAYS {
+        return None;
+    }
+    let flip = shadow.mirrored.then_some(mask.ncols() as f32);
+    let (beta_rad, limit) = longest_run(outline, flip, degrees_about(shadow.beta_rad))?;
+    let gone = clear_left_of(mask.view(), out, beta_rad as f32, limit, shadow.mirrored);
+    if gone as f64 > 0.6 * outline.area as f64 {
+        out.assign(mask);
+        return None;
+    }
+    Some(Edge { beta_rad, limit: Some(limit), half_plane: false })
+}
+
+/// Takes off what is not the body's, and of a shadow that lies sideways also what lies beyond the run point: a body and its shadow look
+/// alike near the feet.
+fn explained_cut(
+    mask: &Mask,
+    out: &mut Mask,
+    outline: &Outline,
+    shadow: &ImageShadow,
+    found: &cast::Explanation,
+) -> Edge {
+    let no_edge = Edge { beta_rad: shadow.beta_rad, limit: None, half_plane: false };
+    let edge = clear_sideways(mask, out, outline, shadow).unwrap_or(no_edge);
+    out.zip_mut_with(&found.body, |left, &body| *left &= body);
+    edge
+}
+
+/// The default method where nothing explains the silhouette.
+fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Edge {
+    if let Some(edge) = clear_sideways(mask, out, outline, shadow) {
+        return edge;
+    }
+    let edge = half_plane(mask, out, shadow);
+    if shadow.eta_rad.sin() < -SIDEWAYS {
+        give_back_the_body(mask, out, outline, shadow);
+    }
+    edge
+}
+
+/// Where the shadow points away, the half-plane takes the near side of the upper body with it. The shadow lies on a strip of ground
+/// from the feet to its tip, as wide as a person: what the half-plane took beside that strip is the body's again.
+fn give_back_the_body(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) {
+    /// Of the stature: a person with their arms and stride.
+    const HALF_WIDTH: f64 = 0.17;
+    /// Of the stature: the head is round, its shadow reaches beyond that of its top.
+    const BEYOND: f64 = 0.04;
+    let half_width = HALF_WIDTH * shadow.height_px;
+    let (sin, cos) = shadow.eta_rad.sin_cos();
+    let length = shadow.m_px[0].hypot(shadow.m_px[1]) + BEYOND * shadow.height_px;
+    let (top, bottom, left, right) = outline.bounds;
+    for y in top..=bottom {
+        for x in left..=right {
+            if !mask[[y, x]] || out[[y, x]] {
+                continue;
+            }
+            let (dx, dy) = (x as f64 - shadow.foot_px[0], y as f64 - shadow.foot_px[1]);
+            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            out[[y, x]] = across.abs() > half_width || along > length;
+        }
+    }
+}
+
+/// Clears the shadow's side of the bisector through the feet.
+fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
+    let (sin, cos) = shadow.beta_rad.sin_cos();
+    let x = if shadow.mirrored { mask.ncols() as f64 - 1.0 - shadow.foot_px[0] } else { shadow.foot_px[0] };
+    let limit = (x * cos - shadow.foot_px[1] * sin) as f32;
+    clear_left_of(mask.view(), out, shadow.beta_rad as f32, limit, shadow.mirrored);
+    Edge { beta_rad: shadow.beta_rad, limit: Some(limit), half_plane: true }
+}

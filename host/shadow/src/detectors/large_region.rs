@@ -1,0 +1,140 @@
+//! Large-region texture: over a whole region, gradients keep their direction in shadow.
+//!
+//! A. Sanin, C. Sanderson and B. C. Lovell, "Improved shadow removal for robust person tracking in surveillance
+//! scenarios", ICPR 2010. Candidates come from a loose chromaticity test; edges that the frame has and the background
+//! has not part them into regions; over a region's n pixels with a gradient worth the name,
+//!
+//! ```text
+//! c = (1 / n) sum H(largest angle - angle between the frame's and the background's gradient)
+//! ```
+//!
+//! and the whole region is shadow where c reaches a threshold (H is the unit step). A region with too few such pixels
+//! has no texture to compare, and colour alone has the say.
+//!
+//! Cost: linear in pixels.
+
+use ndarray::Array2;
+
+use super::{
+    chromaticity,
+    images::{Images, gradient, intensity},
+};
+use farnear_silhouettes::mask::{
+    Mask,
+    bits::BitMask,
+    regions::{Connectivity, regions},
+};
+
+/// Settings of the detector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The loose test that candidates pass.
+    pub candidates: chromaticity::Settings,
+    /// Least gradient worth comparing, grey levels per pixel, in frame or background.
+    pub least_gradient: f32,
+    /// Greatest angle between gradients that counts as the same direction, degrees.
+    pub largest_angle_deg: f32,
+    /// Least share of a region's gradients that keep their direction, c.
+    pub least_share: f32,
+    /// Gradient beyond the shaded background's that parts regions, grey levels per pixel.
+    pub edge_gradient: f32,
+    /// Least number of gradients that a region is judged by.
+    pub fewest_gradients: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            candidates: chromaticity::Settings {
+                saturation: 0.3,
+                hue_deg: 76.0,
+                least_saturation: 0.2,
+                ..chromaticity::Settings::default()
+            },
+            least_gradient: 4.0,
+            largest_angle_deg: 30.0,
+            least_share: 0.45,
+            edge_gradient: 12.0,
+            fewest_gradients: 12,
+        }
+    }
+}
+
+/// The foreground pixels of regions whose gradients keep their direction.
+#[must_use]
+pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
+    let candidates = chromaticity::detect(images, &settings.candidates);
+    let (frame, background) = (intensity(images.frame), intensity(images.background));
+    let (frame_slope, background_slope) = (gradient(&frame), gradient(&background));
+    let shade = |at: (usize, usize)| frame[at] / background[at].max(1.0);
+    let size = |slope: [f32; 2]| slope[0].hypot(slope[1]);
+    let edges = Array2::from_shape_fn(images.size(), |at| {
+        candidates[at]
+            && size(frame_slope[at]) - shade(at) * size(background_slope[at]) > settings.edge_gradient
+    });
+    let parted = Array2::from_shape_fn(images.size(), |at| candidates[at] && !edges[at]);
+
+    // On the foreground's outline frame and background differ by the outline itself.
+    let inside = BitMask::pack(images.foreground).eroded(1).unpack();
+    let least_cosine = settings.largest_angle_deg.to_radians().cos();
+    let mut shadow = Mask::from_elem(images.size(), false);
+    for region in regions(parted.view(), true, Connectivity::Four) {
+        let (mut worthy, mut alike) = (0_usize, 0_usize);
+        for at in region.runs.iter().flat_map(|run| (run.start..run.end).map(|column| (run.row, column))) {
+            let (f, b) = (frame_slope[at], background_slope[at]);
+            // The background's gradient counts as it would look in this shade, so that darkness does not hide texture.
+            if !inside[at] || size(f).max(shade(at) * size(b)) < settings.least_gradient * shade(at) {
+                continue;
+            }
+            worthy += 1;
+            let cosine = (f[0] * b[0] + f[1] * b[1]) / (size(f) * size(b)).max(f32::MIN_POSITIVE);
+            alike += usize::from(cosine >= least_cosine);
+        }
+        if worthy < settings.fewest_gradients || alike as f32 >= settings.least_share * worthy as f32 {
+            region.paint(&mut shadow, true);
+        }
+    }
+    // Edges next to shadow go with it.
+    let near = BitMask::pack(shadow.view()).dilated(1).unpack();
+    shadow.zip_mut_with(&Array2::from_shape_fn(images.size(), |at| edges[at] && near[at]), |set, &edge| {
+        *set |= edge
+    });
+    shadow
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array3, s};
+
+    /// Paving of changing brightness; every channel in proportion.
+    fn paving(row: usize, column: usize) -> f32 {
+        120.0 + 25.0 * ((row as f32 * 0.9).sin() + (column as f32 * 0.7).cos())
+    }
+
+    #[test]
+    fn a_shaded_region_goes_whole_and_a_textured_garment_stays() {
+        let colour = [1.0, 0.9, 0.8];
+        let background = Array3::from_shape_fn((60, 80, 3), |(row, column, channel)| {
+            (colour[channel] * paving(row, column)) as u8
+        });
+        let mut frame = background.clone();
+        for ((row, column, channel), level) in frame.indexed_iter_mut() {
+            let shirt = 70.0 + 20.0 * ((row as f32 * 0.4 + column as f32 * 1.1).sin());
+            match (row, column) {
+                (10..50, 5..30) => *level = (0.55 * colour[channel] * paving(row, column)) as u8,
+                (10..50, 45..70) => *level = (colour[channel] * shirt) as u8,
+                _ => {}
+            }
+        }
+        let mut mask = Mask::from_elem((60, 80), false);
+        mask.slice_mut(s![10..50, 5..30]).fill(true);
+        mask.slice_mut(s![10..50, 45..70]).fill(true);
+        let images = Images::new(frame.view(), background.view(), mask.view()).unwrap();
+        let found = detect(&images, &Settings::default());
+        let count =
+            |columns: std::ops::Range<usize>| found.slice(s![.., columns]).iter().filter(|&&set| set).count();
+        assert!(count(5..30) > 900, "{} of 1000 shadow pixels", count(5..30));
+        assert!(count(45..70) < 200, "{} of 1000 garment pixels", count(45..70));
+    }
+}

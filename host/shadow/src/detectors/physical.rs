@@ -1,0 +1,240 @@
+//! Physical: what a shadow takes away is the direct light's share of the illumination, and that share is the same
+//! on every matt surface of the scene, so it can be learnt while the scene is watched.
+//!
+//! J.-B. Huang and C.-S. Chen, "Moving cast shadow detection using physics-based features", CVPR 2009. With direct
+//! light d, ambient light a and a surface that reflects b, a lit pixel is b (d + a) and a shaded one b a, so
+//! `g = (background - frame) / background = d / (d + a)` per channel, whatever b. Its direction is described by
+//! `theta = atan2(g_green, g_red)` and `phi = acos(g_blue / |g|)`; a weak detector (darker, and inside a cone round the
+//! background's colour) proposes pixels, whose angles feed a Gaussian mixture, each with a confidence that falls where
+//! the frame has gradients that the background has not. A proposed pixel near a heavy component is shadow.
+//!
+//! Cost: a few trigonometric functions per proposed pixel.
+
+use ndarray::Array2;
+
+use super::images::{Images, gradient, intensity, rgb};
+use farnear_silhouettes::mask::Mask;
+
+/// Settings of the detector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Least brightness in proportion to the background's that the weak detector proposes.
+    pub darkest: f32,
+    /// Greatest brightness in proportion to the background's.
+    pub lightest: f32,
+    /// Greatest angle between the frame's and the background's colour, degrees.
+    pub cone_deg: f32,
+    /// Scale of the gradient difference at which confidence has dropped to exp(-1/2), grey levels per pixel.
+    pub gradient_scale: f32,
+    /// Share of the mixture that a frame's pixels replace, 0 to 1.
+    pub learning_rate: f32,
+    /// Distance from a component within which a pixel is its, standard deviations.
+    pub reach_sd: f32,
+    /// Least weight of a component that stands for shadow.
+    pub least_weight: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            darkest: 0.2,
+            lightest: 0.95,
+            cone_deg: 12.0,
+            gradient_scale: 8.0,
+            learning_rate: 0.1,
+            reach_sd: 2.0,
+            least_weight: 0.25,
+        }
+    }
+}
+
+/// Components that the mixture may have.
+const COMPONENTS: usize = 5;
+/// Standard deviation of a new component, radians, and the least that one may shrink to.
+const FIRST_SD: f32 = 0.12;
+const LEAST_SD: f32 = 0.03;
+/// The least confidence-weighted pixels that a frame must have to teach something.
+const LEAST_EVIDENCE: f32 = 20.0;
+
+#[derive(Clone, Copy, Debug)]
+struct Component {
+    weight: f32,
+    mean: [f32; 2],
+    variance: f32,
+}
+
+impl Component {
+    fn distance_sd(&self, angles: [f32; 2]) -> f32 {
+        let squared: f32 = angles.iter().zip(self.mean).map(|(x, mean)| (x - mean).powi(2)).sum();
+        (squared / self.variance).sqrt()
+    }
+}
+
+/// The detector and what it has learnt of the scene's light.
+#[derive(Clone, Debug)]
+pub struct Physical {
+    settings: Settings,
+    mixture: Vec<Component>,
+}
+
+impl Physical {
+    /// A detector that knows nothing of the scene yet.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        Self { settings, mixture: Vec::new() }
+    }
+
+    /// Learns from the next frame, then tells its shadow pixels.
+    pub fn detect(&mut self, images: &Images<'_>) -> Mask {
+        let (frame, background) = (intensity(images.frame), intensity(images.background));
+        let (frame_slope, background_slope) = (gradient(&frame), gradient(&background));
+        let mut proposed: Array2<Option<[f32; 2]>> = Array2::from_elem(images.size(), None);
+        let mut samples = Vec::new();
+        for (at, _) in images.foreground.indexed_iter().filter(|&(_, &set)| set) {
+            let (f, b) = (rgb(images.frame, at), rgb(images.background, at));
+            if !self.weakly_shadow(f, b) {
+                continue;
+            }
+            let angles = direction(f, b);
+            proposed[at] = Some(angles);
+            // The slope that the shaded background would have, against the one that the frame has.
+            let shade = frame[at] / background[at].max(1.0);
+            let [across, down] =
+                [0, 1].map(|axis| frame_slope[at][axis] - shade * background_slope[at][axis]);
+            let excess = (across * across + down * down) / self.settings.gradient_scale.powi(2);
+            samples.push((angles, (-0.5 * excess).exp()));
+        }
+        self.learn(&samples);
+        images.foreground_where(|at| proposed[at].is_some_and(|angles| self.is_shadow(angles)))
+    }
+
+    /// Darker than the background and of about its colour.
+    fn weakly_shadow(&self, frame: [f32; 3], background: [f32; 3]) -> bool {
+        let dot = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>();
+        let (along, length) = (dot(frame, background), dot(background, background));
+        let norm = (length * dot(frame, frame)).sqrt();
+        norm > 0.0
+            && (self.settings.darkest..=self.settings.lightest).contains(&(along / length))
+            && along >= norm * self.settings.cone_deg.to_radians().cos()
+    }
+
+    fn is_shadow(&self, angles: [f32; 2]) -> bool {
+        self.mixture.iter().any(|component| {
+            component.weight >= self.settings.least_weight
+                && component.distance_sd(angles) <= self.settings.reach_sd
+        })
+    }
+
+    /// One step of the mixture: every sample goes to the nearest component within reach, strays found a new one.
+    fn learn(&mut self, samples: &[([f32; 2], f32)]) {
+        let evidence: f32 = samples.iter().map(|&(_, confidence)| confidence).sum();
+        if evidence < LEAST_EVIDENCE {
+            return;
+        }
+        if self.mixture.is_empty() {
+            let middle = [0, 1].map(|axis| weighted_median(samples, axis));
+            self.mixture.push(Component { weight: 1.0, mean: middle, variance: FIRST_SD * FIRST_SD });
+        }
+        // Sums of confidence, angles and squared distances per component; the last place is for strays.
+        let mut sums = vec![(0.0_f32, [0.0_f32; 2], 0.0_f32); self.mixture.len() + 1];
+        for &(angles, confidence) in samples {
+            let nearest = self
+                .mixture
+                .iter()
+                .enumerate()
+                .map(|(index, component)| (index, component.distance_sd(angles)))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .filter(|&(_, distance)| distance <= self.settings.reach_sd);
+            let (index, squared) = nearest.map_or((self.mixture.len(), 0.0), |(index, distance)| {
+                (index, distance * distance * self.mixture[index].variance)
+            });
+            let sum = &mut sums[index];
+            sum.0 += confidence;
+            sum.2 += confidence * squared;
+            for (total, angle) in sum.1.iter_mut().zip(angles) {
+                *total += confidence * angle;
+            }
+        }
+        let rate = self.settings.learning_rate;
+        for (component, &(confidence, angles, squared)) in self.mixture.iter_mut().zip(&sums) {
+            component.weight += rate * (confidence / evidence - component.weight);
+            if confidence > 0.0 {
+                // What a component has seen lately weighs against what it knew by their shares of its weight.
+                let step = (rate * confidence / evidence / component.weight.max(rate)).min(1.0);
+                for (mean, total) in component.mean.iter_mut().zip(angles) {
+                    *mean += step * (total / confidence - *mean);
+                }
+                // Half, for the variance is one axis' and the distance is over two.
+                component.variance += step * (0.5 * squared / confidence - component.variance);
+                component.variance = component.variance.max(LEAST_SD * LEAST_SD);
+            }
+        }
+        let strays = sums[self.mixture.len()];
+        if strays.0 > 0.1 * evidence {
+            if self.mixture.len() == COMPONENTS {
+                self.mixture.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+                self.mixture.pop();
+            }
+            let mean = strays.1.map(|total| total / strays.0);
+            self.mixture.push(Component { weight: rate, mean, variance: FIRST_SD * FIRST_SD });
+        }
+        let total: f32 = self.mixture.iter().map(|component| component.weight).sum();
+        self.mixture.iter_mut().for_each(|component| component.weight /= total);
+    }
+}
+
+/// Where the light that is missing points to, (theta, phi) in radians.
+fn direction(frame: [f32; 3], background: [f32; 3]) -> [f32; 2] {
+    let lost = [0, 1, 2].map(|channel| (background[channel] - frame[channel]) / background[channel].max(1.0));
+    let norm = lost.iter().map(|share| share * share).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
+    [lost[1].atan2(lost[0]), (lost[2] / norm).clamp(-1.0, 1.0).acos()]
+}
+
+/// The value of one angle that halves the confidence; a robust place for the first component.
+fn weighted_median(samples: &[([f32; 2], f32)], axis: usize) -> f32 {
+    let mut sorted: Vec<(f32, f32)> =
+        samples.iter().map(|&(angles, weight)| (angles[axis], weight)).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * sorted.iter().map(|&(_, weight)| weight).sum::<f32>();
+    let mut sum = 0.0;
+    for &(angle, weight) in &sorted {
+        sum += weight;
+        if sum >= half {
+            return angle;
+        }
+    }
+    sorted.last().map_or(0.0, |&(angle, _)| angle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_direction_of_the_lost_light_does_not_depend_on_the_surface() {
+        // Sun to sky in the three channels: 3, 2 and 1.
+        let lit = |surface: [f32; 3]| [4.0 * surface[0], 3.0 * surface[1], 2.0 * surface[2]];
+        let expected = direction([30.0, 30.0, 30.0], lit([30.0, 30.0, 30.0]));
+        for surface in [[10.0, 40.0, 25.0], [60.0, 20.0, 5.0], [5.0, 5.0, 50.0]] {
+            let found = direction(surface, lit(surface));
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{surface:?}: {found:?}");
+        }
+        // g = (3/4, 2/3, 1/2).
+        assert!((expected[0] - (2.0_f32 / 3.0).atan2(0.75)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_median_weighs_confidence() {
+        let samples = [([1.0, 0.0], 1.0), ([2.0, 0.0], 1.0), ([9.0, 0.0], 3.0)];
+        assert_eq!(weighted_median(&samples, 0), 9.0);
+    }
+
+    #[test]
+    fn too_little_evidence_teaches_nothing() {
+        let mut detector = Physical::new(Settings::default());
+        detector.learn(&[([0.8, 0.9], 1.0); 5]);
+        assert!(detector.mixture.is_empty());
+        detector.learn(&[([0.8, 0.9], 1.0); 50]);
+        assert!(detector.is_shadow([0.8, 0.9]) && !detector.is_shadow([1.5, 0.2]));
+    }
+}

@@ -1,0 +1,218 @@
+//! Small-region texture: the texture round a pixel stays in shadow, only its gain drops.
+//!
+//! A. Leone and C. Distante, "Shadow detection for moving objects based on texture analysis", Pattern Recognition 40 (2007),
+//! 1222-1233. Darker foreground pixels are candidates; round each, frame and background are projected on a bank of
+//! Gabor functions (two wavelengths, four orientations, even and odd), both divided by their local mean so that
+//! the gain drops out. Where the projections' squared distance, averaged over a small region and less what camera noise
+//! brings, is small beside the background's own squared length, the region is shadow. Windows are weighted by the
+//! Gabor functions' own Gaussian, and only foreground pixels count: a shadow's edge is not texture.
+//!
+//! Cost: window area times 16 functions, twice, per candidate: about 2600 multiplications.
+
+use ndarray::{Array2, ArrayView2};
+
+use super::images::{Images, intensity, window_means};
+use farnear_silhouettes::mask::{Mask, bits::BitMask};
+
+/// Settings of the detector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Least intensity of a candidate in proportion to the background's.
+    pub darkest: f32,
+    /// Greatest intensity of a candidate in proportion to the background's.
+    pub lightest: f32,
+    /// Greatest distance of the projections in proportion to the background's length.
+    pub distance: f32,
+    /// Length below which a background has no texture to lose, in proportion to the local mean; such ground counts as
+    /// alike.
+    pub smooth: f32,
+    /// Camera noise, standard deviation in grey levels (of the mean of three channels).
+    pub noise_sd: f32,
+    /// Radius of the square region that distances are averaged over, pixels.
+    pub region_radius_px: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { darkest: 0.2, lightest: 0.95, distance: 0.7, smooth: 0.01, noise_sd: 1.5, region_radius_px: 3 }
+    }
+}
+
+/// Radius of the window, pixels.
+const RADIUS: usize = 4;
+const SIDE: usize = 2 * RADIUS + 1;
+const WAVELENGTHS_PX: [f32; 2] = [4.0, 8.0];
+const ORIENTATIONS: usize = 4;
+const FUNCTIONS: usize = WAVELENGTHS_PX.len() * ORIENTATIONS * 2;
+/// Standard deviation of the Gaussian window, pixels.
+const SD_PX: f32 = 2.0;
+
+type Window = [[f32; SIDE]; SIDE];
+
+/// The foreground pixels whose texture is the background's.
+#[must_use]
+pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
+    let (frame, background) = (intensity(images.frame), intensity(images.background));
+    let bank = gabor_bank();
+    let candidates = images.foreground_where(|at| {
+        let ratio = frame[at] / background[at].max(f32::MIN_POSITIVE);
+        (settings.darkest..=settings.lightest).contains(&ratio)
+    });
+    // On a shadow's soft outline the gain changes from pixel to pixel: what lies inside speaks for it.
+    let inside = BitMask::pack(images.foreground).eroded(1).unpack();
+    let mut squares = Array2::from_elem(images.size(), [0.0_f32; 3]);
+    for (at, _) in candidates.indexed_iter().filter(|&(at, &set)| set && inside[at]) {
+        let (shaded, shaded_mean) = project(&frame, inside.view(), at, &bank);
+        let (lit, _) = project(&background, inside.view(), at, &bank);
+        let apart: f32 = shaded.iter().zip(&lit).map(|(a, b)| (a - b).powi(2)).sum();
+        let noise = (settings.noise_sd / shaded_mean).powi(2) * bank.energy;
+        squares[at] = [apart - noise, lit.iter().map(|value| value * value).sum(), 1.0];
+    }
+    let means = window_means(&squares, candidates.view(), settings.region_radius_px);
+    images.foreground_where(|at| {
+        // The share of pixels that speak is in all three, so it cancels.
+        let [apart, length, speaking] = means[at];
+        let limit = settings.distance.powi(2) * length + settings.smooth.powi(2) * speaking;
+        candidates[at] && speaking > 0.0 && apart <= limit
+    })
+}
+
+/// Projections of the foreground pixels of the window round a pixel, less their weighted mean and divided by it; and that mean.
+fn project(
+    image: &Array2<f32>,
+    foreground: ArrayView2<'_, bool>,
+    (row, column): (usize, usize),
+    bank: &Bank,
+) -> ([f32; FUNCTIONS], f32) {
+    let (height, width) = image.dim();
+    let mut window: Window = [[0.0; SIDE]; SIDE];
+    let mut counted = [[0.0_f32; SIDE]; SIDE];
+    for y in RADIUS.saturating_sub(row)..SIDE.min(height + RADIUS - row) {
+        for x in RADIUS.saturating_sub(column)..SIDE.min(width + RADIUS - column) {
+            let at = [row + y - RADIUS, column + x - RADIUS];
+            if foreground[at] {
+                window[y][x] = image[at];
+                counted[y][x] = 1.0;
+            }
+        }
+    }
+    let inner = |a: &Window, b: &Window| -> f32 {
+        a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| a * b).sum()
+    };
+    let mean = (inner(&window, &bank.mean) / inner(&counted, &bank.mean).max(f32::MIN_POSITIVE)).max(1.0);
+    for (values, counted) in window.iter_mut().zip(&counted) {
+        values.iter_mut().zip(counted).for_each(|(value, counted)| *value = (*value / mean - 1.0) * counted);
+    }
+    (std::array::from_fn(|index| inner(&window, &bank.functions[index])), mean)
+}
+
+struct Bank {
+    /// The Gaussian window, of sum 1.
+    mean: Window,
+    /// Zero-mean Gabor functions, of absolute sum 1.
+    functions: [Window; FUNCTIONS],
+    /// Sum of the functions' squares: what white noise of variance 1 brings to a squared length.
+    energy: f32,
+}
+
+fn gabor_bank() -> Bank {
+    let offsets = |y: usize, x: usize| (y as f32 - RADIUS as f32, x as f32 - RADIUS as f32);
+    let build = |value: &dyn Fn(f32, f32) -> f32| -> Window {
+        std::array::from_fn(|y| {
+            std::array::from_fn(|x| {
+                let (dy, dx) = offsets(y, x);
+                value(dy, dx)
+            })
+        })
+    };
+    let sum = |window: &Window, of: &dyn Fn(f32) -> f32| {
+        window.iter().flatten().map(|&value| of(value)).sum::<f32>()
+    };
+    let bell = |dy: f32, dx: f32| (-0.5 * (dy * dy + dx * dx) / (SD_PX * SD_PX)).exp();
+    let raw = build(&bell);
+    let total = sum(&raw, &|value| value);
+    let mean = raw.map(|line| line.map(|value| value / total));
+    let functions: [Window; FUNCTIONS] = std::array::from_fn(|index| {
+        let angle = std::f32::consts::PI * (index % ORIENTATIONS) as f32 / ORIENTATIONS as f32;
+        let wavelength = WAVELENGTHS_PX[index / ORIENTATIONS % WAVELENGTHS_PX.len()];
+        let odd = index >= FUNCTIONS / 2;
+        let wave = |dy: f32, dx: f32| {
+            let phase = 2.0 * std::f32::consts::PI * (dx * angle.cos() + dy * angle.sin()) / wavelength;
+            bell(dy, dx) * if odd { phase.sin() } else { phase.cos() }
+        };
+        let raw = build(&wave);
+        let offset = sum(&raw, &|value| value);
+        let zero_mean = build(&|dy, dx| wave(dy, dx) - offset * bell(dy, dx) / total);
+        let size = sum(&zero_mean, &f32::abs);
+        zero_mean.map(|line| line.map(|value| value / size))
+    });
+    let energy = functions.iter().map(|function| sum(function, &|value| value * value)).sum();
+    Bank { mean, functions, energy }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array3;
+
+    #[test]
+    fn no_function_sees_a_constant_and_the_gain_drops_out() {
+        let bank = gabor_bank();
+        let all = Array2::from_elem((20, 20), true);
+        let (flat, _) = project(&Array2::from_elem((20, 20), 90.0), all.view(), (10, 10), &bank);
+        assert!(flat.iter().all(|value| value.abs() < 1e-5), "{flat:?}");
+        let texture =
+            Array2::from_shape_fn((20, 20), |(row, column)| 60.0 + ((row * 7 + column * 13) % 11) as f32);
+        let (lit, _) = project(&texture, all.view(), (9, 9), &bank);
+        let (shaded, mean) = project(&texture.mapv(|level| 0.4 * level), all.view(), (9, 9), &bank);
+        assert!((20.0..32.0).contains(&mean), "0.4 of about 65: {mean}");
+        assert!(lit.iter().zip(shaded).all(|(a, b)| (a - b).abs() < 1e-5));
+    }
+
+    #[test]
+    fn what_is_not_foreground_does_not_count() {
+        let bank = gabor_bank();
+        let texture =
+            Array2::from_shape_fn((20, 20), |(row, column)| 60.0 + ((row * 7 + column * 13) % 11) as f32);
+        let mask = Array2::from_shape_fn((20, 20), |(row, _)| row < 11);
+        let mut other = texture.clone();
+        other.slice_mut(ndarray::s![11.., ..]).fill(250.0);
+        assert_eq!(
+            project(&texture, mask.view(), (9, 0), &bank),
+            project(&other, mask.view(), (9, 0), &bank)
+        );
+    }
+
+    #[test]
+    fn an_orientation_answers_to_its_own_stripes() {
+        let bank = gabor_bank();
+        let stripes = Array2::from_shape_fn((30, 30), |(_, column)| {
+            100.0 + 20.0 * (std::f32::consts::PI * 0.5 * column as f32).cos()
+        });
+        let all = Array2::from_elem((30, 30), true);
+        let (answers, _) = project(&stripes, all.view(), (15, 16), &bank);
+        let strongest = (0..FUNCTIONS).max_by(|&a, &b| answers[a].abs().total_cmp(&answers[b].abs()));
+        // Wavelength 4, orientation 0, even.
+        assert_eq!(strongest, Some(0));
+    }
+
+    #[test]
+    fn the_same_texture_darker_is_shadow_and_another_is_not() {
+        let level = |row: usize, column: usize, turned: bool| {
+            let phase = if turned { row } else { column };
+            if (phase / 2) % 2 == 0 { 170.0 } else { 110.0 }
+        };
+        let image = |gain: f32, turned: bool| {
+            Array3::from_shape_fn((24, 24, 3), |(row, column, _)| (gain * level(row, column, turned)) as u8)
+        };
+        let mask = Array2::from_elem((24, 24), true);
+        let background = image(1.0, false);
+        for (gain, turned, share) in [(0.5, false, 1.0), (0.5, true, 0.0), (1.2, false, 0.0)] {
+            let frame = image(gain, turned);
+            let images = Images::new(frame.view(), background.view(), mask.view()).unwrap();
+            let found = detect(&images, &Settings::default());
+            let found = found.iter().filter(|&&set| set).count() as f32 / 576.0;
+            assert!((found - share).abs() < 0.02, "gain {gain}, turned {turned}: {found}");
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Seeded scenes and pictures with a shadow whose truth is known.
+
+pub mod pictures;
+pub mod scene;

@@ -1,0 +1,307 @@
+//! The background model over frames: sizes checked, learning rate scheduled, labels out.
+
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
+use pulp::Arch;
+
+use super::{
+    kernel::{self, TILE, Update},
+    settings::{Settings, SettingsError},
+};
+
+/// A video frame of 8-bit samples.
+#[derive(Clone, Copy, Debug)]
+pub enum Frame<'a> {
+    /// Grey levels, shape (height, width).
+    Grey(ArrayView2<'a, u8>),
+    /// Red, green and blue, shape (height, width, 3).
+    Rgb(ArrayView3<'a, u8>),
+}
+
+impl Frame<'_> {
+    /// Its (height, width).
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        match self {
+            Self::Grey(pixels) => pixels.dim(),
+            Self::Rgb(pixels) => (pixels.dim().0, pixels.dim().1),
+        }
+    }
+
+    fn channels(&self) -> usize {
+        match self {
+            Self::Grey(_) => 1,
+            Self::Rgb(pixels) => pixels.dim().2,
+        }
+    }
+}
+
+/// What a pixel is in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Label {
+    /// Explained by the background components.
+    #[default]
+    Background,
+    /// A darker copy of the background (only with [`Settings::shadow`]).
+    Shadow,
+    /// Neither: something that is not part of the scene.
+    Foreground,
+}
+
+/// Why a model was not made or a frame not taken in; the model is as before.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BackgroundError {
+    /// The settings make no sense.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// A frame without pixels.
+    #[error("background model: a frame of {width}x{height} pixels has nothing in it")]
+    Empty {
+        /// Height in pixels.
+        height: usize,
+        /// Width in pixels.
+        width: usize,
+    },
+    /// Neither grey nor RGB.
+    #[error("background model: {channels} channels per pixel; give 1 (grey) or 3 (red, green, blue)")]
+    Channels {
+        /// Channels per pixel that were given.
+        channels: usize,
+    },
+    /// A frame that is not like the first.
+    #[error(
+        "background model: this frame is {}x{} with {found_channels} channel(s), but the video began with {}x{} \
+         and {expected_channels}; scale the frames to one size or start a new model",
+        .found.1, .found.0, .expected.1, .expected.0
+    )]
+    Changed {
+        /// (height, width) of this frame.
+        found: (usize, usize),
+        /// Channels of this frame.
+        found_channels: usize,
+        /// (height, width) of the first frame.
+        expected: (usize, usize),
+        /// Channels of the first frame.
+        expected_channels: usize,
+    },
+}
+
+/// An adaptive Gaussian mixture per pixel.
+///
+/// ```
+/// use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
+/// use ndarray::Array2;
+///
+/// let mut model = BackgroundModel::new((48, 64), 1, Settings::default())?;
+/// let empty = Array2::from_elem((48, 64), 100_u8);
+/// for _ in 0..20 {
+///     model.apply(Frame::Grey(empty.view()))?;
+/// }
+/// let mut somebody = empty.clone();
+/// somebody[[20, 30]] = 180;
+/// let labels = model.apply(Frame::Grey(somebody.view()))?;
+/// assert_eq!(labels[[20, 30]], Label::Foreground);
+/// assert_eq!(labels[[20, 31]], Label::Background);
+/// # Ok::<(), farnear_silhouettes::background::BackgroundError>(())
+/// ```
+pub struct BackgroundModel {
+    settings: Settings,
+    size: (usize, usize),
+    channels: usize,
+    state: Vec<f32>,
+    used: Vec<u8>,
+    codes: Vec<u8>,
+    frames_seen: u32,
+    arch: Arch,
+}
+
+impl BackgroundModel {
+    /// A model that knows nothing yet, for frames of `size` (height, width) with 1 or 3 channels. Memory:
+    /// 4 (2 + channels) bytes per pixel and component.
+    ///
+    /// # Errors
+    /// [`BackgroundError`] for settings that make no sense, an empty size, or another number of channels.
+    pub fn new(size: (usize, usize), channels: usize, settings: Settings) -> Result<Self, BackgroundError> {
+        settings.check()?;
+        let (height, width) = size;
+        let pixels = height * width;
+        if pixels == 0 {
+            return Err(BackgroundError::Empty { height, width });
+        }
+        if channels != 1 && channels != 3 {
+            return Err(BackgroundError::Channels { channels });
+        }
+        let tiles = pixels.div_ceil(TILE);
+        Ok(Self {
+            state: vec![0.0; kernel::state_len(tiles, settings.max_components, channels)],
+            used: vec![0; tiles],
+            codes: vec![kernel::BACKGROUND; pixels],
+            frames_seen: 0,
+            arch: Arch::new(),
+            settings,
+            size,
+            channels,
+        })
+    }
+
+    /// A model for frames like this one, which is not taken in yet.
+    ///
+    /// # Errors
+    /// As [`BackgroundModel::new`].
+    pub fn like(frame: Frame<'_>, settings: Settings) -> Result<Self, BackgroundError> {
+        Self::new(frame.size(), frame.channels(), settings)
+    }
+
+    /// Takes in the next frame and labels its pixels. The learning rate is the mean over what has been seen while
+    /// that is short, 1 / (2 n) for frame n >= 2, and 1 / history from then on. The first frame founds the model:
+    /// nothing explains it, so all of it is foreground.
+    ///
+    /// # Errors
+    /// [`BackgroundError::Changed`] for a frame of another size or kind; the model is as before.
+    pub fn apply(&mut self, frame: Frame<'_>) -> Result<Array2<Label>, BackgroundError> {
+        let n = self.frames_seen.saturating_add(1);
+        let rate =
+            if n == 1 { 1.0 } else { 1.0 / self.settings.history_frames.min(n.saturating_mul(2)) as f32 };
+        self.apply_at(frame, rate)
+    }
+
+    /// As [`BackgroundModel::apply`] with a learning rate of one's own, clamped to 0 (labels only; unexplained
+    /// samples still leave a component of no weight) to 1 (forgets everything).
+    ///
+    /// # Errors
+    /// As [`BackgroundModel::apply`].
+    pub fn apply_at(&mut self, frame: Frame<'_>, rate: f32) -> Result<Array2<Label>, BackgroundError> {
+        if frame.size() != self.size || frame.channels() != self.channels {
+            return Err(BackgroundError::Changed {
+                found: frame.size(),
+                found_channels: frame.channels(),
+                expected: self.size,
+                expected_channels: self.channels,
+            });
+        }
+        let rate = if rate.is_finite() { rate.clamp(0.0, 1.0) } else { 0.0 };
+        match frame {
+            Frame::Grey(pixels) => match pixels.as_slice() {
+                Some(samples) => self.update::<1>(samples, rate),
+                None => self.update::<1>(&pixels.iter().copied().collect::<Vec<_>>(), rate),
+            },
+            Frame::Rgb(pixels) => match pixels.as_slice() {
+                Some(samples) => self.update::<3>(samples, rate),
+                None => self.update::<3>(&pixels.iter().copied().collect::<Vec<_>>(), rate),
+            },
+        }
+        self.frames_seen = self.frames_seen.saturating_add(1);
+        let (_, width) = self.size;
+        Ok(Array2::from_shape_fn(self.size, |(row, column)| match self.codes[row * width + column] {
+            kernel::FOREGROUND => Label::Foreground,
+            kernel::SHADOW => Label::Shadow,
+            _ => Label::Background,
+        }))
+    }
+
+    fn update<const CHANNELS: usize>(&mut self, pixels: &[u8], rate: f32) {
+        self.arch.dispatch(Update::<CHANNELS> {
+            settings: &self.settings,
+            rate,
+            state: &mut self.state,
+            used: &mut self.used,
+            pixels,
+            labels: &mut self.codes,
+        });
+    }
+
+    /// Frames taken in so far.
+    #[must_use]
+    pub fn frames_seen(&self) -> u32 {
+        self.frames_seen
+    }
+
+    /// The mean of each pixel's heaviest component, shape (height, width, channels): the empty scene as far as it is
+    /// known. All 0 before the first frame.
+    #[must_use]
+    pub fn background(&self) -> Array3<u8> {
+        let (height, width) = self.size;
+        Array3::from_shape_fn((height, width, self.channels), |(row, column, channel)| {
+            let (tile, lane) = split(row * width + column);
+            self.state[tile * kernel::component_len(self.channels) + kernel::mean_offset(channel) + lane]
+                .round() as u8
+        })
+    }
+
+    /// How many components each pixel has, shape (height, width).
+    #[must_use]
+    pub fn components(&self) -> Array2<u8> {
+        let (_, width) = self.size;
+        let component_len = kernel::component_len(self.channels);
+        let stride = self.used.len() * component_len;
+        Array2::from_shape_fn(self.size, |(row, column)| {
+            let (tile, lane) = split(row * width + column);
+            let weight = |component: usize| self.state[component * stride + tile * component_len + lane];
+            (0..usize::from(self.used[tile])).filter(|&component| weight(component) > 0.0).count() as u8
+        })
+    }
+}
+
+fn split(pixel: usize) -> (usize, usize) {
+    (pixel / TILE, pixel % TILE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Textured frames with reproducible noise and a block that comes and goes.
+    fn frame(number: usize, (height, width): (usize, usize)) -> Array3<u8> {
+        Array3::from_shape_fn((height, width, 3), |(row, column, channel)| {
+            let hash = (number * 7919 + row * 104_729 + column * 1_299_709 + channel * 15_485_863) % 1009;
+            let noise = (hash % 13) as u8;
+            let block = number % 7 > 3 && row > 4 && column > width / 2;
+            if block { 200 + noise } else { 60 + 10 * (row % 5) as u8 + noise }
+        })
+    }
+
+    #[test]
+    fn every_vector_width_gives_the_same_bits() {
+        // 11 x 13 pixels: the last tile is not full.
+        let size = (11, 13);
+        let mut narrow = BackgroundModel::new(size, 3, Settings::default()).unwrap();
+        narrow.arch = Arch::Scalar;
+        let mut wide = BackgroundModel::new(size, 3, Settings::default()).unwrap();
+        for number in 0..60 {
+            let frame = frame(number, size);
+            let labels = narrow.apply(Frame::Rgb(frame.view())).unwrap();
+            assert_eq!(labels, wide.apply(Frame::Rgb(frame.view())).unwrap(), "frame {number}");
+        }
+        assert_eq!(narrow.state, wide.state);
+        assert_eq!(narrow.components(), wide.components());
+    }
+
+    #[test]
+    fn weights_sum_to_one_and_stay_sorted() {
+        let size = (8, 16);
+        let mut model = BackgroundModel::new(size, 3, Settings::default()).unwrap();
+        let component_len = kernel::component_len(3);
+        let stride = model.used.len() * component_len;
+        for number in 0..80 {
+            model.apply(Frame::Rgb(frame(number, size).view())).unwrap();
+            for pixel in 0..8 * 16 {
+                let (tile, lane) = split(pixel);
+                let weights: Vec<f32> =
+                    (0..5).map(|k| model.state[k * stride + tile * component_len + lane]).collect();
+                assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{weights:?}");
+                assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]), "{weights:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_view_with_gaps_is_read_like_a_copy() {
+        let size = (6, 10);
+        let whole = frame(3, (6, 20));
+        let gappy = whole.slice(ndarray::s![.., ..;2, ..]);
+        let mut first = BackgroundModel::new(size, 3, Settings::default()).unwrap();
+        let mut second = BackgroundModel::new(size, 3, Settings::default()).unwrap();
+        first.apply(Frame::Rgb(gappy)).unwrap();
+        second.apply(Frame::Rgb(gappy.to_owned().view())).unwrap();
+        assert_eq!(first.state, second.state);
+    }
+}

@@ -1,0 +1,242 @@
+//! Readers on real recordings, and on the same recordings damaged in seeded ways.
+
+use crate::cases;
+use farnear_silhouettes::mask::area;
+use farnear_silhouettes::readers::{
+    self, c3d, csv, kinect, matlab, ntu,
+    recording::{Choices, Recording, RecordingError},
+    skeletons, trc,
+};
+use farnear_silhouettes::silhouette::{
+    parts::{Fill, close, draw, extent},
+    template::Template,
+    view::{Canvas, views_round},
+};
+use proptest::prelude::*;
+
+fn shared(name: &str) -> Vec<u8> {
+    std::fs::read(farnear_test_data::path(name)).expect("the file is among the data")
+}
+
+fn read(bytes: &[u8], ending: &str) -> Result<Recording, RecordingError> {
+    readers::read(bytes, ending, Choices::default())
+}
+
+#[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
+    let recording = read(&shared("mocap/cmu_02_05.c3d"), "c3d").expect("a C3D file");
+    assert!(recording.remarks().is_empty(), "unit and axes are the file's and the format's");
+    println!(
+        "{} markers, {} frames, {} Hz: {:?}",
+        recording.names.len(),
+        recording.frames.len(),
+        recording.rate_hz,
+        &recording.names[..8]
+    );
+    assert!(recording.names.len() >= 41 && recording.frames.len() > 100 && recording.rate_hz > 50.0);
+    let template = Template::named("plug-in-gait").expect("built in");
+    template.check(&recording.names).expect("the suit is Plug-in Gait's");
+    let frame = recording.by_name(recording.frames.len() / 2);
+    for view in views_round(8, 0.0) {
+        let canvas = Canvas::fitting(&extent(std::slice::from_ref(&frame), &template, &view), 6.0, 12)
+            .expect("finite");
+        let drawn = draw(&frame, &template, &view, &canvas, Fill::Hull);
+        assert!(drawn.missing_parts.is_empty(), "{:?}", drawn.missing_parts);
+        let mask = close(&drawn.mask, 21);
+        // A person covers between 0.25 and 1.6 square metres of a picture.
+        let square_metres = area(mask.view()) as f64 * 36e-6;
+        assert!((0.25..1.6).contains(&square_metres), "{square_metres}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+fn other_c3d_and_trc_recordings_are_read() {
+    let recording = read(&shared("mocap/nick_freeform_001.c3d"), "c3d").expect("a C3D file");
+    assert!(recording.frames.len() > 10 && !recording.names.is_empty());
+    for name in ["walking1", "DJ1", "squats1"] {
+        let recording = read(&shared(&format!("mocap/{name}.trc")), "trc").expect("a TRC file");
+        assert_eq!(recording.names.len(), 51);
+        assert!(recording.frames.len() > 100);
+        let first = recording.by_name(0)["C7"];
+        // The file is in metres with y up: a neck stands 1.4 m above the ground, 1.8 m at the top
+        // of a drop jump's box.
+        assert!((1200.0..1900.0).contains(&first[2]), "{first:?}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+fn skeleton_sets_hold_what_they_should() {
+    let bytes = shared("skeletons/UTKinect_Skeletons.mat");
+    let clips = skeletons::read_cells(&bytes, &skeletons::KINECT_20).expect("a MAT-file");
+    assert_eq!(clips.len(), 199);
+    assert_eq!(clips[0].frames.len(), 44);
+    assert!(skeletons::read_cells(&bytes, &skeletons::FLORENCE_15).is_err());
+    let bytes = shared("skeletons/Florence_3D_Action_Skeletons.mat");
+    let clips = skeletons::read_cells(&bytes, &skeletons::FLORENCE_15).expect("a MAT-file");
+    assert_eq!(clips.len(), 215);
+}
+
+#[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+fn truncated_recordings_are_errors_not_panics() {
+    let bytes = shared("mocap/cmu_02_05.c3d");
+    for cut in [0, 1, 2, 100, 511, 512, 600, 2000, 5000, bytes.len() / 2, bytes.len() - 600] {
+        assert!(c3d::read(&bytes[..cut]).is_err(), "cut at {cut}");
+    }
+    let bytes = shared("mocap/walking1.trc");
+    assert!(trc::read(&bytes[..40]).is_err());
+    let furlongs = String::from_utf8_lossy(&bytes).replacen("\tm\t", "\tfurlong\t", 1);
+    let error = trc::read(furlongs.as_bytes()).expect_err("unit");
+    assert!(error.to_string().contains("furlong"), "{error}");
+}
+
+#[test]
+#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+fn damaged_recordings_never_panic() {
+    // The header and parameter blocks decide everything: damage is aimed there.
+    let mut motion = shared("mocap/nick_freeform_001.c3d");
+    motion.truncate(60_000);
+    let mut joints = shared("skeletons/Florence_3D_Action_Skeletons.mat");
+    joints.truncate(4000);
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: cases(300),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let damage = proptest::collection::vec((0_usize..6000, any::<u8>()), 1..12);
+    runner
+        .run(&damage, |places| {
+            let damaged = |source: &[u8]| {
+                let mut bytes = source.to_vec();
+                for &(at, value) in &places {
+                    let at = at % bytes.len();
+                    bytes[at] = value;
+                }
+                bytes
+            };
+            let _ = c3d::read(&damaged(&motion));
+            let _ = c3d::read(&damaged(&joints));
+            let _ = matlab::read(&damaged(&joints));
+            Ok(())
+        })
+        .expect("no panic");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(256), failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn any_bytes_and_text_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..2000), text in "\\PC{0,300}") {
+        let _ = matlab::read(&bytes);
+        let mut keyed = bytes.clone();
+        if keyed.len() > 2 {
+            keyed[0] = 2;
+            keyed[1] = 0x50;
+        }
+        let _ = c3d::read(&keyed);
+        let _ = csv::read(text.as_bytes());
+        let _ = ntu::read(text.as_bytes());
+        let _ = kinect::read(text.as_bytes());
+        let headed =
+            format!("PathFileType\t4\nDataRate\tNumMarkers\tUnits\n100\t1\tmm\nFrame#\tTime\tA\n\n{text}");
+        let _ = trc::read(headed.as_bytes());
+    }
+}
+
+#[test]
+fn unknown_markers_are_named() {
+    let error = Template::named("plug-in-gait")
+        .expect("built in")
+        .check(&["A".into(), "B".into()])
+        .expect_err("no such suit");
+    assert!(error.to_string().contains("LFHD") && error.to_string().contains("plug-in-gait"), "{error}");
+    assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
+}
+
+/// A whole small C3D file: one marker, two frames of floating-point data, its label and unit.
+fn small_c3d() -> Vec<u8> {
+    let mut bytes = vec![0_u8; 4 * 512];
+    bytes[..2].copy_from_slice(&[2, 0x50]);
+    for (word, value) in [(2, 1_u16), (3, 0), (4, 1), (5, 2), (9, 4)] {
+        bytes[2 * (word - 1)..2 * word].copy_from_slice(&value.to_le_bytes());
+    }
+    bytes[12..16].copy_from_slice(&(-1.0_f32).to_le_bytes());
+    bytes[20..24].copy_from_slice(&100.0_f32.to_le_bytes());
+    let mut parameters = vec![1, 0x50, 2, 84];
+    let entry = |parameters: &mut Vec<u8>, name: &str, group: i8, body: &[u8], last: bool| {
+        parameters.extend([name.len() as u8, group as u8]);
+        parameters.extend(name.as_bytes());
+        let next = if last { 0 } else { 2 + body.len() as u16 };
+        parameters.extend(next.to_le_bytes());
+        parameters.extend(body);
+    };
+    entry(&mut parameters, "POINT", -1, &[0], false);
+    entry(&mut parameters, "LABELS", 1, &[0xff, 2, 4, 1, b'L', b'A', b'S', b'I', 0], false);
+    entry(&mut parameters, "UNITS", 1, &[0xff, 2, 2, 1, b'm', b'm', 0], true);
+    bytes[512..512 + parameters.len()].copy_from_slice(&parameters);
+    for (i, value) in [1.0_f32, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, -1.0].into_iter().enumerate() {
+        bytes[1536 + 4 * i..1540 + 4 * i].copy_from_slice(&value.to_le_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn a_small_c3d_file_is_read_as_written() {
+    let read = read(&small_c3d(), "C3D").expect("a C3D file");
+    assert_eq!((read.names, read.rate_hz), (vec!["LASI".to_owned()], 100.0));
+    assert_eq!(read.frames, vec![vec![Some([1.0, 2.0, 3.0])], vec![None]]);
+}
+
+const TRC: &str = "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumMarkers\tUnits\n100\t2\tm\nFrame#\tTime\tA\t\t\tB\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0\t0.1\t0.2\t0.3\t\t\t\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
+/// A header that promises more frames than there are tells of a copy that was cut short.
+#[test]
+fn a_trc_file_cut_short_is_refused_with_both_numbers() {
+    let promising = |frames: &str| {
+        let keys = TRC.replace("DataRate\tNumMarkers", "DataRate\tNumFrames\tNumMarkers");
+        keys.replace("100\t2\tm", &format!("100\t{frames}\t2\tm"))
+    };
+    assert_eq!(trc::read(promising("2").as_bytes()).expect("whole").frames.len(), 2);
+    // Fewer than there are, or no number at all, does no harm.
+    assert!(trc::read(promising("1").as_bytes()).is_ok() && trc::read(promising("?").as_bytes()).is_ok());
+    let error = trc::read(promising("139").as_bytes()).expect_err("cut short").to_string();
+    assert!(error.contains("139") && error.contains("ends after 2") && error.contains("line 3"), "{error}");
+}
+
+/// Two people in two frames.
+fn ntu_skeleton() -> String {
+    let joints = "0.1 0.9 3.2 1 2 3 4 0 0 0 1 2\n".repeat(25);
+    let person = |id: u32| format!("{id} 0 1 1 0 0 0 0.1 0.2 2\n25\n{joints}");
+    format!("2\n2\n{}{}1\n{}", person(71), person(72), person(72))
+}
+
+const CSV: &str = "frame,A_x,A_y,A_z,B_x,B_y,B_z\n1,1,2,3,,,\n2,4,5,6,7,8,9\n";
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(256), failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn damaged_small_recordings_are_read_or_refused(
+        places in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        cut in any::<prop::sample::Index>(),
+    ) {
+        let damaged = |source: &[u8]| {
+            let mut bytes = source.to_vec();
+            for (at, value) in &places {
+                let at = at.index(bytes.len());
+                bytes[at] = *value;
+            }
+            bytes
+        };
+        let bytes = damaged(&small_c3d());
+        let _ = c3d::read(&bytes);
+        let _ = c3d::read(&bytes[..cut.index(bytes.len())]);
+        let _ = trc::read(&damaged(TRC.as_bytes()));
+        let _ = csv::read(&damaged(CSV.as_bytes()));
+        let skeleton = ntu_skeleton();
+        assert!(ntu::read(skeleton.as_bytes()).is_ok());
+        let _ = ntu::read(&damaged(skeleton.as_bytes()));
+        let _ = ntu::read(&skeleton.as_bytes()[..cut.index(skeleton.len())]);
+        let _ = kinect::read(&damaged("1 0.5 -2e3 ".repeat(20).as_bytes()));
+    }
+}
