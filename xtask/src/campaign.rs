@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Plays the scenarios of the seeds.
 fn scenarios(arguments: &Arguments, elf: &Path) -> Result<()> {
     step(&format!("campaign, {} scenarios", arguments.seeds));
-    let mut command = cargo(["run", "--locked", "--package", "farnear-sim", "--", "campaign"]);
+    let mut command = cargo(["run", "--locked", "--package", "farnear-campaign", "--", "run"]);
     command
         .args(["--seeds", &arguments.seeds.to_string(), "--first", &arguments.first.to_string()])
         .args(["--shard", arguments.shard.as_deref().unwrap_or("1/1")])

@@ -6,10 +6,12 @@ use anyhow::Result;
 
 use crate::run::{cargo, finish, step, target_folder};
 
-/// What a user runs.
-const PACKAGES: [&str; 4] = ["--package", "farnear", "--package", "farnear-sim"];
+/// The programs that a user runs, each of the package of the same name.
+pub const PROGRAMS: [&str; 3] = ["farnear", "farnear-sim", "farnear-campaign"];
 
-/// Builds `farnear` and `farnear-sim` as the tests use them; gives their folder. The demo takes the same, so that a newcomer
+const PACKAGES: [&str; 6] = ["--package", PROGRAMS[0], "--package", PROGRAMS[1], "--package", PROGRAMS[2]];
+
+/// Builds [`PROGRAMS`] as the tests use them; gives their folder. The demo takes the same, so that a newcomer
 /// who runs both compiles everything once.
 pub fn build() -> Result<PathBuf> {
     step("host programs (the first build takes some minutes)");

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 
 use crate::{boards::BOARDS, firmware, host};
 
-/// Copies `farnear`, `farnear-sim` and the firmware's ELF into cargo's bin folder.
+/// Copies the programs and the firmware's ELF into cargo's bin folder.
 pub fn run() -> Result<()> {
     firmware::build()?;
     let built = host::build_release()?;
@@ -16,7 +16,7 @@ pub fn run() -> Result<()> {
         .context("no home folder: set CARGO_HOME to the folder whose bin/ is to take the programs")?;
     let bin = home.join("bin");
     fs::create_dir_all(&bin).with_context(|| format!("cannot create {}", bin.display()))?;
-    let programs = ["farnear", "farnear-sim"].map(String::from);
+    let programs = host::PROGRAMS.map(String::from);
     for name in programs.into_iter().chain(BOARDS.iter().map(|board| format!("{}.elf", board.program()))) {
         // Aside first: a program that runs cannot be overwritten, but it can be replaced.
         let (aside, place) = (bin.join(format!(".{name}.new")), bin.join(&name));

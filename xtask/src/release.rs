@@ -153,10 +153,10 @@ fn copy(file: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies both programs and the boards' firmware, which the emulated board looks for beside itself, into a folder.
+/// Copies the programs and the boards' firmware, which the emulated board looks for beside itself, into a folder.
 fn lay_programs(programs: &Path, elves: &[PathBuf], folder: &Path) -> Result<()> {
-    let both = [programs.join("farnear"), programs.join("farnear-sim")];
-    both.iter().chain(elves).try_for_each(|file| copy(file, folder))
+    let built = crate::host::PROGRAMS.map(|name| programs.join(name));
+    built.iter().chain(elves).try_for_each(|file| copy(file, folder))
 }
 
 /// Copies what a first user reads, and the optics of a rig to begin with.

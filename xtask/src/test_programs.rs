@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Packages whose tests run the programs or the firmware; those of the others depend on their own code and files alone.
-const RUN_PROGRAMS: [&str; 2] = ["farnear", "farnear-sim"];
+const RUN_PROGRAMS: [&str; 3] = ["farnear", "farnear-sim", "farnear-campaign"];
 /// The package whose tests look at the whole repository.
 const SEES_EVERYTHING: &str = "xtask";
 /// Where the real data are looked for, from the repository's root; see `tools/test-data`.

@@ -37,7 +37,7 @@ fn twice(other: &BTreeMap<String, Vec<String>>) -> Vec<String> {
     demo.iter().filter(differs).map(said).collect()
 }
 
-const DEMO: [&str; 4] = ["--package", "farnear", "--package", "farnear-sim"];
+const DEMO: [&str; 6] = ["--package", "farnear", "--package", "farnear-sim", "--package", "farnear-campaign"];
 
 #[test]
 fn the_demo_and_the_tests_compile_the_same_packages() {

@@ -8,7 +8,7 @@ use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Alarm, AlarmRecord, Axis, Failure, RequestError};
 
 /// Alarms kept.
-pub(crate) const KEPT: usize = 8;
+pub(crate) const RETAINED: usize = 8;
 
 /// All alarms.
 #[derive(Clone, PartialEq, Debug)]
@@ -17,28 +17,28 @@ pub(crate) struct Alarms {
     count: u32,
     /// How many of the last are latched.
     latched: u8,
-    /// Alarm `n` is in place `n % KEPT`.
-    kept: [Option<AlarmRecord>; KEPT],
+    /// Alarm `n` is in place `n % RETAINED`.
+    kept: [Option<AlarmRecord>; RETAINED],
 }
 
 impl Alarms {
     pub(crate) const fn new() -> Self {
-        Self { count: 0, latched: 0, kept: [None; KEPT] }
+        Self { count: 0, latched: 0, kept: [None; RETAINED] }
     }
 
     /// Alarms as they were kept; what does not fit together is dropped.
     pub(crate) fn restored(count: u32, latched: u8, records: impl Iterator<Item = AlarmRecord>) -> Self {
-        let mut alarms = Self { count, latched: 0, kept: [None; KEPT] };
+        let mut alarms = Self { count, latched: 0, kept: [None; RETAINED] };
         for record in records {
-            let recent = record.number <= count && count - record.number < KEPT as u32;
+            let recent = record.number <= count && count - record.number < RETAINED as u32;
             if recent && record.number > 0 {
-                alarms.kept[record.number as usize % KEPT] = Some(record);
+                alarms.kept[record.number as usize % RETAINED] = Some(record);
             }
         }
-        let known = (0..u32::from(latched).min(KEPT as u32))
+        let known = (0..u32::from(latched).min(RETAINED as u32))
             .take_while(|ago| alarms.read(count.wrapping_sub(*ago)).is_ok_and(|record| record.number > 0))
             .count();
-        alarms.latched = known as u8; // at most KEPT
+        alarms.latched = known as u8; // at most RETAINED
         alarms
     }
 
@@ -53,19 +53,19 @@ impl Alarms {
     }
 
     /// What is kept, in no order.
-    pub(crate) const fn kept(&self) -> &[Option<AlarmRecord>; KEPT] {
+    pub(crate) const fn kept(&self) -> &[Option<AlarmRecord>; RETAINED] {
         &self.kept
     }
 
     /// The oldest latched alarm.
     pub(crate) fn latched(&self) -> Option<&AlarmRecord> {
         let oldest = self.count.checked_sub(u32::from(self.latched.checked_sub(1)?))?;
-        self.kept[oldest as usize % KEPT].as_ref()
+        self.kept[oldest as usize % RETAINED].as_ref()
     }
 
     /// Latches an alarm. `None` where its like is latched already.
     pub(crate) fn raise(&mut self, alarm: Alarm, boot: u32, time: BoardMicros) -> Option<AlarmRecord> {
-        let full = usize::from(self.latched) == KEPT;
+        let full = usize::from(self.latched) == RETAINED;
         let number = self.count.checked_add(1)?;
         if full || self.each_latched().any(|record| is_like(&record.alarm, &alarm)) {
             return None;
@@ -73,19 +73,19 @@ impl Alarms {
         let record = AlarmRecord { number, boot, time, alarm };
         self.count = number;
         self.latched += 1;
-        self.kept[number as usize % KEPT] = Some(record);
+        self.kept[number as usize % RETAINED] = Some(record);
         Some(record)
     }
 
     fn each_latched(&self) -> impl Iterator<Item = &AlarmRecord> {
         let latched = u32::from(self.latched);
-        (0..latched).filter_map(|ago| self.kept[self.count.wrapping_sub(ago) as usize % KEPT].as_ref())
+        (0..latched).filter_map(|ago| self.kept[self.count.wrapping_sub(ago) as usize % RETAINED].as_ref())
     }
 
     /// An alarm that is kept; 0 = the last.
     pub(crate) fn read(&self, number: u32) -> Result<AlarmRecord, RequestError> {
         let number = if number == 0 { self.count } else { number };
-        let kept = self.kept[number as usize % KEPT].filter(|record| record.number == number);
+        let kept = self.kept[number as usize % RETAINED].filter(|record| record.number == number);
         kept.ok_or_else(|| self.unknown())
     }
 
@@ -217,7 +217,7 @@ mod tests {
                     }
                 }
                 prop_assert_eq!(alarms.latched(), model.first());
-                prop_assert!(model.len() <= KEPT);
+                prop_assert!(model.len() <= RETAINED);
                 for record in &model {
                     prop_assert_eq!(alarms.read(record.number), Ok(*record), "what is latched can be read");
                 }

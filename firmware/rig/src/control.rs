@@ -13,12 +13,12 @@
 //!    takes one and there is something to say, answers and events first, then the log, which a host that asks without
 //!    a pause does not keep waiting for ever; or else an answer is put into its frame; or else a request is carried out. In a tick in
 //!    which the memory was written, or a frame came to its end, this waits for the next.
-//! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it hungry.
+//! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it not fed.
 //!
 //! A rig at which nothing moves and to which nobody has spoken for [`QUIET_TICKS`] rests: then only every [`REST_TICKS`]th tick is
 //! carried out, for a processor that sleeps warms no optics. The first byte, switch, alarm or step off the piezo's target ends it.
 //!
-//! A reset that the rig orders waits for the frame that is leaving, at most [`LAST_FRAME`]; nothing else is done meanwhile.
+//! A reset that the rig orders waits for the frame under way, at most [`LAST_FRAME`]; nothing else is done meanwhile.
 
 use farnear_protocol::frame::{Header, Kind, delimited, encode};
 use farnear_protocol::message::LinkRate;
@@ -103,11 +103,11 @@ pub struct Control<'r> {
     /// A STEP queue is dry, and it was said.
     dry: bool,
     /// Since when the board is about to be reset.
-    leaving: Option<BoardMicros>,
+    reset_pending: Option<BoardMicros>,
     /// Frames since the log had its turn.
     frames_before_log: u8,
     /// What is to be done for the host was put off in the tick before.
-    put_off: bool,
+    deferred: bool,
     /// Ticks since something was heard, said or done.
     quiet_ticks: u32,
 }
@@ -115,12 +115,12 @@ pub struct Control<'r> {
 impl<'r> Control<'r> {
     /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
-        Self { rig, dry: false, leaving: None, frames_before_log: 0, put_off: false, quiet_ticks: 0 }
+        Self { rig, dry: false, reset_pending: None, frames_before_log: 0, deferred: false, quiet_ticks: 0 }
     }
 
     /// One tick; gives after how many ticks' time the next is due.
     pub fn tick(&mut self, board: &mut impl Board) -> u32 {
-        if let Some(since) = self.leaving {
+        if let Some(since) = self.reset_pending {
             leave(board, since);
             return 1;
         }
@@ -147,13 +147,13 @@ impl<'r> Control<'r> {
             board.set_link_rate(rate);
         }
         // Frames without a pause put it off by a tick at most; the memory's writes leave a tick out by themselves.
-        let has_time = outputs.memory.is_none() && (!frame_came || self.put_off);
-        self.put_off = !has_time;
+        let has_time = outputs.memory.is_none() && (!frame_came || self.deferred);
+        self.deferred = !has_time;
         let acted = !has_time || self.speak(board) || self.rig.serve(inputs.now);
         if outputs.reset {
             board.note(Note::Reset);
             let now = board.now();
-            self.leaving = Some(now);
+            self.reset_pending = Some(now);
             leave(board, now);
             return 1;
         }

@@ -22,12 +22,12 @@ const TABLE_WORDS: usize = Full::table_words(ROW_PIXELS_MAX);
 
 /// A correction: what it is for, and its coefficients.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Kept {
+pub(crate) struct StoredCorrection {
     info: CorrectionInfo,
     bits: [i32; COEFFICIENTS],
 }
 
-impl Kept {
+impl StoredCorrection {
     /// A correction that the memory kept; `None` where it cannot be one.
     pub(crate) fn restored(info: CorrectionInfo, bits: [i32; COEFFICIENTS]) -> Option<Self> {
         frame(&info).ok()?;
@@ -103,8 +103,8 @@ enum Scratch {
 /// The open correction and the kept one.
 #[derive(Clone, Debug)]
 pub(crate) struct Correction {
-    stored: Option<Kept>,
-    open: Option<Kept>,
+    stored: Option<StoredCorrection>,
+    open: Option<StoredCorrection>,
     row: [i16; ROW_PIXELS_MAX as usize],
     scratch: Scratch,
 }
@@ -112,12 +112,12 @@ pub(crate) struct Correction {
 impl Correction {
     /// None open. Inlined, so that its 15 KiB are made in their place.
     #[inline(always)]
-    pub(crate) const fn new(stored: Option<Kept>) -> Self {
+    pub(crate) const fn new(stored: Option<StoredCorrection>) -> Self {
         Self { stored, open: None, row: [0; ROW_PIXELS_MAX as usize], scratch: Scratch::Empty }
     }
 
     /// The one that is kept in the memory.
-    pub(crate) const fn stored(&self) -> Option<&Kept> {
+    pub(crate) const fn stored(&self) -> Option<&StoredCorrection> {
         self.stored.as_ref()
     }
 
@@ -127,7 +127,7 @@ impl Correction {
         if info.half_span_um <= 0 {
             return Err(CorrectionFault::Size);
         }
-        self.open = Some(Kept { info, bits: [0; COEFFICIENTS] });
+        self.open = Some(StoredCorrection { info, bits: [0; COEFFICIENTS] });
         self.scratch = Scratch::Empty;
         Ok(())
     }

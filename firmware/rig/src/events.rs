@@ -7,19 +7,19 @@ use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Event, EventKind};
 
 /// Events kept.
-pub const KEPT: u32 = 16;
+pub const RETAINED: u32 = 16;
 
 /// The numbered events.
 #[derive(Clone, Debug)]
 pub(crate) struct Events {
-    ring: [Option<Event>; KEPT as usize],
+    ring: [Option<Event>; RETAINED as usize],
     next: u32,
     unsent: u32,
 }
 
 impl Events {
     pub(crate) const fn new() -> Self {
-        Self { ring: [const { None }; KEPT as usize], next: 0, unsent: 0 }
+        Self { ring: [const { None }; RETAINED as usize], next: 0, unsent: 0 }
     }
 
     /// The number the next event will get.
@@ -29,12 +29,12 @@ impl Events {
 
     /// The oldest event that can be read.
     pub(crate) const fn oldest(&self) -> u32 {
-        self.next.saturating_sub(KEPT)
+        self.next.saturating_sub(RETAINED)
     }
 
     /// Adds an event. Numbers would run out after 2^32 events, years at a thousand a second.
     pub(crate) fn push(&mut self, time: BoardMicros, kind: EventKind) {
-        self.ring[(self.next % KEPT) as usize] = Some(Event { time, kind });
+        self.ring[(self.next % RETAINED) as usize] = Some(Event { time, kind });
         self.next = self.next.saturating_add(1);
     }
 
@@ -43,7 +43,7 @@ impl Events {
         if !(self.oldest()..self.next).contains(&number) {
             return None;
         }
-        self.ring[(number % KEPT) as usize].as_ref()
+        self.ring[(number % RETAINED) as usize].as_ref()
     }
 
     /// The next event to send and its number; counts as sent.

@@ -48,7 +48,7 @@ pub struct Gains {
     pub(crate) input_before: [i32; 2],
     /// Feedback of position and scaled velocity errors.
     pub(crate) feedback: [i32; 2],
-    /// Correction of position, scaled velocity, disturbance and drift per nm of surprise.
+    /// Correction of position, scaled velocity, disturbance and drift per nm of innovation.
     pub(crate) observer: [i32; 4],
     /// One zero-vibration stage.
     pub(crate) shaper: ShaperGains,
@@ -227,8 +227,9 @@ mod tests {
         let b = [0, 1].map(|i| real(GAINS.input[i]) + real(GAINS.input_before[i]));
         let mut error = [1.0, 1.0, 1.0, 1.0];
         for _ in 0..40 {
-            let surprise = error[0];
-            let corrected: [f64; 4] = core::array::from_fn(|i| error[i] - real(GAINS.observer[i]) * surprise);
+            let innovation = error[0];
+            let corrected: [f64; 4] =
+                core::array::from_fn(|i| error[i] - real(GAINS.observer[i]) * innovation);
             let [p, w, d, drift] = corrected;
             error = [
                 a[0][0] * p + a[0][1] * w + b[0] * d,

@@ -14,7 +14,7 @@
 //! the next move. So it does where the piezo does not move as it should: a loop that feeds a mode of the flexure which it does
 //! not know is opened before the stack is pulled apart.
 //!
-//! A piezo that has stood at its target for a second is at ease: then it is enough to look rarely, for creep is all that moves it. The
+//! A piezo that has stood at its target for a second is idle: then it is enough to look rarely, for creep is all that moves it. The
 //! model of the resonance knows control ticks only, so after a rest the gauge corrects disturbance and drift alone, slowly.
 //!
 //! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64; saturating, so no input can wrap it. Cost: about 35
@@ -41,19 +41,19 @@ const SWING: i32 = 45 << BITS;
 const MIDDLE_SHIFT: u32 = 4;
 /// For so long: a period of the resonance, in which what swings farther is seen to.
 const NEAR_TICKS: u16 = 25;
-/// Ticks near the target after which it is at ease.
-const EASE_TICKS: u16 = TICK_HZ as u16;
+/// Ticks near the target after which it is idle.
+const IDLE_TICKS: u16 = TICK_HZ as u16;
 /// Shares, as shifts, of what it is off after a rest that are disturbance and drift in a control tick: critically damped, with 64 rests (0.13 s) as
 /// time constant. At the resonance, of a Q of 30, the loop's gain is a half.
 const EASE_DISTURBANCE: u32 = 5;
 const EASE_DRIFT: u32 = 15;
-/// Mean surprise beyond which the piezo does not follow. The fast loop's stays below 2 um, also with a resonance a quarter off, and the gentle loop's below
+/// Mean innovation beyond which the piezo does not follow. The fast loop's stays below 2 um, also with a resonance a quarter off, and the gentle loop's below
 /// 11 um; one that feeds a mode with a share of 2 % goes to 18 um and more within 0.1 s, with 5 % to 60.
-const STRANGE: i32 = 15_000 << BITS;
+const INNOVATION_LIMIT: i32 = 15_000 << BITS;
 /// Ticks of that mean, as a shift: 3 ms.
-const STRANGE_SHIFT: u32 = 4;
+const INNOVATION_SHIFT: u32 = 4;
 /// No tick counts for more, for a single reading may be all wrong.
-const STRANGEST: i32 = 2 * STRANGE;
+const INNOVATION_CLIP: i32 = 2 * INNOVATION_LIMIT;
 /// Ticks of the way down at the start, and the codes (3 um) below which it is none.
 const RELAX: u32 = TICK_HZ / 10;
 const RELAXED: u16 = 1_000;
@@ -76,7 +76,7 @@ struct Loop {
     reference_before: i32,
     trend: Trend,
     /// Running mean of how far the gauge is beside what was expected of the tick, without sign.
-    surprise: i32,
+    innovation: i32,
 }
 
 impl Loop {
@@ -166,9 +166,9 @@ impl Piezo {
     }
 
     /// Whether it is enough to look rarely: it stands where it was sent for long, or nobody leads it, and the gauge speaks.
-    pub(crate) fn is_at_ease(&self) -> bool {
+    pub(crate) fn is_settled_idle(&self) -> bool {
         let led = self.control.is_some() || self.closing || self.driven;
-        let stands = self.arrived() && self.near_ticks >= EASE_TICKS;
+        let stands = self.arrived() && self.near_ticks >= IDLE_TICKS;
         self.start == Start::Over && self.gauge_fresh() && (stands || !led)
     }
 
@@ -267,7 +267,7 @@ impl Piezo {
             state: [here, 0, disturbance, 0],
             reference_before: here,
             trend: Trend::new(i64::from(disturbance) << Trend::BITS, 0),
-            surprise: 0,
+            innovation: 0,
         });
         (self.closing, self.start) = (false, Start::Over);
     }
@@ -310,14 +310,14 @@ impl Piezo {
             if rested {
                 return control.correct_after_rest(fixed(self.measured), fixed(self.target), self.passed);
             }
-            let surprise = fixed(self.measured).saturating_sub(control.state[0]);
+            let innovation = fixed(self.measured).saturating_sub(control.state[0]);
             for (state, gain) in control.state.iter_mut().zip(self.settings.gains.observer) {
-                *state = state.saturating_add(sum([(gain, surprise)]));
+                *state = state.saturating_add(sum([(gain, innovation)]));
             }
             control.trend.push(control.state[2]);
-            control.surprise +=
-                (surprise.saturating_abs().min(STRANGEST) - control.surprise) >> STRANGE_SHIFT;
-            if control.surprise > STRANGE {
+            control.innovation +=
+                (innovation.saturating_abs().min(INNOVATION_CLIP) - control.innovation) >> INNOVATION_SHIFT;
+            if control.innovation > INNOVATION_LIMIT {
                 // The last command is somewhere on its swing; the set-point's does not swing.
                 let still = control.reference_before.saturating_sub(self.lag.offset());
                 (self.code, self.command) = self.scale.playable(still);

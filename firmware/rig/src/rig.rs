@@ -333,7 +333,8 @@ impl Rig {
     pub(crate) fn rest(&mut self) -> bool {
         let said = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
         let idle = self.works.any().is_none() && self.reboot.is_none() && self.camera.is_idle();
-        self.rested = said && idle && self.store.is_idle() && !self.supply_low && self.stage.is_at_ease();
+        self.rested =
+            said && idle && self.store.is_idle() && !self.supply_low && self.stage.is_settled_idle();
         self.rested
     }
 

@@ -14,7 +14,7 @@ use farnear_protocol::{
     message::Axis,
 };
 use farnear_scene::{Camera, Lens, OpticsFile, standard};
-use farnear_sim::{EmulatedRig, RigConfig, campaign::cpu_time, imager::Imager};
+use farnear_sim::{EmulatedRig, RigConfig, cpu_time::cpu_time, imager::Imager};
 
 const SESSION: u32 = 1;
 const SILENCE: Micros = Micros(60_000_000);

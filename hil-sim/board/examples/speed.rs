@@ -13,7 +13,7 @@ use farnear_protocol::{
     frame::{Header, Kind, encode},
     message::Axis,
 };
-use farnear_sim::{EmulatedRig, RigConfig, SimError, campaign::cpu_time as cpu};
+use farnear_sim::{EmulatedRig, RigConfig, SimError, cpu_time::cpu_time as cpu};
 
 const SESSION: u32 = 1;
 const SILENCE: Micros = Micros(60_000_000);

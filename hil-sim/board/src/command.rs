@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, mpsc::Sender};
 
-use crate::{access::RigAccess, pictures::Pictures, report::Report, wiring::Shot, witness::Sight};
+use crate::{access::RigAccess, observer::Sight, pictures::Pictures, report::Report, wiring::Shot};
 
 /// Work to be done on a rig between two instructions.
 pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;

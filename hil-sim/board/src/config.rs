@@ -34,8 +34,8 @@ pub struct RigConfig {
     /// What the board's memory holds at power-on, and where it is kept when the rig ends; a new one is made where there is
     /// none. `None`: a blank memory, which is forgotten.
     pub memory: Option<PathBuf>,
-    /// Note what crosses the line, what the plant does and what happens, for a judge ([`crate::judge`]).
-    pub witness: bool,
+    /// Note what crosses the line, what the plant does and what happens, for the invariants of a campaign.
+    pub observe: bool,
     /// Where to write what the plant really did, as CSV.
     pub trace: Option<PathBuf>,
 }
@@ -51,7 +51,7 @@ impl Default for RigConfig {
             scenario: Scenario::default(),
             pace: Pace::Told,
             memory: None,
-            witness: false,
+            observe: false,
             trace: None,
         }
     }

@@ -24,9 +24,10 @@ use crate::{
     config::RigConfig,
     error::SimError,
     faults::{Lines, Moment, Schedule},
-    kept_memory,
     link_rates::LinkRates,
     memory::MemoryChip,
+    memory_file,
+    observer::{Observer, Seen, Truth},
     pacing::Pacing,
     parts::Parts,
     pictures::Patience,
@@ -37,7 +38,6 @@ use crate::{
     serial::Line,
     trace::{Trace, vcd::Vcd},
     wiring::Wiring,
-    witness::{Seen, Truth, Witness},
 };
 
 /// SPI4's registers: the memory hangs there, and its supply may be set to fail in the middle of a write.
@@ -72,7 +72,7 @@ pub struct Driver {
     parts: Parts,
     /// What is still to happen.
     schedule: Schedule,
-    witness: Witness,
+    observer: Observer,
     /// What was seen at the last stop: STEP edges, exposures begun and ended, bytes of the memory and when they were written.
     last: Last,
     trace: Option<Trace>,
@@ -115,7 +115,7 @@ impl Driver {
             scenario: config.scenario.clone(),
             parts: config.parts.clone(),
             schedule: Schedule::new(&config.scenario.happens, config.seed),
-            witness: Witness::new(config.witness),
+            observer: Observer::new(config.observe),
             last: Last::default(),
             trace,
             script: None,
@@ -144,7 +144,7 @@ impl Driver {
     pub fn finish(self) -> Result<(), SimError> {
         self.trace.map_or(Ok(()), Trace::finish)?;
         if let Some((path, contents)) = self.memory.filter(|(_, contents)| !contents.is_empty()) {
-            kept_memory::write(&path, &contents)?;
+            memory_file::write(&path, &contents)?;
         }
         self.failed.map_or(Ok(()), Err)
     }
@@ -189,11 +189,11 @@ impl Driver {
             plant.advance(now_ns);
             Truth::of(plant)
         });
-        for moment in self.witness.received(now_ns, &bytes, truth) {
+        for moment in self.observer.received(now_ns, &bytes, truth) {
             if matches!(moment, Moment::Alarm | Moment::Answer) {
                 // Pulses before it and after it are two bursts.
                 for burst in self.wiring.take_bursts(now_ns, true) {
-                    self.witness.note(burst.last_ns, Seen::Stepped(burst));
+                    self.observer.note(burst.last_ns, Seen::Stepped(burst));
                 }
             }
             self.schedule.notice(moment, now_ns);
@@ -217,7 +217,7 @@ impl Driver {
         });
         for shot in shots {
             self.schedule.notice(Moment::ExposureEnds, now_ns);
-            self.witness.note(shot.end_ns, Seen::Exposed(shot));
+            self.observer.note(shot.end_ns, Seen::Exposed(shot));
             self.patience.expose();
             let _ = self.outlets.shots.send(shot); // whoever looked may have gone
         }
@@ -255,9 +255,9 @@ impl Driver {
             Command::Heal => self.heal(session, stop, host),
             Command::Sights { done } => {
                 for burst in self.wiring.take_bursts(now_ns, true) {
-                    self.witness.note(burst.last_ns, Seen::Stepped(burst));
+                    self.observer.note(burst.last_ns, Seen::Stepped(burst));
                 }
-                let _ = done.send(self.witness.take()); // whoever asked may have gone
+                let _ = done.send(self.observer.take()); // whoever asked may have gone
             }
             Command::End => return false,
         }
@@ -320,7 +320,7 @@ impl Driver {
             vcd.sent(now_ns, &bytes);
         }
         self.lines.to_board.carry(&mut bytes);
-        for _ in 0..self.witness.sent(now_ns, &bytes) {
+        for _ in 0..self.observer.sent(now_ns, &bytes) {
             self.schedule.notice(Moment::Request, now_ns);
         }
         self.line.send(&bytes);
@@ -360,12 +360,12 @@ impl Driver {
             vcd.reset(at.0, power);
         }
         if resets != self.resets {
-            self.witness.note(at.0, Seen::Reset);
+            self.observer.note(at.0, Seen::Reset);
         }
         if powered != self.powered {
-            self.witness.note(at.0, Seen::Powered(powered));
+            self.observer.note(at.0, Seen::Powered(powered));
         }
-        self.witness.reset();
+        self.observer.reset();
         (self.resets, self.powered) = (resets, powered);
         self.wiring.board_reset(at);
         self.rates.reset();

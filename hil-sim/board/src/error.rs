@@ -83,4 +83,7 @@ pub enum SimError {
     /// What the camera looks at or through makes no picture.
     #[error("the camera cannot render: {0}")]
     Scene(String),
+    /// The GigE Vision camera.
+    #[error(transparent)]
+    Gige(#[from] farnear_gige::OpenError),
 }

@@ -38,9 +38,10 @@ impl Picture {
         Self { begin_ns, header, frame }
     }
 
-    /// Its pixels row by row, 16 bits each, the lower byte first.
-    pub fn pixels(&self) -> &[u8] {
-        self.frame.get(4 + FRAME_HEADER..).unwrap_or_default()
+    /// For the GigE Vision server.
+    fn for_gige(&self) -> farnear_gige::Picture {
+        let pixels = self.frame.get(4 + FRAME_HEADER..).unwrap_or_default().to_vec();
+        farnear_gige::Picture { begin_ns: self.begin_ns, header: self.header, pixels }
     }
 }
 
@@ -141,7 +142,7 @@ impl Imager {
 pub fn watch(
     mut cameras: Vec<(Imager, SyncSender<Vec<u8>>)>,
     shots: Receiver<Shot>,
-    mut gige: Option<SyncSender<Picture>>,
+    mut gige: Option<SyncSender<farnear_gige::Picture>>,
     pictures: Arc<Pictures>,
 ) -> Result<JoinHandle<()>, SimError> {
     std::thread::Builder::new()
@@ -157,7 +158,7 @@ pub fn watch(
                         Ok(picture) => {
                             if at == 0 {
                                 // A client that has ended is missed by nobody.
-                                gige = gige.take().filter(|gige| gige.send(picture.clone()).is_ok());
+                                gige = gige.take().filter(|gige| gige.send(picture.for_gige()).is_ok());
                             }
                             if frames.send(picture.frame).is_err() {
                                 return;
@@ -194,7 +195,7 @@ mod tests {
     /// Codes of a picture of 64 x 48 px.
     fn codes(imager: &mut Imager, shot: &Shot) -> Vec<i32> {
         let picture = imager.picture(shot).expect("a picture");
-        picture.pixels().chunks(2).map(|code| i32::from(u16::from_le_bytes([code[0], code[1]]))).collect()
+        picture.for_gige().pixels.chunks(2).map(|code| i32::from(u16::from_le_bytes([code[0], code[1]]))).collect()
     }
 
     fn imager(parts: &str) -> (Imager, f64) {

@@ -7,8 +7,8 @@
 //! - [`parts`]: what the parts are like, the numbers of `parts.toml`; [`processor`]: what its instructions cost.
 //! - [`rig`]: the emulated rig in this process, for tests; [`config`], [`command`], [`report`]: what it is made of, what
 //!   it can be asked and what it answers.
-//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client; the same camera as one of [`gige`] Vision.
-//! - [`board`], [`chips`], [`memory`], [`kept_memory`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
+//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client; the same camera as one of GigE Vision ([`farnear_gige`]).
+//! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
 //! - [`camera`], [`imager`], [`half_mirror`]: when the camera exposes, its images, and a second camera.
 //! - [`driver`]: what happens whenever the emulator stops; [`pacing`], [`lockstep`]: when virtual time passes.
 //! - [`mod@count`]: instructions of the on-board routines.
@@ -23,29 +23,31 @@ pub mod access;
 mod adapter;
 pub mod board;
 pub mod camera;
-pub mod campaign;
+
 pub mod chips;
 pub mod command;
 pub mod config;
 pub mod count;
+pub mod cpu_time;
 pub mod driver;
 pub mod endpoint;
 pub mod error;
 pub mod faults;
 pub mod firmware;
-pub mod gige;
+
 pub mod half_mirror;
 pub mod imager;
-pub mod judge;
-pub mod kept_memory;
+
 mod link_rates;
 pub mod lockstep;
 pub mod memory;
+pub mod memory_file;
 pub mod pacing;
 pub mod parts;
 pub mod pictures;
 pub mod plant;
-pub mod player;
+
+pub mod observer;
 pub mod port;
 pub mod processor;
 pub mod replay;
@@ -56,7 +58,6 @@ pub mod scenario;
 pub mod serial;
 pub mod trace;
 pub mod wiring;
-pub mod witness;
 
 pub use access::RigAccess;
 pub use config::{Pace, RigConfig};

@@ -11,16 +11,9 @@ use std::{
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
+use farnear_gige::{self as gige, GigeConfig};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, PackedScene, Psf, Scene, SceneError, standard};
-use farnear_sim::{
-    Pace, Parts, RigConfig, Scenario,
-    campaign::{self, Campaign, Shard, cpu_time},
-    gige::{self, GigeConfig},
-    half_mirror::Further,
-    imager::Imager,
-    player,
-    run::ServedRig,
-};
+use farnear_sim::{Pace, Parts, RigConfig, Scenario, half_mirror::Further, imager::Imager, run::ServedRig};
 
 /// The farnear rig without hardware: the real firmware on an emulated board.
 #[derive(Parser)]
@@ -38,10 +31,6 @@ enum Job {
         farnear-sim run --scene staircase --psf gaussian:k=0.4578 --noise 8bit --seed 1\n  \
         {\"port\": \"/dev/pts/3\", \"camera\": \"127.0.0.1:40123\"}")]
     Run(Box<Run>),
-    /// Play random scenarios, one for each seed, on all cores; judge each, and make small and write those that break a
-    /// property. Fails where one does.
-    #[command(after_help = "Example:\n  farnear-sim campaign --seeds 200 --shard 2/8 --out broken/")]
-    Campaign(Seeds),
     /// Make a run again from its trace, and say where it departs from it.
     #[command(after_help = "Example:\n  farnear-sim run --trace run.vcd ...\n  farnear-sim replay run.vcd")]
     Replay {
@@ -57,34 +46,6 @@ enum Job {
         /// The counting firmware, which `cargo xtask firmware` builds.
         elf: PathBuf,
     },
-}
-
-#[derive(Args)]
-struct Seeds {
-    /// How many scenarios.
-    #[arg(long, default_value_t = 100)]
-    seeds: u64,
-    /// The first seed.
-    #[arg(long, default_value_t = 1)]
-    first: u64,
-    /// Only every so manieth of them, e.g. 2/8: for several machines.
-    #[arg(long, default_value = "1/1")]
-    shard: Shard,
-    /// Rigs that run at a time; as many as there are cores, unless told.
-    #[arg(long)]
-    jobs: Option<usize>,
-    /// The firmware; without it the one that lies beside this program.
-    #[arg(long, value_name = "ELF")]
-    firmware: Option<PathBuf>,
-    /// Where the small scenarios are written that break a property.
-    #[arg(long, default_value = "campaign", value_name = "FOLDER")]
-    out: PathBuf,
-    /// Write the scenario of the first seed to the standard output instead of playing any.
-    #[arg(long)]
-    show: bool,
-    /// Print the sum as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Args)]
@@ -108,8 +69,8 @@ struct Run {
     /// The firmware; without it the one that lies beside this program.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// TOML file with what happens to the rig, when and how long (docs/hil.md); with [[host]] steps in it this program is
-    /// its own host, carries them out, judges the run and ends.
+    /// TOML file with what happens to the rig, when and how long (docs/hil.md). `farnear-campaign play` plays one
+    /// with [[host]] steps.
     #[arg(long, visible_alias = "faults", value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// TOML file with what the parts are like where they differ from the standard rig's; `parts.toml` in the sources has all of
@@ -170,7 +131,6 @@ impl FromStr for SceneSource {
 fn main() -> ExitCode {
     let done = match Program::parse().job {
         Job::Run(run) => serve(&run),
-        Job::Campaign(seeds) => play_seeds(&seeds),
         Job::Replay { trace, firmware } => play_again(&trace, firmware.as_deref()),
         Job::Count { elf } => count(&elf),
     };
@@ -181,44 +141,6 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-fn play_seeds(seeds: &Seeds) -> Result<()> {
-    let mut stdout = std::io::stdout();
-    if seeds.show {
-        stdout.write_all(campaign::draw(seeds.first).text().as_bytes())?;
-        return Ok(());
-    }
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let campaign = Campaign {
-        seeds: seeds.first..seeds.first.saturating_add(seeds.seeds),
-        shard: seeds.shard,
-        jobs: seeds.jobs.unwrap_or(cores),
-        firmware: seeds.firmware.clone(),
-        out: seeds.out.clone(),
-    };
-    let mut played = 0;
-    let summary = campaign::run(&campaign, |seed, outcome| {
-        played += 1;
-        if let Some(broken) = outcome.broken.first() {
-            eprintln!("seed {seed} breaks {}: {}", broken.property, broken.what);
-        }
-        if played % 20 == 0 {
-            eprintln!("{played} scenarios, {:.0} s of CPU", cpu_time().as_secs_f64());
-        }
-    })?;
-    if seeds.json {
-        writeln!(stdout, "{}", summary.json())?;
-    } else {
-        stdout.write_all(summary.table(cpu_time()).as_bytes())?;
-    }
-    anyhow::ensure!(
-        summary.broken.is_empty(),
-        "{} of {} scenarios break a property; play one again: farnear-sim run --scenario FILE",
-        summary.broken.len(),
-        summary.played
-    );
-    Ok(())
 }
 
 fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
@@ -236,35 +158,6 @@ fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
     }
     let mut stdout = std::io::stdout();
     writeln!(stdout, "the same run to its end, {:.6} s of the board's time", end_ns as f64 * 1e-9)?;
-    Ok(())
-}
-
-/// Plays the steps of a scenario's own host.
-fn play(config: &RigConfig) -> Result<()> {
-    let outcome = player::play(&config.scenario, config)?;
-    let mut stdout = std::io::stdout();
-    writeln!(
-        stdout,
-        "{:.3} s of the board's time: {} requests answered, {} works done and {} failed, {} alarms, {} exposures, {} resets",
-        outcome.board_ns as f64 * 1e-9,
-        outcome.answered,
-        outcome.done,
-        outcome.failed,
-        outcome.alarms,
-        outcome.exposures,
-        outcome.resets
-    )?;
-    for broken in &outcome.broken {
-        writeln!(
-            stdout,
-            "broken at {:.6} s: {}: {}",
-            broken.at_ns as f64 * 1e-9,
-            broken.property,
-            broken.what
-        )?;
-    }
-    anyhow::ensure!(outcome.broken.is_empty(), "{} properties do not hold", outcome.broken.len());
-    writeln!(stdout, "every property holds")?;
     Ok(())
 }
 
@@ -286,15 +179,10 @@ fn config(run: &Run) -> Result<RigConfig> {
         seed: run.seed.or(scenario.seed).unwrap_or(standard::SEED),
         parts: run.parts.as_deref().map(Parts::read).transpose()?.unwrap_or(own),
         costs_by_kind: false,
-        // A host of one's own lets time pass itself.
-        pace: match (run.paced, scenario.host.is_empty()) {
-            (_, false) => Pace::Told,
-            (true, true) => Pace::Realtime,
-            (false, true) => Pace::Lockstep,
-        },
+        pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
         scenario,
         memory: run.memory.clone(),
-        witness: false,
+        observe: false,
         trace: run.trace.clone(),
     })
 }
@@ -302,7 +190,7 @@ fn config(run: &Run) -> Result<RigConfig> {
 fn serve(run: &Run) -> Result<()> {
     let config = config(run)?;
     if !config.scenario.host.is_empty() {
-        return play(&config);
+        anyhow::bail!("the scenario has its own host: play it with `farnear-campaign play FILE`");
     }
     let optics = match &run.optics {
         Some(path) => {

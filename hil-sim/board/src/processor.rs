@@ -9,8 +9,8 @@
 //!   its wait states, instruction cache and prefetch takes (`flash`), and a peripheral's register its bus. For that
 //!   the processor goes step by step, some hundred times slower, so it is for measuring.
 
+mod cached;
 mod flash;
-mod kept;
 mod kinds;
 mod outer_clock;
 
@@ -28,8 +28,8 @@ use rigless::{
 
 pub use self::outer_clock::OuterClock;
 use self::{
+    cached::Translated,
     flash::FlashInterface,
-    kept::Translated,
     kinds::{Instruction, bus_cycles},
 };
 use crate::parts::ProcessorParts;
@@ -317,7 +317,7 @@ impl Processor for Metered {
 
     #[expect(unsafe_code, reason = "passed on as it came")]
     unsafe fn map(&mut self, start: u64, length: u64, host: *mut u8, writable: bool) {
-        // SAFETY: the caller keeps what this method's trait asks for as long as this processor lives. What outlives it in `kept`
+        // SAFETY: the caller keeps what this method's trait asks for as long as this processor lives. What outlives it in `cached`
         // runs no instruction before the next run has mapped memory of its own at the same places: every board has the same.
         unsafe { self.inner.map(start, length, host, writable) };
     }

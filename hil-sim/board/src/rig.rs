@@ -26,8 +26,10 @@ use crate::{
     config::RigConfig,
     driver::Driver,
     error::SimError,
-    firmware, kept_memory,
+    firmware,
     lockstep::BOOT_NS,
+    memory_file,
+    observer::Sight,
     plant::Plant,
     processor::Costs,
     replay::Script,
@@ -35,7 +37,6 @@ use crate::{
     serial::Line,
     trace::Trace,
     wiring::{Shot, Wiring},
-    witness::Sight,
 };
 
 /// A running emulated rig; ends when dropped.
@@ -101,7 +102,7 @@ impl EmulatedRig {
         self.commands.send(Command::Heal).map_err(|_| SimError::Stopped)
     }
 
-    /// What was seen since the last call, where the rig was asked to keep it ([`RigConfig::witness`]).
+    /// What was seen since the last call, where the rig was asked to keep it ([`RigConfig::observe`]).
     ///
     /// # Errors
     /// [`SimError::Stopped`].
@@ -200,7 +201,7 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
     let mut board = RigBoard::new(&plant, line.clone(), (config.seed, fingerprint), &config.parts, costs)
         .map_err(|error| emulator(&error))?;
     if let Some(file) = &config.memory
-        && let Some(contents) = kept_memory::read(file)?
+        && let Some(contents) = memory_file::read(file)?
         && !script_given
         && let Some(memory) = board.chip.memory()
     {

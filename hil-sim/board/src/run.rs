@@ -10,6 +10,7 @@ use std::{
     time::Duration,
 };
 
+use farnear_gige::{self as gige, GigeConfig};
 use farnear_protocol::camera::Control;
 
 use crate::{
@@ -17,7 +18,6 @@ use crate::{
     config::RigConfig,
     endpoint,
     error::SimError,
-    gige::{self, GigeConfig},
     imager::{self, Imager},
     pictures::Pictures,
     port,

@@ -30,7 +30,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             Some("`farnear calibrate correction --out` saves one".into())
         }
         WorkflowError::NoOptics { .. } => Some("name a file with --optics".into()),
-        WorkflowError::Simulator(SimulatorError::Missing) => {
+        WorkflowError::Simulator(SimulatorError::Missing { .. }) => {
             Some("`cargo xtask install` installs both, `cargo xtask demo` builds them".into())
         }
         WorkflowError::Unanswered { .. } => {

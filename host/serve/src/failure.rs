@@ -71,7 +71,7 @@ impl From<WorkflowError> for Failure {
 pub fn hint(error: &WorkflowError) -> Option<&'static str> {
     match error {
         WorkflowError::About { source, .. } => hint(source),
-        WorkflowError::Simulator(SimulatorError::Missing) => Some(
+        WorkflowError::Simulator(SimulatorError::Missing { .. }) => Some(
             "Build the emulated rig with `cargo xtask demo`, or install both with `cargo xtask install`.",
         ),
         WorkflowError::Client(error)

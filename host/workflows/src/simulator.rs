@@ -66,8 +66,11 @@ pub struct Scenery {
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatorError {
     /// There is no such program.
-    #[error("{PROGRAM} is neither beside this program nor on the PATH")]
-    Missing,
+    #[error("{program} is neither next to this program nor on the PATH")]
+    Missing {
+        /// The program.
+        program: &'static str,
+    },
     /// The system refuses.
     #[error("cannot start {}: {source}", program.display())]
     Start {
@@ -247,11 +250,19 @@ fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<Str
 
 /// Beside this program, else on the PATH.
 pub(crate) fn find() -> Result<PathBuf, SimulatorError> {
-    let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
+    find_program(PROGRAM)
+}
+
+/// A program of the emulated board, next to this one or on the PATH.
+///
+/// # Errors
+/// [`SimulatorError::Missing`].
+pub(crate) fn find_program(program: &'static str) -> Result<PathBuf, SimulatorError> {
+    let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(&name)));
     let path = std::env::var_os("PATH").unwrap_or_default();
     let on_path = std::env::split_paths(&path).map(|folder| folder.join(&name));
-    beside.into_iter().chain(on_path).find(|place| place.is_file()).ok_or(SimulatorError::Missing)
+    beside.into_iter().chain(on_path).find(|place| place.is_file()).ok_or(SimulatorError::Missing { program })
 }
 
 /// The firmware that the simulator takes by itself: the one that FARNEAR_FIRMWARE names, else the one beside it.

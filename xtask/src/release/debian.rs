@@ -41,7 +41,7 @@ pub fn write(
     let root = release.work.join(format!("deb-{}", target.debian));
     lay_programs(&programs, elves, &root.join(PROGRAMS))?;
     fs::create_dir_all(root.join("usr/bin")).context("cannot create usr/bin")?;
-    for program in ["farnear", "farnear-sim"] {
+    for program in crate::host::PROGRAMS {
         symlink(format!("../lib/farnear/{program}"), root.join("usr/bin").join(program))
             .context("cannot make a link in usr/bin")?;
     }
@@ -113,13 +113,23 @@ fn with_cameras(release: &Release, kinds: &[&str]) -> Result<(PathBuf, String)> 
     step(&format!("programs with cameras: {}", kinds.join(", ")));
     let folder = target_folder().join("release-cameras");
     finish(
-        cargo(["build", "--release", "--locked", "--package", "farnear", "--package", "farnear-sim"])
-            .args(["--config", "profile.release.strip=true", "--features"])
-            .arg(kinds.iter().map(|kind| format!("farnear/{kind}")).collect::<Vec<_>>().join(","))
-            .arg("--target-dir")
-            .arg(&folder)
-            .env("SOURCE_DATE_EPOCH", &release.epoch)
-            .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
+        cargo([
+            "build",
+            "--release",
+            "--locked",
+            "--package",
+            "farnear",
+            "--package",
+            "farnear-sim",
+            "--package",
+            "farnear-campaign",
+        ])
+        .args(["--config", "profile.release.strip=true", "--features"])
+        .arg(kinds.iter().map(|kind| format!("farnear/{kind}")).collect::<Vec<_>>().join(","))
+        .arg("--target-dir")
+        .arg(&folder)
+        .env("SOURCE_DATE_EPOCH", &release.epoch)
+        .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
     )?;
     let programs = folder.join("release");
     let source = release.work.join("shlibdeps");
@@ -129,7 +139,7 @@ fn with_cameras(release: &Release, kinds: &[&str]) -> Result<(PathBuf, String)> 
     let depends = output(
         Command::new("dpkg-shlibdeps")
             .arg("-O")
-            .args(["farnear", "farnear-sim"].map(|name| programs.join(name)))
+            .args(crate::host::PROGRAMS.map(|name| programs.join(name)))
             .current_dir(&source),
     )?;
     Ok((programs, depends.trim().trim_start_matches("shlibs:Depends=").into()))

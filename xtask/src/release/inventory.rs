@@ -53,7 +53,7 @@ struct Part {
 /// A dependency under a licence that is not accepted, or without one.
 pub fn write(release: &Release) -> Result<PathBuf> {
     let mut parts = BTreeMap::new();
-    parts_of(&ROOT, &["farnear", "farnear-sim"], &mut parts)?;
+    parts_of(&ROOT, &crate::host::PROGRAMS, &mut parts)?;
     for board in &BOARDS {
         parts_of(&board.folder(), &[&board.program()], &mut parts)?;
     }

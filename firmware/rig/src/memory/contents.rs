@@ -5,8 +5,8 @@
 use farnear_protocol::message::{AlarmRecord, CorrectionForm, CorrectionInfo, Counters, RecordName, Shot};
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::alarms::{Alarms, KEPT};
-use crate::correction::Kept;
+use crate::alarms::{Alarms, RETAINED};
+use crate::correction::StoredCorrection;
 use crate::io::MEMORY_BYTES;
 use crate::memory::record::{self, BLOCK, Block, Found, VALUES};
 use crate::program::{SHOTS_MAX, Shots};
@@ -21,7 +21,7 @@ pub(crate) struct Contents<'r> {
     pub(crate) alarms: &'r Alarms,
     pub(crate) values: &'r Values,
     pub(crate) shots: &'r Shots,
-    pub(crate) correction: Option<&'r Kept>,
+    pub(crate) correction: Option<&'r StoredCorrection>,
 }
 
 impl Contents<'_> {
@@ -70,7 +70,7 @@ pub(crate) struct Restored {
     pub(crate) alarms: Alarms,
     pub(crate) values: Values,
     pub(crate) shots: Shots,
-    pub(crate) correction: Option<Kept>,
+    pub(crate) correction: Option<StoredCorrection>,
 }
 
 impl Restored {
@@ -109,7 +109,7 @@ impl Restored {
         if let Some(copy) = copy(RecordName::Alarms) {
             let block = |i| record::block(memory, RecordName::Alarms, copy, i);
             let head = block(0);
-            let records = (1..=KEPT).filter_map(|i| from_item::<AlarmRecord>(&block(i)));
+            let records = (1..=RETAINED).filter_map(|i| from_item::<AlarmRecord>(&block(i)));
             restored.alarms = Alarms::restored(u32_at(&head, 0), head[4], records);
         }
         if let Some(copy) = copy(RecordName::Settings) {
@@ -141,7 +141,7 @@ impl Restored {
 }
 
 /// A block of a correction: the first says what it is for, the others hold its coefficients.
-fn correction(kept: &Kept, index: usize) -> Block {
+fn correction(kept: &StoredCorrection, index: usize) -> Block {
     let Some(index) = index.checked_sub(1) else {
         let CorrectionInfo { form, width, height, centre_um, half_span_um } = *kept.info();
         let form = match form {
@@ -155,7 +155,7 @@ fn correction(kept: &Kept, index: usize) -> Block {
 }
 
 /// And back; `None` where none was kept.
-fn kept_correction(block: impl Fn(usize) -> Block) -> Option<Kept> {
+fn kept_correction(block: impl Fn(usize) -> Block) -> Option<StoredCorrection> {
     let head = block(0);
     let form = match u32_at(&head, 0) {
         1 => CorrectionForm::Regions,
@@ -171,7 +171,7 @@ fn kept_correction(block: impl Fn(usize) -> Block) -> Option<Kept> {
         half_span_um: u32_at(&head, 16) as i32,
     };
     let bits = core::array::from_fn(|i| u32_at(&block(1 + i / VALUES), i % VALUES * 4) as i32);
-    Kept::restored(info, bits)
+    StoredCorrection::restored(info, bits)
 }
 
 /// Eight values of a list; 0 beyond its end.

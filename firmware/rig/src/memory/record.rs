@@ -75,7 +75,7 @@ pub(crate) const fn index(record: RecordName) -> usize {
 pub(crate) const fn blocks(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 2,
-        RecordName::Alarms => 1 + crate::alarms::KEPT,
+        RecordName::Alarms => 1 + crate::alarms::RETAINED,
         RecordName::Settings => 4, // 32 values, more than there are: a new one keeps the form
         RecordName::Program => SHOTS_MAX,
         RecordName::Correction => 1 + COEFFICIENTS.div_ceil(VALUES),

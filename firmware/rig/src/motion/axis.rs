@@ -182,7 +182,7 @@ impl Stepper {
     }
 
     /// Whether it stands, and its switches say what is believed.
-    pub(crate) const fn is_at_ease(&self) -> bool {
+    pub(crate) const fn is_settled_idle(&self) -> bool {
         self.is_still() && self.home_switch.is_steady() && self.far_switch.is_steady()
     }
 

@@ -145,8 +145,8 @@ impl Stage {
     }
 
     /// Whether it is enough to look rarely.
-    pub(crate) fn is_at_ease(&self) -> bool {
-        self.coarse.is_at_ease() && self.lens.is_at_ease() && self.fine.is_at_ease()
+    pub(crate) fn is_settled_idle(&self) -> bool {
+        self.coarse.is_settled_idle() && self.lens.is_settled_idle() && self.fine.is_settled_idle()
     }
 
     /// Whether no pulse comes any more.

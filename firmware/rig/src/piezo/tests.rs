@@ -166,7 +166,7 @@ fn holding_turns_3_nm_of_gauge_noise_into_less_than_10_nm_of_motion() {
 fn look(piezo: &mut Piezo, plant: &mut Plant, seconds: u32) -> (f64, f64) {
     let (mut worst, mut looks, mut tick) = (0f64, 0, 0);
     while tick < seconds * TICK_HZ {
-        let ticks = if piezo.is_at_ease() { REST_TICKS } else { 1 };
+        let ticks = if piezo.is_settled_idle() { REST_TICKS } else { 1 };
         for _ in 1..ticks {
             plant.tick(None);
             worst = worst.max((plant.position - f64::from(piezo.target().0)).abs());
@@ -210,11 +210,11 @@ fn who_is_pushed_off_at_ease_is_led_back_by_all_ticks() {
     let mut plant = Plant::new(NOMINAL, 1);
     step(&mut piezo, &mut plant, 100_000);
     look(&mut piezo, &mut plant, 2);
-    assert!(piezo.is_at_ease());
+    assert!(piezo.is_settled_idle());
     plant.position += 400.0;
     piezo.after(REST_TICKS);
     piezo.sense(plant.gauge());
-    assert!(!piezo.is_at_ease());
+    assert!(!piezo.is_settled_idle());
     plant.tick(piezo.act());
     let (_, share) = look(&mut piezo, &mut plant, 1);
     assert!(share > 0.9 && (plant.position - 100e3).abs() < 50.0, "{share}, {} nm", plant.position);
@@ -292,7 +292,7 @@ fn a_loop_that_feeds_a_mode_is_opened_before_the_stack_is_pulled_apart() {
     }
 }
 
-/// The largest mean surprise of some ways, um.
+/// The largest mean innovation of some ways, um.
 fn surprise_um(settings: FineSettings, part: Part) -> f64 {
     let (mut piezo, mut plant, mut worst) = (Piezo::new(settings), Plant::new(part, 7), 0);
     for target in [20_000, 176_270, 20_000, 100_000] {
@@ -300,7 +300,7 @@ fn surprise_um(settings: FineSettings, part: Part) -> f64 {
         for _ in 0..500 {
             piezo.sense(plant.gauge());
             plant.tick(piezo.act());
-            worst = piezo.control.as_ref().map_or(STRANGE, |control| control.surprise).max(worst);
+            worst = piezo.control.as_ref().map_or(INNOVATION_LIMIT, |control| control.innovation).max(worst);
         }
     }
     f64::from(worst >> BITS) / 1e3
@@ -328,7 +328,7 @@ fn a_piezo_that_follows_is_far_from_one_that_does_not() {
             }
         }
     }
-    let limit = f64::from(STRANGE >> BITS) / 1e3;
+    let limit = f64::from(INNOVATION_LIMIT >> BITS) / 1e3;
     std::println!("{fast} um with the fast loop, {gentle} um with the gentle one, of {limit}");
     // A fifth for what a piezo may be off its data sheet in both, and a second mode of any share within what the gentle one bears.
     assert!(fast < 0.2 * limit && gentle < 0.8 * limit, "{fast} um, {gentle} um");

@@ -9,10 +9,10 @@ use super::{Driver, Last};
 use crate::{
     board::RigBoard,
     faults::Moment,
+    observer::Seen,
     plant::StageName,
     replay::{Entry, Script},
     trace::{Trace, vcd::Vcd},
-    witness::Seen,
 };
 
 /// A motor that steps after so long has set off anew.
@@ -61,7 +61,7 @@ impl Driver {
         for due in self.schedule.end() {
             self.access(|rig| due.happen(rig), session, stop, host);
         }
-        self.witness.note(stop.at.0, Seen::Healed);
+        self.observer.note(stop.at.0, Seen::Healed);
     }
 
     /// Lets happen what is due.
@@ -73,7 +73,7 @@ impl Driver {
             if let Some(vcd) = self.vcd() {
                 vcd.happened(now_ns, what, due.mends);
             }
-            self.witness.note(now_ns, Seen::Happened { what, mends: due.mends });
+            self.observer.note(now_ns, Seen::Happened { what, mends: due.mends });
             self.access(|rig| due.happen(rig), session, stop, host);
         }
         if std::mem::take(&mut self.lines.renamed) {
@@ -92,7 +92,7 @@ impl Driver {
     /// Looks for the moments of a run that no frame tells of.
     fn notice(&mut self, session: &mut Session<RigBoard>, now_ns: u64) {
         for burst in self.wiring.take_bursts(now_ns, false) {
-            self.witness.note(burst.last_ns, Seen::Stepped(burst));
+            self.observer.note(burst.last_ns, Seen::Stepped(burst));
         }
         let Last { step_edges, exposures, memory } = &mut self.last;
         for (edges, stage) in step_edges.iter_mut().zip([StageName::Sensor, StageName::Lens]) {

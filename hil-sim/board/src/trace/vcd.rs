@@ -95,7 +95,7 @@ fn heading(config: &RigConfig, firmware: u64) -> Result<String, SimError> {
         ..config.scenario.clone()
     };
     let pace = if config.pace == Pace::Realtime { "paced" } else { "lockstep" };
-    let kept = config.memory.as_deref().map(crate::kept_memory::read).transpose()?.flatten();
+    let kept = config.memory.as_deref().map(crate::memory_file::read).transpose()?.flatten();
     let memory = kept.map_or(String::new(), |memory| hex(memory.as_slice()));
     let [of_firmware, of_pace, of_memory, of_scenario] = MADE_OF;
     let mut text = format!(

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_sim::gige::{
+use farnear_gige::{
     features::{
         ACQUISITION, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, GAIN, HEIGHT, OFFSET_X, OFFSET_Y, PAYLOAD_SIZE,
         SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,

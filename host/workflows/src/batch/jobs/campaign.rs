@@ -18,6 +18,7 @@ use crate::{
 
 /// From one look at the wish to stop to the next.
 const LOOK: Duration = Duration::from_millis(50);
+const PROGRAM: &str = "farnear-campaign";
 /// Name of the figures beside the scenarios that broke something.
 const FIGURES: &str = "campaign.json";
 
@@ -31,7 +32,7 @@ struct Seeds {
 
 pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
     fields.path("out")?;
-    let program = simulator::find()?;
+    let program = simulator::find_program(PROGRAM)?;
     let settings = Seeds {
         first: fields.or("first", 1)?,
         seeds: fields.optional("seeds")?.ok_or(BatchError::MissingField { name: "seeds" })?,
@@ -50,7 +51,7 @@ fn played(settings: &Seeds, out: &Path, context: &Context<'_>) -> Result<Value> 
     fs::create_dir_all(out).map_err(folder)?;
     let figures = out.join(FIGURES);
     let mut command = Command::new(&settings.program);
-    command.args(["campaign", "--json", "--jobs", "1"]);
+    command.args(["run", "--json", "--jobs", "1"]);
     command.args(["--first", &settings.first.to_string(), "--seeds", &settings.seeds.to_string()]);
     if let Some(firmware) = &settings.firmware {
         command.arg("--firmware").arg(firmware);

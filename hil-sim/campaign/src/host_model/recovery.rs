@@ -10,7 +10,7 @@ use super::{
     client::{Client, Ended},
     go, load,
 };
-use crate::{SimError, scenario::host::Program};
+use farnear_sim::{SimError, scenario::host::Program};
 
 /// A board that is mended answers within so long: the watchdog takes 0.2 s, a start 0.1 s.
 const ANSWERS_US: u64 = 3_000_000;

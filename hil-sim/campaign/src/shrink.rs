@@ -1,12 +1,13 @@
 //! Makes a scenario that breaks a property as small as it still does: parts of it are left out, one after the other, as
 //! long as the same property breaks (Zeller & Hildebrandt, IEEE Trans. Software Engineering 28, 2002, in its simplest form).
 
-use crate::{
+use farnear_sim::{
     SimError,
     faults::When,
-    player::Outcome,
     scenario::{Scenario, Step},
 };
+
+use crate::host_model::Outcome;
 
 /// Runs that it may take: each costs seconds.
 const RUNS: u32 = 60;

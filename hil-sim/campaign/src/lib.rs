@@ -1,6 +1,14 @@
-//! Campaigns: scenarios drawn from seeds, played on all cores, judged, and those that break a property made small.
+//! # farnear-campaign
+//!
+//! Seeded fault campaigns on the emulated board: draws scenarios, plays them on all cores, checks the invariants of each run
+//! and shrinks the scenarios that break one.
+//!
+//! - [`host_model`]: a protocol client that carries out the steps of a scenario.
+//! - [`invariants`]: the properties that must hold in every run.
 
 mod draw;
+pub mod host_model;
+pub mod invariants;
 mod shrink;
 
 use std::{
@@ -17,12 +25,10 @@ use std::{
 };
 
 pub use self::{draw::draw, shrink::shrink};
-use crate::{
-    RigConfig, SimError,
-    judge::Broken,
-    player::{Outcome, play},
-    scenario::Scenario,
-};
+use farnear_sim::{RigConfig, Scenario, SimError};
+
+use host_model::{Outcome, play};
+use invariants::Broken;
 
 /// A part of a campaign's seeds: the `index`th of `count` parts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -136,15 +142,6 @@ impl Summary {
     }
 }
 
-/// CPU time of this process, all threads; the kernel counts it in hundredths of a second. Linux only, 0 elsewhere.
-pub fn cpu_time() -> Duration {
-    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name, which stands in brackets and may hold spaces, come the fields from 3 on; 14 and 15 are the times.
-    let fields = stat.rsplit(") ").next().unwrap_or_default().split(' ');
-    let ticks: u64 = fields.skip(11).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
-    Duration::from_millis(10 * ticks)
-}
-
 /// Plays a scenario with its own seed and parts.
 ///
 /// # Errors
@@ -155,7 +152,7 @@ pub fn play_alone(scenario: &Scenario, firmware: Option<&Path>) -> Result<Outcom
     play(scenario, &RigConfig { firmware: firmware.map(Into::into), ..config })
 }
 
-/// Carries a campaign out. `progress` hears of each scenario, in the order in which they end.
+/// Runs a campaign. `progress` hears of each scenario, in the order in which they end.
 ///
 /// # Errors
 /// [`SimError`] where a rig cannot start or a file cannot be written; scenarios that break a property are no error.
@@ -235,7 +232,7 @@ mod tests {
         assert_ne!(draw(1), draw(2));
         // All but those that only take another back, a gauge that drifts, which no board can see, and a port's other name.
         assert!(!kinds.contains("gauge-drifts") && !kinds.contains("link-renamed"));
-        assert_eq!(kinds.len(), crate::faults::KINDS.len() - 7, "{kinds:?}");
+        assert_eq!(kinds.len(), farnear_sim::faults::KINDS.len() - 7, "{kinds:?}");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use farnear_protocol::{
 };
 
 use super::{Broken, Case, motion::ended};
-use crate::witness::Seen;
+use farnear_sim::observer::Seen;
 
 type Answer = Result<Response, RequestError>;
 

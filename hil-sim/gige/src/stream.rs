@@ -1,6 +1,6 @@
 //! Frames as packets of the stream (GVSP 1.x): a leader, the payload, a trailer.
 
-use super::description::CHUNKS;
+use crate::description::CHUNKS;
 
 /// Headers of IP, UDP and GVSP, which the size of a packet counts.
 pub const HEADERS_BYTES: usize = 20 + 8 + 8;

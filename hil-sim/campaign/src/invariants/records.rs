@@ -8,7 +8,7 @@ use farnear_protocol::{
 };
 
 use super::{Broken, Case};
-use crate::witness::Seen;
+use farnear_sim::observer::Seen;
 
 /// So long after its confirmation a record is in the memory: some milliseconds a record, five of them, and a tick of each two
 /// is the host's.

@@ -6,7 +6,7 @@ use farnear_protocol::{
     message::{Failure, NO_SESSION, ProgramState, SettingKey, Status},
 };
 
-use crate::{EmulatedRig, SimError};
+use farnear_sim::{EmulatedRig, SimError};
 
 /// Board time between two looks for an answer, and for the end of work.
 const LOOK_US: u64 = 500;

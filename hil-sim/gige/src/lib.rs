@@ -1,5 +1,6 @@
-//! The emulated camera as a GigE Vision camera: the same pictures as those of the TCP [`crate::endpoint`], over the transport of cameras that
-//! can be bought, so that a client's whole way from trigger to depth can be tried without one.
+//! # farnear-gige
+//!
+//! A GigE Vision server for the emulated camera: a client can test its whole path from trigger to depth without buying a camera.
 //!
 //! Written from the protocol's public descriptions (packet layouts and register addresses as Aravis' headers give them), because Aravis' own
 //! fake camera has no line that triggers it, stamps its frames by the wall clock, and takes pictures from a C callback only. Here:
@@ -29,9 +30,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_protocol::camera::Control;
+use farnear_protocol::camera::{Control, FrameHeader};
+use thiserror::Error;
 
-use crate::{error::SimError, imager::Picture};
 use device::{Device, Sending};
 use pace::Pace;
 
@@ -73,6 +74,27 @@ pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
     }
 }
 
+/// An exposure of the emulated camera.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Picture {
+    /// Start of the exposure, virtual nanoseconds.
+    pub begin_ns: u64,
+    /// Name, size and bits.
+    pub header: FrameHeader,
+    /// Row by row, 16 bits each, the lower byte first.
+    pub pixels: Vec<u8>,
+}
+
+/// The camera cannot open its sockets or threads.
+#[derive(Debug, Error)]
+#[error("{what}: {source}")]
+pub struct OpenError {
+    /// What was being done.
+    pub what: String,
+    /// The system's error.
+    pub source: std::io::Error,
+}
+
 type Shared = Arc<Mutex<Device>>;
 
 fn lock(device: &Shared) -> MutexGuard<'_, Device> {
@@ -83,13 +105,13 @@ fn lock(device: &Shared) -> MutexGuard<'_, Device> {
 /// ns. Gives its identification, by which clients open it.
 ///
 /// # Errors
-/// [`SimError::Io`] where the address is not this computer's, or another camera has the port.
+/// [`OpenError`] where the address is not this computer's, or another camera has the port.
 pub fn open(
     config: &GigeConfig,
     pictures: Receiver<Picture>,
     ask: impl Fn(Control) + Send + Clone + 'static,
     now: impl Fn() -> u64 + Send + 'static,
-) -> Result<String, SimError> {
+) -> Result<String, OpenError> {
     let bind = |port: u16| {
         let address = SocketAddrV4::new(config.address, port);
         UdpSocket::bind(address).map_err(|source| {
@@ -101,10 +123,10 @@ pub fn open(
                 ErrorKind::AddrNotAvailable => format!("no network interface here has the address {}", config.address),
                 _ => format!("cannot open the GigE Vision camera at {address}"),
             };
-            SimError::Io { what, source }
+            OpenError { what, source }
         })
     };
-    let failed = |source| SimError::Io { what: "cannot open the GigE Vision camera".into(), source };
+    let failed = |source| OpenError { what: "cannot open the GigE Vision camera".into(), source };
     let (control, stream) = (bind(CONTROL_PORT)?, bind(0)?);
     control.set_read_timeout(Some(LOOK)).map_err(failed)?;
     let device = Device::new(config);

@@ -3,7 +3,7 @@
 use farnear_protocol::{EventKind, Request, Response};
 
 use super::{Broken, Case};
-use crate::witness::Seen;
+use farnear_sim::observer::Seen;
 
 /// Microsteps against a hard stop until a stall has ended the motion: 6 um of following error are 38, the running segment of
 /// a millisecond 26 at the speed of homing, and a rotor that snaps back by a period comes to it once more.

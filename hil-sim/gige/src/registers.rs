@@ -2,7 +2,7 @@
 
 use std::net::Ipv4Addr;
 
-use super::{
+use crate::{
     GigeConfig,
     description::{CHUNKS, FILE, MODEL, TICKS_PER_SECOND, VENDOR, description},
     features::{

@@ -7,9 +7,9 @@ use farnear_protocol::{
 };
 
 use super::{Broken, Case, positions};
-use crate::{
+use farnear_sim::{
+    observer::{Seen, Sight},
     wiring::Shot,
-    witness::{Seen, Sight},
 };
 
 /// The board stamps whole microseconds, each end rounded by itself.

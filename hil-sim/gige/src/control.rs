@@ -1,6 +1,6 @@
 //! The control channel's packets (GVCP): commands that came, and their answers.
 
-use super::{
+use crate::{
     features::{ACQUISITION, START},
     registers::{DISCOVERY_BYTES, Refusal, Registers},
 };

@@ -1,6 +1,6 @@
 //! Sees everything in a run: what crosses the line (as the board said it, before the line could spoil it), where the
-//! mechanics really are when it does, each burst of STEP pulses, each exposure, each reset, each thing that happens. A judge
-//! ([`crate::judge`]) holds one beside the other.
+//! mechanics really are when it does, each burst of STEP pulses, each exposure, each reset, each injected fault. The invariants
+//! of a campaign (`farnear-campaign`) compare them.
 
 use farnear_protocol::{
     Call, Event, EventKind, RequestError, Response,
@@ -103,14 +103,14 @@ pub struct Sight {
 
 /// See the module.
 #[derive(Default)]
-pub struct Witness {
+pub struct Observer {
     keeps: bool,
     to_board: Decoder,
     from_board: Decoder,
     sights: Vec<Sight>,
 }
 
-impl Witness {
+impl Observer {
     /// One that keeps what it sees, or only tells of moments.
     pub fn new(keeps: bool) -> Self {
         Self { keeps, ..Self::default() }

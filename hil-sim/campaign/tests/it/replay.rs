@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use farnear_sim::{RigConfig, Scenario, player, replay::replay};
+use farnear_campaign::host_model;
+use farnear_sim::{RigConfig, Scenario, replay::replay};
 
 const SCENARIO: &str = "start_um = [60.0, 80.0]\nbit_error_rate = 1e-5\n\
     [[happens]]\non = \"exposure-begins\"\nwhat = \"power-loss\"\nfor_ms = 20\n\
@@ -14,7 +15,7 @@ fn a_trace_is_made_again_to_its_end_and_a_changed_one_is_told_where() {
     let path = folder.path().join("run.vcd");
     let scenario = Scenario::parse(SCENARIO).expect("a scenario");
     let config = RigConfig { trace: Some(path.clone()), ..RigConfig::of(&scenario).expect("good parts") };
-    let outcome = player::play(&scenario, &config).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = host_model::play(&scenario, &config).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((outcome.broken.as_slice(), outcome.resets > 0), (&[][..], true));
 
     let text = fs::read_to_string(&path).expect("a trace");

@@ -8,7 +8,7 @@ use farnear_protocol::{
 };
 
 use super::{Broken, Case};
-use crate::witness::{Seen, Truth};
+use farnear_sim::observer::{Seen, Truth};
 
 /// Screw (2 um), home switch (three standard deviations, 0.9 um), a step and a count.
 const STEPPER_UM: f64 = 3.2;

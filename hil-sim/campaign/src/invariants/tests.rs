@@ -9,10 +9,10 @@ use farnear_protocol::{
 };
 
 use super::*;
-use crate::{
+use farnear_sim::{
+    observer::Truth,
     plant::{ExposureTruth, StageName},
     wiring::{Burst, Shot},
-    witness::Truth,
 };
 
 const MS: u64 = 1_000_000;
@@ -58,10 +58,7 @@ fn at(lens_um: f64) -> Truth {
 fn broken(scenario: &str, sights: &[Sight]) -> Vec<&'static str> {
     let scenario = Scenario::parse(scenario).expect("a scenario");
     let parts = Parts::default();
-    verdict(&Case { scenario: &scenario, parts: &parts, sights })
-        .iter()
-        .map(|broken| broken.property)
-        .collect()
+    check(&Case { scenario: &scenario, parts: &parts, sights }).iter().map(|broken| broken.property).collect()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use farnear_protocol::message::{Axis, SettingKey};
 
-use crate::{
+use farnear_sim::{
     faults::{Happening, KINDS, Kind, Moment, When},
     plant::{Noise, StageName},
     scenario::{

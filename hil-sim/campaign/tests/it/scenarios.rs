@@ -2,7 +2,8 @@
 
 use std::{fs, path::PathBuf, process::Command, sync::Mutex};
 
-use farnear_sim::{Scenario, campaign::play_alone};
+use farnear_campaign::play_alone;
+use farnear_sim::Scenario;
 
 fn files() -> Vec<PathBuf> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/scenarios");
@@ -43,11 +44,11 @@ fn the_program_plays_a_scenario_and_refuses_a_wrong_one_by_line_and_field() {
     let run = |text: &str| {
         let file = folder.path().join("scenario.toml");
         fs::write(&file, text).expect("writable");
-        let program = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
-            .args(["run", "--scenario"])
+        let program = Command::new(env!("CARGO_BIN_EXE_farnear-campaign"))
+            .args(["play"])
             .arg(&file)
             .output()
-            .expect("farnear-sim starts");
+            .expect("farnear-campaign starts");
         let text = String::from_utf8_lossy(&program.stdout) + String::from_utf8_lossy(&program.stderr);
         (program.status.success(), text.into_owned())
     };

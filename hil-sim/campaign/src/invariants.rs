@@ -11,7 +11,7 @@
 //! | `records` | settings, alarms and boot numbers outlast everything, or their loss is told |
 //! | `works-after` | once everything is mended the alarms can be cleared, and the rig homes, moves and exposes |
 //!
-//! A new property is a file of this module with a function over all sights, a line in [`verdict`], and a row above.
+//! A new property is a file of this module with a function over all sights, a line in [`check`], and a row above.
 
 mod exposures;
 mod motion;
@@ -19,10 +19,10 @@ mod positions;
 mod records;
 mod requests;
 
-use crate::{
+use farnear_sim::{
+    observer::{Seen, Sight},
     parts::Parts,
     scenario::Scenario,
-    witness::{Seen, Sight},
 };
 
 /// A property that did not hold.
@@ -72,7 +72,7 @@ impl Case<'_> {
 }
 
 /// Everything that did not hold, in the order of time.
-pub fn verdict(case: &Case<'_>) -> Vec<Broken> {
+pub fn check(case: &Case<'_>) -> Vec<Broken> {
     let checks = [
         motion::hard_stop,
         motion::step_after_alarm,

@@ -10,9 +10,13 @@ use farnear_protocol::{
     camera::{Control, FREE_RUNNING},
     units::Micros,
 };
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{RngCore, SeedableRng},
+};
 
-use super::{
-    GigeConfig,
+use crate::{
+    GigeConfig, Picture,
     control::{Ask, Command},
     description::CHUNKS,
     features::{
@@ -25,10 +29,9 @@ use super::{
     },
     stream::{Frame, HEADERS_BYTES, UDP_HEADERS_BYTES},
 };
-use crate::{imager::Picture, plant::Noise};
 
 /// Frames that can be asked for again.
-const KEPT: usize = 8;
+const FRAMES_RETAINED: usize = 8;
 /// Largest packet of UDP.
 const PACKET_BYTES_MAX: usize = 65_507;
 /// Where the size of packets stands in its register.
@@ -63,15 +66,15 @@ pub struct Sending {
 pub struct Device {
     registers: Registers,
     bits: u8,
-    lost: f64,
-    losses: Noise,
+    lost_per_thousand: u32,
+    losses: ChaCha8Rng,
     /// Who has it under control, and when that was heard of last.
     controller: Option<(SocketAddr, Instant)>,
     /// Rig time at which the acquisition began, in ns.
     acquires_since_ns: Option<u64>,
     frames: u64,
     triggers: u32,
-    kept: VecDeque<(u16, Vec<Vec<u8>>)>,
+    sent_frames: VecDeque<(u16, Vec<Vec<u8>>)>,
     free_run: bool,
 }
 
@@ -81,13 +84,13 @@ impl Device {
         Self {
             registers: Registers::new(config),
             bits: config.bits,
-            lost: f64::from(config.lost_per_thousand) / 1000.0,
-            losses: Noise::new(config.seed, "GigE packets"),
+            lost_per_thousand: config.lost_per_thousand,
+            losses: ChaCha8Rng::seed_from_u64(config.seed),
             controller: None,
             acquires_since_ns: None,
             frames: 0,
             triggers: 0,
-            kept: VecDeque::new(),
+            sent_frames: VecDeque::new(),
             free_run: false,
         }
     }
@@ -173,7 +176,7 @@ impl Device {
             ACQUISITION if value == START => {
                 self.acquires_since_ns = Some(now_ns);
                 self.frames = 0;
-                self.kept.clear();
+                self.sent_frames.clear();
             }
             ACQUISITION => self.acquires_since_ns = None,
             TRIGGER_SOFTWARE if self.is_triggered_by_software() => {
@@ -257,10 +260,14 @@ impl Device {
         self.frames += 1;
         let frame = self.picture(picture)?;
         let packets = frame.packets(self.packet_bytes());
-        let sent = packets.iter().filter(|_| self.losses.uniform() >= self.lost).cloned().collect();
-        self.kept.push_back((frame.short_number(), packets));
-        if self.kept.len() > KEPT {
-            self.kept.pop_front();
+        let sent = packets
+            .iter()
+            .filter(|_| self.losses.next_u32() % 1000 >= self.lost_per_thousand)
+            .cloned()
+            .collect();
+        self.sent_frames.push_back((frame.short_number(), packets));
+        if self.sent_frames.len() > FRAMES_RETAINED {
+            self.sent_frames.pop_front();
         }
         self.sending(sent)
     }
@@ -273,11 +280,11 @@ impl Device {
 
     /// The packets of a frame that can be sent again; some of them are lost again.
     fn again(&mut self, frame: u16, first: u32, last: u32) -> Option<Sending> {
-        let (_, packets) = self.kept.iter().find(|(number, _)| *number == frame)?;
+        let (_, packets) = self.sent_frames.iter().find(|(number, _)| *number == frame)?;
         let (first, last) = (first as usize, (last as usize).min(packets.len().saturating_sub(1)));
         let asked = packets.get(first..=last)?;
-        let lost = self.lost;
-        let sent = asked.iter().filter(|_| self.losses.uniform() >= lost).cloned().collect();
+        let lost = self.lost_per_thousand;
+        let sent = asked.iter().filter(|_| self.losses.next_u32() % 1000 >= lost).cloned().collect();
         self.sending(sent)
     }
 
@@ -294,7 +301,7 @@ impl Device {
         let max = (1_u32 << self.bits) - 1;
         // To the next code, half of one up.
         let developed = |code: u16| ((u32::from(code) * gain + 50) / 100 + black).min(max);
-        let pixels = picture.pixels();
+        let pixels = &picture.pixels;
         let mut bytes = Vec::with_capacity(2 * width * height);
         for row in pixels.chunks_exact(2 * sensor_width).skip(top).take(height) {
             for pixel in row[2 * left..2 * (left + width)].chunks_exact(2) {

@@ -1,6 +1,6 @@
 //! The camera's description of itself (GenICam's GenApi 1.0, XML), which clients read from it.
 
-use super::features::{CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, Value};
+use crate::features::{CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, Value};
 
 /// Name under which the camera has it.
 pub const FILE: &str = "farnear-emulated.xml";

@@ -11,15 +11,16 @@ use farnear_protocol::{
 };
 
 use self::client::{Client, Ended};
-use crate::{
+use farnear_sim::{
     EmulatedRig, RigConfig, SimError,
-    judge::{Broken, Case, verdict},
+    observer::Sight,
     scenario::{
         Scenario, Step,
         host::{Deed, Program},
     },
-    witness::Sight,
 };
+
+use crate::invariants::{Broken, Case, check};
 
 /// What a host may be silent for while something moves.
 const SILENCE: Micros = Micros(2_000_000);
@@ -50,7 +51,7 @@ pub struct Outcome {
 /// # Errors
 /// [`SimError`] where the rig cannot start or does not run on.
 pub fn play(scenario: &Scenario, config: &RigConfig) -> Result<Outcome, SimError> {
-    let config = RigConfig { witness: true, ..config.clone() };
+    let config = RigConfig { observe: true, ..config.clone() };
     let mut client = Client::new(EmulatedRig::new(&config)?);
     let mut sights = Vec::new();
     client.join()?;
@@ -64,7 +65,7 @@ pub fn play(scenario: &Scenario, config: &RigConfig) -> Result<Outcome, SimError
     let works = works?;
     sights.sort_by_key(|sight: &Sight| sight.at_ns);
     let case = Case { scenario, parts: &config.parts, sights: &sights };
-    let mut broken = verdict(&case);
+    let mut broken = check(&case);
     broken.extend(works.map(|what| Broken { property: "works-after", at_ns: report.now_ns, what }));
     let counts = client.counts;
     client.rig.stop()?;

@@ -1,0 +1,4 @@
+//! Scenarios and traces on the emulated board, played by the host model.
+
+mod replay;
+mod scenarios;
