@@ -195,7 +195,12 @@ mod tests {
     /// Codes of a picture of 64 x 48 px.
     fn codes(imager: &mut Imager, shot: &Shot) -> Vec<i32> {
         let picture = imager.picture(shot).expect("a picture");
-        picture.for_gige().pixels.chunks(2).map(|code| i32::from(u16::from_le_bytes([code[0], code[1]]))).collect()
+        picture
+            .for_gige()
+            .pixels
+            .chunks(2)
+            .map(|code| i32::from(u16::from_le_bytes([code[0], code[1]])))
+            .collect()
     }
 
     fn imager(parts: &str) -> (Imager, f64) {
