@@ -17,7 +17,9 @@ mod terminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use farnear_workflows::{WorkflowError, correct::CorrectRequest, depth::DepthRequest};
+use farnear_workflows::{
+    WorkflowError, correct::CorrectRequest, depth::DepthRequest, operators::OperatorRequest, target::TargetRequest,
+};
 
 use run::Run;
 
@@ -39,7 +41,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Optics(commands::optics::Arguments),
-    Operators(commands::operators::Arguments),
+    Operators(Run<OperatorRequest>),
     Depth(Run<DepthRequest>),
     FocusStack(commands::focus_stack::Arguments),
     Calibrate(commands::calibrate::Arguments),
@@ -54,7 +56,7 @@ enum Command {
     Activity(commands::activity::Arguments),
     Batch(commands::batch::Arguments),
     Measure(commands::measure::Arguments),
-    Target(commands::target::Arguments),
+    Target(Run<TargetRequest>),
     Report(commands::report::Arguments),
     Serve(commands::serve::Arguments),
     Doctor(commands::doctor::Arguments),
@@ -65,7 +67,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Optics(arguments) => commands::optics::run(arguments),
-        Command::Operators(arguments) => commands::operators::run(arguments),
+        Command::Operators(task) => task.run(),
         Command::Depth(task) => task.run(),
         Command::FocusStack(arguments) => commands::focus_stack::run(arguments),
         Command::Calibrate(arguments) => commands::calibrate::run(arguments),
@@ -80,7 +82,7 @@ fn main() -> ExitCode {
         Command::Activity(arguments) => commands::activity::run(arguments),
         Command::Batch(arguments) => commands::batch::run(arguments),
         Command::Measure(arguments) => commands::measure::run(arguments),
-        Command::Target(arguments) => commands::target::run(arguments),
+        Command::Target(task) => task.run(),
         Command::Report(arguments) => commands::report::run(arguments),
         Command::Serve(arguments) => commands::serve::run(arguments),
         Command::Doctor(arguments) => commands::doctor::run(arguments),

@@ -7,13 +7,16 @@ use std::{
 };
 
 use farnear_depth::{
-    operators::{self, Design, Family, Operators, Request},
+    operators::{self, Design, Family, Operators},
     optics::Optics,
 };
 use farnear_files::staging;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
+    request::{PathKind, Request},
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
@@ -26,26 +29,76 @@ use crate::{
 /// What a file of operators holds, as [`WorkflowError::File`] names it.
 pub const KIND: &str = "saved operators";
 
-/// What is designed, and where it goes.
-#[derive(Clone, PartialEq, Debug)]
-pub struct OperatorSettings {
+/// Design rational operators and report how well they fit.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear operators --psf gaussian:k=0.4578 --optics optics.toml --out operators.toml --json"
+    )
+)]
+#[serde(default)]
+pub struct OperatorRequest {
     /// The optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// Point spread function; without it that of the optics.
+    /// Point spread function: pillbox, gaussian:k=K, generalised:p=P,k=K, ring:inner=I, or an image of the PSF or of the aperture
+    /// (FILE.png, .tiff or .npy; FILE,radius=PX if the blur radius is not half its shorter side) [default: that of the optics file].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PSF|FILE"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
     pub psf: Option<PsfSource>,
-    /// Family; without it the one that belongs to the point spread function.
+    /// Family: watanabe, raj, ro, gro or ggro [default: the one that fits the point spread function].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
     pub family: Option<Family>,
-    /// Design procedure.
+    /// Design procedure: linear or thesis.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
     pub design: Design,
-    /// Width and height of the kernels in pixels.
-    pub kernel_size: usize,
-    /// Where the operators are saved, as TOML.
+    /// Width and height of the kernels in pixels: 5, 7, 9, 11 or 13.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().kernel_size_px))]
+    pub kernel_size_px: usize,
+    /// File for the operators, TOML.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: Option<PathBuf>,
-    /// Where they are drawn: `.svg` or `.png`.
+    /// File for a plot of the fit and of the kernels' responses: .svg or .png.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub plot: Option<PathBuf>,
 }
 
-/// What there is to say of operators.
+impl Default for OperatorRequest {
+    fn default() -> Self {
+        Self {
+            optics: PathBuf::new(),
+            psf: None,
+            family: None,
+            design: Design::default(),
+            kernel_size_px: 7,
+            out: None,
+            plot: None,
+        }
+    }
+}
+
+impl Request for OperatorRequest {
+    const NAME: &'static str = "operators";
+    const REQUIRED: &'static [&'static str] = &["optics"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[
+        ("optics", PathKind::Input),
+        ("psf", PathKind::InputOrName),
+        ("out", PathKind::OutputFile),
+        ("plot", PathKind::OutputFile),
+    ];
+    type Figures = OperatorFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<OperatorFigures> {
+        design(self, context)
+    }
+}
+
+/// Quality of a design.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OperatorFigures {
     /// Family, design, point spread function and blur.
@@ -60,19 +113,19 @@ pub struct OperatorFigures {
 ///
 /// # Errors
 /// [`WorkflowError::Parameter`] for a drawing of another kind; optics; [`WorkflowError::Design`]; files.
-pub fn design(settings: &OperatorSettings, context: &Context<'_>) -> Result<OperatorFigures> {
+pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<OperatorFigures> {
     let plot = match &settings.plot {
         Some(file) => Some((file, Format::of(file)?)),
         None => None,
     };
     let optics = optics::read(&settings.optics)?;
     let psf = settings.psf.as_ref().map_or(Ok(optics.psf()), |source| source.read(context))?;
-    let request = Request {
+    let request = operators::Request {
         family: settings.family.unwrap_or(Family::of(psf)),
         design: settings.design,
         psf,
         max_blur_px: optics.max_blur_px(),
-        kernel_size: settings.kernel_size,
+        kernel_size: settings.kernel_size_px,
     };
     let start = Instant::now();
     // Not from the cache: how long a design takes is one of the figures.
@@ -103,13 +156,13 @@ pub fn design(settings: &OperatorSettings, context: &Context<'_>) -> Result<Oper
 /// # Errors
 /// What is wrong with the name or the file, or why no operators can be designed.
 pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
-    let default = Request::for_optics(optics);
+    let default = operators::Request::for_optics(optics);
     let Some(asked) = asked else { return Ok(cache::operators(&default)?) };
     match named(asked) {
         // A file is a file, whatever it is called.
         Some(name) if !asked.exists() => {
             let (family, design) = name.about(|| format!("operators {}", asked.display()))?;
-            let request = Request { family, design, ..default };
+            let request = operators::Request { family, design, ..default };
             cache::operators(&request).about(|| format!("operators {family}:{design}"))
         }
         _ => read(asked),

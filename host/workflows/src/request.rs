@@ -3,6 +3,8 @@
 //! A request's fields are the command's options, the page's JSON, a batch job's fields and Python's keywords. Its doc comments are
 //! the help text and its [`Default`] holds the defaults. [`parse`] reads fields from any of these sources.
 
+pub mod reference;
+
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -163,8 +165,14 @@ pub fn schema_without_paths<R: Request>() -> Value {
 }
 
 /// All tasks that are described by a request.
-pub const TASKS: &[Task] =
-    &[Task::of::<crate::depth::DepthRequest>(), Task::of::<crate::correct::CorrectRequest>()];
+pub const TASKS: &[Task] = &[
+    Task::of::<crate::depth::DepthRequest>(),
+    Task::of::<crate::correct::CorrectRequest>(),
+    Task::of::<crate::operators::OperatorRequest>(),
+    Task::of::<crate::target::TargetRequest>(),
+    Task::of::<crate::calibrate::psf::CalibratePsfRequest>(),
+    Task::of::<crate::calibrate::correction::CalibrateCorrectionRequest>(),
+];
 
 /// A task by its name, for callers that know it at run time only.
 pub struct Task {

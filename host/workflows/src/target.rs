@@ -7,9 +7,12 @@ use std::{fmt, path::PathBuf, str::FromStr};
 use farnear_files::staging;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
+    request::{PathKind, Request},
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
@@ -83,21 +86,65 @@ impl fmt::Display for Paper {
     }
 }
 
-/// What is to be printed.
-#[derive(Clone, PartialEq, Debug)]
-pub struct TargetSettings {
+/// Write a textured target as a PDF page, true to scale, as fine as the optics can use.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear target --optics optics.toml --paper a3 --out target.pdf
+
+Print it in black, at its actual size (100 %), and glue it to something flat: the line at its foot is 100 mm long then."
+    )
+)]
+#[serde(default)]
+pub struct TargetRequest {
     /// The optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// How far from the lens the target will stand, mm; without it the distance of the far focus.
+    /// Distance of the target from the lens in mm [default: the far focus].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub distance_mm: Option<f64>,
-    /// The sheet.
+    /// The sheet: a4, a3, a2, a1, a0, letter, or WIDTHxHEIGHT in mm.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().paper))]
+    #[serde_as(as = "DisplayFromStr")]
     pub paper: Paper,
-    /// The printer's dots per inch, 150 to 4800.
+    /// The printer's dots per inch.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().dpi))]
     pub dpi: u32,
-    /// Decides the texture.
+    /// Seed of the texture.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().seed))]
     pub seed: u64,
     /// The PDF file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: PathBuf,
+}
+
+impl Default for TargetRequest {
+    fn default() -> Self {
+        let [width_mm, height_mm] = PAPERS[0].1;
+        Self {
+            optics: PathBuf::new(),
+            distance_mm: None,
+            paper: Paper { width_mm, height_mm },
+            dpi: 600,
+            seed: 1,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for TargetRequest {
+    const NAME: &'static str = "target";
+    const REQUIRED: &'static [&'static str] = &["optics", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("optics", PathKind::Input), ("out", PathKind::OutputFile)];
+    type Figures = TargetFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<TargetFigures> {
+        print(self, context)
+    }
 }
 
 /// What there is to say of a target.
@@ -148,7 +195,7 @@ impl Texture {
 /// # Errors
 /// Optics that cannot be read; [`WorkflowError::Parameter`] for a distance within the focal length, or dots so coarse that no texture is
 /// left; a file that cannot be written.
-pub fn print(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {
+pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFigures> {
     within("dpi", settings.dpi, &(150..=4800), "")?;
     let optics = GivenOptics::read(&settings.optics)?.optics;
     let focal_mm = optics.focal_length_mm();

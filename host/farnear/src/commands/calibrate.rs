@@ -1,11 +1,12 @@
 //! `farnear calibrate`: learns what the optics do from captured images and depth maps.
 
 mod camera;
-mod correction;
-mod psf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
+use farnear_workflows::calibrate::{correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest};
+
+use crate::run::Run;
 
 /// Learn the point spread function, a correction of the lens's distortion, or the camera's own frames.
 #[derive(Args)]
@@ -19,16 +20,16 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    Psf(psf::Arguments),
-    Correction(correction::Arguments),
+    Psf(Run<CalibratePsfRequest>),
+    Correction(Run<CalibrateCorrectionRequest>),
     Camera(camera::Arguments),
 }
 
 /// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.what {
-        What::Psf(arguments) => psf::run(arguments),
-        What::Correction(arguments) => correction::run(arguments),
+        What::Psf(task) => task.run(),
+        What::Correction(task) => task.run(),
         What::Camera(arguments) => camera::run(arguments),
     }
 }

@@ -84,7 +84,7 @@ fn the_blur_constant_of_a_rendered_pair_is_found() {
     assert!(written.contains("gaussian"), "{written}");
     bench.figures(&["optics", "--optics", "found.toml"]);
     bench.fails(2, &[&["calibrate", "psf"], &pair[..], &["--model", "pillbox"]].concat(), "gaussian");
-    let inside = [&find[..], &["--depth", "20"]].concat();
+    let inside = [&find[..], &["--depth-mm", "20"]].concat();
     bench.fails(2, &inside, "no image");
 }
 

@@ -24,7 +24,7 @@ fn a_target_is_a_page_with_cells_of_whole_dots_true_to_scale() {
     }
     figures(farnear(&asked).arg(&again));
     assert_eq!(fs::read(&again).unwrap(), page, "the same seed is the same page");
-    let coarse = figures(farnear(&asked).args([&a3, "--paper", "A3", "--distance", "480", "--dpi", "300"]));
+    let coarse = figures(farnear(&asked).args([&a3, "--paper", "A3", "--distance-mm", "480", "--dpi", "300"]));
     assert_eq!(number(&coarse, "cell_dots"), 2.0);
     assert!(number(&coarse, "columns") > columns);
     assert_eq!(folder.listing(), ["a3.pdf", "a4.pdf", "again.pdf"]);
@@ -36,9 +36,9 @@ fn what_cannot_be_printed_is_refused_and_leaves_nothing() {
     let out = folder.text("target.pdf");
     let asked = ["target", "--optics", rig_optics(), "--out", &out];
     for (more, phrases) in [
-        (["--distance", "50"], ["distance 50", "more than the focal length, 50 mm"]),
-        (["--distance", "inf"], ["distance inf", "focal length"]),
-        (["--distance", "9e9"], ["paper 210x297 mm", "room for 48 cells"]),
+        (["--distance-mm", "50"], ["distance 50", "more than the focal length, 50 mm"]),
+        (["--distance-mm", "inf"], ["distance inf", "focal length"]),
+        (["--distance-mm", "9e9"], ["paper 210x297 mm", "room for 48 cells"]),
         (["--dpi", "72"], ["dpi 72", "150 to 4800"]),
         (["--paper", "b5"], ["unknown paper `b5`", "WIDTHxHEIGHT"]),
         (["--paper", "90x90"], ["paper 90x90", "130 to 2000 mm"]),

@@ -1,6 +1,9 @@
 //! What a rig is taught: its point spread function, and a correction from flat targets.
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path as FsPath, PathBuf},
+};
 
 use axum::{
     Json,
@@ -9,14 +12,13 @@ use axum::{
 };
 use farnear_depth::{
     calibrate::Model,
-    corrections::{CdcSettings, Method},
-    prepare::Align,
+    corrections::Method,
 };
 use farnear_workflows::{
     Context, WorkflowError,
     calibrate::{
-        correction::{self, CorrectionSettings},
-        psf::{self, PsfSettings, TargetPair},
+        correction::{self, CalibrateCorrectionRequest},
+        psf::{self, CalibratePsfRequest},
     },
     rig::{
         RigAddress,
@@ -155,27 +157,24 @@ async fn find_psf(
     seated(&app, &headers)?;
     let bad = |error: String| Failure::new(StatusCode::BAD_REQUEST, error);
     let model: Model = wish.model.parse().map_err(|error| bad(format!("model {:?}: {error}", wish.model)))?;
-    let mut pairs = Vec::new();
+    let mut request =
+        CalibratePsfRequest { optics: app.optics_file(), model, ..CalibratePsfRequest::default() };
+    let mut add = |folder: &FsPath, depth_mm: f64| {
+        request.images.extend(["far.png", "near.png"].map(|name| folder.join(name)));
+        request.depth_mm.push(depth_mm);
+    };
     for Target { capture, depth_mm } in wish.targets {
-        let folder = sessions::folder_of(&app.session, &capture)?;
-        pairs.push(TargetPair { far: folder.join("far.png"), near: folder.join("near.png"), depth_mm });
+        add(&sessions::folder_of(&app.session, &capture)?, depth_mm.unwrap_or(0.0));
     }
     if wish.series {
         for (map, mm) in patterns(&app)? {
-            let folder = map.parent().map(PathBuf::from).unwrap_or_default();
-            pairs.push(TargetPair {
-                far: folder.join("far.png"),
-                near: folder.join("near.png"),
-                depth_mm: Some(mm),
-            });
+            add(map.parent().unwrap_or(FsPath::new("")), mm);
         }
     }
-    if pairs.is_empty() {
+    if request.images.is_empty() {
         return Err(bad("no pair was chosen: capture a flat, textured target first".into()));
     }
-    let align = Align::default();
-    let settings = PsfSettings { pairs, optics: app.optics_file(), model, align, out: None };
-    let work = move |_: &App, context: &Context<'_>| figures(psf::fit(&settings, context)?);
+    let work = move |_: &App, context: &Context<'_>| figures(psf::fit(&request, context)?);
     compute(&app, Task { kind: "psf", title: "Find the point spread function".into(), work: Box::new(work) })
 }
 
@@ -240,11 +239,11 @@ async fn learn(
 ) -> Result<Json<Begun>, Failure> {
     seated(&app, &headers)?;
     let wrong = |error| Failure::new(StatusCode::BAD_REQUEST, format!("method {method:?}: {error}"));
-    let settings = CorrectionSettings {
+    let settings = CalibrateCorrectionRequest {
         patterns: app.session.join(SERIES).join(LIST),
         method: method.parse().map_err(wrong)?,
-        cdc: CdcSettings::default(),
         out: app.session.join(CORRECTION),
+        ..CalibrateCorrectionRequest::default()
     };
     let work = move |_: &App, context: &Context<'_>| figures(correction::learn(&settings, context)?);
     compute(&app, Task { kind: "correction", title: "Learn the correction".into(), work: Box::new(work) })

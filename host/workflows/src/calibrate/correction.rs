@@ -8,25 +8,76 @@ use std::{
 use farnear_depth::corrections::{CdcSettings, Correction, Method, Pattern, fit};
 use farnear_files::{map, staging};
 use ndarray::Array2;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
+    request::{PathKind, Request},
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
 };
 
-/// What is learned, from what, and where it goes.
-#[derive(Clone, PartialEq, Debug)]
-pub struct CorrectionSettings {
-    /// The list of depth maps; see [`read`].
+/// Learn a correction of the elliptical distortion from depth maps of flat targets at known depths.
+///
+/// PATTERNS.toml lists the maps, paths relative to itself. Any method needs 20 to 30 targets through the working range.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "\
+PATTERNS.toml has an entry for each map:
+  [[pattern]]
+  depth = \"target-01/depth.npy\"
+  true_mm = 933.0
+
+Example: farnear calibrate correction patterns.toml --method clsf-full --out correction.toml")
+)]
+#[serde(default)]
+pub struct CalibrateCorrectionRequest {
+    /// The list of depth maps.
     pub patterns: PathBuf,
-    /// Which kind of correction.
+    /// Method: clsf (3x3 regions), clsf-blend (3x3 regions without steps), clsf-full (one polynomial), cdc (stored patterns), two-step
+    /// (two polynomials in turn) or spline (smooth surface over field and depth).
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "DisplayFromStr")]
     pub method: Method,
-    /// Window and smoothing of cdc.
-    pub cdc: CdcSettings,
-    /// Where the correction is saved.
+    /// cdc: N of its window of 2 N + 1 pixels.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().window_px))]
+    pub window_px: usize,
+    /// cdc: standard deviation of the Gaussian that smooths the patterns; 0 = as measured.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().smoothing_px))]
+    pub smoothing_px: f64,
+    /// File for the correction.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: PathBuf,
+}
+
+impl Default for CalibrateCorrectionRequest {
+    fn default() -> Self {
+        let CdcSettings { window, smoothing_px } = CdcSettings::default();
+        Self {
+            patterns: PathBuf::new(),
+            method: Method::Clsf,
+            window_px: window,
+            smoothing_px,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for CalibrateCorrectionRequest {
+    const NAME: &'static str = "calibrate correction";
+    const REQUIRED: &'static [&'static str] = &["patterns", "method", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("patterns", PathKind::Input), ("out", PathKind::OutputFile)];
+    type Figures = CorrectionFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<CorrectionFigures> {
+        learn(self, context)
+    }
 }
 
 /// What there is to say of a correction that was learned.
@@ -50,12 +101,13 @@ pub struct CorrectionFigures {
 ///
 /// # Errors
 /// The list, its maps, [`WorkflowError::Correction`].
-pub fn learn(settings: &CorrectionSettings, context: &Context<'_>) -> Result<CorrectionFigures> {
+pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Result<CorrectionFigures> {
     let maps = read(&settings.patterns)?;
     context.cancel.check("reading the maps")?;
     let patterns: Vec<Pattern<'_>> =
         maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
-    let correction = fit(settings.method, &patterns, &settings.cdc)?;
+    let cdc = CdcSettings { window: settings.window_px, smoothing_px: settings.smoothing_px };
+    let correction = fit(settings.method, &patterns, &cdc)?;
     let (far_mm, near_mm) = correction.range_mm();
     let figures = CorrectionFigures {
         method: correction.method().to_string(),

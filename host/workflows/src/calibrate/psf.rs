@@ -10,9 +10,12 @@ use farnear_depth::{
     psf::Psf,
 };
 use farnear_files::{image_file::read_grey, staging};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
+    request::{PathKind, Request},
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
@@ -22,30 +25,88 @@ use crate::{
 /// Decimals of p and of k: no pair tells them better.
 const DECIMALS: [i32; 2] = [4, 5];
 
-/// A pair of a flat target.
-#[derive(Clone, PartialEq, Debug)]
-pub struct TargetPair {
-    /// The far-focused image.
-    pub far: PathBuf,
-    /// The near-focused image.
-    pub near: PathBuf,
-    /// Where the target stands; without it it is taken to stand at the focus of the sharper image.
-    pub depth_mm: Option<f64>,
+/// Find the point spread function from one pair or several of a flat, textured target.
+///
+/// Without --depth-mm the target is assumed at the focus of the sharper image.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian --out calibrated.toml
+         farnear calibrate psf a/far.png a/near.png b/far.png b/near.png --depth-mm 900 --depth-mm 920 --optics optics.toml --model generalised"
+    )
+)]
+#[serde(default)]
+pub struct CalibratePsfRequest {
+    /// The images of each pair: the far-focused one, the near-focused one; then those of the next pair.
+    #[cfg_attr(feature = "clap", arg(num_args = 2.., required = true, value_names = ["FAR", "NEAR"]))]
+    pub images: Vec<PathBuf>,
+    /// The optics file; its point spread function is ignored.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub optics: PathBuf,
+    /// Model: gaussian (finds k), generalised (p and k) or free (any round profile, as its OTF over frequency times blur radius).
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub model: Model,
+    /// Registration of the near image to the far one: auto (a similarity if a significant one is found), none, optics, shift,
+    /// similarity or affine.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "METHOD", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub align: Align,
+    /// Depth of the target in mm, once for each pair; 0 = the focus of the sharper image [default: 0 for all].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
+    pub depth_mm: Vec<f64>,
+    /// File for the optics with the point spread function.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub out: Option<PathBuf>,
 }
 
-/// What is looked at, and for what.
-#[derive(Clone, PartialEq, Debug)]
-pub struct PsfSettings {
-    /// One pair or several, which are fitted together.
-    pub pairs: Vec<TargetPair>,
-    /// The optics file; its own point spread function does not matter.
-    pub optics: PathBuf,
-    /// What to find.
-    pub model: Model,
-    /// How the near image of each pair is laid on the far one, after the lens' distortion was taken out of both.
-    pub align: Align,
-    /// Where the optics with what was found are written to.
-    pub out: Option<PathBuf>,
+impl Default for CalibratePsfRequest {
+    fn default() -> Self {
+        Self {
+            images: Vec::new(),
+            optics: PathBuf::new(),
+            model: Model::Gaussian,
+            align: Align::default(),
+            depth_mm: Vec::new(),
+            out: None,
+        }
+    }
+}
+
+impl Request for CalibratePsfRequest {
+    const NAME: &'static str = "calibrate psf";
+    const REQUIRED: &'static [&'static str] = &["images", "optics", "model"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("images", PathKind::Input), ("optics", PathKind::Input), ("out", PathKind::OutputFile)];
+    type Figures = PsfFigures;
+
+    fn check(&self) -> Result<()> {
+        let (images, depths) = (self.images.len(), self.depth_mm.len());
+        if images == 0 || images % 2 != 0 {
+            return Err(WorkflowError::parameter("images", images, "a far and a near image of each pair"));
+        }
+        if depths != 0 && depths != images / 2 {
+            let expected = format!("{} pairs: give a depth for each, or for none", images / 2);
+            return Err(WorkflowError::parameter("depth-mm", format!("given {depths} times"), expected));
+        }
+        Ok(())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<PsfFigures> {
+        fit(self, context)
+    }
+}
+
+impl CalibratePsfRequest {
+    /// Far and near image of each pair with the target's depth.
+    fn pairs(&self) -> impl Iterator<Item = ([&PathBuf; 2], Option<f64>)> {
+        let given = self.depth_mm.iter().map(|mm| Some(*mm).filter(|mm| *mm != 0.0));
+        let depths = given.chain(std::iter::repeat(None));
+        self.images.chunks_exact(2).map(|pair| [&pair[0], &pair[1]]).zip(depths)
+    }
 }
 
 /// What was found.
@@ -87,14 +148,14 @@ pub struct PsfFigures {
 ///
 /// # Errors
 /// Optics, images, [`WorkflowError::Calibration`]; [`WorkflowError::Parameter`] for a target inside the focal length.
-pub fn fit(settings: &PsfSettings, context: &Context<'_>) -> Result<PsfFigures> {
+pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfFigures> {
     let optics = optics::read(&settings.optics)?;
     let (mut images, mut moved_px) = (Vec::new(), Vec::new());
-    for pair in &settings.pairs {
-        let alpha = pair.depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
-        let read = [read_grey(&pair.far)?.pixels, read_grey(&pair.near)?.pixels];
+    for ([far, near], depth_mm) in settings.pairs() {
+        let alpha = depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
+        let read = [read_grey(far)?.pixels, read_grey(near)?.pixels];
         let (ready, report) = made_ready(read, &optics, settings.align)
-            .about(|| format!("{} and {}", pair.far.display(), pair.near.display()))?;
+            .about(|| format!("{} and {}", far.display(), near.display()))?;
         images.push((ready, alpha));
         moved_px.push(report.aligned.map_or(0.0, |aligned| rounded(aligned.displacement_px, 3)));
         context.cancel.check("reading the pairs")?;
