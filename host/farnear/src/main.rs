@@ -18,7 +18,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use farnear_workflows::{
-    WorkflowError, correct::CorrectRequest, depth::DepthRequest, operators::OperatorRequest, target::TargetRequest,
+    WorkflowError, correct::CorrectRequest, depth::DepthRequest, operators::OperatorRequest,
+    target::TargetRequest,
 };
 
 use run::Run;

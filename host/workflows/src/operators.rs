@@ -16,7 +16,6 @@ use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
-    request::{PathKind, Request},
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
@@ -24,6 +23,7 @@ use crate::{
     operator_plot::{self, Format},
     optics,
     psf::PsfSource,
+    request::{PathKind, Request},
 };
 
 /// What a file of operators holds, as [`WorkflowError::File`] names it.

@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
-    request::{PathKind, Request},
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
     optics::GivenOptics,
     parameters::within,
+    request::{PathKind, Request},
 };
 
 /// Millimetres of an inch.
@@ -92,11 +92,9 @@ impl fmt::Display for Paper {
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(
     feature = "clap",
-    command(
-        after_help = "Example: farnear target --optics optics.toml --paper a3 --out target.pdf
+    command(after_help = "Example: farnear target --optics optics.toml --paper a3 --out target.pdf
 
-Print it in black, at its actual size (100 %), and glue it to something flat: the line at its foot is 100 mm long then."
-    )
+Print it in black, at its actual size (100 %), and glue it to something flat: the line at its foot is 100 mm long then.")
 )]
 #[serde(default)]
 pub struct TargetRequest {

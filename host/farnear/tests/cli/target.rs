@@ -24,7 +24,8 @@ fn a_target_is_a_page_with_cells_of_whole_dots_true_to_scale() {
     }
     figures(farnear(&asked).arg(&again));
     assert_eq!(fs::read(&again).unwrap(), page, "the same seed is the same page");
-    let coarse = figures(farnear(&asked).args([&a3, "--paper", "A3", "--distance-mm", "480", "--dpi", "300"]));
+    let coarse =
+        figures(farnear(&asked).args([&a3, "--paper", "A3", "--distance-mm", "480", "--dpi", "300"]));
     assert_eq!(number(&coarse, "cell_dots"), 2.0);
     assert!(number(&coarse, "columns") > columns);
     assert_eq!(folder.listing(), ["a3.pdf", "a4.pdf", "again.pdf"]);

@@ -10,10 +10,7 @@ use axum::{
     extract::State,
     http::{HeaderMap, StatusCode},
 };
-use farnear_depth::{
-    calibrate::Model,
-    corrections::Method,
-};
+use farnear_depth::{calibrate::Model, corrections::Method};
 use farnear_workflows::{
     Context, WorkflowError,
     calibrate::{

@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
-    request::{PathKind, Request},
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    request::{PathKind, Request},
 };
 
 /// Learn a correction of the elliptical distortion from depth maps of flat targets at known depths.

@@ -15,11 +15,11 @@ use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
-    request::{PathKind, Request},
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
     optics,
+    request::{PathKind, Request},
 };
 
 /// Decimals of p and of k: no pair tells them better.
