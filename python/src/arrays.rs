@@ -1,75 +1,189 @@
-//! Images and maps from Python: `float32` is looked at where it lies, integers are scaled to 0 to 1.
+//! Images, maps and masks from Python: native `float32` is not copied, everything else is converted.
 
 use ndarray::{Array2, ArrayView2};
-use numpy::{PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::{exceptions::PyTypeError, prelude::*};
+use numpy::{PyArrayDescrMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::{
+    exceptions::PyTypeError,
+    prelude::*,
+    types::{PyBool, PyBytes, PyList, PyString, PyTuple},
+};
+
+use crate::optics::Optics;
+
+/// An argument by its name, which the message of a `TypeError` states: notes of an exception exist from Python 3.11 on only.
+pub fn named<'py, T>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    object.extract::<T>().map_err(|error| {
+        if error.is_instance_of::<PyTypeError>(object.py()) {
+            return PyTypeError::new_err(format!("{name}: {}", error.value(object.py())));
+        }
+        error
+    })
+}
+
+/// Optics by the name of the argument.
+pub fn optics_named<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyRef<'py, Optics>> {
+    object.extract::<PyRef<'py, Optics>>().map_err(|_| {
+        PyTypeError::new_err(format!("{name}: expected farnear.Optics, not {}", type_name(object)))
+    })
+}
+
+/// Values of (height, width).
+enum Values<'py> {
+    Lent(PyReadonlyArray2<'py, f32>),
+    Own(Array2<f32>),
+}
+
+impl Values<'_> {
+    fn view(&self) -> ArrayView2<'_, f32> {
+        match self {
+            Self::Lent(array) => array.as_array(),
+            Self::Own(array) => array.view(),
+        }
+    }
+}
 
 /// A grey image.
-pub enum Image<'py> {
-    /// `float32`, without a copy: any scale.
-    Float(PyReadonlyArray2<'py, f32>),
-    /// Integers over their largest value, 0 to 1: full scale is where the camera clips.
-    Scaled(Array2<f32>),
+pub struct Image<'py> {
+    values: Values<'py>,
+    scaled: bool,
+}
+
+impl Image<'_> {
+    /// Its values: those of `uint8` and `uint16` from 0 to 1, others as they are; NaN where a masked array is masked.
+    pub fn view(&self) -> ArrayView2<'_, f32> {
+        self.values.view()
+    }
+
+    /// Whether its values are camera codes over the full range of their type, so that the largest one is a saturated pixel.
+    pub fn is_scaled(&self) -> bool {
+        self.scaled
+    }
 }
 
 impl<'py> FromPyObject<'_, 'py> for Image<'py> {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(float) = object.extract::<PyReadonlyArray2<'py, f32>>() {
-            return Ok(Self::Float(float));
-        }
-        if let Ok(bytes) = object.extract::<PyReadonlyArray2<'py, u8>>() {
-            return Ok(Self::Scaled(bytes.as_array().mapv(|code| f32::from(code) / f32::from(u8::MAX))));
-        }
-        if let Ok(words) = object.extract::<PyReadonlyArray2<'py, u16>>() {
-            return Ok(Self::Scaled(words.as_array().mapv(|code| f32::from(code) / f32::from(u16::MAX))));
-        }
-        if let Ok(double) = object.extract::<PyReadonlyArray2<'py, f64>>() {
-            let float = double.as_array().mapv(|value| value as f32);
-            return Ok(Self::Float(numpy::PyArray2::from_owned_array(object.py(), float).readonly()));
-        }
-        let found = match object.cast::<PyUntypedArray>() {
-            Ok(array) => format!("an array of {} with {} dimensions", array.dtype(), array.ndim()),
-            Err(_) => object.get_type().to_string(),
+        let what = "a grey image, a numpy array (height, width) of integers or floating point numbers";
+        let array = Untyped::of(object, what)?;
+        let full = match (array.kind, array.size) {
+            ('u', 1) => Some(f32::from(u8::MAX)),
+            ('u', 2) => Some(f32::from(u16::MAX)),
+            _ => None,
         };
-        Err(PyTypeError::new_err(format!(
-            "expected a grey image, a numpy array (height, width) of uint8, uint16, float32 or float64, not {found}"
-        )))
-    }
-}
-
-impl Image<'_> {
-    /// Its values.
-    pub fn view(&self) -> ArrayView2<'_, f32> {
-        match self {
-            Self::Float(array) => array.as_array(),
-            Self::Scaled(array) => array.view(),
+        let mut values = array.values()?;
+        if let Some(full) = full {
+            values = Values::Own(values.view().mapv(|code| code / full));
         }
-    }
-
-    /// Whether its values are a camera's codes.
-    pub fn is_scaled(&self) -> bool {
-        matches!(self, Self::Scaled(_))
+        Ok(Self { values, scaled: full.is_some() })
     }
 }
 
-/// A mask: bool, or numbers that are set where they are not 0.
+/// A map, for example of depth: any numeric type.
+pub struct Map<'py>(Values<'py>);
+
+impl Map<'_> {
+    /// Its values; NaN where a masked array is masked.
+    pub fn view(&self) -> ArrayView2<'_, f32> {
+        self.0.view()
+    }
+}
+
+impl<'py> FromPyObject<'_, 'py> for Map<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let what = "a map, a numpy array (height, width) of integers or floating point numbers";
+        Untyped::of(object, what)?.values().map(Self)
+    }
+}
+
+/// A mask: bool, or integers that are set where they are not 0. What a masked array masks is not set.
 pub struct Mask(pub Array2<bool>);
 
 impl<'py> FromPyObject<'_, 'py> for Mask {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(mask) = object.extract::<PyReadonlyArray2<'py, bool>>() {
-            return Ok(Self(mask.as_array().to_owned()));
+        let what = "a mask, a numpy array (height, width) of bool or uint8 (0 = not set)";
+        let array = Untyped::numeric(object, what, &['b', 'u', 'i'])?;
+        let set = array.data.call_method1("astype", ("bool",))?.extract::<PyReadonlyArray2<'py, bool>>()?;
+        let mut set = set.as_array().to_owned();
+        if let Some(masked) = &array.masked {
+            set.zip_mut_with(&masked.as_array(), |set, masked| *set &= !masked);
         }
-        let levels = object.extract::<PyReadonlyArray2<'py, u8>>();
-        let levels = levels.map_err(|_| {
-            PyTypeError::new_err(
-                "expected a mask, a numpy array (height, width) of bool or uint8 (0 = not set)",
-            )
-        })?;
-        Ok(Self(levels.as_array().mapv(|level| level != 0)))
+        Ok(Self(set))
     }
+}
+
+/// An array of two dimensions whose type is not known while compiling.
+struct Untyped<'py> {
+    data: Bound<'py, PyAny>,
+    masked: Option<PyReadonlyArray2<'py, bool>>,
+    kind: char,
+    size: usize,
+}
+
+impl<'py> Untyped<'py> {
+    fn of(object: Borrowed<'_, 'py, PyAny>, what: &str) -> PyResult<Self> {
+        Self::numeric(object, what, &['u', 'i', 'f'])
+    }
+
+    fn numeric(object: Borrowed<'_, 'py, PyAny>, what: &str, kinds: &[char]) -> PyResult<Self> {
+        let py = object.py();
+        let numpy = py.import("numpy")?;
+        let mut given = object.to_owned();
+        if given.cast::<PyUntypedArray>().is_err() && is_array_like(&given) {
+            given = numpy.call_method1("asarray", (given,))?; // xarray, torch on the CPU, ...
+        }
+        let array = given.cast::<PyUntypedArray>().map_err(|_| {
+            PyTypeError::new_err(format!("expected {what}, not {}", type_name(&object.to_owned())))
+        })?;
+        let (dtype, dimensions) = (array.dtype(), array.ndim());
+        let (kind, size) = (dtype.kind() as char, dtype.itemsize());
+        if dimensions != 2 || !kinds.contains(&kind) {
+            return Err(PyTypeError::new_err(format!(
+                "expected {what}, not an array of {dtype} with {dimensions} dimensions"
+            )));
+        }
+        let ma = numpy.getattr("ma")?;
+        let mut masked = None;
+        if given.is_instance(&ma.getattr("MaskedArray")?)? {
+            masked = Some(ma.call_method1("getmaskarray", (&given,))?.extract()?);
+            given = ma.call_method1("getdata", (&given,))?;
+        }
+        Ok(Self { data: given, masked, kind, size })
+    }
+
+    fn values(&self) -> PyResult<Values<'py>> {
+        let lent = match self.data.extract::<PyReadonlyArray2<'py, f32>>() {
+            Ok(native) => native,
+            Err(_) => self.data.call_method1("astype", ("=f4",))?.extract()?,
+        };
+        let Some(masked) = &self.masked else { return Ok(Values::Lent(lent)) };
+        let mut own = lent.as_array().to_owned();
+        own.zip_mut_with(&masked.as_array(), |value, masked| {
+            if *masked {
+                *value = f32::NAN;
+            }
+        });
+        Ok(Values::Own(own))
+    }
+}
+
+/// Whether numpy can make an array of it that has the type its owner meant: not a list, whose type would be a guess.
+fn is_array_like(object: &Bound<'_, PyAny>) -> bool {
+    let plain = object.is_instance_of::<PyList>()
+        || object.is_instance_of::<PyTuple>()
+        || object.is_instance_of::<PyString>()
+        || object.is_instance_of::<PyBytes>()
+        || object.is_instance_of::<PyBool>();
+    !plain && object.hasattr("__array__").unwrap_or(false)
+}
+
+fn type_name(object: &Bound<'_, PyAny>) -> String {
+    object.get_type().to_string()
 }

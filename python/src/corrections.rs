@@ -3,33 +3,59 @@
 use std::path::PathBuf;
 
 use farnear_depth::corrections::{self, CdcSettings, Method, Pattern};
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
+use crate::arrays::{Map, named};
 use crate::errors::{FarnearError, wrong};
 
-/// A correction, learned or loaded.
+/// Correction of field curvature, fitted to depth maps of flat targets or loaded; immutable.
+///
+/// Examples
+/// --------
+/// >>> optics = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703, psf="gaussian:k=0.4578")
+/// >>> targets = []
+/// >>> for mm in (932, 921, 910, 899, 888):
+/// ...     far, near, _ = farnear.render(optics, f"plane:{mm}", width=160, height=120, elliptical_distortion=True)
+/// ...     targets.append((farnear.depth(far, near, optics).depth_mm, mm))
+/// >>> farnear.Correction.fit(targets, method="clsf")
+/// Correction(clsf, 120x160, 932 to 888 mm)
 #[pyclass(frozen, module = "farnear")]
 pub struct Correction(corrections::Correction);
 
 #[pymethods]
 impl Correction {
+    /// Fit a correction to flat targets.
+    ///
+    /// Parameters
+    /// ----------
+    /// patterns : sequence of (depth_mm, true_mm)
+    ///     Depth map (height, width) in mm of a flat target, and the target's true distance in mm; 20 to 30 through the working range
+    ///     are good. 24 maps of 640x480 take 0.1 s (clsf) to 1.2 s (cdc).
+    /// method : {"clsf", "clsf-blend", "clsf-full", "cdc", "two-step", "spline"}
+    ///     Form of the correction.
     #[staticmethod]
     #[pyo3(signature = (patterns, *, method="spline"))]
-    fn fit(py: Python<'_>, patterns: Vec<(PyReadonlyArray2<'_, f32>, f64)>, method: &str) -> PyResult<Self> {
+    fn fit(py: Python<'_>, patterns: Vec<(Bound<'_, PyAny>, f64)>, method: &str) -> PyResult<Self> {
         let method: Method = method.parse().map_err(wrong)?;
-        let patterns: Vec<Pattern<'_>> = patterns
+        let mut maps = Vec::with_capacity(patterns.len());
+        for (index, (map, true_mm)) in patterns.iter().enumerate() {
+            maps.push((named::<Map<'_>>(&format!("patterns[{index}][0]"), map)?, *true_mm));
+        }
+        let patterns: Vec<Pattern<'_>> = maps
             .iter()
-            .map(|(map, true_mm)| Pattern { depth_mm: map.as_array(), true_mm: *true_mm })
+            .map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
             .collect();
         py.detach(|| corrections::fit(method, &patterns, &CdcSettings::default())).map(Self).map_err(wrong)
     }
 
+    /// Read a correction from the TOML that `farnear calibrate correction --out` writes.
     #[staticmethod]
     fn loads(py: Python<'_>, text: &str) -> PyResult<Self> {
         py.detach(|| toml::from_str(text)).map(Self).map_err(wrong)
     }
 
+    /// Read a file that `farnear calibrate correction --out` wrote.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let text = std::fs::read_to_string(&path)?;
@@ -41,29 +67,37 @@ impl Correction {
         Ok((py.get_type::<Self>().getattr("loads")?, (self.dumps(py)?,)))
     }
 
+    /// TOML of the correction, as `farnear correct --correction` reads it.
     fn dumps(&self, py: Python<'_>) -> PyResult<String> {
         py.detach(|| toml::to_string(&self.0)).map_err(wrong)
     }
 
+    /// Correct a depth map.
+    ///
+    /// `depth_mm` is (height, width) in mm. Returns float32 (height, width) in mm; NaN stays NaN, and depths beyond the fitted range become NaN.
     fn apply<'py>(
         &self,
         py: Python<'py>,
-        depth_mm: PyReadonlyArray2<'py, f32>,
+        depth_mm: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let map = depth_mm.as_array();
+        let map: Map<'py> = named("depth_mm", depth_mm)?;
+        let map = map.view();
         Ok(py.detach(|| self.0.apply(map)).map_err(wrong)?.into_pyarray(py))
     }
 
+    /// Name of the method.
     #[getter]
     fn method(&self) -> String {
         self.0.method().to_string()
     }
 
+    /// (height, width) of the maps that it corrects.
     #[getter]
     fn shape(&self) -> (usize, usize) {
         self.0.dim()
     }
 
+    /// True distances in mm of the farthest and the nearest target.
     #[getter]
     fn range_mm(&self) -> (f64, f64) {
         self.0.range_mm()

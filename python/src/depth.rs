@@ -7,15 +7,17 @@ use farnear_depth::{
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
-    reason::Reason,
 };
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{IntoPyArray, PyArray2};
 use pyo3::{exceptions::PyTypeError, prelude::*};
 
 use crate::{
-    arrays::Image,
+    arrays::{Image, named, optics_named},
+    depth_map::DepthMap,
     errors::{FarnearError, wrong},
-    optics::{Operators, Optics},
+    optics::Operators,
 };
 
 /// How regions of low texture are filled: not, as `farnear depth` does by itself, or by name.
@@ -55,41 +57,66 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
     })
 }
 
-/// A depth map with all that is known of it.
-#[pyclass(frozen, get_all, module = "farnear")]
-pub struct DepthMap {
-    depth_mm: Py<PyArray2<f32>>,
-    confidence: Py<PyArray2<f32>>,
-    deviation_mm: Py<PyArray2<f32>>,
-    reasons: Py<PyArray2<u8>>,
-    findings: Vec<String>,
-    valid_fraction: f64,
-}
-
-#[pymethods]
-impl DepthMap {
-    /// Why pixels have no depth: the numbers in `reasons`, in words.
-    #[classattr]
-    fn reason_words() -> std::collections::BTreeMap<u8, &'static str> {
-        Reason::ALL.into_iter().map(|reason| (reason.code(), reason.words())).collect()
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> String {
-        use numpy::PyUntypedArrayMethods;
-        let [height, width] = self.depth_mm.bind(py).shape() else { return "DepthMap()".into() };
-        format!("DepthMap({height}x{width}, {:.1} % with a depth)", 100.0 * self.valid_fraction)
-    }
-}
-
+/// Depth map of a far- and a near-focused image, as `farnear depth` computes it.
+///
+/// Parameters
+/// ----------
+/// far, near : array (height, width)
+///     Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` the largest value is a saturated pixel;
+///     other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels of a masked array
+///     have no depth.
+/// optics : Optics
+///     The optics of the pair.
+/// operators : Operators, optional
+///     Operators for method "ro"; by default they are designed for the optics.
+/// method : {"ro", "whitened", "subbarao", "subbarao-fourier", "favaro"}
+///     Rational operators, whitened (least noise), or a baseline.
+/// window : int or {"adaptive", "safe"}, optional
+///     Side in px (odd, up to 63) of the window over which evidence is summed; by default adaptive for "whitened", else 7.
+/// median_px : int
+///     Side of the median filter, px, odd; 1 = none.
+/// fill : bool or {"surface", "thesis"}
+///     Fill regions of low texture by a surface, or in the order of the thesis.
+/// low_texture : str
+///     Criterion of low texture: "energy", or "variance:T" as in the thesis.
+/// align : {"auto", "none", "optics", "shift", "similarity", "affine"}
+///     Alignment of the near image with the far one.
+/// balance : {"auto", "none", "gain", "local"}
+///     Equalisation of brightness.
+/// min_confidence : float
+///     Least confidence of a depth, 0 to 1.
+/// threads : int
+///     Threads; 0 = one per core.
+///
+/// Returns
+/// -------
+/// DepthMap
+///     Depth in mm, confidence, standard deviation and reasons, each (height, width).
+///
+/// Raises
+/// ------
+/// FarnearError
+///     Images of two sizes, kinds or scenes, a constant image, operators for other optics, values out of range.
+///
+/// Notes
+/// -----
+/// 640x480 take 0.2 s. Other Python threads run meanwhile; Ctrl-C takes effect when the map is done.
+///
+/// Examples
+/// --------
+/// >>> optics = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703, psf="gaussian:k=0.4578")
+/// >>> far, near, truth = farnear.render(optics, "slant", width=160, height=120)
+/// >>> farnear.depth(far, near, optics).depth_mm.shape
+/// (120, 160)
 #[pyfunction]
 #[pyo3(signature = (far, near, optics, *, operators=None, method="ro", window=None, median_px=3, fill=Fill(None), low_texture="energy", align="auto",
                     balance="auto", min_confidence=0.0, threads=1))]
 #[allow(clippy::too_many_arguments)] // keywords in Python
 pub fn depth(
     py: Python<'_>,
-    far: Image<'_>,
-    near: Image<'_>,
-    optics: &Optics,
+    far: &Bound<'_, PyAny>,
+    near: &Bound<'_, PyAny>,
+    optics: &Bound<'_, PyAny>,
     operators: Option<&Operators>,
     method: &str,
     window: Option<&Bound<'_, PyAny>>,
@@ -101,9 +128,13 @@ pub fn depth(
     min_confidence: f32,
     threads: usize,
 ) -> PyResult<DepthMap> {
+    let (far, near): (Image<'_>, Image<'_>) = (named("far", far)?, named("near", near)?);
+    let optics = &*optics_named("optics", optics)?;
+    if !(0.0..=1.0).contains(&min_confidence) {
+        return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
+    }
     if far.is_scaled() != near.is_scaled() {
-        let message =
-            "one image holds integers and the other float numbers: give both alike, or their scales differ";
+        let message = "one of far and near holds uint8 or uint16 and the other does not: give both alike, or their scales differ";
         return Err(FarnearError::new_err(message));
     }
     let designed;
@@ -140,20 +171,39 @@ pub fn depth(
     let (far, near) = (far.view(), near.view());
     let found =
         py.detach(|| measure_pair_of_views(far, near, &optics.0, method, None, &settings)).map_err(wrong)?;
-    let validity = found.validity;
-    Ok(DepthMap {
-        depth_mm: found.map.depth_mm.into_pyarray(py).unbind(),
-        confidence: found.map.confidence.into_pyarray(py).unbind(),
-        deviation_mm: validity.deviation_mm.into_pyarray(py).unbind(),
-        reasons: validity.reasons.into_pyarray(py).unbind(),
-        findings: found.findings.iter().map(ToString::to_string).collect(),
-        valid_fraction: validity.valid_fraction,
-    })
+    Ok(DepthMap::of(py, found, optics))
 }
 
-/// Pair after pair with the bare run time.
-#[pyclass(module = "farnear")]
-pub struct Processor(pipeline::Processor);
+/// Depth of pair after pair with fixed settings: no alignment, no validation; some ms for 640x480.
+///
+/// Parameters
+/// ----------
+/// optics : Optics
+///     The optics of the pairs.
+/// operators : Operators, optional
+///     By default they are designed for the optics.
+/// smoothing_px : int
+///     Side of the window over which evidence is summed, px, odd.
+/// median_px : int
+///     Side of the median filter, px, odd; 1 = none.
+/// fill : bool or {"surface", "thesis"}
+///     Fill regions of low texture.
+/// low_texture : str
+///     Criterion of low texture: "energy" or "variance:T".
+/// threads : int
+///     Threads; 0 = one per core.
+///
+/// Notes
+/// -----
+/// Several threads may share a processor; their pairs are computed one after the other.
+///
+/// Examples
+/// --------
+/// >>> optics = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703)
+/// >>> far, near, truth = farnear.render(optics, "slant", width=160, height=120)
+/// >>> depth_mm, confidence = farnear.Processor(optics).run(far, near)
+#[pyclass(frozen, module = "farnear")]
+pub struct Processor(Mutex<pipeline::Processor>);
 
 #[pymethods]
 impl Processor {
@@ -162,7 +212,7 @@ impl Processor {
     #[allow(clippy::too_many_arguments)] // keywords in Python
     fn new(
         py: Python<'_>,
-        optics: &Optics,
+        optics: &Bound<'_, PyAny>,
         operators: Option<&Operators>,
         smoothing_px: usize,
         median_px: usize,
@@ -170,9 +220,10 @@ impl Processor {
         low_texture: &str,
         threads: usize,
     ) -> PyResult<Self> {
+        let optics = &*optics_named("optics", optics)?;
         let settings = Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? };
         let make = |operators: &operators::Operators| {
-            pipeline::Processor::new(operators, &optics.0, &settings).map(Self).map_err(wrong)
+            pipeline::Processor::new(operators, &optics.0, &settings).map(|processor| Self(Mutex::new(processor))).map_err(wrong)
         };
         match operators {
             Some(operators) => make(&operators.0),
@@ -180,16 +231,33 @@ impl Processor {
         }
     }
 
+    /// Depth map and confidence of a pair.
+    ///
+    /// Parameters
+    /// ----------
+    /// far, near : array (height, width)
+    ///     Images of one size and any common scale, of any numeric type.
+    ///
+    /// Returns
+    /// -------
+    /// depth_mm, confidence : array float32 (height, width)
+    ///     Depth in mm, and confidence from texture and fit, 0 to 1. Masked pixels and those whose windows contain them have no depth.
     #[allow(clippy::type_complexity)] // two arrays
     fn run<'py>(
-        &mut self,
+        &self,
         py: Python<'py>,
-        far: PyReadonlyArray2<'py, f32>,
-        near: PyReadonlyArray2<'py, f32>,
+        far: &Bound<'py, PyAny>,
+        near: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
-        let (far, near) = (far.as_array(), near.as_array());
-        let map = py.detach(|| self.0.run(far, near)).map_err(wrong)?;
-        // The processor keeps its map for the next pair, so these are copies.
-        Ok((PyArray2::from_array(py, &map.depth_mm), PyArray2::from_array(py, &map.confidence)))
+        let (far, near): (Image<'py>, Image<'py>) = (named("far", far)?, named("near", near)?);
+        let (far, near) = (far.view(), near.view());
+        let (depth_mm, confidence) = py.detach(|| {
+            // A panic in another thread leaves buffers that the next run overwrites.
+            let mut processor = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let map = processor.run(far, near).map_err(wrong)?;
+            // The processor reuses its map for the next pair.
+            Ok::<_, PyErr>((map.depth_mm.clone(), map.confidence.clone()))
+        })?;
+        Ok((depth_mm.into_pyarray(py), confidence.into_pyarray(py)))
     }
 }

@@ -9,6 +9,9 @@ use crate::errors::wrong;
 /// Coordinates, eigenvalues, geodesic distances.
 type Laid<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>);
 
+/// Isomap of samples.
+///
+/// `samples` is float32 (n, features). Returns coordinates (n, dimensions), eigenvalues (dimensions) and path lengths (n, n).
 #[pyfunction]
 #[pyo3(signature = (samples, *, neighbours=5, dimensions=2))]
 pub fn isomap<'py>(
@@ -30,7 +33,7 @@ pub fn isomap<'py>(
 /// What makes a map: centres, weights, gamma, ridge, condition.
 type Parts<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>, f32, f64, f64);
 
-/// Gaussian radial basis functions on all samples.
+/// Gaussian radial basis functions on all samples (n, features), solved with a ridge for targets (n, d).
 #[pyclass(frozen, module = "farnear._farnear")]
 pub struct Rbf(rbf::Rbf);
 
@@ -49,6 +52,7 @@ impl Rbf {
         py.detach(|| rbf::Rbf::train(samples, targets, gamma, ridge)).map(Self).map_err(wrong)
     }
 
+    /// Coordinates, float32 (m, d), of samples, float32 (m, features).
     fn embed<'py>(
         &self,
         py: Python<'py>,
@@ -79,6 +83,7 @@ impl Rbf {
         Ok((assemble, (arrays.0, arrays.1, *gamma, *ridge, *condition)))
     }
 
+    /// Condition number of the system that was solved.
     #[getter]
     fn condition(&self) -> f64 {
         self.0.condition

@@ -1,12 +1,14 @@
-//! farnear for Python: thin functions and classes over the libraries. What they do is said in `farnear/_farnear.pyi` and
-//! `docs/python.md`; arrays go in without a copy where they are `float32` and come out without one.
+//! farnear for Python: thin functions and classes over the libraries. Doc comments of
+//! what Python sees are its docstrings; `python/docstrings.py` copies them into the stub. Arrays go in without a copy where they are `float32` and come out without one.
 
 mod arrays;
 mod calibrate;
 mod corrections;
 mod depth;
+mod depth_map;
 mod embedding;
 mod errors;
+mod focus_stack;
 #[cfg(feature = "measure")]
 mod measure;
 mod optics;
@@ -21,15 +23,19 @@ mod synthetic;
 #[pyo3::pymodule]
 mod _farnear {
     #[pymodule_export]
-    use super::calibrate::calibrate_psf;
+    use super::calibrate::{PsfFit, calibrate_psf};
     #[pymodule_export]
     use super::corrections::Correction;
     #[pymodule_export]
-    use super::depth::{DepthMap, Processor, depth};
+    use super::depth::{Processor, depth};
+    #[pymodule_export]
+    use super::depth_map::{DepthMap, Plane};
     #[pymodule_export]
     use super::embedding::{Rbf, isomap};
     #[pymodule_export]
     use super::errors::{FarnearError, RigError};
+    #[pymodule_export]
+    use super::focus_stack::{FocusStack, focus_stack};
     #[cfg(feature = "measure")]
     #[pymodule_export]
     use super::measure::{seconds_of_depth, seconds_of_processor};
@@ -47,4 +53,7 @@ mod _farnear {
     use super::rig::RigClient;
     #[pymodule_export]
     use super::synthetic::synthetic_masks;
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)] // a name of Python
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

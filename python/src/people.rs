@@ -7,10 +7,31 @@ use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::Mask,
+    arrays::{Mask, named},
     errors::{FarnearError, wrong},
 };
 
+/// Position of the sun, without refraction.
+///
+/// Parameters
+/// ----------
+/// time : str or datetime.datetime
+///     Time with its time zone.
+/// latitude_deg, longitude_deg : float
+///     Place, degrees; north and east are positive.
+/// model : {"psa", "almanac", "thesis", "spa"}
+///     Formulas.
+///
+/// Returns
+/// -------
+/// elevation_deg, azimuth_deg : float
+///     Elevation above the horizon, and azimuth clockwise from north, degrees.
+///
+/// Examples
+/// --------
+/// >>> elevation_deg, azimuth_deg = farnear.sun_position("2014-06-23T11:30:00Z", 52.38, -1.56)
+/// >>> round(elevation_deg)
+/// 60
 #[pyfunction]
 #[pyo3(signature = (time, latitude_deg, longitude_deg, *, model="psa"))]
 pub fn sun_position(
@@ -30,16 +51,36 @@ pub fn sun_position(
     Ok((sun.elevation_deg, sun.azimuth_deg))
 }
 
+/// Remove the shadow of the one person in a mask.
+///
+/// Parameters
+/// ----------
+/// mask : array bool or uint8 (height, width)
+///     Person with shadow; 0 = background.
+/// camera : str
+///     Text of a camera file (`farnear shadow remove --help`).
+/// elevation_deg, azimuth_deg : float
+///     Position of the sun, degrees.
+/// method : {"hybrid", "thesis"}
+///     How the shadow is cut.
+///
+/// Returns
+/// -------
+/// mask : array bool (height, width)
+///     The person without shadow.
+/// report : dict
+///     `beta_deg`, `removed_fraction`, `distance_m` of the person, and whether the cut is `trustworthy`.
 #[pyfunction]
 #[pyo3(signature = (mask, camera, *, elevation_deg, azimuth_deg, method="hybrid"))]
 pub fn remove_shadow<'py>(
     py: Python<'py>,
-    mask: Mask,
+    mask: &Bound<'py, PyAny>,
     camera: &str,
     elevation_deg: f64,
     azimuth_deg: f64,
     method: &str,
 ) -> PyResult<(Bound<'py, PyArray2<bool>>, Bound<'py, PyDict>)> {
+    let mask: Mask = named("mask", mask)?;
     let file = CameraFile::parse(camera).map_err(wrong)?;
     let method: Method = method.parse().map_err(FarnearError::new_err::<String>)?;
     let sun = SunPosition { elevation_deg, azimuth_deg };
@@ -53,13 +94,32 @@ pub fn remove_shadow<'py>(
     Ok((clean.into_pyarray(py), said))
 }
 
+/// Centroid distances of a silhouette: its descriptor; takes 20 us.
+///
+/// Parameters
+/// ----------
+/// mask : array bool or uint8 (height, width)
+///     The silhouette, px; 0 = background.
+/// scaling : {"keep-aspect", "stretch"}
+///     How the silhouette is scaled to the frame.
+///
+/// Returns
+/// -------
+/// array float32 (360,)
+///     Distance from the centroid to the outermost pixel, one a degree anticlockwise from the right, in units of the frame's side.
+///
+/// Examples
+/// --------
+/// >>> farnear.centroid_distance(np.ones((40, 20), bool)).shape
+/// (360,)
 #[pyfunction]
 #[pyo3(signature = (mask, *, scaling="keep-aspect"))]
 pub fn centroid_distance<'py>(
     py: Python<'py>,
-    mask: Mask,
+    mask: &Bound<'py, PyAny>,
     scaling: &str,
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let mask: Mask = named("mask", mask)?;
     let scaling = match scaling {
         "keep-aspect" => Scaling::KeepAspect,
         "stretch" => Scaling::Stretch,

@@ -1,16 +1,37 @@
 //! Points of a depth map in space.
 
-use numpy::{IntoPyArray, PyArray3, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
 
-use crate::optics::Optics;
+use crate::arrays::{Map, named, optics_named};
 
+/// Object point that each pixel of a whole depth map sees.
+///
+/// Parameters
+/// ----------
+/// depth_mm : array (height, width)
+///     Depth map, mm.
+/// optics : Optics
+///     The optics of the map.
+///
+/// Returns
+/// -------
+/// array float32 (height, width, 3)
+///     x to the right, y up, z towards the viewer, mm; the origin is the lens. NaN where there is no depth.
+///
+/// Examples
+/// --------
+/// >>> optics = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703)
+/// >>> farnear.points_mm(np.full((4, 6), 900.0), optics).shape
+/// (4, 6, 3)
 #[pyfunction]
 pub fn points_mm<'py>(
     py: Python<'py>,
-    depth_mm: PyReadonlyArray2<'py, f32>,
-    optics: &Optics,
-) -> Bound<'py, PyArray3<f32>> {
-    let depth_mm = depth_mm.as_array();
-    py.detach(|| farnear_workflows::measure::points_mm(depth_mm, &optics.0)).into_pyarray(py)
+    depth_mm: &Bound<'py, PyAny>,
+    optics: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    let depth_mm: Map<'py> = named("depth_mm", depth_mm)?;
+    let optics = &*optics_named("optics", optics)?;
+    let depth_mm = depth_mm.view();
+    Ok(py.detach(|| farnear_workflows::measure::points_mm(depth_mm, &optics.0)).into_pyarray(py))
 }

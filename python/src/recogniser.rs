@@ -15,7 +15,18 @@ use crate::{
     errors::{FarnearError, wrong},
 };
 
-/// A recogniser of activities: one that comes with the package, or a file of one's own.
+/// Recogniser of activities of people, from the masks of a clip.
+///
+/// Parameters
+/// ----------
+/// model : path
+///     A recogniser of the package ("everyday", "everyday-order-free"), or a file.
+///
+/// Examples
+/// --------
+/// >>> answer = farnear.Recogniser("everyday").recognise(farnear.synthetic_masks("walk"))
+/// >>> sorted(answer["probabilities"])[0] in farnear.Recogniser("everyday").activities
+/// True
 #[pyclass(frozen, module = "farnear")]
 pub struct Recogniser {
     model: Model,
@@ -31,6 +42,7 @@ impl Recogniser {
         Ok(Self { model: read, path: model })
     }
 
+    /// Activities that it can answer.
     #[getter]
     fn activities(&self) -> Vec<String> {
         self.model.activities().to_vec()
@@ -41,6 +53,20 @@ impl Recogniser {
         Ok((py.get_type::<Self>().into_any(), (&self.path,)))
     }
 
+    /// Activity in the masks of a clip.
+    ///
+    /// Parameters
+    /// ----------
+    /// *views : sequence of array bool (height, width), or array (frames, height, width)
+    ///     Masks of the clip, from one view or several; masks of 100x100 px are taken as cropped.
+    /// among : sequence of str, optional
+    ///     Restrict the answer to these activities.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     `activity` (None = unknown), `confidence` (its probability, 0 to 1), a score of how unlike the trained activities the clip
+    ///     is (above 1 = unknown), and `probabilities` by name.
     #[pyo3(signature = (*views, among=None))]
     fn recognise<'py>(
         &self,

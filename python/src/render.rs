@@ -10,6 +10,36 @@ use crate::{errors::wrong, optics::Optics};
 /// Far image, near image, true depth.
 type Rendered<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyArray2<f32>>);
 
+/// Render what a camera exposes of a known scene.
+///
+/// Parameters
+/// ----------
+/// optics : Optics
+///     The lens.
+/// scene : str
+///     "plane:MM", "staircase", "slant", "cone" or "sphere", with options such as "cone,texture=fractal,contrast=0.3".
+/// width, height : int
+///     Size of the images, px.
+/// noise : {"none", "8bit", "12bit"}
+///     Noise and quantisation of the camera.
+/// seed : int
+///     Seed of texture and noise; the same seed gives the same images.
+/// elliptical_distortion : bool
+///     Whether the lens has field curvature.
+///
+/// Returns
+/// -------
+/// far, near : array uint8 or uint16 (height, width)
+///     The images; with more than 8 bits `uint16` over its full range.
+/// truth : array float32 (height, width)
+///     True depth, mm.
+///
+/// Examples
+/// --------
+/// >>> optics = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703)
+/// >>> far, near, truth = farnear.render(optics, "plane:900", width=64, height=48)
+/// >>> far.shape, far.dtype.name, float(truth[0, 0])
+/// ((48, 64), 'uint8', 900.0)
 #[pyfunction]
 #[pyo3(signature = (optics, scene="staircase", *, width=640, height=480, noise="8bit", seed=1, elliptical_distortion=false))]
 #[allow(clippy::too_many_arguments)] // keywords in Python

@@ -12,6 +12,28 @@ use crate::errors::FarnearError;
 const MM_PER_PX: f64 = 10.0;
 const MARGIN_PX: usize = 2;
 
+/// Silhouettes of a synthetic person.
+///
+/// Parameters
+/// ----------
+/// activity : str
+///     walk, drop, crouch, peer, mobile, place, bag, shoot, gun or dig.
+/// subject : int
+///     Number of the person; the same number is always the same person.
+/// azimuth_deg : float
+///     Direction of view, degrees; 0 = from the front.
+/// rate_hz : float
+///     Frames per second, 1 to 1000.
+///
+/// Returns
+/// -------
+/// array bool (frames, height, width)
+///     Masks, 10 mm a pixel.
+///
+/// Examples
+/// --------
+/// >>> farnear.synthetic_masks("walk").ndim
+/// 3
 #[pyfunction]
 #[pyo3(signature = (activity, *, subject=0, azimuth_deg=90.0, rate_hz=15.0))]
 pub fn synthetic_masks<'py>(

@@ -17,7 +17,7 @@ use farnear_files::{image_file, npy, staging::Staging, view};
 use ndarray::{Array2, ArrayView2};
 use serde::Serialize;
 
-pub use places::{Places, numbers};
+pub use places::{Places, depth_of_places, numbers};
 
 use crate::{
     MADE_BY,
@@ -170,6 +170,14 @@ fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<boo
         });
     }
     unseen
+}
+
+/// Aligns the images of a stack; returns the farthest distance that a pixel was moved, px.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] if neighbours show nothing in common.
+pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
+    aligned(images, model, &Context::unattended())
 }
 
 /// Lays each image on the one in the middle, by way of its neighbours, which differ least; gives the farthest way of a pixel.

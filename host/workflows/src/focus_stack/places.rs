@@ -98,19 +98,23 @@ fn objects(sensor_mm: &[f64], settings: &FocusStackSettings) -> Result<Vec<f64>>
 }
 
 impl Listed {
-    /// Depth of each place in the stack: mm where the distances are known, else the number of the image, from 1. Between images
-    /// the sensor's distance is what changes evenly, and that goes with the reciprocal of depth.
     pub(super) fn depth(&self, place: &Array2<f32>) -> Array2<f32> {
-        let Some(mm) = &self.focused_at_mm else { return place.mapv(|place| place + 1.0) };
-        place.mapv(|place| {
-            if !place.is_finite() {
-                return f32::NAN;
-            }
-            let below = (place as usize).min(mm.len().saturating_sub(2));
-            let part = f64::from(place) - below as f64;
-            ((1.0 - part) / mm[below] + part / mm[below + 1]).recip() as f32
-        })
+        depth_of_places(place, self.focused_at_mm.as_deref())
     }
+}
+
+/// Depth of each place in the stack: mm where the distances are known, else the number of the image, from 1. Between images
+/// the sensor's distance is what changes evenly, and that goes with the reciprocal of depth.
+pub fn depth_of_places(place: &Array2<f32>, focused_at_mm: Option<&[f64]>) -> Array2<f32> {
+    let Some(mm) = focused_at_mm else { return place.mapv(|place| place + 1.0) };
+    place.mapv(|place| {
+        if !place.is_finite() {
+            return f32::NAN;
+        }
+        let below = (place as usize).min(mm.len().saturating_sub(2));
+        let part = f64::from(place) - below as f64;
+        ((1.0 - part) / mm[below] + part / mm[below + 1]).recip() as f32
+    })
 }
 
 /// Numbers with commas between them, as a person types them.

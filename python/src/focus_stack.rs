@@ -1,0 +1,152 @@
+//! Depth from a focus stack.
+
+use farnear_depth::{focus_stack::{StackSettings, depth_from_stack}, prepare::align::Model};
+use farnear_workflows::focus_stack::{aligned_stack, depth_of_places};
+use ndarray::ArrayView2;
+use numpy::{IntoPyArray, PyArray2};
+use pyo3::prelude::*;
+
+use crate::{arrays::{Image, named}, errors::{FarnearError, wrong}};
+
+/// Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width).
+///
+/// Attributes
+/// ----------
+/// depth : array float32
+///     Object distance in mm, or the number of the sharpest image, from 1, if the distances were not given. NaN = unreliable.
+/// unit : str
+///     "mm" or "image".
+/// reliability : array float32
+///     How clear and how well fitted the maximum of sharpness is, 0 to 1.
+/// all_in_focus : array float32
+///     Each pixel from the image in which it is sharpest, in the scale of the images.
+/// moved_px : float
+///     Farthest that alignment moved a pixel, px.
+#[pyclass(frozen, get_all, module = "farnear")]
+pub struct FocusStack {
+    depth: Py<PyArray2<f32>>,
+    unit: &'static str,
+    reliability: Py<PyArray2<f32>>,
+    all_in_focus: Py<PyArray2<f32>>,
+    moved_px: f64,
+}
+
+#[pymethods]
+impl FocusStack {
+    fn __repr__(&self, py: Python<'_>) -> String {
+        use numpy::PyUntypedArrayMethods;
+        let [height, width] = self.depth.bind(py).shape() else { return "FocusStack()".into() };
+        format!("FocusStack({height}x{width}, depth in {})", self.unit)
+    }
+}
+
+/// Depth and all-in-focus image of a stack of images at different focus, as `farnear focus-stack` computes them.
+///
+/// Parameters
+/// ----------
+/// images : sequence of array (height, width)
+///     At least three grey images of one size, in the order of their focus.
+/// focused_at_mm : sequence of float, optional
+///     Object distance in mm at which each image is sharp, ascending or descending.
+/// measure : str
+///     Focus measure, for example "modified-laplacian" or "tenengrad".
+/// smoothing_px : float
+///     Standard deviation of the Gaussian applied to the images first, px; 0 = none.
+/// window_px : int
+///     Side of the window of the focus measure, px, odd.
+/// fit_points : int
+///     Points of the sharpness curve that the maximum is fitted to, odd.
+/// median_px : int
+///     Side of the median filter, px, odd; 1 = none.
+/// guided_px : float
+///     Standard deviation of the edge-preserving filter, px; 0 = none.
+/// min_reliability : float
+///     Depths below this reliability are NaN, 0 to 1.
+/// align : {"none", "shift", "similarity", "affine"}
+///     Alignment of the images.
+///
+/// Returns
+/// -------
+/// FocusStack
+///     Depth in mm, reliability and all-in-focus image, each (height, width).
+///
+/// Examples
+/// --------
+/// >>> images = [np.random.default_rng(i).random((32, 32)) for i in range(3)]
+/// >>> farnear.focus_stack(images, focused_at_mm=[300, 310, 320]).unit
+/// 'mm'
+#[pyfunction]
+#[pyo3(signature = (images, *, focused_at_mm=None, measure="modified-laplacian", smoothing_px=1.0, window_px=9, fit_points=11, median_px=9,
+                    guided_px=10.0, min_reliability=0.1, align="none"))]
+#[allow(clippy::too_many_arguments)] // keywords in Python
+pub fn focus_stack<'py>(
+    py: Python<'py>,
+    images: Vec<Bound<'py, PyAny>>,
+    focused_at_mm: Option<Vec<f64>>,
+    measure: &str,
+    smoothing_px: f32,
+    window_px: usize,
+    fit_points: usize,
+    median_px: usize,
+    guided_px: f32,
+    min_reliability: f32,
+    align: &str,
+) -> PyResult<FocusStack> {
+    if !(0.0..=1.0).contains(&min_reliability) {
+        return Err(FarnearError::new_err(format!("min_reliability is {min_reliability}; expected 0 to 1")));
+    }
+    if let Some(distances) = &focused_at_mm {
+        check_distances(distances, images.len())?;
+    }
+    let model: Option<Model> = match align {
+        "none" => None,
+        "shift" => Some(Model::Shift),
+        "similarity" => Some(Model::Similarity),
+        "affine" => Some(Model::Affine),
+        other => {
+            let message = format!("align is {other:?}; expected none, shift, similarity or affine");
+            return Err(FarnearError::new_err(message));
+        }
+    };
+    let settings = StackSettings {
+        measure: measure.parse().map_err(wrong)?,
+        smoothing_px,
+        window_px,
+        fit_points,
+        median_px,
+        guided_px,
+        min_reliability,
+    };
+    let mut owned = Vec::with_capacity(images.len());
+    for (index, image) in images.iter().enumerate() {
+        owned.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
+    }
+    let (map, depth, moved_px) = py.detach(|| -> PyResult<_> {
+        let moved_px = model.map_or(Ok(0.0), |model| aligned_stack(&mut owned, model)).map_err(wrong)?;
+        let views: Vec<ArrayView2<'_, f32>> = owned.iter().map(|image| image.view()).collect();
+        let map = depth_from_stack(&views, &settings).map_err(wrong)?;
+        let depth = depth_of_places(&map.place, focused_at_mm.as_deref());
+        Ok((map, depth, moved_px))
+    })?;
+    Ok(FocusStack {
+        depth: depth.into_pyarray(py).unbind(),
+        unit: if focused_at_mm.is_some() { "mm" } else { "image" },
+        reliability: map.reliability.into_pyarray(py).unbind(),
+        all_in_focus: map.all_in_focus.into_pyarray(py).unbind(),
+        moved_px,
+    })
+}
+
+fn check_distances(distances: &[f64], images: usize) -> PyResult<()> {
+    if distances.len() != images {
+        return Err(FarnearError::new_err(format!("focused_at_mm has {} distances for {images} images", distances.len())));
+    }
+    if let Some(wrong) = distances.iter().find(|mm| !(mm.is_finite() && **mm > 0.0)) {
+        return Err(FarnearError::new_err(format!("focused_at_mm holds {wrong}; expected distances in mm above 0")));
+    }
+    let (up, down) = (distances.windows(2).all(|two| two[0] < two[1]), distances.windows(2).all(|two| two[0] > two[1]));
+    if !up && !down {
+        return Err(FarnearError::new_err("focused_at_mm must ascend or descend: sort the images by their focus"));
+    }
+    Ok(())
+}

@@ -1,0 +1,189 @@
+"""What scientists have in memory: masked arrays, any numeric type, results that travel and are stored."""
+
+import copy
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+import farnear
+
+
+@pytest.fixture(scope="module")
+def found(optics, slant):
+    return farnear.depth(slant[0], slant[1], optics)
+
+
+def test_masked_pixels_have_no_depth(optics, slant):
+    far, near, _ = slant
+    hole = (slice(100, 140), slice(50, 90))
+    for masked_image in ("far", "near"):
+        images = {"far": far, "near": near}
+        images[masked_image] = np.ma.masked_array(images[masked_image])
+        images[masked_image][hole] = np.ma.masked
+        found = farnear.depth(images["far"], images["near"], optics)
+        assert np.isnan(found.depth_mm[hole]).all() and (found.confidence[hole] == 0).all()
+        assert set(np.unique(found.reasons[hole])) == {9}
+        depth_mm, _ = farnear.Processor(optics).run(images["far"], images["near"])
+        assert np.isnan(depth_mm[hole]).all()
+    # A mask of other functions counts too.
+    depth = np.ma.masked_less(np.full((4, 6), 900.0), 0)
+    depth[1, 2] = np.ma.masked
+    points = farnear.points_mm(depth, optics)
+    assert np.isnan(points[1, 2]).all() and np.isfinite(points[0, 0]).all()
+
+
+@pytest.mark.parametrize("dtype", ["u1", "<u2", ">u2", "i2", ">i4", "u4", "i8", "u8", "f2", ">f4", "f8", ">f8", "longdouble"])
+def test_every_numeric_type_and_byte_order_is_accepted(optics, slant, dtype):
+    far, near, truth = slant
+    found = farnear.depth(far.astype(dtype), near.astype(dtype), optics)
+    error = (found.depth_mm - truth)[12:-12, 12:-12]
+    assert np.sqrt(np.nanmean(error**2)) < 1.5
+    depth_mm, _ = farnear.Processor(optics).run(far.astype(dtype), near.astype(dtype))
+    assert np.isfinite(depth_mm).mean() > 0.9
+
+
+def test_types_without_an_order_are_refused_by_the_name_of_the_argument(optics, slant):
+    far, near, _ = slant
+    with pytest.raises(TypeError, match="near.*complex"):
+        farnear.depth(far, near.astype(complex), optics)
+    with pytest.raises(TypeError, match="far.*bool"):
+        farnear.depth(far > 0, near, optics)
+    with pytest.raises(TypeError, match="optics.*farnear.Optics"):
+        farnear.depth(far, near, "optics.toml")
+    with pytest.raises(TypeError, match="depth_mm.*list"):
+        farnear.points_mm([[900.0]], optics)
+    with pytest.raises(TypeError, match=r"pairs\[1\]\[0\]"):
+        farnear.calibrate_psf([(far, near, 900.0), (None, near, 900.0)], optics)
+    with pytest.raises(TypeError, match=r"images\[2\]"):
+        farnear.focus_stack([far, near, "third"])
+
+
+@pytest.mark.parametrize("value", [2, -0.1, float("nan")])
+def test_a_confidence_outside_0_to_1_is_refused(optics, slant, value):
+    with pytest.raises(farnear.FarnearError, match="min_confidence.*0 to 1"):
+        farnear.depth(slant[0], slant[1], optics, min_confidence=value)
+
+
+def same(first, second):
+    for name in ("depth_mm", "confidence", "deviation_mm", "reasons"):
+        assert np.array_equal(getattr(first, name), getattr(second, name), equal_nan=True), name
+    assert first.findings == second.findings and first.optics == second.optics
+    assert first.valid_fraction == pytest.approx(second.valid_fraction, abs=1e-6)
+
+
+def test_a_depth_map_is_pickled_copied_saved_and_loaded(found, tmp_path):
+    same(pickle.loads(pickle.dumps(found)), found)
+    deep = copy.deepcopy(found)
+    same(deep, found)
+    deep.depth_mm[0, 0] = 1.0
+    assert found.depth_mm[0, 0] != 1.0, "a deep copy owns its arrays"
+    found.save(tmp_path / "result")
+    same(farnear.DepthMap.load(tmp_path / "result"), found)
+
+
+def test_a_folder_that_is_no_result_is_named(tmp_path, found):
+    with pytest.raises(FileNotFoundError):
+        farnear.DepthMap.load(tmp_path)
+    (tmp_path / "depth.toml").write_text("[nothing]")
+    with pytest.raises(farnear.FarnearError, match="depth.toml"):
+        farnear.DepthMap.load(tmp_path)
+    found.save(tmp_path)
+    (tmp_path / "depth.npy").unlink()
+    with pytest.raises(farnear.FarnearError, match="neither depth.npy nor depth.tiff"):
+        farnear.DepthMap.load(tmp_path)
+    found.save(tmp_path)
+    np.save(tmp_path / "confidence.npy", np.zeros((3, 4), np.float32))
+    with pytest.raises(farnear.FarnearError, match="confidence.npy"):
+        farnear.DepthMap.load(tmp_path)
+
+
+def test_two_threads_share_a_processor(optics, slant):
+    far, near, _ = slant
+    processor = farnear.Processor(optics)
+    alone = [processor.run(far, near)[0], processor.run(near, far)[0]]
+    results, errors = {0: [], 1: []}, []
+
+    def work(which):
+        try:
+            for _ in range(20):
+                results[which].append(processor.run(*((far, near) if which == 0 else (near, far)))[0])
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=work, args=(which,)) for which in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    for which in (0, 1):
+        assert all(np.array_equal(map_mm, alone[which], equal_nan=True) for map_mm in results[which])
+
+
+@pytest.mark.parametrize("model", ["gaussian", "generalised", "free"])
+def test_optics_accept_a_calibrated_point_spread_function(optics, model):
+    pairs = [(*farnear.render(optics, f"plane:{mm}", width=320, height=240, seed=mm)[:2], float(mm)) for mm in (932, 888)]
+    fit = farnear.calibrate_psf(pairs, optics, model=model)
+    again = farnear.Optics(
+        focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=2.703, psf=fit.psf
+    )
+    assert again.psf == fit.psf == fit.optics.psf
+    assert fit.verdict in ("good", "loose") and abs(fit.k - 0.4578) < 0.01
+    assert 0 < fit.standard_error_k < 0.02 and 0 <= fit.residual < 0.1
+    assert (fit.standard_error_p is not None) == (model == "generalised")
+    assert bool(fit.otf) == (model == "free")
+    assert np.isfinite(farnear.depth(*pairs[0][:2], fit.optics).depth_mm).mean() > 0.8
+
+
+def test_a_plane_is_measured(optics):
+    far, near, _ = farnear.render(optics, "plane:910", width=160, height=120)
+    plane = farnear.depth(far, near, optics).plane()
+    assert plane.z_mm == pytest.approx(910, abs=0.5) and plane.tilt_deg < 3 and 0 < plane.rms_mm < 2
+    with pytest.raises(farnear.FarnearError, match="160x120"):
+        farnear.depth(far, near, optics).plane((150, 0, 20, 20))
+
+
+def test_a_focus_stack_has_its_distances(optics):
+    rng = np.random.default_rng(1)
+    texture = rng.random((48, 64)).astype(np.float32)
+
+    def blurred(times):
+        image = texture
+        for _ in range(times):
+            image = (image + np.roll(image, 1, 0) + np.roll(image, 1, 1) + np.roll(image, -1, 0) + np.roll(image, -1, 1)) / 5
+        return image
+
+    stack = farnear.focus_stack(
+        [blurred(abs(i - 3) * 2) for i in range(7)], focused_at_mm=[300, 310, 320, 330, 340, 350, 360], guided_px=0
+    )
+    assert stack.unit == "mm" and stack.depth.shape == (48, 64)
+    assert np.nanmedian(stack.depth) == pytest.approx(330, abs=3)
+    assert farnear.focus_stack([blurred(2), blurred(0), blurred(2)], align="shift").unit == "image"
+    for settings, match in [
+        ({"focused_at_mm": [1, 2]}, "2 distances for 3"),
+        ({"focused_at_mm": [3, 2, 4]}, "ascend"),
+        ({"focused_at_mm": [1, -2, 3]}, "-2"),
+        ({"min_reliability": 1.5}, "0 to 1"),
+        ({"align": "sideways"}, "similarity"),
+    ]:
+        with pytest.raises(farnear.FarnearError, match=match):
+            farnear.focus_stack([texture] * 3, **settings)
+
+
+def test_notebooks_show_maps(found):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    assert found._repr_html_().startswith("<figure><img")
+    axes = found.plot()
+    assert axes.images[0].get_array().shape == found.depth_mm.shape
+    pyplot.close("all")
+
+
+def test_maps_go_to_xarray_and_come_from_it(found, optics, slant):
+    xarray = pytest.importorskip("xarray")
+    data = found.to_xarray()
+    assert data["depth"].attrs["units"] == "mm" and data["depth"].dims == ("row", "column")
+    again = farnear.depth(xarray.DataArray(slant[0]), xarray.DataArray(slant[1]), optics)
+    assert np.array_equal(again.depth_mm, found.depth_mm, equal_nan=True)
