@@ -6,7 +6,11 @@ use farnear_depth::{
 };
 use pyo3::prelude::*;
 
-use crate::{arrays::{Image, named, optics_named}, errors::wrong, optics::{Optics, psf_text}};
+use crate::{
+    arrays::{Image, named, optics_named},
+    errors::wrong,
+    optics::{Optics, psf_text},
+};
 
 /// A calibrated point spread function, as `calibrate_psf` returns it.
 ///
@@ -48,7 +52,12 @@ pub struct PsfFit {
 impl PsfFit {
     fn __repr__(&self) -> String {
         let error = self.standard_error_k.map_or(String::new(), |error| format!(" +- {error:.5}"));
-        format!("PsfFit({}, k = {:.5}{error}, {})", self.psf.lines().next().unwrap_or_default(), self.k, self.verdict)
+        format!(
+            "PsfFit({}, k = {:.5}{error}, {})",
+            self.psf.lines().next().unwrap_or_default(),
+            self.k,
+            self.verdict
+        )
     }
 }
 

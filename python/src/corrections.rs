@@ -42,10 +42,8 @@ impl Correction {
         for (index, (map, true_mm)) in patterns.iter().enumerate() {
             maps.push((named::<Map<'_>>(&format!("patterns[{index}][0]"), map)?, *true_mm));
         }
-        let patterns: Vec<Pattern<'_>> = maps
-            .iter()
-            .map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
-            .collect();
+        let patterns: Vec<Pattern<'_>> =
+            maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
         py.detach(|| corrections::fit(method, &patterns, &CdcSettings::default())).map(Self).map_err(wrong)
     }
 

@@ -223,7 +223,9 @@ impl Processor {
         let optics = &*optics_named("optics", optics)?;
         let settings = Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? };
         let make = |operators: &operators::Operators| {
-            pipeline::Processor::new(operators, &optics.0, &settings).map(|processor| Self(Mutex::new(processor))).map_err(wrong)
+            pipeline::Processor::new(operators, &optics.0, &settings)
+                .map(|processor| Self(Mutex::new(processor)))
+                .map_err(wrong)
         };
         match operators {
             Some(operators) => make(&operators.0),

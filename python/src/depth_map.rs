@@ -119,11 +119,16 @@ impl DepthMap {
     fn load(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
         let path = folder.join("depth.toml");
         let text = std::fs::read_to_string(&path)?;
-        let record: Record = toml::from_str(&text)
-            .map_err(|error| FarnearError::new_err(format!("{} is not the record of a depth map: {error}", path.display())))?;
-        let file = ["depth.npy", "depth.tiff"].map(|name| folder.join(name)).into_iter().find(|file| file.is_file());
+        let record: Record = toml::from_str(&text).map_err(|error| {
+            FarnearError::new_err(format!("{} is not the record of a depth map: {error}", path.display()))
+        })?;
+        let file =
+            ["depth.npy", "depth.tiff"].map(|name| folder.join(name)).into_iter().find(|file| file.is_file());
         let file = file.ok_or_else(|| {
-            FarnearError::new_err(format!("{} has neither depth.npy nor depth.tiff; run farnear depth with --write npy", folder.display()))
+            FarnearError::new_err(format!(
+                "{} has neither depth.npy nor depth.tiff; run farnear depth with --write npy",
+                folder.display()
+            ))
         })?;
         let depth = map::read(&file).map_err(wrong)?;
         let dim = depth.dim();
@@ -131,7 +136,11 @@ impl DepthMap {
             if array.dim() == dim {
                 return Ok(array);
             }
-            let message = format!("{}: {:?} rows and columns, the depth map has {dim:?}", folder.join(name).display(), array.dim());
+            let message = format!(
+                "{}: {:?} rows and columns, the depth map has {dim:?}",
+                folder.join(name).display(),
+                array.dim()
+            );
             Err(FarnearError::new_err(message))
         };
         let optional = |name: &str| -> PyResult<Option<Array2<f32>>> {
@@ -175,7 +184,10 @@ impl DepthMap {
             write(name, &npy::write(array.bind(py).readonly().as_array()))?;
         }
         let reasons = self.reasons.bind(py).readonly();
-        write("reason.png", &image_file::encode_png(reasons.as_array().mapv(u16::from).view(), 8).map_err(wrong)?)?;
+        write(
+            "reason.png",
+            &image_file::encode_png(reasons.as_array().mapv(u16::from).view(), 8).map_err(wrong)?,
+        )?;
         write("view.png", &self.view_png(py)?)?;
         let record = Record {
             made_by: MADE_BY.into(),
@@ -209,7 +221,10 @@ impl DepthMap {
             return Err(FarnearError::new_err(format!("region {region:?} is too large")));
         };
         if right > width || bottom > height {
-            let message = format!("region {:?} is outside the map of {width}x{height} px; expected column, row, width, height", (x, y, columns, rows));
+            let message = format!(
+                "region {:?} is outside the map of {width}x{height} px; expected column, row, width, height",
+                (x, y, columns, rows)
+            );
             return Err(FarnearError::new_err(message));
         }
         let points = measure::points_mm(depth, &self.optics.0);
@@ -223,7 +238,8 @@ impl DepthMap {
                 }
             }
         }
-        let plane = measure::fit(&kept).ok_or_else(|| FarnearError::new_err("fewer than three depths, or all in a line: no plane"))?;
+        let plane = measure::fit(&kept)
+            .ok_or_else(|| FarnearError::new_err("fewer than three depths, or all in a line: no plane"))?;
         Ok(Plane {
             z_mm: plane.z_mm,
             slope_x: plane.slope_x,
@@ -248,10 +264,15 @@ impl DepthMap {
     /// Picture of the map for notebooks.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         let png = PyBytes::new(py, &self.view_png(py)?);
-        let text: String =
-            py.import("base64")?.call_method1("b64encode", (png,))?.call_method1("decode", ("ascii",))?.extract()?;
+        let text: String = py
+            .import("base64")?
+            .call_method1("b64encode", (png,))?
+            .call_method1("decode", ("ascii",))?
+            .extract()?;
         let title = self.__repr__(py).replace('<', "&lt;");
-        Ok(format!("<figure><img alt=\"depth map\" src=\"data:image/png;base64,{text}\"/><figcaption>{title}</figcaption></figure>"))
+        Ok(format!(
+            "<figure><img alt=\"depth map\" src=\"data:image/png;base64,{text}\"/><figcaption>{title}</figcaption></figure>"
+        ))
     }
 
     /// For pickle and copy.

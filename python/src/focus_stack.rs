@@ -1,12 +1,18 @@
 //! Depth from a focus stack.
 
-use farnear_depth::{focus_stack::{StackSettings, depth_from_stack}, prepare::align::Model};
+use farnear_depth::{
+    focus_stack::{StackSettings, depth_from_stack},
+    prepare::align::Model,
+};
 use farnear_workflows::focus_stack::{aligned_stack, depth_of_places};
 use ndarray::ArrayView2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
-use crate::{arrays::{Image, named}, errors::{FarnearError, wrong}};
+use crate::{
+    arrays::{Image, named},
+    errors::{FarnearError, wrong},
+};
 
 /// Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width).
 ///
@@ -139,14 +145,22 @@ pub fn focus_stack<'py>(
 
 fn check_distances(distances: &[f64], images: usize) -> PyResult<()> {
     if distances.len() != images {
-        return Err(FarnearError::new_err(format!("focused_at_mm has {} distances for {images} images", distances.len())));
+        return Err(FarnearError::new_err(format!(
+            "focused_at_mm has {} distances for {images} images",
+            distances.len()
+        )));
     }
     if let Some(wrong) = distances.iter().find(|mm| !(mm.is_finite() && **mm > 0.0)) {
-        return Err(FarnearError::new_err(format!("focused_at_mm holds {wrong}; expected distances in mm above 0")));
+        return Err(FarnearError::new_err(format!(
+            "focused_at_mm holds {wrong}; expected distances in mm above 0"
+        )));
     }
-    let (up, down) = (distances.windows(2).all(|two| two[0] < two[1]), distances.windows(2).all(|two| two[0] > two[1]));
+    let (up, down) =
+        (distances.windows(2).all(|two| two[0] < two[1]), distances.windows(2).all(|two| two[0] > two[1]));
     if !up && !down {
-        return Err(FarnearError::new_err("focused_at_mm must ascend or descend: sort the images by their focus"));
+        return Err(FarnearError::new_err(
+            "focused_at_mm must ascend or descend: sort the images by their focus",
+        ));
     }
     Ok(())
 }
