@@ -10,7 +10,7 @@ use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
-        mpsc::{Sender, channel, sync_channel},
+        mpsc::{RecvTimeoutError, Sender, channel, sync_channel},
     },
     thread::JoinHandle,
     time::{Duration, Instant},
@@ -29,6 +29,10 @@ use crate::{
     transport::{Place, Transport, with_rate},
 };
 
+/// Interval at which the wait for an answer checks for an interruption.
+const INTERRUPT_POLL: Duration = Duration::from_millis(25);
+/// How long an answer is still awaited after an interruption.
+const ANSWER_GRACE: Duration = Duration::from_millis(150);
 /// From one attempt to reach a board that restarts to the next.
 const NEXT_ATTEMPT: Duration = Duration::from_millis(50);
 
@@ -257,8 +261,22 @@ impl Client {
         during: &str,
     ) -> Result<Vec<Answered>, ClientError> {
         let (answers, answered) = sync_channel(1);
+        let stopping = self.interrupted(); // what follows an interruption is awaited, e.g. a stop
         self.command(Command::Ask { session: self.session.number, questions, answers }, during)?;
-        answered.recv().map_err(|_| self.ended(during))
+        let mut interrupted: Option<Instant> = None;
+        loop {
+            match answered.recv_timeout(INTERRUPT_POLL) {
+                Ok(answered) => return Ok(answered),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.ended(during)),
+                Err(RecvTimeoutError::Timeout) if stopping || !self.interrupted() => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    // Work that is accepted later has no listener and is stopped by the port's owner.
+                    if interrupted.get_or_insert_with(Instant::now).elapsed() >= ANSWER_GRACE {
+                        return Err(ClientError::Interrupted { during: during.into() });
+                    }
+                }
+            }
+        }
     }
 
     /// Asks for something that is done at once.

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Longest single wait for an image, so that an interruption by the user is seen soon.
-const SLICE: Duration = Duration::from_millis(200);
+const SLICE: Duration = Duration::from_millis(50);
 
 /// Images could not be taken.
 #[derive(Debug, thiserror::Error)]

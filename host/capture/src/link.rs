@@ -173,6 +173,9 @@ impl Link {
             .iter()
             .map(|request| self.number(address, request, during))
             .collect::<Result<Vec<_>, _>>()?;
+        if asked.is_empty() {
+            return Ok(Vec::new());
+        }
         let begin = Instant::now();
         let (bytes_before, bad_frames) = (self.bytes, self.bad_frames);
         for wait in waits {

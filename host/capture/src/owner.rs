@@ -222,13 +222,19 @@ impl Owner {
             Ok(answered) => answered,
             Err(error) => return vec![Err(error)],
         };
+        let mut abandoned = false;
         for (question, answered) in questions.into_iter().zip(&answered) {
             if let (Some(listener), Ok((id, Response::Accepted))) = (question.listener, answered) {
+                abandoned |= listener.held.strong_count() == 0;
                 // Before any event is given out, so that even work that has ended already is told its end.
                 self.works.insert(*id, listener);
             }
         }
         self.give_out();
+        if abandoned {
+            // The user interrupted before the board had accepted the work.
+            let _ = self.ask(&Request::Stop, "stopping");
+        }
         answered
     }
 

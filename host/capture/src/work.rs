@@ -254,8 +254,11 @@ impl Client {
         only(self.start_together(vec![Plan { request: request.clone(), work, during }])?, &name)
     }
 
-    /// Begins several works at the same time. Where one is refused, those that have begun are stopped.
+    /// Starts several works simultaneously. If one is refused, the others are stopped.
     fn start_together(&self, plans: Vec<Plan>) -> Result<Vec<Work>, ClientError> {
+        if plans.is_empty() {
+            return Ok(Vec::new());
+        }
         let during = plans.iter().map(|plan| plan.during.as_str()).collect::<Vec<_>>().join(" and ");
         if self.interrupted() {
             return Err(ClientError::Interrupted { during });

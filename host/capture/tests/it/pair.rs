@@ -1,9 +1,13 @@
 //! Taking a pair with a scripted board, and cameras that do and do not deliver.
 
-use std::{fs, path::Path, time::Duration};
+use std::{
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use farnear_capture::{
-    Client, ClientError,
+    Client, ClientError, Timing,
     camera::{Camera, CameraError, FolderCamera, Image},
     half_mirror::capture_behind_mirror,
     pair::{CaptureError, Exposures, capture_pair},
@@ -102,10 +106,13 @@ fn a_pair_is_homed_moved_exposed_and_written() {
     // The second time it is homed already, and needs no homing.
     let acts = peer.board().acts;
     let mut said = Vec::new();
+    client.set_timing(Timing::EMULATED);
+    let begin = Instant::now();
     capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
         .unwrap();
     assert!(!said.iter().any(|text| text.contains("homing")), "{said:?}");
     assert_eq!(peer.board().acts - acts, 2);
+    assert!(begin.elapsed() < Duration::from_secs(2), "a homed rig waits for nothing: {:?}", begin.elapsed());
 }
 
 #[test]

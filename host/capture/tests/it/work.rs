@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_capture::{ClientError, Step};
+use farnear_capture::{ClientError, Step, Timing};
 use farnear_protocol::{
     message::{Axis, EventKind, Shot, TriggerMode},
     units::{Micros, Nanometres},
@@ -166,4 +166,15 @@ fn a_program_is_armed_once_run_twice_and_told_of_shots_that_the_host_triggers() 
         assert_eq!(said, [true, false, true, false], "run {run}");
     }
     assert_eq!(peer.board().triggers, 4);
+}
+
+#[test]
+fn no_work_at_all_ends_immediately() {
+    let (client, peer) = connect(Faults::default());
+    client.set_timing(Timing::EMULATED);
+    let begin = Instant::now();
+    assert!(client.start_homing(&[]).unwrap().is_empty());
+    assert!(client.start_moves(&[]).unwrap().is_empty());
+    assert!(begin.elapsed() < Duration::from_secs(2), "{:?}", begin.elapsed());
+    assert_eq!(peer.board().acts, 0);
 }

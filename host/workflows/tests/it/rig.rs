@@ -3,6 +3,7 @@
 mod cancelling;
 mod checklist;
 mod jobs;
+mod twice;
 
 use std::{path::Path, sync::Mutex, time::Duration};
 

@@ -1,0 +1,213 @@
+//! A second job on a running rig waits for nothing that the first one did.
+
+use std::{
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use farnear_depth::{focus_measure::FocusMeasure, pipeline};
+use farnear_files::image_file::encode_png;
+use farnear_protocol::message::{Axis, EventKind, Routine, ShotRecord};
+use farnear_scripted_board::{Faults, Peer, plug_in};
+use farnear_workflows::{
+    Context, Result, WorkflowError,
+    optics::GivenOptics,
+    rig::{
+        RigAddress,
+        check::{self, CheckSettings},
+        continuous::{self, ContinuousSettings, Cycle, Enough},
+        focus::{self, FocusSettings},
+        live,
+        live_depth::{self, LiveDepthSettings},
+        mechanics, motion,
+        open::OpenRig,
+        pair::{self, PairSettings},
+        sequence::{self, Program, SequenceSettings},
+        series::{self, SeriesSettings},
+        targets::{self, TargetSettings},
+    },
+};
+use ndarray::Array2;
+
+use super::{Face, camera, optics};
+
+/// What a second run may take longer than the first on a crowded computer. Each needless wait for the board is 5 s or more.
+const LEEWAY: Duration = Duration::from_secs(2);
+
+/// Sharpest where the piezo and the coarse stage together are here.
+const SHARPEST_NM: i32 = 2_880_000;
+
+/// A checkerboard whose contrast tells how far the sensor is from the best focus.
+fn picture(shot: &ShotRecord) -> Vec<u8> {
+    let away_um = f64::from(shot.coarse.0 + shot.fine.0 - SHARPEST_NM) / 1e3;
+    let contrast = 100.0 / (1.0 + (away_um / 60.0).powi(2));
+    let light = |(row, column): (usize, usize)| {
+        let sign = if (row / 2 + column / 2) % 2 == 0 { 1.0 } else { -1.0 };
+        // No two pictures are the same, as those of a camera are not.
+        let noise = ((row * 31 + column * 17 + shot.trigger_number as usize * 7) % 5) as f64;
+        (120.0 + sign * contrast + noise) as u16
+    };
+    encode_png(Array2::from_shape_fn((96, 96), light).view(), 8).unwrap()
+}
+
+/// Puts a picture of each exposure into the folder until `over`.
+fn feed(folder: &Path, board: &Peer, over: &AtomicBool) {
+    let mut seen = 0;
+    while !over.load(Ordering::Relaxed) {
+        let taken: Vec<ShotRecord> = {
+            let board = board.board();
+            let shots = board.events.iter().filter_map(|event| match &event.kind {
+                EventKind::ShotDone { shot, .. } | EventKind::FrameTaken { shot, .. } => Some(*shot),
+                _ => None,
+            });
+            shots.skip(seen).collect()
+        };
+        for shot in &taken {
+            let (draft, path) =
+                (folder.join("draft"), folder.join(format!("image-{:05}.png", shot.trigger_number)));
+            std::fs::write(&draft, picture(shot)).unwrap();
+            std::fs::rename(draft, path).unwrap();
+        }
+        seen += taken.len();
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+type Job<'a> = Box<dyn Fn(RigAddress, usize, &Context<'_>) -> Result<()> + 'a>;
+
+/// What is looked at until two pictures or maps have come.
+fn until_two<T>(watch: impl FnOnce(&mut dyn FnMut(T) -> Result<()>) -> Result<()>) -> Result<()> {
+    let mut count = 0;
+    let ended = watch(&mut |_| {
+        count += 1;
+        let enough = WorkflowError::Cancelled { during: "watching".into() };
+        if count < 2 { Ok(()) } else { Err(enough) }
+    });
+    match ended {
+        Err(error) if error.is_cancelled() => Ok(()),
+        other => other,
+    }
+}
+
+#[test]
+fn a_second_run_takes_no_longer_than_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = folder.path().join("images");
+    std::fs::create_dir(&images).unwrap();
+    let out = |name: &str, run: usize| folder.path().join(format!("{name}-{run}"));
+    let camera = || camera(&images);
+    let jobs: Vec<(&str, Job<'_>)> = vec![
+        ("home", Box::new(|rig, _, context| motion::home(&rig, &[], context).map(drop))),
+        (
+            "capture",
+            Box::new(|rig, run, context| {
+                let (camera, out) = (camera(), out("pair", run));
+                let settings = PairSettings { rig, camera, optics: optics(), averaged: 1, frames: None, out };
+                pair::capture(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "series",
+            Box::new(|rig, run, context| {
+                let out = vec![out("series-a", run), out("series-b", run)];
+                let settings = SeriesSettings { rig, camera: camera(), optics: optics(), out };
+                series::capture(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "sequence",
+            Box::new(|rig, run, context| {
+                let program =
+                    Program::Stack { axis: Axis::SensorFine, from_um: 20.0, to_um: 180.0, steps: 3 };
+                let (camera, out) = (camera(), out("sequence", run));
+                let settings = SequenceSettings { rig, camera, program, runs: 1, optics: None, out };
+                sequence::run(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "focus",
+            Box::new(|rig, _, context| {
+                let settings = FocusSettings {
+                    rig,
+                    camera: camera(),
+                    optics: optics(),
+                    start_mm: Some(52.9),
+                    range_mm: 0.3,
+                    measure: FocusMeasure::Tenengrad,
+                    region: None,
+                };
+                focus::focus(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "continuous",
+            Box::new(|rig, run, context| {
+                let (camera, out) = (camera(), Some(out("continuous", run)));
+                let (cycle, enough) = (Cycle::Pair { optics: optics() }, Enough::Exposures(4));
+                let settings = ContinuousSettings { rig, camera, cycle, rate_hz: None, enough, out };
+                continuous::run(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "live image",
+            Box::new(|rig, _, context| {
+                let settings = live::LiveSettings { rig, camera: camera() };
+                until_two(|seen| live::watch(&settings, context, |_, image| seen(image)))
+            }),
+        ),
+        (
+            "live depth",
+            Box::new(|rig, _, context| {
+                let computation = pipeline::Settings::default();
+                let settings = LiveDepthSettings { rig, camera: camera(), optics: optics(), computation };
+                until_two(|seen| live_depth::watch(&settings, context, |depth| seen(depth.pair_ms)))
+            }),
+        ),
+        (
+            "targets",
+            Box::new(|rig, run, context| {
+                let (camera, distances_mm, out) = (camera(), vec![900.0], out("targets", run));
+                let settings =
+                    TargetSettings { rig, camera, optics: optics(), distances_mm, ask: true, out };
+                targets::capture(&settings, context).map(drop)
+            }),
+        ),
+        ("mechanics", Box::new(|rig, _, context| mechanics::measure(&rig, Routine::Piezo, context).map(drop))),
+        (
+            "check",
+            Box::new(|rig, _, context| {
+                let settings = CheckSettings { rig, camera: camera(), resting_only: true, hands: false };
+                check::check(&settings, context).map(drop)
+            }),
+        ),
+    ];
+    let (port, board) = plug_in(Faults::default());
+    board.board().hello.capabilities.memory = false;
+    // The host is patient with an emulated board: a wait for nothing takes as long as it can.
+    board.board().hello.emulated = true;
+    board.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().unwrap();
+    let face = Face::default();
+    let context = face.context();
+    let given = GivenOptics::read(&optics()).unwrap();
+    let rig = RigAddress::Open(OpenRig::open(&RigAddress::Port(port), &given, &context).unwrap());
+    let over = AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| feed(&images, &board, &over));
+        let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            for (name, job) in &jobs {
+                let took = [0, 1].map(|run| {
+                    let begin = Instant::now();
+                    job(rig.clone(), run, &context).unwrap_or_else(|error| panic!("{name}: {error}"));
+                    begin.elapsed()
+                });
+                println!("{name}: {took:?}");
+                assert!(took[1] < took[0] + LEEWAY, "{name}: {took:?}");
+                assert!(took[0] < Duration::from_secs(10), "{name}: {took:?}");
+            }
+        }));
+        over.store(true, Ordering::Relaxed);
+        ended.unwrap();
+    });
+}
