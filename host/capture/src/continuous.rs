@@ -1,7 +1,7 @@
 //! Continuous capture: far, near, far, near ..., or any cycle of shots, each exposure with its image, until it has taken as
 //! many as wanted or is stopped.
 //!
-//! The board holds the pace and numbers its frames without a gap; what it drops it says. What is lost on the way to here is told likewise:
+//! The board holds the pace and numbers its frames without a gap; what it drops it says. What is lost on the way to here is reported likewise:
 //! an event that the board no longer remembers shows as a missing number, an image that does not come as such. Nothing is passed
 //! over in silence, and no image is given to another exposure than its own.
 
@@ -52,7 +52,7 @@ pub enum Loss {
     /// The board took none.
     Board(DropReason),
     /// The event that tells of it was lost, and the board no longer remembers it.
-    Untold,
+    EventLost,
     /// The image of this exposure did not come; with the camera's word for it.
     Image {
         /// Which exposure.
@@ -76,15 +76,15 @@ pub enum Outcome {
     },
 }
 
-/// An exposure that was told of, without its image yet.
-enum Told {
+/// An exposure that was reported of, without its image yet.
+enum Reported {
     Taken { number: u32, deviation: Nanometres, record: ShotRecord },
     Dropped { number: u32, loss: Loss },
 }
 
 /// A continuous run; dropped before its end it stops the rig.
 ///
-/// Images wait in the camera until they are asked for: who takes longer than a period for each [`Self::outcome`] loses some, and is told.
+/// Images wait in the camera until they are asked for: a caller that takes longer than a period for each [`Self::outcome`] loses some, which is reported.
 pub struct Continuous<'c> {
     client: Client,
     camera: &'c mut dyn Camera,
@@ -94,7 +94,7 @@ pub struct Continuous<'c> {
     image_wait: Duration,
     /// The frame that is due next.
     next: u32,
-    told: VecDeque<Told>,
+    reported: VecDeque<Reported>,
     undelivered: u32,
 }
 
@@ -115,11 +115,11 @@ impl<'c> Continuous<'c> {
         camera.arm(mode, exposure)?;
         let work = Some(client.start_continuous(shots, pace.period, pace.exposures)?);
         let client = client.clone();
-        let told = VecDeque::new();
-        Ok(Self { client, camera, work, mode, exposure, image_wait, next: 0, told, undelivered: 0 })
+        let reported = VecDeque::new();
+        Ok(Self { client, camera, work, mode, exposure, image_wait, next: 0, reported, undelivered: 0 })
     }
 
-    /// Frames that the board has told of and nobody has asked for yet: whoever falls behind may want to leave some out.
+    /// Frames that the board has reported of and nobody has asked for yet: whoever falls behind may want to leave some out.
     ///
     /// # Errors
     /// As [`Self::outcome`].
@@ -129,7 +129,7 @@ impl<'c> Continuous<'c> {
         {
             self.take(step)?;
         }
-        Ok(self.told.len())
+        Ok(self.reported.len())
     }
 
     /// What became of the next frame; `None` after the last. Frames come in order, none is left out.
@@ -140,15 +140,15 @@ impl<'c> Continuous<'c> {
         let outcome = self.try_outcome();
         if outcome.is_err() {
             self.work = None;
-            self.told.clear();
+            self.reported.clear();
         }
         outcome
     }
 
     fn try_outcome(&mut self) -> Result<Option<Outcome>, CaptureError> {
         loop {
-            if let Some(told) = self.told.pop_front() {
-                return self.fetch(told).map(Some);
+            if let Some(reported) = self.reported.pop_front() {
+                return self.fetch(reported).map(Some);
             }
             let Some(work) = &mut self.work else { return Ok(None) };
             let step = work.step()?;
@@ -178,12 +178,12 @@ impl<'c> Continuous<'c> {
             }
             EventKind::FrameTaken { frame, deviation, shot, .. } => {
                 self.miss_until(frame);
-                self.told.push_back(Told::Taken { number: frame, deviation, record: shot });
+                self.reported.push_back(Reported::Taken { number: frame, deviation, record: shot });
                 self.next = frame.wrapping_add(1);
             }
             EventKind::FrameDropped { frame, reason, .. } => {
                 self.miss_until(frame);
-                self.told.push_back(Told::Dropped { number: frame, loss: Loss::Board(reason) });
+                self.reported.push_back(Reported::Dropped { number: frame, loss: Loss::Board(reason) });
                 self.next = frame.wrapping_add(1);
             }
             _ => {}
@@ -191,18 +191,18 @@ impl<'c> Continuous<'c> {
         Ok(())
     }
 
-    /// Nothing was told of the frames before this one.
+    /// Nothing was reported of the frames before this one.
     fn miss_until(&mut self, frame: u32) {
         while (frame.wrapping_sub(self.next) as i32) > 0 {
-            self.told.push_back(Told::Dropped { number: self.next, loss: Loss::Untold });
+            self.reported.push_back(Reported::Dropped { number: self.next, loss: Loss::EventLost });
             self.next = self.next.wrapping_add(1);
         }
     }
 
-    fn fetch(&mut self, told: Told) -> Result<Outcome, CaptureError> {
-        let (number, deviation, record) = match told {
-            Told::Taken { number, deviation, record } => (number, deviation, record),
-            Told::Dropped { number, loss } => return Ok(Outcome::Dropped { number, loss }),
+    fn fetch(&mut self, reported: Reported) -> Result<Outcome, CaptureError> {
+        let (number, deviation, record) = match reported {
+            Reported::Taken { number, deviation, record } => (number, deviation, record),
+            Reported::Dropped { number, loss } => return Ok(Outcome::Dropped { number, loss }),
         };
         match wait_for_image(&self.client, self.camera, &record, self.image_wait) {
             Ok(image) => {
@@ -272,7 +272,7 @@ impl Cycles {
 impl Client {
     /// Runs the armed program again and again, a trigger each period (0: as fast as position and camera allow), until it has
     /// taken so many exposures (0: until the work is dropped). Its events are [`EventKind::FrameTaken`] and
-    /// [`EventKind::FrameDropped`]; of those that are lost nothing is told, their numbers are missing.
+    /// [`EventKind::FrameDropped`]; of those that are lost nothing is reported, their numbers are missing.
     ///
     /// # Errors
     /// [`ClientError`].

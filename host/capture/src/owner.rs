@@ -48,7 +48,7 @@ const UNANSWERED_POLLS: u32 = 2;
 const GLANCE: Duration = Duration::from_millis(1);
 
 /// What running work is told.
-pub(crate) enum Note {
+pub(crate) enum Message {
     Event(EventKind),
     Broken(Break),
     EventsLost {
@@ -59,9 +59,9 @@ pub(crate) enum Note {
     NoEnd,
 }
 
-/// Where notes about work go.
+/// Where messages about work go.
 pub(crate) struct Listener {
-    pub notes: Sender<Note>,
+    pub messages: Sender<Message>,
     /// Gone when nobody holds the work any more.
     pub held: Weak<()>,
     /// Events that are lost for ever are no reason to give it up.
@@ -357,7 +357,7 @@ impl Owner {
                     if matches!(kind, EventKind::StillThere { .. }) {
                         self.still_there |= held;
                     } else {
-                        let _ = work.notes.send(Note::Event(kind.clone()));
+                        let _ = work.messages.send(Message::Event(kind.clone()));
                     }
                     if ends || !held {
                         self.works.remove(&request);
@@ -366,7 +366,7 @@ impl Owner {
             }
             None if matches!(kind, EventKind::Alarm(_)) => {
                 for work in self.works.values() {
-                    let _ = work.notes.send(Note::Event(kind.clone()));
+                    let _ = work.messages.send(Message::Event(kind.clone()));
                 }
             }
             None => {}
@@ -388,7 +388,7 @@ impl Owner {
                 let to = self.events.due - 1;
                 self.works.retain(|_, work| {
                     if !work.bears_loss {
-                        let _ = work.notes.send(Note::EventsLost { from: number, to });
+                        let _ = work.messages.send(Message::EventsLost { from: number, to });
                     }
                     work.bears_loss
                 });
@@ -429,7 +429,7 @@ impl Owner {
         self.works.retain(|id, work| {
             let goes_on = is_under_way(*id, &status);
             if !goes_on {
-                let _ = work.notes.send(Note::NoEnd);
+                let _ = work.messages.send(Message::NoEnd);
             }
             goes_on
         });

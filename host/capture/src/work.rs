@@ -23,7 +23,7 @@ use crate::{
     client::Client,
     describe::{axis_name, routine_name, um},
     error::ClientError,
-    owner::{Listener, Note, Question, nonsense, nothing},
+    owner::{Listener, Message, Question, nonsense, nothing},
     timing::{Pace, calibration_time, homing_time, move_time, program_time},
 };
 
@@ -53,7 +53,7 @@ pub struct Work {
     id: u32,
     request: Request,
     during: String,
-    notes: Receiver<Note>,
+    messages: Receiver<Message>,
     /// What the owner of the port holds weakly.
     _held: Arc<()>,
     allowed: Duration,
@@ -93,12 +93,12 @@ impl Work {
             }
             let begin = Instant::now();
             let slice = SLICE.min(until.saturating_duration_since(begin)).min(self.left);
-            let note = self.notes.recv_timeout(slice);
+            let message = self.messages.recv_timeout(slice);
             if !self.paused {
                 self.left = self.left.saturating_sub(begin.elapsed());
             }
-            match note {
-                Ok(note) => return self.take(note).map(Some),
+            match message {
+                Ok(message) => return self.take(message).map(Some),
                 Err(RecvTimeoutError::Disconnected) => {
                     self.over = true;
                     return Err(self.client.ended(&self.during));
@@ -161,19 +161,19 @@ impl Work {
         }
     }
 
-    fn take(&mut self, note: Note) -> Result<Step, ClientError> {
+    fn take(&mut self, message: Message) -> Result<Step, ClientError> {
         let during = || self.during.clone();
-        let kind = match note {
-            Note::Event(kind) => kind,
-            Note::Broken(broken) => {
+        let kind = match message {
+            Message::Event(kind) => kind,
+            Message::Broken(broken) => {
                 self.over = true;
                 return Err(broken.error(self.client.port(), &self.during));
             }
-            Note::EventsLost { from, to } => {
+            Message::EventsLost { from, to } => {
                 let error = ClientError::EventsLost { during: during(), from, to };
                 return Err(self.stop_with(error));
             }
-            Note::NoEnd => {
+            Message::NoEnd => {
                 self.over = true;
                 return Err(ClientError::NoEnd { during: during() });
             }
@@ -265,16 +265,16 @@ impl Client {
         }
         let (mut questions, mut ends) = (Vec::new(), Vec::new());
         for plan in &plans {
-            let ((notes, receiver), held) = (channel(), Arc::new(()));
+            let ((messages, receiver), held) = (channel(), Arc::new(()));
             let bears_loss = matches!(plan.request, Request::RunContinuously { .. });
-            let listener = Listener { notes, held: Arc::downgrade(&held), bears_loss };
+            let listener = Listener { messages, held: Arc::downgrade(&held), bears_loss };
             let (request, during) = (plan.request.clone(), plan.during.clone());
             questions.push(Question { request, during, listener: Some(listener) });
             ends.push((receiver, held));
         }
         let answered = self.ask_together(questions, &during)?;
         let (mut started, mut refused) = (Vec::new(), None);
-        for ((plan, answered), (notes, held)) in plans.into_iter().zip(answered).zip(ends) {
+        for ((plan, answered), (messages, held)) in plans.into_iter().zip(answered).zip(ends) {
             match answered {
                 Ok((id, Response::Accepted)) => {
                     let allowed = self.timing().allowance(plan.work);
@@ -283,7 +283,7 @@ impl Client {
                         id,
                         request: plan.request,
                         during: plan.during,
-                        notes,
+                        messages,
                         _held: held,
                         allowed,
                         left: allowed,

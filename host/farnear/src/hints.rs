@@ -34,7 +34,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
             Some("`cargo xtask install` installs both, `cargo xtask demo` builds them".into())
         }
         WorkflowError::Unanswered { .. } => {
-            Some("--no-prompt (targets) or --no-hands (check) asks nothing".into())
+            Some("--no-prompt (targets) or --no-actuation (check) asks nothing".into())
         }
         WorkflowError::InsideFocalLength { .. } => {
             Some("`farnear rig settings get datum_nm` shows it".into())

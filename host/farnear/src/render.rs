@@ -63,7 +63,7 @@ pub fn render(settings: RenderSettings, context: &Context<'_>) -> Result<RenderF
     staged.write("truth.npy", &npy::write(depth.view()))?;
     staged.write("optics.toml", toml::to_string(&optics.with_psf(psf))?.as_bytes())?;
     staged.finish()?;
-    context.say(&format!("wrote {}", out.display()));
+    context.info(&format!("wrote {}", out.display()));
     let (height, width) = depth.dim();
     Ok(RenderFigures {
         width,

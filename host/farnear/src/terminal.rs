@@ -113,7 +113,7 @@ fn in_words(seconds: u64) -> String {
 }
 
 impl Progress for Terminal {
-    fn say(&self, what: &str) {
+    fn info(&self, what: &str) {
         end_count();
         eprintln!("{what}");
     }

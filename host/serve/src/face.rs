@@ -31,7 +31,7 @@ pub struct Face<'a> {
 }
 
 impl Progress for Face<'_> {
-    fn say(&self, what: &str) {
+    fn info(&self, what: &str) {
         self.app.note(what);
         self.app.change(|state| {
             if let Some(job) = (self.place)(state) {

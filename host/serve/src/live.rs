@@ -5,7 +5,7 @@ use std::{cell::RefCell, path::Path, time::Instant};
 use farnear_capture::camera::Image;
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
-    Context, Nobody, Result, WorkflowError,
+    Context, Unattended, Result, WorkflowError,
     camera::{self, CameraChoice},
     optics, picture,
     rig::{
@@ -37,7 +37,7 @@ pub fn look(app: &App) {
     if rig.is_none() && !app.has_camera_alone() {
         return;
     }
-    let context = Context::new(&Nobody, &Nobody, live.cancel.clone());
+    let context = Context::new(&Unattended, &Unattended, live.cancel.clone());
     let rate = Rate::default();
     let ended = match (live.mode, rig) {
         (LiveMode::Off, _) => return,

@@ -8,7 +8,7 @@ use std::{
 };
 
 use farnear_workflows::{
-    Cancel, Context, Nobody, Progress, WorkflowError,
+    Cancel, Context, Unattended, Progress, WorkflowError,
     optics::GivenOptics,
     rig::{RigAddress, info, open::OpenRig},
 };
@@ -52,7 +52,7 @@ fn run(app: &App) {
 struct ToLog<'a>(&'a App);
 
 impl Progress for ToLog<'_> {
-    fn say(&self, what: &str) {
+    fn info(&self, what: &str) {
         self.0.note(what);
     }
 }
@@ -65,7 +65,7 @@ fn connect(app: &App) {
     });
     app.set_rig(None);
     let log = ToLog(app);
-    let context = Context::new(&log, &Nobody, Cancel::default());
+    let context = Context::new(&log, &Unattended, Cancel::default());
     let opened =
         GivenOptics::read(&app.optics_file()).and_then(|optics| OpenRig::open(address, &optics, &context));
     match opened {

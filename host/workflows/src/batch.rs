@@ -33,7 +33,7 @@ use self::{
 };
 use crate::{
     cache::Cache,
-    context::{Cancel, Context, Nobody, Progress},
+    context::{Cancel, Context, Unattended, Progress},
     error::Result,
     figures::rounded,
 };
@@ -184,7 +184,7 @@ pub fn run(
     let BatchFigures { jobs, done, already, failed, seconds } = figures;
     let sum = format!("{done} done, {already} already done, {failed} failed, of {jobs} jobs");
     context.cancel.check(&format!("doing jobs ({sum}); the same command goes on where this one ended"))?;
-    context.say(&format!("{sum}, in {seconds} s"));
+    context.info(&format!("{sum}, in {seconds} s"));
     if failed > 0 {
         return Err(BatchError::Failed { failed, jobs, failures }.into());
     }
@@ -275,7 +275,7 @@ impl Work<'_> {
         };
         let warnings = Warnings::default();
         let cache = Arc::clone(&self.cache);
-        let context = Context { cache, ..Context::new(&warnings, &Nobody, self.cancel.clone()) };
+        let context = Context { cache, ..Context::new(&warnings, &Unattended, self.cancel.clone()) };
         let out = fields.optional_text("out").ok().flatten();
         let ended = match unreadable {
             Some(error) => Err(error.into()),
@@ -320,7 +320,7 @@ impl Work<'_> {
 struct Warnings(Mutex<Vec<String>>);
 
 impl Progress for Warnings {
-    fn say(&self, _: &str) {}
+    fn info(&self, _: &str) {}
 
     fn warn(&self, what: &str) {
         let mut warnings = self.0.lock().unwrap_or_else(PoisonError::into_inner);

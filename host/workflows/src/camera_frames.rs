@@ -69,7 +69,7 @@ pub fn calibrate(settings: &CameraSettings, context: &Context<'_>) -> Result<Cam
     staged.write(BAD, &encode_png(bad.view(), 8)?)?;
     context.cancel.check("writing the frames")?;
     staged.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     let (height, width) = frames.response().dim();
     Ok(CameraFigures {
         width,

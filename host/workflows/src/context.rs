@@ -1,7 +1,7 @@
-//! How a workflow and the person it works for hear of each other: progress, questions, cancelling.
+//! Progress, prompts and cancellation for workflows.
 //!
-//! A workflow writes nothing to a terminal, reads no keyboard and listens for no signal; whoever starts it (the command
-//! line, a web page, a batch runner, Python) gives it a [`Context`].
+//! A workflow does not use the terminal, the keyboard or signals. Its caller (command line, page, batch, Python) passes a
+//! [`Context`].
 
 use std::{
     sync::{
@@ -16,50 +16,48 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Told what is being done.
+/// Receives the progress of a workflow.
 pub trait Progress: Sync {
-    /// A step in words, for a log: "moving the coarse stage to 5800.000 um".
-    fn say(&self, what: &str);
+    /// Reports a step, for a log: "moving the coarse stage to 5800.000 um".
+    fn info(&self, what: &str);
 
-    /// Something that the user should know though the work goes on.
+    /// Reports something that the user should know although the work continues.
     fn warn(&self, what: &str) {
-        self.say(&format!("warning: {what}"));
+        self.info(&format!("warning: {what}"));
     }
 
-    /// How much longer it will take, as far as that can be told; said before the count that it belongs to.
+    /// Reports the estimated remaining time, before the count that it belongs to.
     fn time_left(&self, _left: Duration) {}
 
-    /// How far the work has come: `done` of `total` (where that is known) of what `unit` names, e.g. "frames".
+    /// Reports that `done` of `total` (if known) units are complete; `unit` is e.g. "frames".
     fn advance(&self, _unit: &'static str, _done: usize, _total: Option<usize>) {}
 }
 
-/// Asked what only a person can tell or do.
+/// Prompts a person.
 pub trait Questions: Sync {
-    /// Shows the question and gives the answer as it was typed; an empty one where the person only agreed.
+    /// Shows the question and returns the typed answer; it is empty if the person only confirmed.
     ///
     /// # Errors
-    /// [`WorkflowError::Unanswered`] where nobody is there, [`WorkflowError::Cancelled`] where the person gave up.
+    /// [`WorkflowError::Unanswered`] without a person, [`WorkflowError::Cancelled`] if the person cancelled.
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String>;
 }
 
-/// A wish to stop, shared by whoever may utter it and whoever has to heed it. A rig workflow that is cancelled stops the
-/// rig before it returns.
+/// Cancellation token; clones share it. A cancelled rig workflow stops the rig before it returns.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Utters the wish; nothing takes it back.
+    /// Cancels. Cannot be reset.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was uttered.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
     /// # Errors
-    /// [`WorkflowError::Cancelled`] where it was uttered; `during` says what was under way.
+    /// [`WorkflowError::Cancelled`] once cancelled; `during` names the running step.
     pub fn check(&self, during: &str) -> Result<()> {
         match self.is_cancelled() {
             true => Err(WorkflowError::Cancelled { during: during.into() }),
@@ -67,18 +65,18 @@ impl Cancel {
         }
     }
 
-    /// The flag itself, as the rig's client takes it.
+    /// The flag, for the rig's client.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.0)
     }
 }
 
-/// What a workflow is given beside its own settings.
+/// What a workflow needs in addition to its settings.
 #[derive(Clone)]
 pub struct Context<'a> {
-    /// Told what is being done.
+    /// Receives progress.
     pub progress: &'a dyn Progress,
-    /// Asked what only a person can tell or do.
+    /// Prompts a person.
     pub questions: &'a dyn Questions,
     /// Cancellation.
     pub cancel: Cancel,
@@ -92,30 +90,30 @@ impl<'a> Context<'a> {
         Self { progress, questions, cancel, cache: Arc::default() }
     }
 
-    /// A step in words.
-    pub fn say(&self, what: &str) {
-        self.progress.say(what);
+    /// Reports a step.
+    pub fn info(&self, what: &str) {
+        self.progress.info(what);
     }
 }
 
-/// Nobody: progress is not shown, questions have no answer.
+/// Discards progress; prompts fail.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Nobody;
+pub struct Unattended;
 
-impl Progress for Nobody {
-    fn say(&self, _: &str) {}
+impl Progress for Unattended {
+    fn info(&self, _: &str) {}
 }
 
-impl Questions for Nobody {
+impl Questions for Unattended {
     fn ask(&self, question: &str, _: &Cancel) -> Result<String> {
         Err(WorkflowError::Unanswered { question: question.into() })
     }
 }
 
 impl Context<'static> {
-    /// For work that nobody watches.
+    /// Discards progress; prompts fail.
     pub fn unattended() -> Self {
-        Self::new(&Nobody, &Nobody, Cancel::default())
+        Self::new(&Unattended, &Unattended, Cancel::default())
     }
 }
 
@@ -124,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wish_is_heard_by_every_copy() {
+    fn cancelling_reaches_every_clone() {
         let context = Context::unattended();
         let copy = context.cancel.clone();
         assert!(context.cancel.check("waiting").is_ok());
@@ -134,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_answers() {
+    fn unattended_prompts_fail() {
         let context = Context::unattended();
         let error = context.questions.ask("ready?", &context.cancel).unwrap_err();
         assert!(matches!(error, WorkflowError::Unanswered { question } if question == "ready?"));

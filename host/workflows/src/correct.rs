@@ -94,7 +94,7 @@ pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<Correct
     let bytes = format.encode(corrected.view())?;
     context.cancel.check("correcting the map")?;
     staging::write_file(&settings.out, &bytes)?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     let changes: Vec<f64> = depth
         .iter()
         .zip(&corrected)

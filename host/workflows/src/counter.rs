@@ -40,14 +40,14 @@ impl<'a> Counter<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Cancel, Nobody, Progress};
+    use crate::context::{Cancel, Unattended, Progress};
     use rayon::prelude::*;
 
     #[derive(Default)]
     struct Heard(Mutex<Vec<(usize, Option<usize>)>>);
 
     impl Progress for Heard {
-        fn say(&self, _: &str) {}
+        fn info(&self, _: &str) {}
         fn advance(&self, _: &'static str, done: usize, total: Option<usize>) {
             self.0.lock().unwrap_or_else(PoisonError::into_inner).push((done, total));
         }
@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn counts_rise_by_one_whoever_counts() {
         let heard = Heard::default();
-        let context = Context::new(&heard, &Nobody, Cancel::default());
+        let context = Context::new(&heard, &Unattended, Cancel::default());
         let counter = Counter::new(&context, "clips");
         (0..100).into_par_iter().for_each(|_| counter.one(Some(100)));
         let expected: Vec<_> = (1..=100).map(|done| (done, Some(100))).collect();

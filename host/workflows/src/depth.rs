@@ -283,7 +283,7 @@ pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFi
     }
     let out = settings.out.clone().unwrap_or_else(|| pair::default_folder(&settings.far));
     Results::new(settings, &inputs, &computed, &warnings)?.write(&out, context)?;
-    context.say(&format!("wrote {}", out.display()));
+    context.info(&format!("wrote {}", out.display()));
     let (height, width) = computed.map.depth_mm.dim();
     Ok(DepthFigures {
         seconds: rounded(seconds, 6),
@@ -497,7 +497,7 @@ mod tests {
     use farnear_files::image_file::encode_png;
 
     use super::*;
-    use crate::context::{Cancel, Nobody, Progress};
+    use crate::context::{Cancel, Unattended, Progress};
 
     const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
                           [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
@@ -529,7 +529,7 @@ mod tests {
     struct Impatient(Cancel);
 
     impl Progress for Impatient {
-        fn say(&self, _: &str) {
+        fn info(&self, _: &str) {
             self.0.cancel();
         }
     }
@@ -543,7 +543,7 @@ mod tests {
         early.cancel.cancel();
         let late = Cancel::default();
         let impatient = Impatient(late.clone());
-        let late = Context::new(&impatient, &Nobody, late);
+        let late = Context::new(&impatient, &Unattended, late);
         for (context, stage) in [(&early, "reading the pair"), (&late, "writing the results")] {
             let error = compute(&settings, context).unwrap_err();
             assert!(matches!(&error, WorkflowError::Cancelled { during } if during == stage), "{error}");

@@ -98,7 +98,7 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
         None => 0.0,
     };
     context.cancel.check("measuring the stack")?;
-    context.say(&format!("measuring {} images by {}", images.len(), settings.computation.measure));
+    context.info(&format!("measuring {} images by {}", images.len(), settings.computation.measure));
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
     let mut map = focus_stack::depth_from_stack(&views, &settings.computation)?;
     if let Some(unseen) = &unseen {
@@ -141,7 +141,7 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
     staging.write("view.png", &view::view_png_in(figures.unit, depth.view(), map.reliability.view())?)?;
     staging.write("stack.toml", toml::to_string(&record)?.as_bytes())?;
     staging.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(figures)
 }
 

@@ -25,13 +25,13 @@
 //! # use std::sync::Mutex;
 //! # use farnear_protocol::message::Axis;
 //! # use farnear_scripted_board::{Faults, plug_in};
-//! use farnear_workflows::{Cancel, Context, Nobody, Progress, rig};
+//! use farnear_workflows::{Cancel, Context, Unattended, Progress, rig};
 //!
 //! #[derive(Default)]
 //! struct Face(Mutex<Vec<String>>);
 //!
 //! impl Progress for Face {
-//!     fn say(&self, what: &str) {
+//!     fn info(&self, what: &str) {
 //!         self.0.lock().expect("one thread").push(what.into());
 //!     }
 //! }
@@ -45,7 +45,7 @@
 //! let face = Face::default();
 //! // Whoever holds a clone of `cancel` can stop the rig, from any thread.
 //! let cancel = Cancel::default();
-//! let context = Context::new(&face, &Nobody, cancel.clone());
+//! let context = Context::new(&face, &Unattended, cancel.clone());
 //! let moved = rig::motion::move_to(&settings, &context)?;
 //! assert!(matches!(moved, rig::motion::MoveFigures::One(lens) if lens.measured_um == 1_000.125));
 //! assert!(face.0.lock().expect("one thread").iter().any(|said| said.starts_with("homing the lens stage")));
@@ -93,7 +93,7 @@ pub mod simulator;
 pub mod sun;
 pub mod target;
 
-pub use context::{Cancel, Context, Nobody, Progress, Questions};
+pub use context::{Cancel, Context, Unattended, Progress, Questions};
 pub use error::{Result, WorkflowError};
 
 /// What records say made them.

@@ -134,7 +134,7 @@ pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<Opera
     context.cancel.check("designing the operators")?;
     let write = |file: &Path, bytes: &[u8]| -> Result<()> {
         staging::write_file(file, bytes)?;
-        context.say(&format!("wrote {}", file.display()));
+        context.info(&format!("wrote {}", file.display()));
         Ok(())
     };
     if let Some(out) = &settings.out {

@@ -117,7 +117,7 @@ impl Rig {
         };
         client.interrupt_by(context.cancel.flag());
         for note in [client.firmware_note(), client.link_note()].into_iter().flatten() {
-            context.say(&note);
+            context.info(&note);
         }
         Ok(Self { client, emulation })
     }

@@ -144,7 +144,7 @@ impl Simulator {
     /// [`SimulatorError`], [`crate::WorkflowError::Cancelled`].
     pub fn start(scenery: &Scenery, optics: Option<(&Path, Psf)>, context: &Context<'_>) -> Result<Self> {
         let program = find()?;
-        context.say(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
+        context.info(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
         let mut command = Command::new(&program);
         let record = scenery.decided(optics.map_or(USUAL_PSF, |(_, psf)| psf));
         let scene = if scenery.packed_scene.is_some() { "-" } else { record.scene.as_str() };

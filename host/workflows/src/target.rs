@@ -222,7 +222,7 @@ pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFi
         return Err(WorkflowError::parameter("paper", settings.paper, expected));
     }
     if cell_px > COARSE_PX {
-        context.say(&format!(
+        context.info(&format!(
             "the printer's dots make cells of {cell_px:.1} px, and depth wants some {CELL_PX}: more dots per inch, or a larger distance, give finer ones"
         ));
     }
@@ -230,7 +230,7 @@ pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFi
     let label = format!("farnear target, cells of {cell_mm:.3} mm, seed {}", settings.seed);
     let bytes = page::pdf(&texture, settings.paper, cell_mm, &label);
     staging::write_file(&settings.out, &bytes)?;
-    context.say(&format!("wrote {}; print it at its actual size", settings.out.display()));
+    context.info(&format!("wrote {}; print it at its actual size", settings.out.display()));
     Ok(TargetFigures {
         pixel_on_target_mm: rounded(pixel_mm, 4),
         cell_mm: rounded(cell_mm, 4),

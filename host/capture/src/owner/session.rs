@@ -8,7 +8,7 @@ use std::{
 
 use farnear_protocol::message::{Hello, LinkRate, ResetCause};
 
-use super::{Note, Owner};
+use super::{Message, Owner};
 use crate::{
     error::ClientError,
     events::Events,
@@ -101,7 +101,7 @@ impl Owner {
 
     pub(super) fn end_session(&mut self, broken: Break) {
         for (_, work) in std::mem::take(&mut self.works) {
-            let _ = work.notes.send(Note::Broken(broken.clone()));
+            let _ = work.messages.send(Message::Broken(broken.clone()));
         }
         if broken.has_no_line() {
             self.link.close();

@@ -78,7 +78,7 @@ fn events_that_the_board_forgot_are_told_and_do_not_end_it() {
     // Event 0 is the start: 3 and 4 tell of the frames 2 and 3.
     let faults = Faults { lose_events: vec![3, 4], forgetful: true, ..Faults::default() };
     let frames = run(faults, Losing::default(), 6).unwrap();
-    assert_eq!(frames, [Ok(0), Ok(1), Err(Loss::Untold), Err(Loss::Untold), Ok(4), Ok(5)]);
+    assert_eq!(frames, [Ok(0), Ok(1), Err(Loss::EventLost), Err(Loss::EventLost), Ok(4), Ok(5)]);
 }
 
 #[test]

@@ -95,7 +95,7 @@ fn a_checklist_without_hands_stops_at_what_fails() {
     let images = Folder::new();
     let camera = format!("folder:{}", images.text(""));
     let check =
-        ["rig", "check", "--port", &port, "--no-hands", "--resting-only", "--json", "--camera", &camera];
+        ["rig", "check", "--port", &port, "--no-actuation", "--resting-only", "--json", "--camera", &camera];
     // The scripted board has no memory worth the name: its counter of boots stands still.
     let output = farnear(&check).output().expect("it starts");
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("figures");

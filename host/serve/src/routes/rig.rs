@@ -297,9 +297,9 @@ async fn checklist(
 ) -> Result<Json<Begun>, Failure> {
     driver(&app, &headers)?;
     let rig = connected(&app)?;
-    let hands = !rig.is_emulated();
+    let actuation = !rig.is_emulated();
     let settings =
-        CheckSettings { rig: RigAddress::Open(rig), camera: app.camera(), resting_only: false, hands };
+        CheckSettings { rig: RigAddress::Open(rig), camera: app.camera(), resting_only: false, actuation };
     let work = move |_: &App, context: &Context<'_>| figures(check::check(&settings, context)?);
     begin(&app, Task { kind: "check", title: "Bring-up checklist".into(), work: Box::new(work) })
 }

@@ -15,7 +15,7 @@ use farnear_protocol::Micros;
 use farnear_scripted_board::{Faults, plug_in};
 use farnear_serve::{Listen, ServeSettings, serve};
 use farnear_workflows::{
-    Cancel, Context, Nobody,
+    Cancel, Context, Unattended,
     rig::{
         RigAddress,
         camera::{CameraAddress, CameraSettings},
@@ -68,7 +68,7 @@ impl Served {
         let (cancel, (sender, address)) = (Cancel::default(), channel());
         let wish = cancel.clone();
         let thread = std::thread::spawn(move || {
-            let context = Context::new(&Nobody, &Nobody, wish);
+            let context = Context::new(&Unattended, &Unattended, wish);
             serve(settings, &context, |address| sender.send(address.to_owned()).unwrap()).unwrap();
         });
         let address = address.recv_timeout(PATIENCE).unwrap();

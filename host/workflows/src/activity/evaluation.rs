@@ -156,7 +156,7 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     };
     if let (Some(staged), Some(out)) = (out, &settings.out) {
         keep(&figures, &outcome, staged)?;
-        context.say(&format!("wrote {}", out.display()));
+        context.info(&format!("wrote {}", out.display()));
     }
     figures.seconds_per_frame = seconds_per_frame(learned, &settings.method, &folders, context)?;
     figures.seconds = rounded(start.elapsed().as_secs_f64(), 3);

@@ -118,7 +118,7 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
         .into());
     }
     if !not_known.is_empty() {
-        context.say(&format!("the model does not know: {}", not_known.join(", ")));
+        context.info(&format!("the model does not know: {}", not_known.join(", ")));
     }
     let figures = figures(&known, &strange, &among, not_known);
     if let (Some(staged), Some(out)) = (out, &settings.out) {
@@ -126,7 +126,7 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
         staged.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
         staged.write("wrong.csv", wrong(&known, &among).as_bytes())?;
         staged.finish()?;
-        context.say(&format!("wrote {}", out.display()));
+        context.info(&format!("wrote {}", out.display()));
     }
     Ok(figures)
 }

@@ -203,11 +203,11 @@ pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<Synt
             let views = people.iter_mut().chain(&mut others).flat_map(|clip| &mut clip.views);
             views.for_each(|view| view.boxes = None);
         }
-        context.say(&format!("training {file}"));
+        context.info(&format!("training {file}"));
         made.push(one(file, mode, &people, &others, settings.passes, &out, context)?);
     }
     out.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(SyntheticTrainingFigures {
         clips: people.len(),
         calibration_clips: others.len(),

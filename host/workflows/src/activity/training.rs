@@ -94,7 +94,7 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
     let trained = Recogniser::train_searched(&clips, &experiment, SCALING, &watched::Training::new(context));
     let (model, inner_accuracy) = watched::outcome(trained, context, "training").about(|| what)?;
     staging::write_file(&settings.out, &model.to_bytes()?)?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     let (gamma, condition_number) = match &model.space.map {
         Map::Rbf(rbf) => (Some(rbf.gamma), Some(rbf.condition)),
         Map::Pca(_) => (None, None),

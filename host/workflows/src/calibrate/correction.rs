@@ -119,7 +119,7 @@ pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Re
     };
     context.cancel.check("learning the correction")?;
     staging::write_file(&settings.out, toml::to_string(&correction)?.as_bytes())?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(figures)
 }
 

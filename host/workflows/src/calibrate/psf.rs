@@ -172,7 +172,7 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
     let psf = rounded_psf(found.psf);
     if let Some(out) = &settings.out {
         staging::write_file(out, toml::to_string(&optics.with_psf(psf))?.as_bytes())?;
-        context.say(&format!("wrote {}", out.display()));
+        context.info(&format!("wrote {}", out.display()));
     }
     let (p, k) = match psf {
         Psf::Gaussian { k } => (None, k),

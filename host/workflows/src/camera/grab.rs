@@ -125,7 +125,7 @@ pub fn grab(settings: &GrabSettings, context: &Context<'_>) -> Result<GrabFigure
     }
     staged.write(GRAB_FILE, toml::to_string(&record)?.as_bytes())?;
     staged.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     figures(&record).ok_or_else(|| WorkflowError::parameter("frames", 0, "expected 1 or more"))
 }
 

@@ -82,7 +82,7 @@ pub fn live(
                 line(&figures(&image, settings.measure, rate))
                     .map_err(|source| WorkflowError::Sink { source })?;
             }
-            None => context.say("no picture came"),
+            None => context.info("no picture came"),
         }
         (all, since, frames) = (all + frames, Instant::now(), 0);
     }

@@ -36,7 +36,7 @@ pub fn alarms(rig: &RigAddress, clear: Option<u32>, context: &Context<'_>) -> Re
     let rig = Rig::connect(rig, None, context)?;
     if let Some(number) = clear {
         rig.client.clear_alarm(number)?;
-        context.say(&format!(
+        context.info(&format!(
             "alarm {number} is cleared; a stage that moved has lost its position: home it again"
         ));
     }

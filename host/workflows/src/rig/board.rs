@@ -65,7 +65,7 @@ pub fn reset(rig: &RigAddress, context: &Context<'_>) -> Result<ResetFigures> {
     rig.client.reboot()?;
     let alarm = rig.client.status()?.alarm;
     if let Some(record) = alarm {
-        context.say(&format!("alarm {} is latched: {}", record.number, alarm_text(record.alarm)));
+        context.info(&format!("alarm {} is latched: {}", record.number, alarm_text(record.alarm)));
     }
     let hello = rig.client.hello();
     Ok(ResetFigures {

@@ -1,9 +1,9 @@
 //! The bring-up checklist: its steps in order, each with a verdict and what was found.
 //!
-//! Before each step with somebody's hands in it the person is asked; what the board can tell by itself is measured. On an
-//! emulated rig nobody has hands: those steps are passed over and say what shows the same thing later.
+//! Prompts the person before each step that needs actuation by hand and measures the rest. On an emulated rig these steps
+//! are skipped; their detail names the later step that shows the same.
 
-mod hands;
+mod actuation;
 mod moving;
 mod resting;
 
@@ -50,16 +50,16 @@ const PHASES: [Phase; 3] = [
         moves: false,
         in_turn: false, // each may fail without harm to the next
         steps: &[
-            Step { name: "end switches by hand", check: hands::switches },
-            Step { name: "emergency stop", check: hands::emergency_stop },
-            Step { name: "encoder direction", check: hands::encoders },
+            Step { name: "end switches by hand", check: actuation::switches },
+            Step { name: "emergency stop", check: actuation::emergency_stop },
+            Step { name: "encoder direction", check: actuation::encoders },
         ],
     },
     Phase {
         moves: true,
         in_turn: true,
         steps: &[
-            Step { name: "motors on", check: hands::connect_motors },
+            Step { name: "motors on", check: actuation::connect_motors },
             Step { name: "first slow homing", check: moving::slow_homing },
             Step { name: "homing repeats", check: moving::homing_repeats },
             Step { name: "a move at full speed", check: moving::full_speed },
@@ -80,8 +80,8 @@ pub struct CheckSettings {
     pub camera: CameraSettings,
     /// Only the steps with the motors disconnected: nothing moves.
     pub resting_only: bool,
-    /// Whether somebody is there to press switches; never at an emulated rig.
-    pub hands: bool,
+    /// Include the steps that a person actuates; never on an emulated rig.
+    pub actuation: bool,
 }
 
 /// How a step ended.
@@ -154,7 +154,7 @@ struct Checkup<'a> {
     settings: &'a CheckSettings,
     context: &'a Context<'a>,
     /// Whether somebody can press switches.
-    hands: bool,
+    actuation: bool,
     outcomes: Vec<Outcome>,
 }
 
@@ -164,14 +164,14 @@ struct Checkup<'a> {
 /// Camera and rig that are not there, and cancelling. Any other error is the failure of its step.
 pub fn check(settings: &CheckSettings, context: &Context<'_>) -> Result<Checklist> {
     let equipped = settings.camera.connect(&settings.rig, None, context)?;
-    let hands = settings.hands && !equipped.rig.client.hello().emulated;
-    let mut checkup = Checkup { equipped, settings, context, hands, outcomes: Vec::new() };
+    let actuation = settings.actuation && !equipped.rig.client.hello().emulated;
+    let mut checkup = Checkup { equipped, settings, context, actuation, outcomes: Vec::new() };
     for phase in PHASES.iter().filter(|phase| !(settings.resting_only && phase.moves)) {
         if !checkup.go_through(phase)? {
             break;
         }
     }
-    context.say("");
+    context.info("");
     let count = |verdict| checkup.outcomes.iter().filter(|outcome| outcome.verdict == verdict).count();
     let failed = count(Verdict::Failed);
     let latched = || checkup.client().status().ok()?.alarm.map(|record| record.number);
@@ -203,20 +203,20 @@ impl Checkup<'_> {
 
     /// Carries out a step; gives whether it did not fail.
     fn take(&mut self, step: &Step) -> Result<bool> {
-        self.context.say(&format!("\n{}. {}", self.outcomes.len() + 1, step.name));
+        self.context.info(&format!("\n{}. {}", self.outcomes.len() + 1, step.name));
         let (verdict, detail) = match (step.check)(self) {
             Ok(found) => found,
             Err(error) if self.context.cancel.is_cancelled() => return Err(error),
             Err(error) => (Verdict::Failed, error.to_string()),
         };
-        self.context.say(&format!("   {}: {detail}", verdict.text()));
+        self.context.info(&format!("   {}: {detail}", verdict.text()));
         self.outcomes.push(Outcome { step: step.name, verdict, detail });
         Ok(verdict != Verdict::Failed)
     }
 
-    /// Says what to do with the hands while the board is watched.
-    fn say(&self, what: &str) {
-        self.context.say(&format!("   {what}"));
+    /// Tells the person what to actuate while the board is polled.
+    fn info(&self, what: &str) {
+        self.context.info(&format!("   {what}"));
     }
 
     /// Asks the person to do something and waits until it is done.

@@ -125,7 +125,7 @@ pub fn run(settings: &ContinuousSettings, context: &Context<'_>) -> Result<Conti
     let lens = optics.as_ref().map(GivenOptics::for_emulation);
     let mut equipped = settings.camera.connect(&settings.rig, lens, context)?;
     let ready = make_ready(&equipped, program, optics, settings, context)?;
-    context.say("capturing; Ctrl-C ends it");
+    context.info("capturing; Ctrl-C ends it");
     let mut tally = Tally::new(pace.period, &ready.shots);
     let captured = capture(&mut equipped, &ready, (settings, pace), &mut tally, folder.as_mut(), context);
     match captured {
@@ -134,7 +134,7 @@ pub fn run(settings: &ContinuousSettings, context: &Context<'_>) -> Result<Conti
     }
     if let Some(folder) = folder {
         folder.finish()?;
-        context.say(&format!("wrote {}", settings.out.as_deref().unwrap_or(".".as_ref()).display()));
+        context.info(&format!("wrote {}", settings.out.as_deref().unwrap_or(".".as_ref()).display()));
     }
     Ok(tally.figures())
 }
@@ -146,7 +146,7 @@ fn make_ready(
     settings: &ContinuousSettings,
     context: &Context<'_>,
 ) -> Result<Ready> {
-    let (client, say) = (&equipped.rig.client, &mut |what: &str| context.say(what));
+    let (client, say) = (&equipped.rig.client, &mut |what: &str| context.info(what));
     let Some(optics) = optics else {
         ensure_homed(client, say)?;
         return Ok(Ready { shots: program.unwrap_or_default(), pair: None });

@@ -100,13 +100,13 @@ pub fn correct(settings: &BoardCorrectSettings, context: &Context<'_>) -> Result
     let codes = encode(depth.view(), board.scale);
     let corrected = rig.client.correct_codes(codes.view(), &mut |row| {
         if row % 60 == 0 || row == height {
-            context.say(&format!("{row} of {height} rows"));
+            context.info(&format!("{row} of {height} rows"));
         }
     })?;
     let seconds = begin.elapsed().as_secs_f64();
     let corrected = decode(corrected.view(), board.scale);
     staging::write_file(&settings.out, &format.encode(corrected.view())?)?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     let (different_pixels, first_difference) = compare(&corrected, &expected);
     Ok(BoardCorrectFigures {
         method: correction.method().to_string(),

@@ -80,7 +80,7 @@ pub fn fit(settings: &FitSettings, context: &Context<'_>) -> Result<FitFigures> 
     let rows = targets.len() * usize::from(frame.height().div_ceil(settings.step));
     let say_row = &mut |row| {
         if row % 200 == 0 || row == rows {
-            context.say(&format!("{row} of {rows} rows"));
+            context.info(&format!("{row} of {rows} rows"));
         }
     };
     let FitSettings { method, step, store, .. } = *settings;

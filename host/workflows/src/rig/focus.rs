@@ -93,14 +93,14 @@ pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFig
         image_wait: settings.camera.image_wait,
         region: settings.region,
     };
-    let found = find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.say(what))?;
+    let found = find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.info(what))?;
     figures(given.optics, &found)
 }
 
 /// Homes what is not homed; gives whether nothing had to be.
 fn ensure_ready(client: &Client, context: &Context<'_>) -> Result<bool> {
     let before = client.status()?.coarse.state;
-    ensure_homed(client, &mut |what| context.say(what))?;
+    ensure_homed(client, &mut |what| context.info(what))?;
     Ok(before == client.status()?.coarse.state)
 }
 
@@ -110,7 +110,7 @@ fn begin_at(client: &Client, start_mm: f64, context: &Context<'_>) -> Result<()>
     let middle = i64::from(limits.fine_min.0 + limits.fine_max.0) / 2;
     let coarse_nm = start_mm * 1e6 - (base_nm(client, &client.status()?) + middle) as f64;
     let coarse = nanometres("start-mm", coarse_nm / 1e3)?;
-    context.say(&format!("starting at a sensor distance of {start_mm:.4} mm"));
+    context.info(&format!("starting at a sensor distance of {start_mm:.4} mm"));
     client.move_to(Axis::SensorCoarse, coarse)?;
     client.move_to(Axis::SensorFine, Nanometres(middle as i32))?;
     Ok(())

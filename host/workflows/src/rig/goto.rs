@@ -57,10 +57,10 @@ pub fn goto(settings: &GotoSettings, context: &Context<'_>) -> Result<GotoFigure
     let limits = client.hello().limits;
     // What the stage cannot reach is said before anything moves.
     coarse_for(&pair, base_when_homed_nm(client, &client.status()?), &limits)?;
-    ensure_homed(client, &mut |what| context.say(what))?;
+    ensure_homed(client, &mut |what| context.info(what))?;
     let base = base_nm(client, &client.status()?);
     let target = coarse_for(&pair, base, &limits)?;
-    context.say(&format!("moving the coarse stage to {:.3} um", um(target)));
+    context.info(&format!("moving the coarse stage to {:.3} um", um(target)));
     let coarse = client.move_to(Axis::SensorCoarse, target)?;
     let sensor_mm = match settings.focus {
         Focus::Far => pair.far_mm,

@@ -75,7 +75,7 @@ pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<P
         ..Exposures::default()
     };
     let cameras: [&mut dyn Camera; 2] = [equipped.camera.as_mut(), second.as_mut()];
-    let say = &mut |what: &str| context.say(what);
+    let say = &mut |what: &str| context.info(what);
     let client = &equipped.rig.client;
     let mut pair = capture_behind_mirror(client, cameras, &sensor, further_um * 1e-3, &exposures, say)?;
     if settings.mirrored {
@@ -88,7 +88,7 @@ pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<P
         second_mirrored: settings.mirrored,
     });
     finish_folder(folder, &pair, &record)?;
-    context.say(&format!("wrote {}", out.display()));
+    context.info(&format!("wrote {}", out.display()));
     Ok(PairFigures::from(&pair))
 }
 

@@ -61,7 +61,7 @@ pub fn watch(
                 error @ (CameraError::Skipped { .. } | CameraError::Incomplete { .. }),
             ))) if lost + 1 < LOST_MAX => {
                 lost += 1;
-                context.say(&format!("live image: {error}"));
+                context.info(&format!("live image: {error}"));
             }
             exposed => exposed?,
         }

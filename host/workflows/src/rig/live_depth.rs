@@ -69,7 +69,7 @@ pub fn watch(
         ..Exposures::default()
     };
     let EquippedRig { camera, rig } = &mut equipped;
-    let shots = reach(&rig.client, &sensor, &exposures, &mut |what| context.say(what))?.shots;
+    let shots = reach(&rig.client, &sensor, &exposures, &mut |what| context.info(what))?.shots;
     let pace = Pace { period: Micros(0), exposures: 0 };
     let wait = settings.camera.image_wait;
     let mut stream = Continuous::start(&rig.client, camera.as_mut(), &shots, pace, wait)?;

@@ -78,7 +78,7 @@ pub fn follow(settings: &LogSettings, sink: &mut dyn LogSink, context: &Context<
             last_nudge = Instant::now();
         }
     }
-    context.say(&format!("{} lines", reader.lines));
+    context.info(&format!("{} lines", reader.lines));
     Ok(reader.lines)
 }
 
@@ -109,7 +109,7 @@ impl<'a> Reader<'a> {
 
     fn take(&mut self, part: &LogPart) -> Result<()> {
         if part.missing > 0 {
-            self.context.say(&format!("{} pieces of the log are missing", part.missing));
+            self.context.info(&format!("{} pieces of the log are missing", part.missing));
             // What has come of a frame is of no use without its rest.
             self.decoder = self.table.map(Table::new_stream_decoder);
         }
@@ -125,7 +125,7 @@ impl<'a> Reader<'a> {
                 Err(DecodeError::UnexpectedEof) => break,
                 // A damaged frame is passed over; the next one begins behind it.
                 Err(DecodeError::Malformed) => {
-                    self.context.say("a piece of the log is damaged, or of another firmware");
+                    self.context.info("a piece of the log is damaged, or of another firmware");
                 }
             }
         }

@@ -53,7 +53,7 @@ pub enum MechanicsFigures {
 pub fn measure(rig: &RigAddress, routine: Routine, context: &Context<'_>) -> Result<MechanicsFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if matches!(routine, Routine::Backlash { .. }) {
-        ensure_homed(&rig.client, &mut |what| context.say(what))?;
+        ensure_homed(&rig.client, &mut |what| context.info(what))?;
     }
     Ok(match rig.client.calibrate(routine)? {
         Calibration::Travel { axis, length } => {

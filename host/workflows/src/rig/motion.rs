@@ -101,7 +101,7 @@ pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFig
         .collect::<Result<_>>()?;
     let rig = Rig::connect(&settings.rig, None, context)?;
     if settings.home {
-        ensure_homed(&rig.client, &mut |what| context.say(what))?;
+        ensure_homed(&rig.client, &mut |what| context.info(what))?;
     }
     let mut moved = Vec::new();
     for ((axis, _), work) in targets.iter().zip(rig.client.start_moves(&targets)?) {

@@ -83,7 +83,7 @@ impl OpenRig {
         let mut client = self.client().clone();
         client.interrupt_by(context.cancel.flag());
         if let Some(note) = client.port_note() {
-            context.say(&note);
+            context.info(&note);
         }
         Rig { client, emulation: self.0.emulation.clone() }
     }

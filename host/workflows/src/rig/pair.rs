@@ -107,7 +107,7 @@ pub fn capture_seen(
     }
     on_pair(&pair);
     finish_folder(folder, &pair, &record)?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(PairFigures::from(&pair))
 }
 
@@ -155,7 +155,7 @@ fn take_averaged(
         ..Exposures::default()
     };
     let EquippedRig { camera, rig } = equipped;
-    let say = &mut |what: &str| context.say(what);
+    let say = &mut |what: &str| context.info(what);
     let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;
     let record = noted(&pair, equipped, optics, settings, averaged);
     Ok((pair, record))

@@ -89,10 +89,10 @@ pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<Sequenc
     let folder = begin_folder(&settings.out)?;
     let lens = optics.as_ref().map(GivenOptics::for_emulation);
     let mut rig = settings.camera.connect(&settings.rig, lens, context)?;
-    ensure_homed(&rig.rig.client, &mut |what| context.say(what))?;
+    ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
     let mut taken = Vec::new();
     for run in 0..settings.runs {
-        context.say(&format!("running {} shots", shots.len()));
+        context.info(&format!("running {} shots", shots.len()));
         let name = |name: String| if settings.runs > 1 { format!("run-{run:02}-{name}") } else { name };
         run_once(&mut rig, &shots, settings, name, &mut taken)?;
     }
@@ -103,7 +103,7 @@ pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<Sequenc
     let record = record_of_sequence(&taken, &rig.rig.client, rig.circumstances(psf, table))
         .ok_or(CaptureError::Count { told: 0, asked: shots.len() })?;
     finish_sequence(folder, &taken, &record)?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(figures(&shots, &taken))
 }
 

@@ -99,7 +99,7 @@ pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<Targe
     let (mut captured, mut error) = (0, MeanSquare::default());
     for (number, true_mm) in distances_mm.iter().copied().enumerate() {
         if list.pattern.iter().any(|entry| (entry.true_mm - true_mm).abs() < 1e-6) {
-            context.say(&format!("target {} at {true_mm} mm is there already", number + 1));
+            context.info(&format!("target {} at {true_mm} mm is there already", number + 1));
             continue;
         }
         let name = format!("target-{true_mm:.3}");
@@ -115,7 +115,7 @@ pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<Targe
         list.pattern.push(Entry { depth: Path::new(&name).join("depth.npy"), true_mm });
         list.pattern.sort_by(|a, b| a.true_mm.total_cmp(&b.true_mm));
         staging::write_file(&settings.out.join(LIST), toml::to_string(&list)?.as_bytes())?;
-        context.say(&format!("target {} of {} at {true_mm} mm is captured", number + 1, distances_mm.len()));
+        context.info(&format!("target {} of {} at {true_mm} mm is captured", number + 1, distances_mm.len()));
     }
     Ok(TargetFigures {
         targets: list.pattern.len(),
@@ -146,7 +146,7 @@ impl Series<'_> {
             number + 1
         );
         if !self.settings.ask {
-            self.context.say(&place);
+            self.context.info(&place);
             return Ok(());
         }
         let question = format!("{place}, and press Enter: ");

@@ -153,7 +153,7 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     light.check(camera.subject.height_m, &camera.camera)?;
     let sun = sun_of(light, &camera);
     if let Some(Sun { elevation_deg, in_view: true, .. }) = sun {
-        context.say(&format!(
+        context.info(&format!(
             "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
         ));
     }
@@ -173,10 +173,10 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     }
     out.write("shadow.toml", toml::to_string(&index)?.as_bytes())?;
     out.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     if let (Some(stages), Some(folder)) = (work.stages.take(), &settings.stages) {
         stages.finish()?;
-        context.say(&format!("wrote {}", folder.display()));
+        context.info(&format!("wrote {}", folder.display()));
     }
     let removed: Vec<f64> =
         index.frame.iter().filter_map(|entry| Some(entry.cut.as_ref()?.removed_percent)).collect();

@@ -165,7 +165,7 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
     };
     check_fit(&template, &recording, &settings.file)?;
     if settings.template.is_none() {
-        context.say(&format!("{shown}: the template `{}` fits best", template.name));
+        context.info(&format!("{shown}: the template `{}` fits best", template.name));
     }
     let warnings: Vec<String> =
         remarks(&recording).into_iter().map(|remark| format!("{shown}: {remark}")).collect();
@@ -185,7 +185,7 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         None => job.sequences(&views, &out)?,
     };
     for part in &missing.always {
-        context.say(&format!("{shown}: no marker of `{part}` was recorded; it is not drawn"));
+        context.info(&format!("{shown}: no marker of `{part}` was recorded; it is not drawn"));
     }
     let index = Index {
         template: &template.name,
@@ -205,7 +205,7 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         out.write("samples.toml", rows.collect::<String>().as_bytes())?;
     }
     out.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(MarkersFigures {
         views: views.len(),
         frames: frames.len(),

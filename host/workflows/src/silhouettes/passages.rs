@@ -106,7 +106,7 @@ pub fn cut(settings: &PassagesSettings, context: &Context<'_>) -> Result<Passage
     }
     out.write("samples.toml", samples.as_bytes())?;
     out.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(PassagesFigures {
         masks: files.len(),
         passages: passages.len(),

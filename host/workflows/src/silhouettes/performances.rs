@@ -99,7 +99,7 @@ pub(super) fn write(
     counter.check(DURING)?;
     out.write("samples.toml", samples(performances, &names, views.len()).as_bytes())?;
     out.finish()?;
-    context.say(&format!("wrote {}", drawing.out.display()));
+    context.info(&format!("wrote {}", drawing.out.display()));
     let distinct =
         |of: fn(&Performance) -> &String| performances.iter().map(of).collect::<BTreeSet<_>>().len();
     Ok(PerformancesFigures {

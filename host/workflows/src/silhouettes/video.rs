@@ -155,7 +155,7 @@ pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoF
         labels.finish()?;
     }
     out.finish()?;
-    context.say(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", settings.out.display()));
     Ok(figures)
 }
 

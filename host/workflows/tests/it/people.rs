@@ -10,7 +10,7 @@ use std::{
 use farnear_recognition::classifier::Family;
 use farnear_recognition::frames::Mode;
 use farnear_workflows::{
-    Cancel, Context, Nobody, Progress, Result, WorkflowError,
+    Cancel, Context, Unattended, Progress, Result, WorkflowError,
     activity::{
         evaluation::{self, EvaluationSettings, LearnFrom},
         method::{Adaptation, Method, Pattern},
@@ -37,7 +37,7 @@ impl Listener {
     }
 
     fn context(&self) -> Context<'_> {
-        Context::new(self, &Nobody, self.cancel.clone())
+        Context::new(self, &Unattended, self.cancel.clone())
     }
 
     fn note(&self, what: String) {
@@ -50,7 +50,7 @@ impl Listener {
 }
 
 impl Progress for Listener {
-    fn say(&self, what: &str) {
+    fn info(&self, what: &str) {
         self.note(what.into());
     }
 

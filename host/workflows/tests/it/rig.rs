@@ -30,14 +30,14 @@ impl Face {
 }
 
 impl Progress for Face {
-    fn say(&self, what: &str) {
+    fn info(&self, what: &str) {
         self.said.lock().unwrap().push(what.into());
     }
 }
 
 impl Questions for Face {
     fn ask(&self, question: &str, _: &Cancel) -> Result<String> {
-        self.say(question);
+        self.info(question);
         Ok("\n".into())
     }
 }

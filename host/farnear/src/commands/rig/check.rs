@@ -21,9 +21,9 @@ pub struct Arguments {
     /// Only the steps with the motors disconnected: nothing moves.
     #[arg(long)]
     resting_only: bool,
-    /// Ask nothing: pass over what needs hands.
+    /// Skip the steps that a person actuates (switches, shafts).
     #[arg(long)]
-    no_hands: bool,
+    no_actuation: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -35,7 +35,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         rig: arguments.target.address()?,
         camera: arguments.camera.settings()?,
         resting_only: arguments.resting_only,
-        hands: !arguments.no_hands,
+        actuation: !arguments.no_actuation,
     };
     let list = check::check(&settings, &terminal::context()?)?;
     report::print(&list, arguments.json)?;

@@ -39,7 +39,7 @@ fn speed_key(axis: Axis) -> SettingKey {
 /// Homes at a twelfth of the speed, so that what is wired wrongly has time to be noticed.
 pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
     let axes = steppers(&checkup.client().hello().capabilities);
-    if checkup.hands {
+    if checkup.actuation {
         checkup
             .ask("keep a hand on the emergency stop: each stage now goes slowly towards its home switch")?;
     }
@@ -52,7 +52,7 @@ pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
         let restored = client.set_setting(speed_key(*axis), usual.value);
         homed?;
         restored?;
-        if checkup.hands && !checkup.yes(&format!("did the {} move smoothly?", axis_name(*axis)))? {
+        if checkup.actuation && !checkup.yes(&format!("did the {} move smoothly?", axis_name(*axis)))? {
             return failed(format!("the {} did not move smoothly", axis_name(*axis)));
         }
     }

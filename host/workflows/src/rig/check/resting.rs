@@ -43,7 +43,7 @@ pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
         if bad > 0 || round == ROUNDS {
             return failed(format!("{said}: is the cable short and whole, is a hub in between?"));
         }
-        checkup.say(&format!("{said}; once more, for it may be that this computer was late"));
+        checkup.info(&format!("{said}; once more, for it may be that this computer was late"));
         round += 1;
     }
 }

@@ -100,7 +100,7 @@ impl Tally {
                     Loss::Board(DropReason::NotSettled { .. }) => counted.dropped_not_settled += 1,
                     Loss::Board(DropReason::CameraBusy) => counted.dropped_camera_busy += 1,
                     Loss::Board(DropReason::NoStrobe) => counted.dropped_no_strobe += 1,
-                    Loss::Untold => counted.lost_events += 1,
+                    Loss::EventLost => counted.lost_events += 1,
                     Loss::Image { .. } => counted.lost_images += 1,
                 }
                 return;

@@ -62,7 +62,7 @@ impl Folder {
             Outcome::Dropped { number, loss } => {
                 let why = match loss {
                     Loss::Board(reason) => drop_text(*reason),
-                    Loss::Untold => "the board's word was lost".into(),
+                    Loss::EventLost => "the board's event was lost".into(),
                     Loss::Image { reason, .. } => reason.clone(),
                 };
                 writeln!(self.rows, "{number},,,,,,,,\"{}\"", why.replace('"', "'"))

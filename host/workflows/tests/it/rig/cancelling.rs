@@ -178,7 +178,7 @@ fn hands_that_do_not_come_are_waited_for_no_longer() {
             context.cancel.cancel();
         });
         let rig = RigAddress::Port(port);
-        let settings = CheckSettings { rig, camera: camera(path), resting_only: false, hands: true };
+        let settings = CheckSettings { rig, camera: camera(path), resting_only: false, actuation: true };
         let error = check::check(&settings, &context).unwrap_err();
         assert!(matches!(&error, WorkflowError::Cancelled { .. }), "{error}");
     });

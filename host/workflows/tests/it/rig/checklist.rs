@@ -19,8 +19,8 @@ struct Person {
 }
 
 impl Progress for Person {
-    fn say(&self, what: &str) {
-        self.face.say(what);
+    fn info(&self, what: &str) {
+        self.face.info(what);
         let mut board = self.board.board();
         let lens = what.contains("lens stage");
         if what.contains("release it") {
@@ -50,7 +50,7 @@ fn go_through(board: Peer, port: String, hands: bool, resting_only: bool) -> (Ch
     let person = Person { board, face: Face::default() };
     let context = Context::new(&person, &person, Cancel::default());
     let rig = RigAddress::Port(port);
-    let settings = CheckSettings { rig, camera: camera(images.path()), resting_only, hands };
+    let settings = CheckSettings { rig, camera: camera(images.path()), resting_only, actuation: hands };
     let list = check::check(&settings, &context).unwrap();
     (list, person)
 }

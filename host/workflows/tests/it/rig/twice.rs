@@ -178,7 +178,7 @@ fn a_second_run_takes_no_longer_than_the_first() {
         (
             "check",
             Box::new(|rig, _, context| {
-                let settings = CheckSettings { rig, camera: camera(), resting_only: true, hands: false };
+                let settings = CheckSettings { rig, camera: camera(), resting_only: true, actuation: false };
                 check::check(&settings, context).map(drop)
             }),
         ),

@@ -1,4 +1,4 @@
-//! What needs somebody's hands: switches, the emergency stop, turning a motor's shaft.
+//! Steps that a person actuates: switches, the emergency stop, turning a motor's shaft.
 
 use std::time::{Duration, Instant};
 
@@ -29,7 +29,7 @@ fn wait_for(checkup: &Checkup<'_>, what: impl Fn(&Status) -> bool) -> Result<Opt
         if Instant::now() >= until {
             return Ok(None);
         }
-        checkup.context.cancel.check("waiting for somebody's hands")?;
+        checkup.context.cancel.check("waiting for a switch or shaft to be actuated")?;
         std::thread::sleep(LOOK);
     }
 }
@@ -45,19 +45,19 @@ pub(super) fn switches(checkup: &mut Checkup<'_>) -> Found {
             ));
         }
     }
-    if !checkup.hands {
+    if !checkup.actuation {
         return passed_over("nobody is there to press them; homing and the far end show the same");
     }
     for axis in &axes {
         for (which, name) in ["home", "far"].into_iter().enumerate() {
-            checkup.say(&format!("press the {name} switch of the {}", axis_name(*axis)));
+            checkup.info(&format!("press the {name} switch of the {}", axis_name(*axis)));
             let Some(status) = wait_for(checkup, |status| status.switches(*axis)[which])? else {
                 return failed(format!("the {name} switch of the {} was not seen", axis_name(*axis)));
             };
             if status.switches(*axis)[1 - which] {
                 return failed(format!("both switches of the {} closed at once", axis_name(*axis)));
             }
-            checkup.say("seen; release it");
+            checkup.info("seen; release it");
             if wait_for(checkup, |status| !status.switches(*axis)[which])?.is_none() {
                 return failed(format!("the {name} switch of the {} does not open again", axis_name(*axis)));
             }
@@ -73,12 +73,12 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
     if checkup.client().status()?.emergency_stop {
         return failed("the input is open: release the button, check its wire (it is normally closed)");
     }
-    if !checkup.hands {
+    if !checkup.actuation {
         return passed_over(
             "the input is closed; nobody is there to press it (the halt below does the same)",
         );
     }
-    checkup.say("press the emergency stop");
+    checkup.info("press the emergency stop");
     let pressed = wait_for(checkup, |status| status.emergency_stop && status.alarm.is_some())?;
     let Some(record) = pressed.and_then(|status| status.alarm) else {
         return failed("it was not seen, or raised no alarm");
@@ -89,7 +89,7 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
     if checkup.client().clear_alarm(record.number).is_ok() {
         return failed("the alarm could be cleared while the button was pressed");
     }
-    checkup.say("seen; release it");
+    checkup.info("seen; release it");
     if wait_for(checkup, |status| !status.emergency_stop)?.is_none() {
         return failed("the input does not close again");
     }
@@ -98,7 +98,7 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
 }
 
 pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
-    if !checkup.hands {
+    if !checkup.actuation {
         return passed_over(
             "nobody is there to turn the motors; the first homing would fail with the wrong sense",
         );
@@ -108,7 +108,7 @@ pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
     for axis in &axes {
         let place = |status: &Status| um(status.axis(*axis).measured);
         let before = place(&checkup.client().status()?);
-        checkup.say(&format!(
+        checkup.info(&format!(
             "turn the motor of the {} by hand so that its stage moves AWAY from home",
             axis_name(*axis)
         ));
@@ -130,7 +130,7 @@ pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
 }
 
 pub(super) fn connect_motors(checkup: &mut Checkup<'_>) -> Found {
-    if !checkup.hands {
+    if !checkup.actuation {
         return passed("nobody is there; they are taken to be connected");
     }
     checkup.ask("supply off, connect the motors, stages somewhere in the middle, hands off, supply on")?;
