@@ -1,6 +1,9 @@
 //! Cameras: what gives an image for a trigger of the board. One file per kind.
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
@@ -95,9 +98,17 @@ pub trait Camera {
     /// [`CameraError::Late`] it may be called for the same exposure again.
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
 
-    /// Called after the last image of a program: tells of pictures that no exposure accounts for, because then it is not
-    /// certain of any which exposure it belongs to.
-    fn finish(&mut self) -> Result<(), CameraError> {
+    /// Called for each exposure that the board reports, before its image is fetched; `received` is when the report arrived.
+    fn reported(&mut self, _shot: &ShotRecord, _received: Instant) {}
+
+    /// How long no further picture may come after the last image of a program.
+    fn quiet_time(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// Called after the last image of a program, repeatedly until [`Self::quiet_time`] has passed: waits at most `wait` for a
+    /// picture that no exposure accounts for. With such a picture, no picture of the program is certain to be paired correctly.
+    fn finish(&mut self, _wait: Duration) -> Result<(), CameraError> {
         Ok(())
     }
 
@@ -216,11 +227,60 @@ pub enum CameraError {
     /// More pictures than triggers.
     #[error(
         "the camera gave a picture more than it was triggered ({camera}), so none is certain to belong to its exposure; it \
-         must take one picture for each trigger and not run freely"
+         must take one picture for each trigger and not run freely{}",
+        ffmpeg_hint(camera)
     )]
     Surplus {
         /// The camera.
         camera: String,
+    },
+    /// A picture that arrived before its exposure can have begun.
+    #[error(
+        "the next picture arrived {} ms before exposure {wanted} began ({camera}), so it belongs to an earlier one: the camera gave \
+         a picture more than it was triggered; it must take one picture for each trigger and not run freely{}",
+        early.as_millis(),
+        ffmpeg_hint(camera)
+    )]
+    Stale {
+        /// The camera.
+        camera: String,
+        /// Exposure that was due.
+        wanted: u32,
+        /// At least so much too early.
+        early: Duration,
+    },
+    /// Two exposures with the same pixels.
+    #[error(
+        "the pictures for exposures {earlier} and {wanted} are identical ({camera}): one of them is a copy; each trigger must \
+         give one picture of its own{}",
+        ffmpeg_hint(camera)
+    )]
+    Doubled {
+        /// The camera.
+        camera: String,
+        /// Exposure that has the same picture.
+        earlier: u32,
+        /// Exposure that was due.
+        wanted: u32,
+    },
+    /// A picture that is older than one that was already used.
+    #[error(
+        "{} was taken before the picture of the exposure before it: pictures arrive in another order than they were taken; \
+         let them be transferred one after the other",
+        path.display()
+    )]
+    Reordered {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A picture file that was written again.
+    #[error(
+        "{} was overwritten: each picture needs a file name of its own (gphoto2: --filename 'image-%n.jpg')",
+        path.display()
+    )]
+    Overwritten {
+        /// The file.
+        path: PathBuf,
     },
     /// A frame that did not come whole.
     #[error("frame {frame} of {camera} came incomplete: {reason}")]
@@ -250,6 +310,14 @@ pub enum CameraError {
         /// What was expected.
         expected: String,
     },
+}
+
+/// ffmpeg repeats frames by default to keep a constant rate.
+fn ffmpeg_hint(camera: &str) -> &'static str {
+    match camera.contains("ffmpeg") {
+        true => "; ffmpeg repeats frames to keep its rate: add -fps_mode passthrough before the output",
+        false => "",
+    }
 }
 
 #[cfg(test)]

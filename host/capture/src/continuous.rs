@@ -5,7 +5,10 @@
 //! an event that the board no longer remembers shows as a missing number, an image that does not come as such. Nothing is passed
 //! over in silence, and no image is given to another exposure than its own.
 
-use std::{collections::VecDeque, time::Duration};
+use std::{
+    collections::VecDeque,
+    time::{Duration, Instant},
+};
 
 use farnear_protocol::{
     Request,
@@ -127,7 +130,8 @@ impl<'c> Continuous<'c> {
         while let Some(work) = &mut self.work
             && let Some(step) = work.step_within(Duration::ZERO)?
         {
-            self.take(step)?;
+            let received = work.received();
+            self.take(step, received)?;
         }
         Ok(self.reported.len())
     }
@@ -152,13 +156,14 @@ impl<'c> Continuous<'c> {
             }
             let Some(work) = &mut self.work else { return Ok(None) };
             let step = work.step()?;
-            self.take(step)?;
+            let received = work.received();
+            self.take(step, received)?;
         }
     }
 
-    fn take(&mut self, step: Step) -> Result<(), CaptureError> {
+    fn take(&mut self, step: Step, received: Instant) -> Result<(), CaptureError> {
         match step {
-            Step::Event(kind) => self.hear(&kind)?,
+            Step::Event(kind) => self.process(&kind, received)?,
             Step::Done(EventKind::ContinuousDone { exposures, dropped, .. }) => {
                 self.work = None;
                 self.miss_until(exposures.wrapping_add(dropped));
@@ -171,13 +176,14 @@ impl<'c> Continuous<'c> {
         Ok(())
     }
 
-    fn hear(&mut self, kind: &EventKind) -> Result<(), CaptureError> {
+    fn process(&mut self, kind: &EventKind, received: Instant) -> Result<(), CaptureError> {
         match *kind {
             EventKind::ShotReady { trigger_number, exposure, .. } => {
                 self.camera.trigger(trigger_number, exposure)?;
             }
             EventKind::FrameTaken { frame, deviation, shot, .. } => {
                 self.miss_until(frame);
+                self.camera.reported(&shot, received);
                 self.reported.push_back(Reported::Taken { number: frame, deviation, record: shot });
                 self.next = frame.wrapping_add(1);
             }

@@ -12,6 +12,7 @@ use crate::{
     client::Client,
     error::ClientError,
     plan::PlanError,
+    work::{Step, wrong_end},
 };
 
 /// Longest single wait for an image, so that an interruption by the user is seen soon.
@@ -118,7 +119,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
         camera.arm(mode, exposure).map_err(of(at))?;
     }
     let mut told = 0;
-    let run = client.run_program(shots, |kind| -> Result<(), E> {
+    let run = run_program(client, shots, |kind, received| -> Result<(), E> {
         match kind {
             EventKind::ShotReady { trigger_number, exposure, .. } => {
                 for (at, camera) in cameras.iter_mut().enumerate() {
@@ -128,6 +129,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
             EventKind::ShotDone { shot, .. } => {
                 told += 1;
                 for (at, camera) in cameras.iter_mut().enumerate() {
+                    camera.reported(shot, received);
                     let image = wait_for_image(client, &mut **camera, shot, image_wait);
                     let image = image.map_err(|error| match error {
                         CaptureError::Camera(source) => of(at)(source),
@@ -156,9 +158,66 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
         return Err(CaptureError::Count { told, asked }.into());
     }
     for (at, camera) in cameras.iter_mut().enumerate() {
-        camera.finish().map_err(of(at))?;
+        expect_no_more(client, &mut **camera).map_err(|error| match error {
+            CaptureError::Camera(source) => of(at)(source),
+            other => other,
+        })?;
     }
     Ok(())
+}
+
+/// As [`Client::run_program`], with the time at which each event was received.
+fn run_program<E: From<CaptureError> + From<ClientError>>(
+    client: &Client,
+    shots: &[Shot],
+    mut on_event: impl FnMut(&EventKind, Instant) -> Result<(), E>,
+) -> Result<(), E> {
+    client.arm(shots)?;
+    let mut work = client.start_program(shots)?;
+    loop {
+        match work.step()? {
+            Step::Event(kind) => on_event(&kind, work.received())?,
+            Step::Done(EventKind::ProgramDone { .. }) => return Ok(()),
+            Step::Done(other) => {
+                return Err(wrong_end("running the exposure program", &other).into());
+            }
+        }
+    }
+}
+
+/// Waits until no surplus picture of a program can come any more.
+fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), CaptureError> {
+    let until = Instant::now() + camera.quiet_time();
+    loop {
+        if client.interrupted() {
+            return Err(ClientError::Interrupted { during: "waiting for surplus images".into() }.into());
+        }
+        camera.finish(until.saturating_duration_since(Instant::now()).min(SLICE))?;
+        if Instant::now() >= until {
+            return Ok(());
+        }
+    }
+}
+
+/// Checks the exposures of a program against the board's limits.
+///
+/// # Errors
+/// [`PlanError::Exposure`].
+pub fn check_exposures(client: &Client, shots: &[Shot]) -> Result<(), PlanError> {
+    shots.iter().try_for_each(|shot| check_exposure(client, shot.exposure))
+}
+
+/// Checks the length of an exposure against the board's limits.
+///
+/// # Errors
+/// [`PlanError::Exposure`].
+pub fn check_exposure(client: &Client, asked: Micros) -> Result<(), PlanError> {
+    let limits = &client.hello().limits;
+    let (min, max) = (limits.exposure_min, limits.exposure_max);
+    match (min..=max).contains(&asked) {
+        true => Ok(()),
+        false => Err(PlanError::Exposure { asked, min, max }),
+    }
 }
 
 /// How the exposures of a program come about, and the length of the first.

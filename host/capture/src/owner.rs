@@ -49,7 +49,7 @@ const GLANCE: Duration = Duration::from_millis(1);
 
 /// What running work is told.
 pub(crate) enum Message {
-    Event(EventKind),
+    Event(EventKind, Instant),
     Broken(Break),
     EventsLost {
         from: u32,
@@ -357,7 +357,7 @@ impl Owner {
                     if matches!(kind, EventKind::StillThere { .. }) {
                         self.still_there |= held;
                     } else {
-                        let _ = work.messages.send(Message::Event(kind.clone()));
+                        let _ = work.messages.send(Message::Event(kind.clone(), Instant::now()));
                     }
                     if ends || !held {
                         self.works.remove(&request);
@@ -366,7 +366,7 @@ impl Owner {
             }
             None if matches!(kind, EventKind::Alarm(_)) => {
                 for work in self.works.values() {
-                    let _ = work.messages.send(Message::Event(kind.clone()));
+                    let _ = work.messages.send(Message::Event(kind.clone(), Instant::now()));
                 }
             }
             None => {}

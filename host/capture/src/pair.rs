@@ -13,7 +13,7 @@ use crate::{
     camera::{Camera, Image},
     client::Client,
     describe::um,
-    expose::{expose, sensor_mm},
+    expose::{check_exposure, expose, sensor_mm},
     plan::{SensorPair, coarse_for, fine_for},
     ready::{base_nm, base_when_homed_nm, ensure_homed},
     work::Moved,
@@ -103,6 +103,7 @@ pub fn reach(
     say: &mut dyn FnMut(&str),
 ) -> Result<Reach, CaptureError> {
     let limits = client.hello().limits;
+    check_exposure(client, exposures.exposure)?;
     coarse_for(sensor, base_when_homed_nm(client, &client.status()?), &limits)?;
     ensure_homed(client, say)?;
     let base = base_nm(client, &client.status()?);

@@ -5,7 +5,10 @@
 //! piezo's range, in its middle; the piezo then makes up for what the coarse stage is off, and toggles between
 //! the two in milliseconds. Lengths in nanometres unless a name says otherwise.
 
-use farnear_protocol::{message::Limits, units::Nanometres};
+use farnear_protocol::{
+    message::Limits,
+    units::{Micros, Nanometres},
+};
 
 /// Sensor distances of a pair from the lens' principal plane, in millimetres.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -19,6 +22,16 @@ pub struct SensorPair {
 /// The rig cannot reach what the optics ask for.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum PlanError {
+    /// An exposure that the board refuses.
+    #[error("an exposure of {} us is outside the board's limits, {} to {} us", asked.0, min.0, max.0)]
+    Exposure {
+        /// Asked for.
+        asked: Micros,
+        /// The board's shortest.
+        min: Micros,
+        /// The board's longest.
+        max: Micros,
+    },
     /// The two distances are further apart than the piezo can go.
     #[error(
         "the optics ask for {travel_um:.2} um between the two images, the piezo has {piezo_um:.2} um; \
@@ -112,7 +125,6 @@ pub fn fine_for(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use farnear_protocol::units::Micros;
     use proptest::prelude::*;
 
     const BASE: i64 = 47_000_000;

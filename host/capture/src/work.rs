@@ -63,6 +63,7 @@ pub struct Work {
     paused: bool,
     alarm: Option<AlarmRecord>,
     over: bool,
+    received: Instant,
 }
 
 /// What work says.
@@ -78,6 +79,11 @@ impl Work {
     /// Number of the request, by which events name it.
     pub fn id(&self) -> u32 {
         self.id
+    }
+
+    /// When the last event was received.
+    pub fn received(&self) -> Instant {
+        self.received
     }
 
     /// The next event, waiting at most `wait`; `None` where none came. Time between two calls does not count as
@@ -164,7 +170,10 @@ impl Work {
     fn take(&mut self, message: Message) -> Result<Step, ClientError> {
         let during = || self.during.clone();
         let kind = match message {
-            Message::Event(kind) => kind,
+            Message::Event(kind, received) => {
+                self.received = received;
+                kind
+            }
             Message::Broken(broken) => {
                 self.over = true;
                 return Err(broken.error(self.client.port(), &self.during));
@@ -290,6 +299,7 @@ impl Client {
                         paused: false,
                         alarm: None,
                         over: false,
+                        received: Instant::now(),
                     });
                 }
                 Ok((_, other)) => refused = refused.or_else(|| Some(nonsense(&plan.during, &other))),
@@ -498,6 +508,6 @@ fn belongs(kind: &EventKind, request: &Request) -> bool {
     }
 }
 
-fn wrong_end(during: &str, kind: &EventKind) -> ClientError {
+pub(crate) fn wrong_end(during: &str, kind: &EventKind) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: format!("{kind:?}") }
 }

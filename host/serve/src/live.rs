@@ -5,7 +5,7 @@ use std::{cell::RefCell, path::Path, time::Instant};
 use farnear_capture::camera::Image;
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
-    Context, Unattended, Result, WorkflowError,
+    Context, Result, Unattended, WorkflowError,
     camera::{self, CameraChoice},
     optics, picture,
     rig::{

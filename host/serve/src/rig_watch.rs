@@ -8,7 +8,7 @@ use std::{
 };
 
 use farnear_workflows::{
-    Cancel, Context, Unattended, Progress, WorkflowError,
+    Cancel, Context, Progress, Unattended, WorkflowError,
     optics::GivenOptics,
     rig::{RigAddress, info, open::OpenRig},
 };

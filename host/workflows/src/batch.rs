@@ -33,7 +33,7 @@ use self::{
 };
 use crate::{
     cache::Cache,
-    context::{Cancel, Context, Unattended, Progress},
+    context::{Cancel, Context, Progress, Unattended},
     error::Result,
     figures::rounded,
 };

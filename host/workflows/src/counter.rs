@@ -40,7 +40,7 @@ impl<'a> Counter<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Cancel, Unattended, Progress};
+    use crate::context::{Cancel, Progress, Unattended};
     use rayon::prelude::*;
 
     #[derive(Default)]

@@ -497,7 +497,7 @@ mod tests {
     use farnear_files::image_file::encode_png;
 
     use super::*;
-    use crate::context::{Cancel, Unattended, Progress};
+    use crate::context::{Cancel, Progress, Unattended};
 
     const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
                           [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";

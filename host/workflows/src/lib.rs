@@ -93,7 +93,7 @@ pub mod simulator;
 pub mod sun;
 pub mod target;
 
-pub use context::{Cancel, Context, Unattended, Progress, Questions};
+pub use context::{Cancel, Context, Progress, Questions, Unattended};
 pub use error::{Result, WorkflowError};
 
 /// What records say made them.

@@ -11,6 +11,7 @@ use std::{
     str::FromStr,
     sync::{
         Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
         mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel},
     },
     time::{Duration, Instant},
@@ -23,8 +24,8 @@ use farnear_protocol::{
 
 use super::{
     Camera, CameraError, Frame, Image, Stamp,
-    pairing::{Belongs, Pairing},
-    pixels::Layout,
+    pairing::{Belongs, Evidence, Pairing, content},
+    pixels::{BadFrame, Layout},
 };
 use crate::describe::trigger_name;
 
@@ -32,8 +33,6 @@ use crate::describe::trigger_name;
 const QUEUE: usize = 16;
 /// A program that cannot work mostly says so at once.
 const EARLY_END: Duration = Duration::from_millis(300);
-/// After the last picture of a program of exposures nothing may come for so long.
-const QUIET: Duration = Duration::from_millis(200);
 /// What is kept of the program's messages.
 const MESSAGES: usize = 400;
 /// No side may be longer: a damaged header must not ask for all memory.
@@ -43,38 +42,99 @@ const LONGEST_SIDE_PX: usize = 16_384;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct CommandLine {
     words: Vec<String>,
-    /// Width, height and format of raw frames; Y4M where there is none.
-    raw: Option<(usize, usize, Layout)>,
+    /// Of raw frames; without it the output is Y4M.
+    raw: Option<Raw>,
 }
+
+/// Size and format of raw frames.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Raw {
+    width: usize,
+    height: usize,
+    /// Bytes from one row to the next.
+    stride: usize,
+    layout: Layout,
+}
+
+impl Raw {
+    fn new(width: usize, height: usize, stride: Option<usize>, layout: Layout) -> Result<Self, String> {
+        if !(1..=LONGEST_SIDE_PX).contains(&width) || !(1..=LONGEST_SIDE_PX).contains(&height) {
+            return Err(format!("{width}x{height} px: expected 1 to {LONGEST_SIDE_PX} a side"));
+        }
+        let row = layout.row_bytes(width).unwrap_or(width);
+        let stride = stride.unwrap_or(row);
+        if !(row..=8 * LONGEST_SIDE_PX).contains(&stride) || stride % layout.row_bytes(1).unwrap_or(1) != 0 {
+            return Err(format!("a stride of {stride} bytes: a row of {width} px has {row} bytes"));
+        }
+        Ok(Self { width, height, stride, layout })
+    }
+
+    fn bytes(self) -> Option<usize> {
+        self.layout.padded_frame_bytes(self.stride, self.height)
+    }
+
+    fn decode(self, bytes: &[u8]) -> Result<Image, BadFrame> {
+        let Self { width, height, stride, layout } = self;
+        if layout.row_bytes(width) == Some(stride) {
+            return layout.decode(bytes, width, height);
+        }
+        let bytes = layout.without_padding(bytes, width, height, stride)?;
+        // The colour that follows is not used.
+        let layout =
+            if let Layout::Grey8 { .. } = layout { Layout::Grey8 { colour_twelfths: 0 } } else { layout };
+        layout.decode(&bytes, width, height)
+    }
+
+    /// What surplus bytes mostly mean.
+    fn padding_hint(self) -> String {
+        let Self { width, height, layout, .. } = self;
+        let row = layout.row_bytes(width).unwrap_or(width);
+        let padded = row.div_ceil(PADDING) * PADDING;
+        let format = RAW_FORMAT;
+        match padded == row {
+            true => format!("are the size and the format right ({format})?"),
+            false => format!(
+                "a row of {width} px has {row} bytes; programs often pad rows to a multiple of {PADDING} bytes: \
+                 if so, name the stride, {width}x{height}/{padded} ({format})"
+            ),
+        }
+    }
+}
+
+/// Rows are padded to a multiple of this by the Raspberry Pi's programs and many others.
+const PADDING: usize = 64;
+/// How raw frames are described.
+const RAW_FORMAT: &str = "WIDTHxHEIGHT[/STRIDE]:FORMAT:PROGRAM";
 
 impl FromStr for CommandLine {
     type Err = String;
 
-    /// `PROGRAM ARGUMENTS`, quoted as for a shell, or `WIDTHxHEIGHT:FORMAT:PROGRAM ARGUMENTS`.
+    /// `PROGRAM ARGUMENTS`, quoted as for a shell, or `WIDTHxHEIGHT[/STRIDE]:FORMAT:PROGRAM ARGUMENTS`.
     fn from_str(text: &str) -> Result<Self, String> {
         let size = |part: &str| {
             let (width, height) = part.split_once('x')?;
-            Some((width.parse().ok()?, height.parse().ok()?))
+            let (height, stride) = match height.split_once('/') {
+                Some((height, stride)) => (height, Some(stride.parse().ok()?)),
+                None => (height, None),
+            };
+            Some((width.parse().ok()?, height.parse().ok()?, stride))
         };
         let mut parts = text.splitn(3, ':');
         let raw = match (parts.next().and_then(size), parts.next(), parts.next()) {
-            (Some((width, height)), Some(format), Some(program)) => Some((width, height, format, program)),
+            (Some(size), Some(format), Some(program)) => Some((size, format, program)),
             (Some(_), ..) => {
                 return Err("after a size expected a format and a program: 640x480:gray12le:PROGRAM".into());
             }
             (None, ..) => None,
         };
-        let program = raw.map_or(text, |(_, _, _, program)| program);
+        let program = raw.map_or(text, |(.., program)| program);
         let words = shlex::split(program).ok_or("its quotes do not match")?;
         if words.is_empty() {
             return Err("expected a program".into());
         }
         let raw = match raw {
-            Some((width, height, format, _)) => {
-                if !(1..=LONGEST_SIDE_PX).contains(&width) || !(1..=LONGEST_SIDE_PX).contains(&height) {
-                    return Err(format!("{width}x{height} px: expected 1 to {LONGEST_SIDE_PX} a side"));
-                }
-                Some((width, height, format.parse()?))
+            Some(((width, height, stride), format, _)) => {
+                Some(Raw::new(width, height, stride, format.parse()?)?)
             }
             None => None,
         };
@@ -82,12 +142,18 @@ impl FromStr for CommandLine {
     }
 }
 
+/// A picture, and when its last byte arrived.
+type Arrived = (Image, Instant);
+
 /// A running program.
 pub struct CommandCamera {
     /// The program's name, for messages.
     name: String,
     child: Child,
-    frames: Receiver<Result<Image, String>>,
+    frames: Receiver<Result<Arrived, String>>,
+    /// Bytes of a frame that is not complete yet.
+    partial: Arc<AtomicUsize>,
+    raw: Option<Raw>,
     /// The end of what the program wrote to its standard error.
     messages: Arc<Mutex<String>>,
     pairing: Pairing,
@@ -122,17 +188,20 @@ impl CommandCamera {
         // Neither is waited for at the end: they end when the pipes do, or when nobody takes pictures any more.
         std::thread::spawn(move || errors.map(|errors| keep_messages(errors, &kept)));
         let raw = line.raw;
-        std::thread::spawn(move || output.map(|output| read_frames(output, raw, &sender)));
-        let mut camera = Self { name, child, frames, messages, pairing: Pairing::default(), ended: None };
+        let partial = Arc::new(AtomicUsize::new(0));
+        let incoming = Arc::clone(&partial);
+        std::thread::spawn(move || output.map(|output| read_frames(output, raw, &sender, &incoming)));
+        let pairing = Pairing::default();
+        let mut camera = Self { name, child, frames, partial, raw, messages, pairing, ended: None };
         camera.take(EARLY_END)?;
         Ok(camera)
     }
 
     /// The next picture; `None` when time is up.
-    fn take(&mut self, wait: Duration) -> Result<Option<Image>, CameraError> {
+    fn take(&mut self, wait: Duration) -> Result<Option<Arrived>, CameraError> {
         if self.ended.is_none() {
             match self.frames.recv_timeout(wait) {
-                Ok(Ok(image)) => return Ok(Some(image)),
+                Ok(Ok(arrived)) => return Ok(Some(arrived)),
                 Err(RecvTimeoutError::Timeout) => return Ok(None),
                 Ok(Err(reason)) => self.ended = Some(reason),
                 Err(RecvTimeoutError::Disconnected) => self.ended = Some("it has ended".into()),
@@ -193,23 +262,42 @@ impl Camera for CommandCamera {
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         let camera = format!("`{}`", self.name);
         match self.take(wait)? {
-            Some(image) => match self.pairing.judge(&camera, Stamp::default(), shot)? {
-                Belongs::Here => Ok(image),
-                Belongs::Earlier | Belongs::Later(_) => Err(CameraError::Surplus { camera }),
-            },
+            Some((image, arrived)) => {
+                let evidence =
+                    Evidence { arrived: Some(arrived), content: content(&image), ..Evidence::default() };
+                match self.pairing.judge(&camera, evidence, shot)? {
+                    Belongs::Here => Ok(image),
+                    Belongs::Earlier | Belongs::Later(_) => Err(CameraError::Surplus { camera }),
+                }
+            }
             None => Err(CameraError::Late { camera, trigger_number: shot.trigger_number, waited: wait }),
         }
     }
 
-    fn finish(&mut self) -> Result<(), CameraError> {
-        match self.frames.recv_timeout(QUIET) {
-            Ok(Ok(_)) => Err(CameraError::Surplus { camera: format!("`{}`", self.name) }),
-            // A program that ends after its last picture has done what it was there for; the next one is told.
-            Ok(Err(reason)) => {
-                self.ended = Some(reason);
-                Ok(())
+    fn reported(&mut self, shot: &ShotRecord, received: Instant) {
+        self.pairing.reported(shot, received);
+    }
+
+    fn quiet_time(&self) -> Duration {
+        self.pairing.quiet_time()
+    }
+
+    fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
+        match self.frames.recv_timeout(wait) {
+            Ok(Ok(_)) => return Err(CameraError::Surplus { camera: format!("`{}`", self.name) }),
+            // A program may end after its last picture; the next one reports it.
+            Ok(Err(reason)) => self.ended = Some(reason),
+            Err(RecvTimeoutError::Timeout) => {}
+            // The channel of a program that has ended does not wait.
+            Err(RecvTimeoutError::Disconnected) => std::thread::sleep(wait),
+        }
+        match (self.partial.load(Ordering::Relaxed), self.raw) {
+            (0, _) | (_, None) => Ok(()),
+            (bytes, Some(raw)) => {
+                let reason =
+                    format!("{bytes} bytes are left over after the last picture; {}", raw.padding_hint());
+                Err(CameraError::Unusable { camera: format!("`{}`", self.name), reason })
             }
-            Err(_) => Ok(()),
         }
     }
 
@@ -218,10 +306,10 @@ impl Camera for CommandCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
-        let Some(mut image) = self.take(wait)? else { return Ok(None) };
+        let Some((mut image, _)) = self.take(wait)? else { return Ok(None) };
         for _ in 0..QUEUE {
             match self.frames.try_recv() {
-                Ok(Ok(newer)) => image = newer,
+                Ok(Ok((newer, _))) => image = newer,
                 Ok(Err(reason)) => self.ended = Some(reason),
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
@@ -256,12 +344,13 @@ fn keep_messages(errors: impl Read, kept: &Mutex<String>) {
 /// Sends frames until there are none any more, or nobody takes them; at last why there are none.
 fn read_frames(
     output: ChildStdout,
-    raw: Option<(usize, usize, Layout)>,
-    frames: &SyncSender<Result<Image, String>>,
+    raw: Option<Raw>,
+    frames: &SyncSender<Result<Arrived, String>>,
+    partial: &AtomicUsize,
 ) {
     let mut output = BufReader::with_capacity(1 << 16, output);
     let reason = match raw {
-        Some((width, height, layout)) => read_raw(&mut output, width, height, layout, frames),
+        Some(raw) => read_raw(&mut output, raw, frames, partial),
         None => read_y4m(output, frames),
     };
     if let Some(reason) = reason {
@@ -272,30 +361,39 @@ fn read_frames(
 /// Gives why it ended; nothing where nobody takes frames any more.
 fn read_raw(
     output: &mut impl Read,
-    width: usize,
-    height: usize,
-    layout: Layout,
-    frames: &SyncSender<Result<Image, String>>,
+    raw: Raw,
+    frames: &SyncSender<Result<Arrived, String>>,
+    partial: &AtomicUsize,
 ) -> Option<String> {
-    let due = layout.frame_bytes(width, height)?;
+    let Raw { width, height, .. } = raw;
+    let due = raw.bytes()?;
+    let mut bytes = vec![0; due];
     for number in 1.. {
-        let mut bytes = Vec::with_capacity(due);
-        if let Err(error) = output.by_ref().take(due as u64).read_to_end(&mut bytes) {
-            return Some(format!("its output cannot be read: {error}"));
+        let mut filled = 0;
+        while filled < due {
+            match output.read(&mut bytes[filled..]) {
+                Ok(0) => break,
+                Ok(count) => filled += count,
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(error) => return Some(format!("its output cannot be read: {error}")),
+            }
+            partial.store(filled % due, Ordering::Relaxed);
         }
-        match bytes.len() {
+        let arrived = Instant::now();
+        match filled {
             0 => return Some("its output has ended".into()),
             came if came < due => {
                 return Some(format!(
-                    "its output ends within frame {number}, after {came} of {due} bytes; are {width}x{height} px and the format right?"
+                    "its output ends within frame {number}, after {came} of {due} bytes of {width}x{height} px; {}",
+                    raw.padding_hint()
                 ));
             }
             _ => {}
         }
-        match layout.decode(&bytes, width, height) {
-            Ok(image) => frames.send(Ok(image)).ok()?,
+        match raw.decode(&bytes) {
+            Ok(image) => frames.send(Ok((image, arrived))).ok()?,
             Err(error) => {
-                return Some(format!("frame {number}: {error}; are the size and the format right?"));
+                return Some(format!("frame {number}: {error}; {}", raw.padding_hint()));
             }
         }
     }
@@ -304,7 +402,7 @@ fn read_raw(
 
 fn read_y4m(
     mut output: BufReader<ChildStdout>,
-    frames: &SyncSender<Result<Image, String>>,
+    frames: &SyncSender<Result<Arrived, String>>,
 ) -> Option<String> {
     let begins = match output.fill_buf() {
         Ok([]) => return Some("it has ended without a picture".into()),
@@ -337,7 +435,7 @@ fn read_y4m(
             Err(error) => Err(error.to_string()),
         };
         match image {
-            Ok(image) => frames.send(Ok(image)).ok()?,
+            Ok(image) => frames.send(Ok((image, Instant::now()))).ok()?,
             Err(reason) => return Some(format!("frame {number} is damaged: {reason}")),
         }
     }
@@ -355,7 +453,9 @@ mod tests {
         assert_eq!(line.raw, None);
         let line: CommandLine = "640x480:gray12le:grab --url http://a:80/x".parse().unwrap();
         assert_eq!(line.words, ["grab", "--url", "http://a:80/x"]);
-        assert_eq!(line.raw, Some((640, 480, Layout::Grey16 { bits: 12 })));
+        assert_eq!(line.raw, Some(Raw::new(640, 480, None, Layout::Grey16 { bits: 12 }).unwrap()));
+        let padded: CommandLine = "1456x1088/1472:yuv420p:rpicam-vid".parse().unwrap();
+        assert_eq!(padded.raw.unwrap().bytes(), Some(1472 * 1088 * 3 / 2));
         for (text, phrase) in [
             ("", "expected a program"),
             ("a 'b", "quotes"),
@@ -363,6 +463,7 @@ mod tests {
             ("640x480:gray", "a program"),
             ("0x480:gray:a", "expected 1 to"),
             ("99999x480:gray:a", "expected 1 to"),
+            ("640x480/639:gray:a", "a row of 640 px has 640 bytes"),
         ] {
             let error = text.parse::<CommandLine>().unwrap_err();
             assert!(error.contains(phrase), "{text}: {error}");

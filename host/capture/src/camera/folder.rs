@@ -2,7 +2,8 @@
 //! that synchronises) puts an image file into it for each trigger.
 
 use std::{
-    collections::BTreeSet,
+    cmp::Ordering,
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime},
@@ -14,7 +15,11 @@ use farnear_protocol::{
     units::Micros,
 };
 
-use super::{Camera, CameraError, Frame, Image, Stamp, pixels::of_picture};
+use super::{
+    Camera, CameraError, Frame, Image, Stamp,
+    pairing::{Belongs, Evidence, Pairing, by_number, content},
+    pixels::of_picture,
+};
 use crate::describe::trigger_name;
 
 const POLL: Duration = Duration::from_millis(20);
@@ -26,63 +31,114 @@ const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
 #[derive(Debug)]
 pub struct FolderCamera {
     folder: PathBuf,
-    used: BTreeSet<PathBuf>,
+    used: BTreeMap<PathBuf, Used>,
     /// The next image, while it may still be being written: its bytes, and since when they are the same.
     candidate: Option<(PathBuf, Vec<u8>, Instant)>,
+    pairing: Pairing,
+}
+
+/// A file that is no new picture.
+#[derive(Clone, Debug)]
+struct Used {
+    written: SystemTime,
+    bytes: u64,
+    /// Whether it was the picture of an exposure since the camera was armed; else it was there before.
+    paired: bool,
 }
 
 impl FolderCamera {
     /// Watches a folder, which must exist.
     pub fn watch(folder: &Path) -> Result<Self, CameraError> {
-        let mut camera = Self { folder: folder.into(), used: BTreeSet::new(), candidate: None };
+        let mut camera = Self {
+            folder: folder.into(),
+            used: BTreeMap::new(),
+            candidate: None,
+            pairing: Pairing::default(),
+        };
         camera.forget_what_is_there()?;
         Ok(camera)
     }
 
     fn forget_what_is_there(&mut self) -> Result<(), CameraError> {
-        let fresh = self.fresh()?;
-        self.used.extend(fresh.into_iter().map(|(_, path)| path));
+        self.used.clear();
+        self.candidate = None;
+        for (written, path, bytes) in self.pictures()? {
+            self.used.insert(path, Used { written, bytes, paired: false });
+        }
         Ok(())
     }
 
-    /// Image files that were not used yet, oldest first; those written within the same tick of the file
-    /// system's clock by name.
-    fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
+    /// Image files with the time at which they were written and their size.
+    fn pictures(&self) -> Result<Vec<(SystemTime, PathBuf, u64)>, CameraError> {
         let failed = |source| CameraError::Folder { folder: self.folder.clone(), source };
-        let mut fresh = Vec::new();
+        let mut pictures = Vec::new();
         for entry in fs::read_dir(&self.folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
             let ending =
                 path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
-            if self.used.contains(&path) || !ENDINGS.contains(&ending.as_str()) {
+            if !ENDINGS.contains(&ending.as_str()) {
                 continue;
             }
             // A file that is renamed away in between is no image any more.
-            if let Ok(written) = fs::metadata(&path).and_then(|data| data.modified()) {
-                fresh.push((written, path));
+            let Ok(data) = fs::metadata(&path) else { continue };
+            if let Ok(written) = data.modified() {
+                pictures.push((written, path, data.len()));
             }
         }
-        fresh.sort();
+        Ok(pictures)
+    }
+
+    /// New image files, oldest first; those written within the same tick of the file system's clock by number or name.
+    ///
+    /// # Errors
+    /// [`CameraError::Overwritten`] for a file that was written again, [`CameraError::File`] for one picture in two formats.
+    fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
+        let mut fresh = Vec::new();
+        for (written, path, bytes) in self.pictures()? {
+            match self.used.get(&path) {
+                None => fresh.push((written, path)),
+                Some(used) if (used.written, used.bytes) == (written, bytes) => {}
+                Some(used) if used.paired || was_complete(used, written) => {
+                    return Err(CameraError::Overwritten { path });
+                }
+                Some(_) => {} // it was being written when the camera was armed
+            }
+        }
+        for (at, (_, path)) in fresh.iter().enumerate() {
+            let paired = self.used.iter().filter(|(_, used)| used.paired).map(|(path, _)| path);
+            let mut others = fresh[..at].iter().map(|(_, other)| other).chain(paired);
+            if let Some(twin) = others.find(|other| other.with_extension("") == path.with_extension("")) {
+                let twin = twin.file_name().unwrap_or_default().display();
+                let reason = format!(
+                    "{twin} is the same picture in another format; let the camera write one format only"
+                );
+                return Err(CameraError::File { path: path.clone(), reason });
+            }
+        }
+        fresh.sort_by(|(written, path), (other_written, other)| {
+            let by_name = || by_number(path, other).unwrap_or_else(|| path.cmp(other));
+            written.cmp(other_written).then_with(by_name)
+        });
         Ok(fresh)
     }
-}
 
-impl FolderCamera {
-    /// The next image; `None` when time is up.
-    fn next(&mut self, wait: Duration) -> Result<Option<Image>, CameraError> {
+    /// The next image with its file and the time at which it was taken; `None` when time is up.
+    fn next(&mut self, wait: Duration) -> Result<Option<(Image, SystemTime, PathBuf)>, CameraError> {
         let until = Instant::now() + wait;
         loop {
-            if let Some((_, path)) = self.fresh()?.into_iter().next() {
+            if let Some((written, path)) = self.fresh()?.into_iter().next() {
                 let bytes = fs::read(&path).unwrap_or_default();
                 match &self.candidate {
-                    // The same bytes twice: it is no longer being written (half a JPEG would decode, too).
+                    // The same bytes twice: it is no longer being written.
                     Some((same, content, since)) if *same == path && *content == bytes => {
-                        match decode_grey(&bytes) {
+                        match complete(&bytes).and_then(|()| decode_grey(&bytes)) {
                             Ok(picture) => {
-                                self.used.insert(path.clone());
-                                return of_picture(picture)
-                                    .map(Some)
-                                    .map_err(|reason| CameraError::File { path, reason });
+                                let size = bytes.len() as u64;
+                                let used = Used { written, bytes: size, paired: true };
+                                self.used.insert(path.clone(), used);
+                                let failed = |reason| CameraError::File { path: path.clone(), reason };
+                                let image = of_picture(picture).map_err(failed)?;
+                                return Ok(Some((image, written, path)));
                             }
                             Err(reason) if since.elapsed() > QUIET => {
                                 return Err(CameraError::File { path, reason });
@@ -93,11 +149,28 @@ impl FolderCamera {
                     _ => self.candidate = Some((path, bytes, Instant::now())),
                 }
             }
-            if Instant::now() >= until {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
                 return Ok(None);
             }
-            std::thread::sleep(POLL);
+            std::thread::sleep(POLL.min(left));
         }
+    }
+}
+
+/// Whether a file had been at rest for long before it was written again.
+fn was_complete(used: &Used, written: SystemTime) -> bool {
+    written.duration_since(used.written).is_ok_and(|apart| apart > QUIET)
+}
+
+/// Refuses a JPEG without its end: decoders fill the missing rows.
+fn complete(bytes: &[u8]) -> Result<(), String> {
+    let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
+    // A thumbnail within has an end of its own, before the scan of the picture.
+    match (bytes.starts_with(&[0xff, 0xd8]), last(0xda), last(0xd9)) {
+        (false, ..) => Ok(()),
+        (true, Some(scan), Some(end)) if end > scan => Ok(()),
+        _ => Err("the file is incomplete: the end of the JPEG is missing".into()),
     }
 }
 
@@ -111,6 +184,7 @@ impl Camera for FolderCamera {
         if mode == TriggerMode::FreeRunning {
             return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
         }
+        self.pairing.begin();
         self.forget_what_is_there()
     }
 
@@ -119,11 +193,32 @@ impl Camera for FolderCamera {
     }
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
-        self.next(wait)?.ok_or_else(|| CameraError::Late {
-            camera: format!("folder {}", self.folder.display()),
-            trigger_number: shot.trigger_number,
-            waited: wait,
-        })
+        let camera = format!("folder {}", self.folder.display());
+        let Some((image, written, path)) = self.next(wait)? else {
+            return Err(CameraError::Late { camera, trigger_number: shot.trigger_number, waited: wait });
+        };
+        let evidence =
+            Evidence { taken: Some((written, path)), content: content(&image), ..Evidence::default() };
+        match self.pairing.judge(&camera, evidence, shot)? {
+            Belongs::Here => Ok(image),
+            Belongs::Earlier | Belongs::Later(_) => Err(CameraError::Surplus { camera }),
+        }
+    }
+
+    fn reported(&mut self, shot: &ShotRecord, received: Instant) {
+        self.pairing.reported(shot, received);
+    }
+
+    fn quiet_time(&self) -> Duration {
+        self.pairing.quiet_time()
+    }
+
+    fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
+        std::thread::sleep(wait);
+        match self.fresh()?.into_iter().next() {
+            Some((_, path)) => Err(CameraError::Surplus { camera: path.display().to_string() }),
+            None => Ok(()),
+        }
     }
 
     fn watch(&mut self) -> Result<(), CameraError> {
@@ -131,6 +226,6 @@ impl Camera for FolderCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
-        Ok(self.next(wait)?.map(|image| Frame { image, stamp: Stamp::default() }))
+        Ok(self.next(wait)?.map(|(image, ..)| Frame { image, stamp: Stamp::default() }))
     }
 }

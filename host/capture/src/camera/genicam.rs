@@ -8,7 +8,7 @@ use std::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use aravis::{
@@ -29,8 +29,6 @@ use crate::describe::trigger_name;
 
 /// Frames that the library may fill while nobody fetches them.
 const BUFFERS: usize = 16;
-/// After the last picture of a program of exposures nothing may come for so long.
-const QUIET: Duration = Duration::from_millis(200);
 /// Ticks of a GigE Vision camera's clock in a second where it does not say.
 const USUAL_TICKS: i64 = 1_000_000_000;
 /// The trigger source that is a command.
@@ -334,8 +332,16 @@ impl Camera for GenicamCamera {
         Err(CameraError::Late { camera: self.id.clone(), trigger_number: wanted, waited: wait })
     }
 
-    fn finish(&mut self) -> Result<(), CameraError> {
-        match self.take(QUIET)? {
+    fn reported(&mut self, shot: &ShotRecord, received: Instant) {
+        self.pairing.reported(shot, received);
+    }
+
+    fn quiet_time(&self) -> Duration {
+        self.pairing.quiet_time()
+    }
+
+    fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
+        match self.take(wait)? {
             Some(_) => Err(CameraError::Surplus { camera: self.id.clone() }),
             None => Ok(()),
         }

@@ -1,19 +1,28 @@
 //! Which frame belongs to which exposure.
 //!
-//! Between arming and the end of a program every trigger gives one frame, so the n-th frame belongs to the n-th trigger. What a camera says
+//! One set of rules for every kind of camera. They use what the camera offers: the count of its pictures, its time stamps, when a picture
+//! arrived and was taken, and its pixels. Between arming and the end of a program every trigger gives one frame, so the n-th frame belongs to the n-th trigger. What a camera says
 //! of its frames is held against what the board says of its exposures: the camera's own count must advance as the board's trigger number
 //! does, and its time stamps must be as far apart as the starts of the strobe. What does not agree is an error, never a guess; a whole
 //! program counts, because a frame that came too often or not at all shows at its end ([`super::Camera::finish`]) at the latest.
 
-use std::time::Duration;
+use std::{
+    cmp::Ordering,
+    path::{Path, PathBuf},
+    time::{Duration, Instant, SystemTime},
+};
 
 use farnear_protocol::message::ShotRecord;
 
-use super::CameraError;
+use super::{CameraError, Image};
 
 /// A camera's stamp may jitter by so much against the strobe: GigE Vision cameras stamp to a microsecond, drivers of Video4Linux in an
 /// interrupt, some a line or two of the read-out late.
 const JITTER: Duration = Duration::from_millis(2);
+/// Reading a picture from a pipe is stamped no later than this after it arrived, so that it is never taken for an earlier one.
+const ARRIVAL_JITTER: Duration = Duration::from_millis(10);
+/// Least time in which no picture may come after the last one of a program.
+const QUIET: Duration = Duration::from_millis(200);
 /// Two free crystals differ by 50 ppm each at most, and some margin.
 const DRIFT_PPM: u64 = 200;
 /// The count of GigE Vision 1.x goes from 1 to this and around, past 0.
@@ -26,6 +35,36 @@ pub struct Stamp {
     pub count: Option<u64>,
     /// When it was exposed, by a clock of the camera's or the driver's that starts at any time.
     pub time: Option<Duration>,
+}
+
+/// What is known of a picture.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Evidence {
+    /// By the camera.
+    pub stamp: Stamp,
+    /// When it arrived, by this computer's clock; only if that is known to a few milliseconds.
+    pub arrived: Option<Instant>,
+    /// When it was taken or written, by one clock for all pictures of this camera, and its file.
+    pub taken: Option<(SystemTime, PathBuf)>,
+    /// [`content`] of it, if nothing else identifies it.
+    pub content: Option<u64>,
+}
+
+impl From<Stamp> for Evidence {
+    fn from(stamp: Stamp) -> Self {
+        Self { stamp, ..Self::default() }
+    }
+}
+
+/// Identifies pixels. `None` for an even picture (a closed lens cap, a saturated sensor), which may come twice.
+pub fn content(image: &Image) -> Option<u64> {
+    let first = image.pixels.first()?;
+    if image.pixels.iter().all(|pixel| pixel == first) {
+        return None;
+    }
+    // FNV-1a.
+    let hash = |hash: u64, pixel: &u16| (hash ^ u64::from(*pixel)).wrapping_mul(0x0000_0100_0000_01b3);
+    Some(image.pixels.iter().fold(0xcbf2_9ce4_8422_2325, hash))
 }
 
 /// Where a frame stands to an exposure.
@@ -43,33 +82,116 @@ pub enum Belongs {
 #[derive(Clone, Debug)]
 pub struct Pairing {
     /// The last frame that was paired, with its exposure.
-    last: Option<(Stamp, ShotRecord)>,
+    last: Option<(Evidence, ShotRecord)>,
     jitter: Duration,
+    armed: Option<Instant>,
+    /// Board time at which the first move of the program began, in us.
+    begin_us: Option<u64>,
+    /// Whether the board's time is that of this computer's clock; an emulated board may run faster.
+    in_real_time: bool,
+    contents: Vec<(u64, u32)>,
+    /// Longest time between two exposures.
+    longest: Duration,
 }
 
 impl Default for Pairing {
     fn default() -> Self {
-        Self { last: None, jitter: JITTER }
+        Self::with_jitter(JITTER)
     }
 }
 
 impl Pairing {
     /// For a camera whose stamps jitter by more than those of hardware.
     pub fn with_jitter(jitter: Duration) -> Self {
-        Self { last: None, jitter }
+        Self {
+            last: None,
+            jitter,
+            armed: None,
+            begin_us: None,
+            in_real_time: false,
+            contents: Vec::new(),
+            longest: Duration::ZERO,
+        }
     }
 
     /// Forgets what was paired: the camera is armed anew.
     pub fn begin(&mut self) {
-        self.last = None;
+        *self = Self::with_jitter(self.jitter);
+        self.armed = Some(Instant::now());
+    }
+
+    /// Takes the board's report of an exposure, received at this time.
+    pub fn reported(&mut self, shot: &ShotRecord, received: Instant) {
+        if self.begin_us.is_none() {
+            self.begin_us = Some(shot.trigger.0.saturating_sub(u64::from(shot.settle.0)));
+            self.in_real_time = true;
+        }
+        let over = self.at_least(shot.strobe_end.0);
+        self.in_real_time &= over.is_some_and(|over| over <= received);
+    }
+
+    /// Earliest time of this computer's clock that a board time, in us, can be: the program began after the camera was armed.
+    fn at_least(&self, board_us: u64) -> Option<Instant> {
+        let since_us = board_us.saturating_sub(self.begin_us?);
+        let drift_us = since_us.saturating_mul(DRIFT_PPM) / 1_000_000;
+        Some(self.armed? + Duration::from_micros(since_us - drift_us))
+    }
+
+    /// How long a surplus picture is awaited after the program: as long as its longest interval.
+    pub fn quiet_time(&self) -> Duration {
+        self.longest.max(QUIET)
     }
 
     /// Judges the next frame that came against the exposure that waits for one. `camera` is for messages.
     ///
     /// # Errors
     /// [`CameraError::Mispaired`] where count and time contradict each other.
-    pub fn judge(&mut self, camera: &str, stamp: Stamp, shot: &ShotRecord) -> Result<Belongs, CameraError> {
-        if let Some((last, last_shot)) = &self.last {
+    /// [`CameraError::Doubled`], [`CameraError::Reordered`], [`CameraError::Stale`] where a picture cannot be the exposure's.
+    pub fn judge(
+        &mut self,
+        camera: &str,
+        evidence: impl Into<Evidence>,
+        shot: &ShotRecord,
+    ) -> Result<Belongs, CameraError> {
+        let evidence = evidence.into();
+        let wanted = shot.trigger_number;
+        let same = self.contents.iter().find(|(content, _)| Some(*content) == evidence.content);
+        if let Some((_, earlier)) = same {
+            return Err(CameraError::Doubled { camera: camera.into(), earlier: *earlier, wanted });
+        }
+        if let (Some((before, _)), Some((at, path))) =
+            (self.last.as_ref().and_then(|(last, _)| last.taken.as_ref()), &evidence.taken)
+            && (at < before || (at == before && self.is_earlier_by_name(path)))
+        {
+            return Err(CameraError::Reordered { path: path.clone() });
+        }
+        let belongs = self.by_stamp(camera, evidence.stamp, shot)?;
+        if belongs != Belongs::Here {
+            return Ok(belongs);
+        }
+        let earliest = self.at_least(shot.strobe_start.0).filter(|_| self.in_real_time);
+        if let (Some(arrived), Some(earliest)) = (evidence.arrived, earliest)
+            && let Some(early) = earliest.checked_duration_since(arrived + ARRIVAL_JITTER)
+        {
+            return Err(CameraError::Stale { camera: camera.into(), wanted, early });
+        }
+        self.contents.extend(evidence.content.map(|content| (content, wanted)));
+        let (from, to) = match &self.last {
+            Some((_, last)) => (last.strobe_start.0, shot.strobe_start.0),
+            None => (shot.trigger.0.saturating_sub(u64::from(shot.settle.0)), shot.strobe_end.0),
+        };
+        self.longest = self.longest.max(Duration::from_micros(to.saturating_sub(from)));
+        self.last = Some((evidence, *shot));
+        Ok(Belongs::Here)
+    }
+
+    fn is_earlier_by_name(&self, path: &Path) -> bool {
+        let last = self.last.as_ref().and_then(|(last, _)| last.taken.as_ref());
+        last.is_some_and(|(_, last)| by_number(path, last) == Some(Ordering::Less))
+    }
+
+    fn by_stamp(&self, camera: &str, stamp: Stamp, shot: &ShotRecord) -> Result<Belongs, CameraError> {
+        if let Some((Evidence { stamp: last, .. }, last_shot)) = &self.last {
             let triggers = shot.trigger_number.wrapping_sub(last_shot.trigger_number);
             if let (Some(from), Some(to)) = (last.count, stamp.count) {
                 let ahead = counted(from, to).saturating_sub(i64::from(triggers));
@@ -94,9 +216,26 @@ impl Pairing {
                 }
             }
         }
-        self.last = Some((stamp, *shot));
         Ok(Belongs::Here)
     }
+}
+
+/// Orders two files of a camera by the number at the end of their names; a counter of four digits starts anew after 9999. `None` where
+/// the names have no number or differ in more than it.
+pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
+    let split = |path: &Path| {
+        let stem = path.file_stem()?.to_str()?.to_owned();
+        let digits = stem.bytes().rev().take_while(u8::is_ascii_digit).count();
+        let (name, number) = stem.split_at(stem.len() - digits);
+        Some((name.to_owned(), number.parse::<u64>().ok()?, digits))
+    };
+    let ((name_a, a, digits_a), (name_b, b, digits_b)) = (split(a)?, split(b)?);
+    if name_a != name_b {
+        return None;
+    }
+    // Half of the counter is further than any two pictures of one program are apart.
+    let rolled_over = digits_a == 4 && digits_b == 4 && a.abs_diff(b) > 5_000;
+    Some(if rolled_over { b.cmp(&a) } else { a.cmp(&b) })
 }
 
 fn mispaired(camera: &str, shot: &ShotRecord, reason: String) -> CameraError {
@@ -140,6 +279,81 @@ mod tests {
             strobe_end: BoardMicros(strobe_us + 5_000),
             exposure: Micros(5_000),
         }
+    }
+
+    fn long_shot(trigger_number: u32, strobe_us: u64) -> ShotRecord {
+        ShotRecord { settle: Micros(10_000), ..shot(trigger_number, strobe_us) }
+    }
+
+    /// Judges a picture that arrived so many ms after arming, of an exposure that was reported at its end.
+    fn arrive(pairing: &mut Pairing, shot: ShotRecord, arrived_ms: u64) -> Result<Belongs, CameraError> {
+        let armed = pairing.armed.unwrap();
+        let reported = armed
+            + Duration::from_micros(shot.strobe_end.0 - pairing.begin_us.unwrap_or(990_000))
+            + Duration::from_millis(3);
+        pairing.reported(&shot, reported);
+        let arrived = Some(armed + Duration::from_millis(arrived_ms));
+        pairing.judge("ffmpeg", Evidence { arrived, ..Evidence::default() }, &shot)
+    }
+
+    #[test]
+    fn refuses_a_picture_that_arrived_before_its_exposure() {
+        let mut pairing = Pairing::default();
+        pairing.begin();
+        assert_eq!(arrive(&mut pairing, long_shot(1, 1_000_000), 18).unwrap(), Belongs::Here);
+        // A second picture of the first trigger, 400 ms later: the second exposure begins after 1010 ms.
+        let error = arrive(&mut pairing, long_shot(2, 2_000_000), 418).unwrap_err();
+        assert!(matches!(error, CameraError::Stale { wanted: 2, .. }), "{error:?}");
+        assert!(error.to_string().contains("-fps_mode passthrough"), "{error}");
+        assert_eq!(pairing.quiet_time(), QUIET);
+    }
+
+    #[test]
+    fn accepts_pictures_whose_board_runs_faster_than_the_clock() {
+        let mut pairing = Pairing::default();
+        pairing.begin();
+        let armed = pairing.armed.unwrap();
+        for (number, arrived_ms) in [(1, 3), (2, 4), (3, 5)] {
+            let shot = long_shot(number, u64::from(number) * 1_000_000);
+            pairing.reported(&shot, armed + Duration::from_millis(arrived_ms));
+            let arrived = Some(armed + Duration::from_millis(arrived_ms));
+            let evidence = Evidence { arrived, ..Evidence::default() };
+            assert_eq!(pairing.judge("c", evidence, &shot).unwrap(), Belongs::Here);
+        }
+        assert_eq!(pairing.quiet_time(), Duration::from_secs(1));
+    }
+
+    #[test]
+    fn refuses_the_same_pixels_twice_but_for_an_even_picture() {
+        let image = |pixels: [u16; 3]| Image { pixels: ndarray::array![pixels], bits: 8 };
+        assert_eq!(content(&image([7, 7, 7])), None);
+        assert_ne!(content(&image([1, 2, 3])), content(&image([3, 2, 1])));
+        let mut pairing = Pairing::default();
+        pairing.begin();
+        let of = |pixels| Evidence { content: content(&image(pixels)), ..Evidence::default() };
+        pairing.judge("c", of([1, 2, 3]), &shot(4, 0)).unwrap();
+        let error = pairing.judge("c", of([1, 2, 3]), &shot(5, 9)).unwrap_err();
+        assert!(matches!(error, CameraError::Doubled { earlier: 4, wanted: 5, .. }), "{error:?}");
+    }
+
+    #[test]
+    fn refuses_an_older_picture_after_a_newer_one() {
+        let at = |seconds, name: &str| Evidence {
+            taken: Some((SystemTime::UNIX_EPOCH + Duration::from_secs(seconds), name.into())),
+            ..Evidence::default()
+        };
+        let judge = |first: Evidence, second: Evidence| {
+            let mut pairing = Pairing::default();
+            pairing.begin();
+            pairing.judge("c", first, &shot(1, 0)).unwrap();
+            pairing.judge("c", second, &shot(2, 9))
+        };
+        assert!(matches!(judge(at(9, "a.jpg"), at(8, "b.jpg")), Err(CameraError::Reordered { .. })));
+        assert!(judge(at(8, "b.jpg"), at(9, "a.jpg")).is_ok());
+        // Within one tick of the clock the number counts, which starts anew after 9999.
+        assert!(judge(at(9, "IMG_0007.jpg"), at(9, "IMG_0006.jpg")).is_err());
+        assert!(judge(at(9, "IMG_9999.jpg"), at(9, "IMG_0001.jpg")).is_ok());
+        assert!(judge(at(9, "IMG_0001.jpg"), at(9, "IMG_9999.jpg")).is_err());
     }
 
     fn stamp(count: Option<u64>, time_us: Option<u64>) -> Stamp {

@@ -99,6 +99,21 @@ impl Layout {
         }
     }
 
+    /// Bytes of a row without padding; `None` where rows do not begin at a byte of their own.
+    pub fn row_bytes(self, width: usize) -> Option<usize> {
+        match self {
+            Self::Grey8 { .. } => Some(width),
+            Self::Grey16 { .. } | Self::Yuyv => width.checked_mul(2),
+            Self::Packed10 | Self::Packed12 | Self::GigePacked12 | Self::Jpeg => None,
+        }
+    }
+
+    /// As [`Self::frame_bytes`], where rows are `stride` bytes apart.
+    pub fn padded_frame_bytes(self, stride: usize, height: usize) -> Option<usize> {
+        let per_pixel = self.row_bytes(1)?;
+        self.frame_bytes(stride.div_ceil(per_pixel), height)
+    }
+
     /// A frame's bytes without the padding at the end of each row, where rows are `stride` bytes apart.
     ///
     /// # Errors
@@ -110,11 +125,7 @@ impl Layout {
         height: usize,
         stride: usize,
     ) -> Result<Vec<u8>, BadFrame> {
-        let row = match self {
-            Self::Grey8 { .. } => width,
-            Self::Grey16 { .. } | Self::Yuyv => 2 * width,
-            Self::Packed10 | Self::Packed12 | Self::GigePacked12 | Self::Jpeg => return Ok(bytes.to_vec()),
-        };
+        let Some(row) = self.row_bytes(width) else { return Ok(bytes.to_vec()) };
         if stride <= row {
             return Ok(bytes.to_vec());
         }

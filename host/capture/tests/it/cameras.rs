@@ -16,7 +16,7 @@ use farnear_capture::camera::{Camera, CameraError, FolderCamera, SimCamera};
 use farnear_files::image_file::encode_png;
 use farnear_protocol::{
     camera::FrameHeader,
-    message::{Axis, ShotRecord},
+    message::{Axis, ShotRecord, TriggerMode},
     units::{BoardMicros, Micros, Nanometres},
 };
 use ndarray::Array2;
@@ -56,8 +56,10 @@ fn a_folder_gives_its_new_images_in_order_and_waits_for_half_written_ones() {
         fs::write(path.join("b.png"), &png).unwrap();
         fs::write(path.join("notes.txt"), b"no image").unwrap();
     });
-    let value = |camera: &mut FolderCamera| {
-        camera.image(&shot(0), Duration::from_secs(20)).map(|image| image.pixels[[0, 0]])
+    let mut number = 0;
+    let mut value = |camera: &mut FolderCamera| {
+        number += 1;
+        camera.image(&shot(number), Duration::from_secs(20)).map(|image| image.pixels[[0, 0]])
     };
     assert_eq!(value(&mut camera).unwrap(), 2);
     writer.join().unwrap();
@@ -129,4 +131,88 @@ fn a_camera_that_hangs_up_or_is_none_is_named() {
     assert!(matches!(nonsense, CameraError::Nonsense { .. }), "{nonsense:?}");
     let absent = SimCamera::connect("127.0.0.1:1").err().unwrap();
     assert!(matches!(absent, CameraError::Connect { .. }), "{absent:?}");
+}
+
+fn picture(value: u16) -> Vec<u8> {
+    encode_png(Array2::from_shape_fn((4, 4), |(row, column)| value + (row + column) as u16).view(), 8)
+        .unwrap()
+}
+
+/// A folder camera that is armed, after a first picture was used.
+fn used_folder(first: &str) -> (tempfile::TempDir, FolderCamera) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut camera = FolderCamera::watch(folder.path()).unwrap();
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    fs::write(folder.path().join(first), picture(10)).unwrap();
+    camera.image(&shot(0), Duration::from_secs(20)).unwrap();
+    (folder, camera)
+}
+
+fn second_picture(camera: &mut FolderCamera) -> Result<(), CameraError> {
+    camera.image(&shot(1), Duration::from_secs(5)).map(drop)
+}
+
+#[test]
+fn a_copy_of_a_picture_is_refused() {
+    let (folder, mut camera) = used_folder("a.png");
+    fs::copy(folder.path().join("a.png"), folder.path().join("b.png")).unwrap();
+    let error = second_picture(&mut camera).unwrap_err();
+    assert!(matches!(error, CameraError::Doubled { earlier: 0, wanted: 1, .. }), "{error:?}");
+}
+
+#[test]
+fn one_picture_in_two_formats_is_refused() {
+    let (folder, mut camera) = used_folder("a.png");
+    fs::write(folder.path().join("a.tif"), picture(10)).unwrap();
+    let error = second_picture(&mut camera).unwrap_err().to_string();
+    assert!(error.contains("a.png is the same picture in another format"), "{error}");
+}
+
+#[test]
+fn a_surplus_file_is_refused_after_the_last_exposure() {
+    let (folder, mut camera) = used_folder("a.png");
+    camera.finish(Duration::from_millis(10)).unwrap();
+    assert!(camera.quiet_time() >= Duration::from_millis(200));
+    fs::write(folder.path().join("b.png"), picture(20)).unwrap();
+    let error = camera.finish(Duration::from_millis(10)).unwrap_err();
+    assert!(matches!(error, CameraError::Surplus { .. }) && error.to_string().contains("b.png"), "{error}");
+}
+
+#[test]
+fn an_older_picture_after_a_newer_one_is_refused() {
+    let (folder, mut camera) = used_folder("b.png");
+    let path = folder.path().join("a.png");
+    fs::write(&path, picture(20)).unwrap();
+    let earlier = std::time::SystemTime::now() - Duration::from_secs(30);
+    fs::File::options().write(true).open(&path).unwrap().set_modified(earlier).unwrap();
+    let error = second_picture(&mut camera).unwrap_err();
+    assert!(matches!(error, CameraError::Reordered { .. }), "{error:?}");
+}
+
+#[test]
+fn a_file_that_is_written_again_is_named() {
+    let (folder, mut camera) = used_folder("capt0000.png");
+    fs::write(folder.path().join("capt0000.png"), picture(200)).unwrap();
+    let later = std::time::SystemTime::now() + Duration::from_secs(1);
+    let file = fs::File::options().write(true).open(folder.path().join("capt0000.png")).unwrap();
+    file.set_modified(later).unwrap();
+    let error = second_picture(&mut camera).unwrap_err();
+    assert!(matches!(error, CameraError::Overwritten { .. }), "{error:?}");
+    assert!(error.to_string().contains("capt0000.png"), "{error}");
+}
+
+#[test]
+fn a_jpeg_without_its_end_is_waited_for_and_refused() {
+    let (folder, mut camera) = used_folder("a.png");
+    let mut jpeg = Vec::new();
+    let pixels: Vec<u8> = (0..64 * 64).map(|at| (at * 7 % 251) as u8).collect();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 90)
+        .encode(&pixels, 64, 64, image::ExtendedColorType::L8)
+        .unwrap();
+    let path = folder.path().join("b.jpg");
+    fs::write(&path, &jpeg[..jpeg.len() / 2]).unwrap();
+    let error = second_picture(&mut camera).unwrap_err().to_string();
+    assert!(error.contains("b.jpg") && error.contains("incomplete"), "{error}");
+    fs::write(&path, &jpeg).unwrap();
+    second_picture(&mut camera).unwrap();
 }

@@ -53,11 +53,11 @@ fn each_trigger_gives_its_picture_and_one_too_many_is_an_error() {
         let image = camera.image(&shot(number), WAIT).unwrap();
         assert_eq!((image.pixels[[0, 0]], image.pixels[[0, 1]], image.bits), (65, 48 + number as u16, 8));
     }
-    camera.finish().unwrap();
+    camera.finish(Duration::from_millis(200)).unwrap();
     let late = camera.image(&shot(4), Duration::from_millis(30)).unwrap_err();
     assert!(matches!(late, CameraError::Late { trigger_number: 4, .. }), "{late:?}");
     trigger(4);
-    let surplus = camera.finish().unwrap_err();
+    let surplus = camera.finish(Duration::from_millis(200)).unwrap_err();
     assert!(matches!(surplus, CameraError::Surplus { .. }), "{surplus:?}");
 }
 
@@ -67,7 +67,7 @@ fn a_program_that_runs_freely_is_found_out() {
         script("printf 'YUV4MPEG2 W1 H1 Cmono\\n'; while sleep 0.02; do printf 'FRAME\\nA'; done").unwrap();
     camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
     camera.image(&shot(1), WAIT).unwrap();
-    assert!(matches!(camera.finish().unwrap_err(), CameraError::Surplus { .. }));
+    assert!(matches!(camera.finish(Duration::from_millis(200)).unwrap_err(), CameraError::Surplus { .. }));
     let free = camera.arm(TriggerMode::FreeRunning, Micros(1)).unwrap_err();
     assert!(matches!(free, CameraError::Trigger { camera: "command", .. }), "{free:?}");
     // To look at, it is good enough.
@@ -154,4 +154,70 @@ fn ffmpegs_test_picture_comes_as_y4m_and_as_raw_frames() {
             (f64::from(y4m.pixels[[2, column]]), f64::from(raw.pixels[[2, column]]) / 257.0);
         assert!((eight - sixteen).abs() <= 3.0, "column {column}: {eight} and {sixteen}");
     }
+}
+
+#[test]
+fn a_surplus_picture_later_than_any_fixed_wait_is_refused_before_the_next_exposure() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut camera = triggered(folder.path()).unwrap();
+    let trigger = |number: u32| fs::write(folder.path().join(format!("go-{number}")), "").unwrap();
+    let exposure = |number: u32, strobe_us: u64| {
+        let mut shot = shot(number);
+        shot.trigger.0 = strobe_us;
+        (shot.strobe_start.0, shot.strobe_end.0) = (strobe_us, strobe_us + 5_000);
+        shot
+    };
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    let armed = Instant::now();
+    trigger(1);
+    let first = exposure(1, 0);
+    std::thread::sleep(Duration::from_millis(20));
+    camera.reported(&first, Instant::now());
+    camera.image(&first, WAIT).unwrap();
+    // 400 ms after the first picture another one comes, of no exposure; the second exposure is after 900 ms.
+    std::thread::sleep(Duration::from_millis(400).saturating_sub(armed.elapsed()));
+    trigger(2);
+    std::thread::sleep(Duration::from_millis(920).saturating_sub(armed.elapsed()));
+    let second = exposure(2, 900_000);
+    camera.reported(&second, Instant::now());
+    trigger(3);
+    let error = camera.image(&second, WAIT).unwrap_err();
+    assert!(matches!(error, CameraError::Stale { wanted: 2, .. }), "{error:?}");
+}
+
+#[test]
+fn waits_for_surplus_pictures_as_long_as_the_longest_interval() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut camera = triggered(folder.path()).unwrap();
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+    for (number, strobe_us) in [(1, 0), (2, 1_500_000)] {
+        fs::write(folder.path().join(format!("go-{number}")), "").unwrap();
+        let mut shot = shot(number);
+        (shot.trigger.0, shot.strobe_start.0, shot.strobe_end.0) = (strobe_us, strobe_us, strobe_us);
+        camera.image(&shot, WAIT).unwrap();
+    }
+    assert_eq!(camera.quiet_time(), Duration::from_millis(1_500));
+}
+
+#[test]
+fn padded_rows_are_named_and_read_with_their_stride() {
+    // Rows of 3 px, padded to 64 bytes: two frames of 2 rows.
+    let bytes = "printf '\\001\\002\\003%061d\\004\\005\\006%061d' 0 0";
+    let mut camera = start(&format!("3x2/64:gray:sh -c \"sleep 0.5; {bytes}; sleep 30\"")).unwrap();
+    let image = camera.image(&shot(1), WAIT).unwrap();
+    assert_eq!(image.pixels, ndarray::array![[1, 2, 3], [4, 5, 6]]);
+    let mut camera = start(&format!("3x2:gray:sh -c \"sleep 0.5; {bytes}; sleep 30\"")).unwrap();
+    camera.image(&shot(1), WAIT).unwrap();
+    let error = camera.finish(Duration::from_millis(200)).unwrap_err();
+    assert!(matches!(error, CameraError::Surplus { .. }), "whole frames are left over: {error}");
+    let mut camera = start(&format!("60x2:gray:sh -c \"sleep 0.5; {bytes}; sleep 30\"")).unwrap();
+    camera.image(&shot(1), WAIT).unwrap();
+    let error = camera.finish(Duration::from_millis(200)).unwrap_err().to_string();
+    assert!(error.contains("8 bytes are left over") && error.contains("60x2/64"), "{error}");
+}
+
+#[test]
+fn doubled_pictures_of_ffmpeg_have_a_hint() {
+    let error = CameraError::Doubled { camera: "`ffmpeg`".into(), earlier: 1, wanted: 2 }.to_string();
+    assert!(error.contains("-fps_mode passthrough"), "{error}");
 }

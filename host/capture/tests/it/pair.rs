@@ -193,7 +193,7 @@ impl Camera for OneTooMany {
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         numbered().image(shot, wait)
     }
-    fn finish(&mut self) -> Result<(), CameraError> {
+    fn finish(&mut self, _: Duration) -> Result<(), CameraError> {
         Err(CameraError::Surplus { camera: self.kind().into() })
     }
 }
@@ -218,6 +218,11 @@ fn a_camera_that_gives_nothing_stops_the_rig() {
 #[test]
 fn optics_out_of_reach_move_nothing() {
     let (client, peer) = client();
+    let long = Exposures { exposure: Micros(3_600_000_000), ..exposures() };
+    let error = capture_pair(&client, &mut numbered(), &SENSOR, &long, &mut |_| {}).unwrap_err().to_string();
+    let max = client.hello().limits.exposure_max.0;
+    assert!(error.contains("3600000000 us") && error.contains(&max.to_string()), "{error}");
+    assert_eq!(peer.board().acts, 0);
     let far_away = SensorPair { far_mm: 90.0, near_mm: 90.1 };
     let error = capture_pair(&client, &mut numbered(), &far_away, &exposures(), &mut |_| {}).unwrap_err();
     assert!(matches!(error, CaptureError::Plan(_)), "{error:?}");

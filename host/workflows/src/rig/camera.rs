@@ -7,7 +7,8 @@ use std::{
 };
 
 use farnear_capture::{
-    camera::{Camera, CommandCamera, FolderCamera, Setting, SimCamera, command::CommandLine},
+    camera::{Camera, CommandCamera, FolderCamera, Range, Setting, SimCamera, command::CommandLine},
+    expose::{CaptureError, check_exposure},
     record::Circumstances,
 };
 use farnear_depth::psf::Psf;
@@ -198,7 +199,9 @@ impl EarlyCamera {
             }
             (None, None) => return Err(WorkflowError::parameter("camera", "sim", OF_THE_EMULATED_RIG)),
         };
-        Ok(EquippedRig { camera, rig })
+        let mut equipped = EquippedRig { camera, rig };
+        equipped.check_exposure(self.settings.exposure)?;
+        Ok(equipped)
     }
 
     /// The same with a second camera, behind a half mirror; without one of its own, the emulated rig's second.
@@ -234,6 +237,23 @@ pub struct EquippedRig {
 }
 
 impl EquippedRig {
+    /// Checks an exposure against the limits of board and camera, before anything moves.
+    fn check_exposure(&mut self, exposure: Micros) -> Result<()> {
+        check_exposure(&self.rig.client, exposure).map_err(CaptureError::from)?;
+        let asked = f64::from(exposure.0);
+        // A camera whose settings cannot be read says why when it is armed.
+        for control in self.camera.controls().unwrap_or_default() {
+            if control.name == "exposure_us"
+                && matches!(control.range, Range::Number { .. })
+                && !control.range.has(asked)
+            {
+                let expected = format!("the camera allows {}", control.range);
+                return Err(WorkflowError::parameter("exposure_us", asked, expected));
+            }
+        }
+        Ok(())
+    }
+
     /// What a capture's record says beside what was measured. `psf` and `optics` are those that were captured with, as
     /// far as they are known.
     pub fn circumstances(&self, psf: Psf, optics: toml::Table) -> Circumstances {

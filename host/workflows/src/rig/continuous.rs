@@ -8,6 +8,7 @@ use std::{fs, path::PathBuf};
 
 use farnear_capture::{
     continuous::{Continuous, Cycles, Frame, Outcome, Pace},
+    expose::{CaptureError, check_exposures},
     pair::{Exposures, Reach, reach},
     plan::SensorPair,
     ready::ensure_homed,
@@ -148,8 +149,10 @@ fn make_ready(
 ) -> Result<Ready> {
     let (client, say) = (&equipped.rig.client, &mut |what: &str| context.info(what));
     let Some(optics) = optics else {
+        let shots = program.unwrap_or_default();
+        check_exposures(client, &shots).map_err(CaptureError::from)?;
         ensure_homed(client, say)?;
-        return Ok(Ready { shots: program.unwrap_or_default(), pair: None });
+        return Ok(Ready { shots, pair: None });
     };
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };

@@ -3,7 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use farnear_capture::{
-    expose::{CaptureError, expose},
+    expose::{CaptureError, check_exposures, expose},
     ready::ensure_homed,
     record::{begin_folder, finish_sequence, record_of_sequence},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
@@ -89,6 +89,7 @@ pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<Sequenc
     let folder = begin_folder(&settings.out)?;
     let lens = optics.as_ref().map(GivenOptics::for_emulation);
     let mut rig = settings.camera.connect(&settings.rig, lens, context)?;
+    check_exposures(&rig.rig.client, &shots).map_err(CaptureError::from)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
     let mut taken = Vec::new();
     for run in 0..settings.runs {

@@ -10,7 +10,7 @@ use std::{
 use farnear_recognition::classifier::Family;
 use farnear_recognition::frames::Mode;
 use farnear_workflows::{
-    Cancel, Context, Unattended, Progress, Result, WorkflowError,
+    Cancel, Context, Progress, Result, Unattended, WorkflowError,
     activity::{
         evaluation::{self, EvaluationSettings, LearnFrom},
         method::{Adaptation, Method, Pattern},

@@ -4,7 +4,7 @@ use std::{
     io,
     panic::catch_unwind,
     path::{Path, PathBuf},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use ::v4l::{
@@ -35,8 +35,6 @@ use crate::{
 
 /// Buffers that the driver fills in turn.
 const BUFFERS: u32 = 4;
-/// After the last picture of a program of exposures nothing may come for so long.
-const QUIET: Duration = Duration::from_millis(200);
 /// `poll` tells of a frame that is ready by this bit, on every Linux.
 const POLLIN: i16 = 1;
 
@@ -259,8 +257,16 @@ impl Camera for V4lCamera {
         Err(CameraError::Late { camera, trigger_number: wanted, waited: wait })
     }
 
-    fn finish(&mut self) -> Result<(), CameraError> {
-        match self.take(QUIET)? {
+    fn reported(&mut self, shot: &ShotRecord, received: Instant) {
+        self.pairing.reported(shot, received);
+    }
+
+    fn quiet_time(&self) -> Duration {
+        self.pairing.quiet_time()
+    }
+
+    fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
+        match self.take(wait)? {
             Some(_) => Err(CameraError::Surplus { camera: self.path.display().to_string() }),
             None => Ok(()),
         }

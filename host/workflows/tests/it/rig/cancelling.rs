@@ -13,19 +13,25 @@ use farnear_workflows::{
     rig::{
         RigAddress,
         check::{self, CheckSettings},
+        continuous::{self, ContinuousSettings, Cycle, Enough},
         focus::{self, FocusSettings},
+        live,
+        live_depth::{self, LiveDepthSettings},
         mechanics,
         motion::{self, MoveSettings},
         pair::{self, PairSettings},
         sequence::{self, Program, SequenceSettings},
+        series::{self, SeriesSettings},
         targets::{self, TargetSettings},
     },
 };
 
 use super::{Face, camera, optics};
 
-/// From the wish to the error. The board answers at once; a look at the wish comes every 50 to 200 ms.
-const AT_ONCE: Duration = Duration::from_secs(1);
+/// Longest time from cancelling to the end of the workflow, with a board that answers and stops immediately.
+const STOPPED_WITHIN: Duration = Duration::from_millis(300);
+/// A crowded computer may be late once; a slow path is slow each time.
+const TRIES: usize = 3;
 
 /// Waits, but not for ever: a workflow that ended before its time shall fail the test and not hang it.
 fn wait_until(reached: impl Fn() -> bool) {
@@ -37,25 +43,30 @@ fn wait_until(reached: impl Fn() -> bool) {
 
 /// Starts a workflow with this board and cancels it from a second thread as soon as `under_way` is true of the board.
 fn cancelled(
-    faults: Faults,
-    under_way: impl Fn(&Peer) -> bool + Send + 'static,
-    workflow: impl FnOnce(RigAddress, &Context<'_>) -> Result<()>,
+    faults: &Faults,
+    under_way: impl Fn(&Peer) -> bool + Clone + Send + 'static,
+    workflow: impl Fn(RigAddress, &Context<'_>) -> Result<()>,
 ) -> (WorkflowError, Peer) {
-    let (port, board) = plug_in(faults);
-    let face = Face::default();
-    let context = face.context();
-    let (cancel, watched) = (context.cancel.clone(), board.clone());
-    let canceller = thread::spawn(move || {
-        wait_until(|| under_way(&watched));
-        cancel.cancel();
-        Instant::now()
-    });
-    let error = workflow(RigAddress::Port(port), &context).expect_err("it is cancelled");
-    let ended = Instant::now();
-    let wished = canceller.join().unwrap();
-    assert!(ended.duration_since(wished) < AT_ONCE, "{:?} after the wish", ended.duration_since(wished));
-    assert!(error.is_cancelled(), "{error}");
-    (error, board)
+    let mut took = Duration::ZERO;
+    for _ in 0..TRIES {
+        let (port, board) = plug_in(faults.clone());
+        let face = Face::default();
+        let context = face.context();
+        let (cancel, watched, under_way) = (context.cancel.clone(), board.clone(), under_way.clone());
+        let canceller = thread::spawn(move || {
+            wait_until(|| under_way(&watched));
+            cancel.cancel();
+            Instant::now()
+        });
+        let error = workflow(RigAddress::Port(port), &context).expect_err("it is cancelled");
+        let ended = Instant::now();
+        took = ended.duration_since(canceller.join().unwrap());
+        assert!(error.is_cancelled(), "{error}");
+        if took < STOPPED_WITHIN {
+            return (error, board);
+        }
+    }
+    panic!("stopped {took:?} after it was cancelled, in each of {TRIES} tries")
 }
 
 #[test]
@@ -63,7 +74,7 @@ fn every_workflow_that_moves_stops_the_rig() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let out = || path.join("out");
-    type Job<'a> = Box<dyn FnOnce(RigAddress, &Context<'_>) -> Result<()> + 'a>;
+    type Job<'a> = Box<dyn Fn(RigAddress, &Context<'_>) -> Result<()> + 'a>;
     let jobs: Vec<(&str, Job<'_>)> = vec![
         ("home", Box::new(|rig, context| motion::home(&rig, &[], context).map(drop))),
         (
@@ -122,10 +133,41 @@ fn every_workflow_that_moves_stops_the_rig() {
                 targets::capture(&settings, context).map(drop)
             }),
         ),
+        (
+            "continuous",
+            Box::new(|rig, context| {
+                let (camera, cycle) = (camera(path), Cycle::Pair { optics: optics() });
+                let enough = Enough::Never;
+                let settings = ContinuousSettings { rig, camera, cycle, rate_hz: None, enough, out: None };
+                continuous::run(&settings, context).map(drop)
+            }),
+        ),
+        (
+            "series",
+            Box::new(|rig, context| {
+                let (camera, out) = (camera(path), vec![path.join("series")]);
+                series::capture(&SeriesSettings { rig, camera, optics: optics(), out }, context).map(drop)
+            }),
+        ),
+        (
+            "live image",
+            Box::new(|rig, context| {
+                let settings = live::LiveSettings { rig, camera: camera(path) };
+                live::watch(&settings, context, |_, _| Ok(()))
+            }),
+        ),
+        (
+            "live depth",
+            Box::new(|rig, context| {
+                let (camera, computation) = (camera(path), farnear_depth::pipeline::Settings::default());
+                let settings = LiveDepthSettings { rig, camera, optics: optics(), computation };
+                live_depth::watch(&settings, context, |_| Ok(()))
+            }),
+        ),
     ];
     for (name, job) in jobs {
         let faults = Faults { never_ends: true, ..Faults::default() };
-        let (error, board) = cancelled(faults, |board| board.board().acts > 0, job);
+        let (error, board) = cancelled(&faults, |board| board.board().acts > 0, job);
         assert!(board.board().stops > 0, "{name}: {error}");
     }
     let left: Vec<_> = path.read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -147,7 +189,7 @@ fn a_camera_that_gives_nothing_is_waited_for_no_longer() {
             }
             exposed
         };
-        let (error, board) = cancelled(Faults::default(), exposed, |rig, context| {
+        let (error, board) = cancelled(&Faults::default(), exposed, |rig, context| {
             let out = path.join("out");
             let settings =
                 PairSettings { rig, camera: camera(path), optics: optics(), averaged: 1, frames: None, out };

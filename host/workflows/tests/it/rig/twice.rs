@@ -46,7 +46,7 @@ fn picture(shot: &ShotRecord) -> Vec<u8> {
     let light = |(row, column): (usize, usize)| {
         let sign = if (row / 2 + column / 2) % 2 == 0 { 1.0 } else { -1.0 };
         // No two pictures are the same, as those of a camera are not.
-        let noise = ((row * 31 + column * 17 + shot.trigger_number as usize * 7) % 5) as f64;
+        let noise = ((row * 31 + column * 17 + shot.trigger_number as usize * 7) % 97 % 5) as f64;
         (120.0 + sign * contrast + noise) as u16
     };
     encode_png(Array2::from_shape_fn((96, 96), light).view(), 8).unwrap()
@@ -169,12 +169,14 @@ fn a_second_run_takes_no_longer_than_the_first() {
             "targets",
             Box::new(|rig, run, context| {
                 let (camera, distances_mm, out) = (camera(), vec![900.0], out("targets", run));
-                let settings =
-                    TargetSettings { rig, camera, optics: optics(), distances_mm, ask: true, out };
+                let settings = TargetSettings { rig, camera, optics: optics(), distances_mm, ask: true, out };
                 targets::capture(&settings, context).map(drop)
             }),
         ),
-        ("mechanics", Box::new(|rig, _, context| mechanics::measure(&rig, Routine::Piezo, context).map(drop))),
+        (
+            "mechanics",
+            Box::new(|rig, _, context| mechanics::measure(&rig, Routine::Piezo, context).map(drop)),
+        ),
         (
             "check",
             Box::new(|rig, _, context| {
