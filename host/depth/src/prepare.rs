@@ -19,6 +19,7 @@ mod camera;
 mod defects;
 pub mod noise;
 mod straight;
+mod thinned;
 pub mod warp;
 
 use std::fmt;
@@ -33,6 +34,7 @@ use crate::reason::Reason;
 use align::{Alignment, Model};
 use balance::Gain;
 use noise::PairNoise;
+use thinned::Thinned;
 use warp::Warp;
 
 pub use camera::{CameraError, CameraFrames};
@@ -299,7 +301,8 @@ fn finish(
     let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let noise = measured.unwrap_or(PairNoise { constant: 0.0, per_unit: 0.0, mean_variance: 0.0 });
     let mut report = Report::default();
-    let warp = geometry(&far, &near, optics, settings.align, &mut report);
+    let mut thinned = Thinned::new(far.view(), near.view());
+    let warp = geometry(&thinned, far.dim(), optics, settings.align, &mut report);
     if let Some(warp) = &warp {
         near = match &recorded {
             Some(Recorded { near, distortion }) => {
@@ -307,12 +310,14 @@ fn finish(
             }
             None => warp::resample(near.view(), warp),
         };
+        thinned.replace_near(near.view());
     }
     drop(recorded);
-    brightness(&far, &mut near, settings.balance, &mut report);
+    brightness(&far, &mut near, &mut thinned, settings.balance, &mut report);
     let mut reasons = merged(marks, warp.as_ref(), &near);
     report.saturated_fraction = part_of(&reasons, Reason::Saturated);
-    let agreement = agreement::compare(far.view(), near.view(), &noise);
+    let agreement = agreement::compare(&thinned, far.dim(), &noise);
+    drop(thinned);
     (report.correlation, report.detailed_fraction) = (agreement.correlation, agreement.detailed);
     let mut far = far;
     if !settings.trust {
@@ -340,13 +345,12 @@ fn part_of(reasons: &Array2<u8>, reason: Reason) -> f64 {
 
 /// The map by which the near image is laid on the far one; `None` where it stays.
 fn geometry(
-    far: &Array2<f32>,
-    near: &Array2<f32>,
+    pair: &Thinned,
+    size: (usize, usize),
     optics: &Optics,
     align: Align,
     report: &mut Report,
 ) -> Option<Warp> {
-    let size = far.dim();
     let of_optics = || Warp::about_middle(size, optics.magnification_ratio(), 0.0, [0.0; 2]);
     let start = match (align, optics.telecentric()) {
         (Align::None, _) => return None,
@@ -359,8 +363,15 @@ fn geometry(
         Align::Auto | Align::Similarity => Some(Model::Similarity),
         Align::None | Align::Optics => None,
     };
-    let found =
-        model.and_then(|model| align::estimate(far.view(), near.view(), model, start)).filter(|found| {
+    // What is not significant is not looked for.
+    let in_place = |model: &Model| {
+        align == Align::Auto
+            && align::displaced(pair, *model, start, size).is_some_and(|px| px < LEAST_DISPLACEMENT_PX)
+    };
+    let found = model
+        .filter(|model| !in_place(model))
+        .and_then(|model| align::estimate_thinned(pair, model, start))
+        .filter(|found| {
             let beyond_doubt = align != Align::Auto || significant(found, &start, size);
             beyond_doubt && found.correlation > BELIEVED
         });
@@ -390,7 +401,13 @@ fn significant(found: &Alignment, start: &Warp, size: (usize, usize)) -> bool {
         && found.correlation > found.correlation_before
 }
 
-fn brightness(far: &Array2<f32>, near: &mut Array2<f32>, balance: Balance, report: &mut Report) {
+fn brightness(
+    far: &Array2<f32>,
+    near: &mut Array2<f32>,
+    thinned: &mut Thinned,
+    balance: Balance,
+    report: &mut Report,
+) {
     if balance == Balance::None {
         return;
     }
@@ -402,9 +419,11 @@ fn brightness(far: &Array2<f32>, near: &mut Array2<f32>, balance: Balance, repor
     let differs = (gain.mean - 1.0).abs() > LEAST_GAIN.max(SIGNIFICANT * gain.standard_error);
     if varies {
         gain.divide_by_field(&mut near.view_mut());
+        gain.divide_by_field(&mut thinned.near.band.view_mut());
         report.balanced = Some(Balanced { gain: gain.mean, range: Some(gain.range) });
     } else if differs || balance == Balance::Gain {
         gain.divide_by_mean(&mut near.view_mut());
+        gain.divide_by_mean(&mut thinned.near.band.view_mut());
         report.balanced = Some(Balanced { gain: gain.mean, range: None });
     }
 }

@@ -4,15 +4,14 @@
 //! the same surface, less what noise takes. A window in which they are not, although both have detail far above the noise,
 //! shows something else in each: it moved.
 //!
-//! Cost: six box sums per pixel of the level that is looked at, at most `FINEST_PX` pixels.
+//! Cost: three box means per pixel of the small images (`thinned`).
 
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, Zip};
 
-use super::band::{band, band_noise_gain, box_mean, halved, halving_noise_gain, without_holes};
+use super::band::{band_noise_gain, box_mean, halving_noise_gain};
 use super::noise::PairNoise;
+use super::thinned::Thinned;
 
-/// Most pixels that are looked at.
-const FINEST_PX: usize = 800_000;
 /// Side of the window.
 const WINDOW_PX: usize = 21;
 /// Part of the energy that must be detail, in both images, for a window to say anything.
@@ -32,20 +31,13 @@ pub struct Agreement {
     pub moved: Option<Array2<bool>>,
 }
 
-/// Compares a pair that lies on each other.
-pub fn compare(far: ArrayView2<f32>, near: ArrayView2<f32>, noise: &PairNoise) -> Agreement {
-    let size = far.dim();
-    let [mut far, mut near] = [far, near].map(without_holes);
-    let mut variance = noise.mean_variance * band_noise_gain();
-    let mut factor = 1;
-    while far.len() > FINEST_PX {
-        [far, near] = [&far, &near].map(|image| halved(image.view()).into());
-        variance *= halving_noise_gain();
-        factor *= 2;
-    }
-    let [a, b] = [far, near].map(|image| band(image.view()));
+/// Compares a pair that lies on each other and has `size` at full size.
+pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -> Agreement {
+    let factor = 1 << pair.halvings;
+    let variance = noise.mean_variance * band_noise_gain() * halving_noise_gain().powi(pair.halvings as i32);
+    let [a, b] = [&pair.far.band, &pair.near.band];
     let mean = |x: &Array2<f32>, y: &Array2<f32>| box_mean((x * y).view(), WINDOW_PX);
-    let [product, of_a, of_b] = [mean(&a, &b), mean(&a, &a), mean(&b, &b)];
+    let [product, of_a, of_b] = [mean(a, b), mean(a, a), mean(b, b)];
     let noise = variance as f32;
     let [mut sum, mut expected, mut windows] = [0.0_f64; 3];
     let mut different = Array2::from_elem(a.dim(), false);

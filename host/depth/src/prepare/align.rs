@@ -6,19 +6,22 @@
 //! what moved between the exposures has little say. A symmetric point spread function moves nothing, so the minimum lies
 //! where the images belong however different their blur.
 //!
-//! Cost: about 8 ms for 640x480 on two cores, 0.15 s for 12 megapixels, of which no more than `FINEST_PX` pixels are
-//! looked at on the finest level.
+//! Cost: `cargo bench -p farnear-depth --bench registration`; of large images a smaller copy of at most 800,000 pixels is
+//! registered (`thinned`). Where the images already lie on each other, one level is enough to see it ([`displaced`]).
 
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::band::{band, halved, normalised, without_holes};
+use super::band::{band, halved, normalised};
+use super::thinned::Thinned;
 use super::warp::{Warp, middle};
 
-/// Most pixels of the finest level.
-const FINEST_PX: usize = 800_000;
+/// Most pixels of the level on which a displacement is ruled out.
+const CHECKED_PX: usize = 200_000;
+/// Correlation from which the nearest alignment is taken for the right one without a search.
+const SURE: f64 = 0.6;
 /// Most pixels of a level that take part in a step; of larger ones every few rows.
 const STEP_PX: usize = 100_000;
 /// Shortest side of the coarsest level.
@@ -27,6 +30,8 @@ const COARSEST_PX: usize = 24;
 const STEPS: usize = 12;
 /// A step that moves no corner farther is the last, px.
 const SETTLED_PX: f64 = 2e-3;
+/// The same on levels that only start the next finer one.
+const COARSELY_SETTLED_PX: f64 = 2e-2;
 /// Pixels of the band that vary together: its correlation area.
 const CORRELATED_PX: f64 = 12.0;
 /// Pixels of a level's rim that are not compared.
@@ -99,7 +104,15 @@ struct Level {
 /// the image's mean. `None` where nothing could be compared: images below 48 px, without any detail, or that do not
 /// overlap.
 pub fn estimate(far: ArrayView2<f32>, near: ArrayView2<f32>, model: Model, start: Warp) -> Option<Alignment> {
-    let (levels, skipped) = levels(far, near)?;
+    if far.dim() != near.dim() || far.nrows().min(far.ncols()) < 2 * COARSEST_PX {
+        return None;
+    }
+    estimate_thinned(&Thinned::new(far, near), model, start)
+}
+
+/// The same of a pair that is thinned already.
+pub(super) fn estimate_thinned(pair: &Thinned, model: Model, start: Warp) -> Option<Alignment> {
+    let (levels, skipped) = (levels(pair)?, pair.halvings);
     let mut warp = start;
     for _ in 0..skipped + levels.len() - 1 {
         warp = warp.halved();
@@ -110,7 +123,8 @@ pub fn estimate(far: ArrayView2<f32>, near: ArrayView2<f32>, model: Model, start
     for (index, level) in levels.iter().enumerate().rev() {
         // The coarsest levels say little about anything but the shift.
         let of_level = if index + 1 == levels.len() && levels.len() > 2 { Model::Shift } else { model };
-        let refined = refine(level, of_level, warp)?;
+        let settled = if index == 0 { SETTLED_PX } else { COARSELY_SETTLED_PX };
+        let refined = refine(level, of_level, warp, settled)?;
         warp = refined.0;
         found = Some(refined);
         if index > 0 {
@@ -131,26 +145,52 @@ pub fn estimate(far: ArrayView2<f32>, near: ArrayView2<f32>, model: Model, start
     Some(Alignment { warp, correlation, correlation_before, standard_error_px: scale * standard_error })
 }
 
-/// The bands of both images from fine to coarse, and how often the images were halved before the first.
-fn levels(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<(Vec<Level>, usize)> {
-    let (height, width) = far.dim();
-    if far.dim() != near.dim() || height.min(width) < 2 * COARSEST_PX {
+/// How far the images may lie from `start`, root mean square with its standard error, px: a few steps on one level, without a
+/// search. `None` where they resemble each other too little at `start` for the nearest alignment to be the right one.
+pub(super) fn displaced(pair: &Thinned, model: Model, start: Warp, size: (usize, usize)) -> Option<f64> {
+    let [far, near] = [&pair.far, &pair.near];
+    if far.image.nrows().min(far.image.ncols()) < 4 * COARSEST_PX {
         return None;
     }
-    let [mut far, mut near] = [far, near].map(without_holes);
-    let mut skipped = 0;
-    while far.len() > FINEST_PX {
-        [far, near] = [&far, &near].map(|image| halved(image.view()).into());
-        skipped += 1;
+    let mut halvings = pair.halvings;
+    let level = if far.image.len() > CHECKED_PX {
+        halvings += 1;
+        let [far, near] = [far, near].map(|small| normalised(&band(halved(small.image.view()).view())));
+        Level { far, near }
+    } else {
+        let [far, near] = [far, near].map(|small| normalised(&small.band));
+        Level { far, near }
+    };
+    let mut first = start;
+    for _ in 0..halvings {
+        first = first.halved();
     }
-    let mut levels = Vec::new();
+    let (mut warp, mut error) = refine(&level, model, first, SETTLED_PX)?;
+    if correlation(&level, &warp) < SURE {
+        return None;
+    }
+    for _ in 0..halvings {
+        warp = warp.doubled();
+        error *= 2.0;
+    }
+    Some(warp.after(&start.inverse()?).rms_px(size) + error)
+}
+
+/// The bands of both images from fine to coarse. `None` for images that are too small.
+fn levels(pair: &Thinned) -> Option<Vec<Level>> {
+    let [far, near] = [&pair.far, &pair.near];
+    if far.image.nrows().min(far.image.ncols()) < 2 * COARSEST_PX {
+        return None;
+    }
+    let mut levels = vec![Level { far: normalised(&far.band), near: normalised(&near.band) }];
+    let [mut far, mut near] = [far, near].map(|small| halved(small.image.view()));
     loop {
+        if far.nrows().min(far.ncols()) < COARSEST_PX {
+            return Some(levels);
+        }
         let [a, b] = [&far, &near].map(|image| normalised(&band(image.view())));
         levels.push(Level { far: a, near: b });
-        if far.nrows().min(far.ncols()) < 2 * COARSEST_PX {
-            return Some((levels, skipped));
-        }
-        [far, near] = [&far, &near].map(|image| halved(image.view()).into());
+        [far, near] = [&far, &near].map(|image| halved(image.view()));
     }
 }
 
@@ -234,7 +274,7 @@ impl Sums {
 }
 
 /// Gauss-Newton steps on one level: the map, and its standard error in the level's pixels.
-fn refine(level: &Level, model: Model, start: Warp) -> Option<(Warp, f64)> {
+fn refine(level: &Level, model: Model, start: Warp, settled_px: f64) -> Option<(Warp, f64)> {
     let (height, width) = level.far.dim();
     let centre = middle((height, width));
     let unit = 0.5 * (height as f64).hypot(width as f64);
@@ -244,7 +284,11 @@ fn refine(level: &Level, model: Model, start: Warp) -> Option<(Warp, f64)> {
     let mut scale = f64::INFINITY;
     let mut error = f64::INFINITY;
     for _ in 0..STEPS {
-        let sums = sums(level, model, &warp, scale, centre, unit);
+        let sums = match model {
+            Model::Shift => sums::<2>(level, &warp, scale, centre, unit),
+            Model::Similarity => sums::<4>(level, &warp, scale, centre, unit),
+            Model::Affine => sums::<6>(level, &warp, scale, centre, unit),
+        };
         if sums.count < 8.0 * n as f64 {
             return None;
         }
@@ -260,7 +304,7 @@ fn refine(level: &Level, model: Model, start: Warp) -> Option<(Warp, f64)> {
             return None;
         }
         warp = warp.after(&model.warp(step.as_slice(), centre, unit).inverse()?);
-        if step.iter().map(|p| p.abs()).fold(0.0, f64::max) < SETTLED_PX {
+        if step.iter().map(|p| p.abs()).fold(0.0, f64::max) < settled_px {
             break;
         }
     }
@@ -278,42 +322,106 @@ fn rms_over_field(model: Model, covariance: &DMatrix<f64>, unit: f64, size: (usi
     (along(0) + along(1)).sqrt()
 }
 
-fn sums(level: &Level, model: Model, warp: &Warp, scale: f64, centre: [f64; 2], unit: f64) -> Sums {
+/// Pixels that are summed side by side, which the compiler makes vectors of.
+const SIDE_BY_SIDE: usize = 8;
+
+/// How the far image changes with each of `N` parameters, at pixels with these gradients and places; as [`Model::basis`].
+#[inline(always)]
+fn jacobian<const N: usize>(
+    [gx, gy]: [&[f32; SIDE_BY_SIDE]; 2],
+    x: &[f32; SIDE_BY_SIDE],
+    y: f32,
+) -> [[f32; SIDE_BY_SIDE]; N] {
+    std::array::from_fn(|parameter| {
+        std::array::from_fn(|i| match (N, parameter) {
+            (_, 0) => gx[i],
+            (_, 1) => gy[i],
+            (4, 2) => gx[i] * x[i] + gy[i] * y,
+            (4, _) => gy[i] * x[i] - gx[i] * y,
+            (_, 2) => gx[i] * x[i],
+            (_, 3) => gx[i] * y,
+            (_, 4) => gy[i] * x[i],
+            (_, _) => gy[i] * y,
+        })
+    })
+}
+
+/// The sums of a step for a model of `N` parameters.
+fn sums<const N: usize>(level: &Level, warp: &Warp, scale: f64, centre: [f64; 2], unit: f64) -> Sums {
     let (height, width) = level.far.dim();
-    let n = model.parameters();
     let step = (level.far.len() / STEP_PX).max(1);
     let rows: Vec<usize> = (RIM_PX..height - RIM_PX).step_by(step).collect();
     let Some(far) = level.far.as_slice() else { return Sums::NONE };
-    let weight_of = |difference: f64| 1.0 / (1.0 + (difference / (2.4 * scale)).powi(2));
+    let of_scale = (2.4 * scale).recip() as f32;
     let of_rows = rows.par_chunks(16).map(|rows| {
         let mut sums = Sums::NONE;
         for &y in rows {
-            for x in RIM_PX..width - RIM_PX {
-                let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) else { continue };
-                let at = y * width + x;
-                let gradient = [far[at + 1] - far[at - 1], far[at + width] - far[at - width]]
-                    .map(|d| 0.5 * f64::from(d));
-                let difference = f64::from(near) - f64::from(far[at]);
-                let weight = weight_of(difference);
-                let basis = model.basis((x as f64 - centre[0]) / unit, (y as f64 - centre[1]) / unit);
-                let mut jacobian = [0.0; 6];
-                for (j, b) in jacobian[..n].iter_mut().zip(&basis) {
-                    *j = gradient[0] * b[0] + gradient[1] * b[1];
-                }
-                for i in 0..n {
-                    let weighted = weight * jacobian[i];
-                    sums.right[i] += weighted * difference;
-                    for (sum, other) in sums.normal[i].iter_mut().zip(&jacobian[..n]) {
-                        *sum += weighted * other;
-                    }
-                }
-                sums.squares += weight * difference * difference;
-                sums.count += 1.0;
-            }
+            sums = sums.plus(sums_of_row::<N>(far, width, y, level, warp, of_scale, centre, unit));
         }
         sums
     });
     // In order, so that the sum does not depend on how threads share the work.
     let parts: Vec<Sums> = of_rows.collect();
     parts.into_iter().fold(Sums::NONE, Sums::plus)
+}
+
+#[allow(clippy::too_many_arguments)] // the innermost loop
+fn sums_of_row<const N: usize>(
+    far: &[f32],
+    width: usize,
+    y: usize,
+    level: &Level,
+    warp: &Warp,
+    of_scale: f32,
+    centre: [f64; 2],
+    unit: f64,
+) -> Sums {
+    const NONE: [f32; SIDE_BY_SIDE] = [0.0; SIDE_BY_SIDE];
+    let mut normal = [[NONE; N]; N];
+    let (mut right, mut squares, mut count) = ([NONE; N], NONE, 0_usize);
+    let row_of_field = ((y as f64 - centre[1]) / unit) as f32;
+    let [above, here, below] = [y - 1, y, y + 1].map(|y| &far[y * width..(y + 1) * width]);
+    for left in (RIM_PX..width - RIM_PX).step_by(SIDE_BY_SIDE) {
+        let (mut gx, mut gy, mut difference, mut present, mut column) = (NONE, NONE, NONE, NONE, NONE);
+        for i in 0..SIDE_BY_SIDE.min(width - RIM_PX - left) {
+            let x = left + i;
+            if let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) {
+                gx[i] = 0.5 * (here[x + 1] - here[x - 1]);
+                gy[i] = 0.5 * (below[x] - above[x]);
+                difference[i] = near - here[x];
+                present[i] = 1.0;
+                column[i] = ((x as f64 - centre[0]) / unit) as f32;
+                count += 1;
+            }
+        }
+        let weight: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| {
+            let relative = difference[i] * of_scale;
+            present[i] / (1.0 + relative * relative)
+        });
+        let jacobian = jacobian::<N>([&gx, &gy], &column, row_of_field);
+        for i in 0..N {
+            let weighted: [f32; SIDE_BY_SIDE] = std::array::from_fn(|x| weight[x] * jacobian[i][x]);
+            for x in 0..SIDE_BY_SIDE {
+                right[i][x] += weighted[x] * difference[x];
+            }
+            for j in i..N {
+                for x in 0..SIDE_BY_SIDE {
+                    normal[i][j][x] += weighted[x] * jacobian[j][x];
+                }
+            }
+        }
+        for x in 0..SIDE_BY_SIDE {
+            squares[x] += weight[x] * difference[x] * difference[x];
+        }
+    }
+    let whole = |parts: [f32; SIDE_BY_SIDE]| parts.into_iter().map(f64::from).sum::<f64>();
+    let mut sums = Sums { squares: whole(squares), count: count as f64, ..Sums::NONE };
+    for i in 0..N {
+        sums.right[i] = whole(right[i]);
+        for j in i..N {
+            sums.normal[i][j] = whole(normal[i][j]);
+            sums.normal[j][i] = sums.normal[i][j];
+        }
+    }
+    sums
 }

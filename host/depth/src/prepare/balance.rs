@@ -199,6 +199,16 @@ fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64
     Some(found)
 }
 
+/// Sum of a row of a block in eight sums side by side, which the compiler makes vectors of.
+fn sum(row: &[f32]) -> f32 {
+    let (parts, rest) = row.as_chunks::<8>();
+    let mut sums = [0.0_f32; 8];
+    for part in parts {
+        sums.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
+    }
+    sums.iter().chain(rest).sum()
+}
+
 fn blocks(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Vec<Block> {
     let (height, width) = far.dim();
     let side = (height.min(width) / BLOCKS).max(LEAST_BLOCK_PX);
@@ -210,6 +220,13 @@ fn blocks(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Vec<Block> {
                 let area = ndarray::s![top..top + side, left..left + side];
                 let (mut sums, mut count) = ([0.0_f64; 2], 0_usize);
                 for (far, near) in far.slice(area).rows().into_iter().zip(near.slice(area).rows()) {
+                    // Without holes, as nearly always, both sums are finite and every pixel counts.
+                    let whole = [&far, &near].map(|row| row.as_slice().map_or(f32::NAN, sum));
+                    if whole.iter().all(|sum| sum.is_finite()) {
+                        sums.iter_mut().zip(whole).for_each(|(all, sum)| *all += f64::from(sum));
+                        count += side;
+                        continue;
+                    }
                     for (far, near) in far.iter().zip(near).filter(|(f, n)| f.is_finite() && n.is_finite()) {
                         sums[0] += f64::from(*far);
                         sums[1] += f64::from(*near);

@@ -24,16 +24,28 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     let (rows, columns) = (height / 2, width / 2);
     let mut half = Array2::zeros((rows, columns));
     half.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
-        || vec![0.0_f32; width],
+        || vec![0.0_f32; width + 2],
         |across, (y, mut row)| {
-            across.fill(0.0);
-            for (tap, weight) in WEIGHTS.iter().enumerate() {
-                let from = image.row(reflect(2 * y as isize + tap as isize - 1, height));
-                across.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+            // One reflected pixel on either side, so that every output has its four taps in a slice.
+            let inner = &mut across[1..=width];
+            let taps = [0, 1, 2, 3].map(|tap| image.row(reflect(2 * y as isize + tap - 1, height)));
+            match taps.each_ref().map(|row| row.as_slice()) {
+                [Some(a), Some(b), Some(c), Some(d)] => {
+                    for ((((sum, a), b), c), d) in inner.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+                        *sum = WEIGHTS[0] * a + WEIGHTS[1] * b + WEIGHTS[2] * c + WEIGHTS[3] * d;
+                    }
+                }
+                _ => {
+                    inner.fill(0.0);
+                    for (from, weight) in taps.iter().zip(WEIGHTS) {
+                        inner.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+                    }
+                }
             }
-            for (x, value) in row.iter_mut().enumerate() {
-                let taps = (0..4).map(|tap| across[reflect(2 * x as isize + tap - 1, width)]);
-                *value = taps.zip(WEIGHTS).map(|(value, weight)| value * weight).sum();
+            across[0] = across[1 + reflect(-1, width)];
+            across[width + 1] = across[1 + reflect(width as isize, width)];
+            for (value, taps) in row.iter_mut().zip(across.windows(4).step_by(2)) {
+                *value = taps.iter().zip(WEIGHTS).map(|(value, weight)| value * weight).sum();
             }
         },
     );
@@ -97,13 +109,18 @@ fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
             row_sum.fill(0.0);
             for (tap, weight) in WEIGHTS.iter().enumerate() {
                 let from = image.row(reflect(y as isize + tap as isize - 2, height));
-                row_sum[2..2 + width].iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+                let to = row_sum[2..2 + width].iter_mut();
+                match from.as_slice() {
+                    Some(from) => to.zip(from).for_each(|(sum, value)| *sum += weight * value),
+                    None => to.zip(from).for_each(|(sum, value)| *sum += weight * value),
+                }
             }
             for d in 1..=2_isize {
                 row_sum[(2 - d) as usize] = row_sum[2 + reflect(-d, width)];
                 row_sum[(width as isize + 1 + d) as usize] =
                     row_sum[2 + reflect(width as isize - 1 + d, width)];
             }
+            let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
             for (tap, weight) in WEIGHTS.iter().enumerate() {
                 let from = &row_sum[tap..tap + width];
                 row.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
@@ -124,9 +141,16 @@ pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
             for (x, value) in image.row(y).iter().enumerate() {
                 sums[x + 1] = sums[x] + f64::from(*value);
             }
-            for (x, value) in row.iter_mut().enumerate() {
+            let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
+            let inner = r.min(width)..width.saturating_sub(r).max(r.min(width));
+            for x in (0..inner.start).chain(inner.end..width) {
                 let [from, to] = [x.saturating_sub(r), (x + r + 1).min(width)];
-                *value = ((sums[to] - sums[from]) / (to - from) as f64) as f32;
+                row[x] = ((sums[to] - sums[from]) / (to - from) as f64) as f32;
+            }
+            let share = 1.0 / (2 * r + 1) as f64;
+            let ends = sums.iter().zip(sums.get(2 * r + 1..).unwrap_or_default());
+            for (value, (from, to)) in row[inner].iter_mut().zip(ends) {
+                *value = ((to - from) * share) as f32;
             }
         },
     );
@@ -137,7 +161,8 @@ pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
             let top = chunk * rows;
             let mut sums = vec![0.0_f64; width];
             let add = |sums: &mut [f64], y: usize, sign: f64| {
-                sums.iter_mut().zip(across.row(y)).for_each(|(sum, value)| *sum += sign * f64::from(*value));
+                let Some(row) = across.row(y).to_slice() else { unreachable!("made in standard layout") };
+                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += sign * f64::from(*value));
             };
             let [mut from, mut to] = [top.saturating_sub(r), top.saturating_sub(r)];
             for (i, mut row) in rows_out.axis_iter_mut(Axis(0)).enumerate() {
@@ -151,6 +176,7 @@ pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
                     from += 1;
                 }
                 let share = 1.0 / (to - from) as f64;
+                let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
                 row.iter_mut().zip(&sums).for_each(|(value, sum)| *value = (sum * share) as f32);
             }
         },

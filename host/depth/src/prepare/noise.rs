@@ -41,15 +41,15 @@ impl PairNoise {
 pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise> {
     let (height, width) = far.dim();
     let [rows, columns] = [height, width].map(|n| n.saturating_sub(2) / BLOCK_PX);
-    let mut blocks: Vec<[f64; 2]> = (0..rows * columns)
-        .into_par_iter()
-        .filter_map(|index| {
-            let (top, left) = (index / columns * BLOCK_PX, index % columns * BLOCK_PX);
-            let [a, b] = [&far, &near].map(|image| energy(image, top, left));
+    let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
+    let of_row = |row: usize| {
+        let [far, near] = [&far, &near].map(|image| energies(&image.view(), row * BLOCK_PX, columns));
+        far.into_iter().zip(near).filter_map(|(a, b)| {
             let (variance, brightness) = (a[0].min(b[0]) / SMALLER_OF_TWO, 0.5 * (a[1] + b[1]));
             (variance.is_finite() && brightness.is_finite()).then_some([brightness, variance])
         })
-        .collect();
+    };
+    let mut blocks: Vec<[f64; 2]> = (0..rows).into_par_iter().flat_map_iter(of_row).collect();
     if blocks.is_empty() {
         return None;
     }
@@ -71,18 +71,27 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     Some(PairNoise { constant, per_unit, mean_variance })
 }
 
-/// Variance of the noise of a block and its mean brightness.
-fn energy(image: &ArrayView2<f32>, top: usize, left: usize) -> [f64; 2] {
-    let (mut squares, mut sum) = (0.0_f64, 0.0_f64);
+/// Variance of the noise and mean brightness of each block of a row of blocks.
+fn energies(image: &ArrayView2<f32>, top: usize, columns: usize) -> Vec<[f64; 2]> {
+    let pixels = (BLOCK_PX * BLOCK_PX) as f64;
+    let mut sums = vec![[0.0_f64; 2]; columns];
     for y in top + 1..=top + BLOCK_PX {
-        for x in left + 1..=left + BLOCK_PX {
-            let at = |dy: usize, dx: usize| image[(y + dy - 1, x + dx - 1)];
-            let row = |dy: usize| at(dy, 0) - 2.0 * at(dy, 1) + at(dy, 2);
-            let second = row(0) - 2.0 * row(1) + row(2);
-            squares += f64::from(second * second);
-            sum += f64::from(at(1, 1));
+        let rows = [y - 1, y, y + 1].map(|y| image.row(y).to_slice());
+        let [Some(above), Some(here), Some(below)] = rows else { unreachable!("made in standard layout") };
+        for (column, sums) in sums.iter_mut().enumerate() {
+            const SEEN_PX: usize = BLOCK_PX + 2;
+            let seen = [above, here, below].map(|row| &row[column * BLOCK_PX..column * BLOCK_PX + SEEN_PX]);
+            let down: [f32; SEEN_PX] = std::array::from_fn(|x| seen[0][x] - 2.0 * seen[1][x] + seen[2][x]);
+            // Eight sums side by side, which the compiler makes vectors of.
+            let (mut squares, mut brightness) = ([0.0_f32; 8], [0.0_f32; 8]);
+            for x in 0..BLOCK_PX {
+                let second = down[x] - 2.0 * down[x + 1] + down[x + 2];
+                squares[x % 8] += second * second;
+                brightness[x % 8] += seen[1][x + 1];
+            }
+            sums[0] += f64::from(squares.iter().sum::<f32>());
+            sums[1] += f64::from(brightness.iter().sum::<f32>());
         }
     }
-    let pixels = (BLOCK_PX * BLOCK_PX) as f64;
-    [squares / pixels / GAIN, sum / pixels]
+    sums.into_iter().map(|[squares, sum]| [squares / pixels / GAIN, sum / pixels]).collect()
 }

@@ -1,0 +1,51 @@
+//! A pair at the size at which it is compared: halved until few enough pixels are left, with the band that both images share.
+//!
+//! Registration and agreement look at the same small images, so they are made once.
+
+use ndarray::{Array2, ArrayView2};
+
+use super::band::{band, halved, without_holes};
+
+/// Most pixels of the small images.
+const FINEST_PX: usize = 800_000;
+
+/// A small pair.
+pub(crate) struct Thinned {
+    pub(crate) far: Small,
+    pub(crate) near: Small,
+    /// How often the images were halved.
+    pub(crate) halvings: usize,
+}
+
+/// A small image without holes, and its band.
+pub(crate) struct Small {
+    pub(crate) image: Array2<f32>,
+    pub(crate) band: Array2<f32>,
+}
+
+impl Thinned {
+    /// Of images of one size.
+    pub(crate) fn new(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Self {
+        let (far, halvings) = Small::new(far);
+        Self { far, near: Small::new(near).0, halvings }
+    }
+
+    /// The same after the near image has changed.
+    pub(crate) fn replace_near(&mut self, near: ArrayView2<f32>) {
+        self.near = Small::new(near).0;
+    }
+}
+
+impl Small {
+    fn new(image: ArrayView2<f32>) -> (Self, usize) {
+        let mut small = without_holes(image);
+        let mut halvings = 0;
+        while small.len() > FINEST_PX {
+            small = halved(small.view()).into();
+            halvings += 1;
+        }
+        let image = small.into_owned();
+        let band = band(image.view());
+        (Self { image, band }, halvings)
+    }
+}
