@@ -425,3 +425,34 @@ fn sums_of_row<const N: usize>(
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texture(shift: f64) -> Array2<f32> {
+        let wave = |x: f64, y: f64, k: f64| (k * x + 1.7 * k * y + 40.0 * (k * k)).sin();
+        Array2::from_shape_fn((240, 320), |(y, x)| {
+            let (x, y) = (x as f64 + shift, y as f64);
+            (1..30).map(|i| wave(x, y, 0.04 * f64::from(i))).sum::<f64>() as f32
+        })
+    }
+
+    #[test]
+    fn measures_how_far_a_pair_lies_from_the_start_without_a_search() {
+        let far = texture(0.0);
+        for shift in [0.0, 0.03, 0.5] {
+            let pair = Thinned::new(far.view(), texture(shift).view());
+            let px = displaced(&pair, Model::Similarity, Warp::IDENTITY, far.dim()).unwrap();
+            // With its standard error, which is some hundredths here.
+            assert!((shift - 0.01..shift + 0.04).contains(&px), "{shift}: {px}");
+        }
+    }
+
+    #[test]
+    fn leaves_a_pair_that_lies_far_from_the_start_to_the_search() {
+        let far = texture(0.0);
+        let pair = Thinned::new(far.view(), texture(25.0).view());
+        assert_eq!(displaced(&pair, Model::Similarity, Warp::IDENTITY, far.dim()), None);
+    }
+}
