@@ -9,11 +9,12 @@
 //!   smoothed over 21 px and steps stay where they are;
 //! - [`Window::Safe`] takes the smallest window that is certain enough, whatever lies beside it.
 //!
-//! The work is done in bands of rows, so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
+//! The work is done in tiles (`rows`), so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
 //! five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
 
 mod bank;
 mod rows;
+mod scales;
 mod whitened;
 
 use std::fmt;
@@ -27,7 +28,8 @@ use crate::optics::Optics;
 use crate::pipeline::{MAX_SMOOTHING_PX, RunError};
 use crate::prepare::noise::PairNoise;
 use crate::simd::Backend;
-use rows::{Band, Scales};
+use rows::{Job, Maps, Tile};
+use scales::Scales;
 
 pub use bank::Bank;
 
@@ -158,6 +160,8 @@ fn estimate_into(
     settings: &WindowSettings,
 ) -> Result<Estimate, RunError> {
     check_pair(far, near)?;
+    let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
+    let [far, near] = [far.view(), near.view()];
     let smoothing_px = if let Window::Fixed(side) = settings.window { side } else { 1 };
     let windows =
         crate::pipeline::Settings { smoothing_px, median_px: settings.median_px, ..Default::default() };
@@ -172,20 +176,18 @@ fn estimate_into(
         Some(depth_mm) => depth_mm.axis_chunks_iter_mut(Axis(0), rows).map(Some).collect(),
         None => (0..size.0.div_ceil(rows)).map(|_| None).collect(),
     };
+    let job = Job { far, near, bank, optics, settings, scales: &scales, backend };
     let of_bands: Vec<[f64; 3]> = of_depth
         .into_par_iter()
         .zip(deviation.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
         .zip(misfit.axis_chunks_iter_mut(Axis(0), rows).into_par_iter())
         .enumerate()
-        .map(|(index, ((depth_mm, deviation_mm), misfit))| {
-            let mut unwanted = Array2::zeros(if depth_mm.is_none() { misfit.dim() } else { (0, 0) });
-            let depth_mm = depth_mm.unwrap_or_else(|| unwanted.view_mut());
-            Band { far, near, bank, optics, settings, scales: &scales, backend, top: index * rows }.run(
-                depth_mm,
-                deviation_mm,
-                misfit,
-            )
-        })
+        .map_init(
+            || Tile::new(&job),
+            |tile, (index, ((depth_mm, deviation_mm), misfit))| {
+                tile.band(index * rows, Maps { depth_mm, deviation_mm, misfit })
+            },
+        )
         .collect();
     // In the bands' order, so that the sum does not depend on how threads share them.
     let [left, noise, texture] =

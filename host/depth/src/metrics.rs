@@ -168,20 +168,33 @@ pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
 
 /// Spreads true values by `distance` rows and columns.
 pub(crate) fn dilate_square(mask: &Array2<bool>, distance: usize) -> Array2<bool> {
-    dilate(&dilate(mask, distance, true), distance, false)
-}
-
-/// Spreads true values by `distance` along rows or columns.
-fn dilate(mask: &Array2<bool>, distance: usize, along_rows: bool) -> Array2<bool> {
     let (height, width) = mask.dim();
-    let mut wider = Array2::from_elem((height, width), false);
-    for ((y, x), _) in mask.indexed_iter().filter(|(_, set)| **set) {
-        let [at, end] = if along_rows { [x, width] } else { [y, height] };
-        for i in at.saturating_sub(distance)..(at + distance + 1).min(end) {
-            wider[if along_rows { (y, i) } else { (i, x) }] = true;
+    let mut wider = mask.clone();
+    // Steps since the last true value; along the columns a row at a time.
+    for mut row in wider.rows_mut() {
+        spread(row.iter_mut(), distance);
+        spread(row.iter_mut().rev(), distance);
+    }
+    let along = wider.clone();
+    for rows in [(0..height).collect::<Vec<_>>(), (0..height).rev().collect()] {
+        let mut since = vec![distance; width];
+        for y in rows {
+            for ((value, own), since) in wider.row_mut(y).iter_mut().zip(along.row(y)).zip(&mut since) {
+                *since = if *own { 0 } else { since.saturating_add(1) };
+                *value |= *since <= distance;
+            }
         }
     }
     wider
+}
+
+/// Spreads true values by `distance` to those that follow.
+fn spread<'a>(values: impl Iterator<Item = &'a mut bool>, distance: usize) {
+    let mut since = distance;
+    for value in values {
+        since = if *value { 0 } else { since.saturating_add(1) };
+        *value = since <= distance;
+    }
 }
 
 #[cfg(test)]
@@ -199,6 +212,20 @@ mod tests {
         let relative = ((1e-4 + 1e-4 + 0.015_f64.powi(2)) / 3.0).sqrt();
         assert!((c.rmse_percent_of_depth - 100.0 * relative).abs() < 1e-9);
         assert!(c.pixels == 3 && (c.missing_fraction - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_mask_spreads_over_squares() {
+        let mask = Array2::from_shape_fn((9, 30), |at| [(0, 3), (5, 3), (5, 4), (8, 20)].contains(&at));
+        for distance in [0, 1, 2, 40] {
+            let wider = dilate_square(&mask, distance);
+            for ((y, x), value) in wider.indexed_iter() {
+                let near = mask.indexed_iter().any(|((at_y, at_x), set)| {
+                    *set && at_y.abs_diff(y) <= distance && at_x.abs_diff(x) <= distance
+                });
+                assert_eq!(*value, near, "{distance} ({y}, {x})");
+            }
+        }
     }
 
     #[test]

@@ -363,7 +363,7 @@ fn geometry(
         Align::Auto | Align::Similarity => Some(Model::Similarity),
         Align::None | Align::Optics => None,
     };
-    // What is not significant is not looked for.
+    // A displacement that cannot be significant needs no search.
     let in_place = |model: &Model| {
         align == Align::Auto
             && align::displaced(pair, *model, start, size).is_some_and(|px| px < LEAST_DISPLACEMENT_PX)

@@ -32,7 +32,11 @@ pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
     vertical_sums_of_seven,
 };
-pub(crate) use windows::{Choice, CubicSums, Found, Weighing, choose, choose_safe, roots, row_sums};
+pub(crate) use windows::{
+    Choice, CubicSums, Deviation, Found, Residual, Weighing, add_products, choose, choose_safe,
+    deviation_row, dimensionless_row, move_products, residual_row, roots, row_sums, sum, sum_of_squares,
+    sum_rows, without_noise,
+};
 
 /// Calls the generic function for the backend inside a function that has the backend's instructions enabled, so that
 /// the whole loop is inlined and compiled with them.

@@ -10,7 +10,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use image::{DynamicImage, ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::{
+    DynamicImage, ExtendedColorType, ImageEncoder,
+    codecs::png::{CompressionType, FilterType, PngEncoder},
+};
 use ndarray::{Array2, ArrayView2};
 use tiff::{
     decoder::{Decoder, DecodingResult, Limits},
@@ -160,6 +163,10 @@ fn average<T: Copy + Into<f64>>(
     full_scale: f64,
 ) -> Vec<f32> {
     let scale = 1.0 / (full_scale * averaged as f64);
+    if channels == 1 {
+        // A separate loop, because the compiler vectorises it.
+        return samples.iter().map(|sample| ((*sample).into() * scale) as f32).collect();
+    }
     samples
         .chunks_exact(channels)
         .map(|pixel| (pixel[..averaged].iter().map(|sample| (*sample).into()).sum::<f64>() * scale) as f32)
@@ -188,16 +195,34 @@ pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeEr
 /// # Errors
 /// What the system or the encoder says.
 pub fn png_to(pixels: ArrayView2<u16>, bits: u8, to: &mut impl Write) -> Result<(), EncodeError> {
-    let (height, width) = pixels.dim();
-    let (bytes, colour): (Vec<u8>, _) = if bits <= 8 {
-        (pixels.iter().map(|value| (*value).min(255) as u8).collect(), ExtendedColorType::L8)
-    } else {
-        let shift = 16 - u32::from(bits.min(16));
-        // `image` takes 16-bit samples in the machine's byte order.
-        (pixels.iter().flat_map(|value| (value << shift).to_ne_bytes()).collect(), ExtendedColorType::L16)
-    };
-    PngEncoder::new(to)
-        .write_image(&bytes, width as u32, height as u32, colour)
+    if bits <= 8 {
+        return png8_to(pixels.mapv(|value| value.min(255) as u8).view(), to);
+    }
+    let shift = 16 - u32::from(bits.min(16));
+    // `image` takes 16-bit samples in the machine's byte order.
+    let samples: Vec<[u8; 2]> = pixels.iter().map(|value| (value << shift).to_ne_bytes()).collect();
+    encode_to(samples.as_flattened(), pixels.dim(), ExtendedColorType::L16, to)
+}
+
+/// A grey PNG of 8 bits.
+///
+/// # Errors
+/// What the system or the encoder says.
+pub fn png8_to(pixels: ArrayView2<u8>, to: &mut impl Write) -> Result<(), EncodeError> {
+    let standard = pixels.as_standard_layout();
+    let Some(samples) = standard.as_slice() else { unreachable!("made in standard layout") };
+    encode_to(samples, pixels.dim(), ExtendedColorType::L8, to)
+}
+
+/// One filter for all rows: to try all five for each takes three quarters of the time and saves some percent of a noisy image.
+pub(crate) fn encode_to(
+    samples: &[u8],
+    (height, width): (usize, usize),
+    colour: ExtendedColorType,
+    to: &mut impl Write,
+) -> Result<(), EncodeError> {
+    PngEncoder::new_with_quality(to, CompressionType::Fast, FilterType::Up)
+        .write_image(samples, width as u32, height as u32, colour)
         .map_err(EncodeError::of("a PNG"))
 }
 

@@ -28,6 +28,7 @@ pub mod map;
 pub mod masks;
 pub mod mesh;
 pub mod npy;
+pub mod quantiles;
 pub mod staging;
 pub mod text;
 pub mod video;

@@ -169,11 +169,9 @@ pub fn scale(map: ArrayView2<f32>) -> Scale {
 
 /// A map as 16-bit codes.
 pub fn codes(map: ArrayView2<f32>, Scale { offset_mm, scale_mm }: Scale) -> Array2<u16> {
-    map.mapv(
-        |value| {
-            if value.is_finite() { ((f64::from(value) - offset_mm) / scale_mm).round() as u16 } else { 0 }
-        },
-    )
+    // Codes are positive, so that half a code more and no fraction is the nearest one.
+    let code = |value: f32| ((f64::from(value) - offset_mm) / scale_mm + 0.5) as u16;
+    map.mapv(|value| if value.is_finite() { code(value) } else { 0 })
 }
 
 #[cfg(test)]

@@ -56,13 +56,15 @@ pub fn write(
     let step = (high - low) * STEP;
     let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
 
-    let vertices = finite().count();
-    let mut faces = 0_usize;
-    for row in 1..height {
-        each_face(depth_mm, row, step, |_| {
-            faces += 1;
-            Ok(())
-        })?;
+    let mut marks = vec![0; width];
+    let (mut vertices, mut faces) = (0, 0);
+    for row in 0..height {
+        vertices += depth_mm.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
+        if row > 0 {
+            mark_faces(depth_mm, row, step, &mut marks);
+            faces +=
+                marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>() as usize;
+        }
     }
     write!(
         to,
@@ -71,14 +73,21 @@ pub fn write(
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
-    for ((row, column), &z) in depth_mm.indexed_iter().filter(|(_, z)| z.is_finite()) {
-        let [x, y] = projection.beside_axis_mm((height, width), column, row, f64::from(z));
-        let shade = (255.0 * (grey[[row, column]] / brightest).clamp(0.0, 1.0)).round() as u8;
-        let mut vertex = [shade; 15];
-        for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
-            place.copy_from_slice(&value.to_le_bytes());
+    // A row at a time, so that the file is written in large pieces.
+    let mut bytes = Vec::with_capacity(2 * FACE_BYTES * width);
+    for row in 0..height {
+        bytes.clear();
+        let line = depth_mm.row(row).into_iter().zip(grey.row(row)).enumerate();
+        for (column, (&z, grey)) in line.filter(|(_, (z, _))| z.is_finite()) {
+            let [x, y] = projection.beside_axis_mm((height, width), column, row, f64::from(z));
+            let shade = (255.0 * (grey / brightest).clamp(0.0, 1.0) + 0.5) as u8;
+            let mut vertex = [shade; VERTEX_BYTES];
+            for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
+                place.copy_from_slice(&value.to_le_bytes());
+            }
+            bytes.extend_from_slice(&vertex);
         }
-        to.write_all(&vertex)?;
+        to.write_all(&bytes)?;
     }
     // Vertices are numbered as they come, so that two rows of numbers are enough.
     let mut next = 0;
@@ -92,15 +101,33 @@ pub fn write(
         if row == 0 {
             continue;
         }
-        each_face(depth_mm, row, step, |corners| {
-            let mut face = [3_u8; 13];
-            for (place, (down, column)) in face[1..].chunks_exact_mut(4).zip(corners) {
-                place.copy_from_slice(&numbers[down][column].to_le_bytes());
+        mark_faces(depth_mm, row, step, &mut marks);
+        bytes.clear();
+        let [upper, lower] = &numbers;
+        for ((mark, upper), lower) in marks.iter().zip(upper.windows(2)).zip(lower.windows(2)) {
+            if mark & 1 != 0 {
+                bytes.extend_from_slice(&face([upper[0], lower[0], upper[1]]));
             }
-            to.write_all(&face)
-        })?;
+            if mark & 2 != 0 {
+                bytes.extend_from_slice(&face([upper[1], lower[0], lower[1]]));
+            }
+        }
+        to.write_all(&bytes)?;
     }
     Ok(())
+}
+
+/// Bytes of a vertex and of a face.
+const VERTEX_BYTES: usize = 15;
+const FACE_BYTES: usize = 13;
+
+/// A triangle of vertices of these numbers.
+fn face(corners: [u32; 3]) -> [u8; FACE_BYTES] {
+    let mut face = [3_u8; FACE_BYTES];
+    for (place, number) in face[1..].chunks_exact_mut(4).zip(corners) {
+        place.copy_from_slice(&number.to_le_bytes());
+    }
+    face
 }
 
 /// The same as bytes, for what is thinned first.
@@ -110,26 +137,20 @@ pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, projection: Project
     bytes
 }
 
-/// The triangles between the row before `row` and this one, each as (0 = upper, 1 = lower row; column) of its corners.
-fn each_face(
-    depth_mm: ArrayView2<f32>,
-    row: usize,
-    step: f32,
-    mut face: impl FnMut([(usize, usize); 3]) -> io::Result<()>,
-) -> io::Result<()> {
-    let rows = [depth_mm.row(row - 1), depth_mm.row(row)];
-    for column in 0..depth_mm.ncols().saturating_sub(1) {
-        let right = column + 1;
-        for corners in [[(0, column), (1, column), (0, right)], [(0, right), (1, column), (1, right)]] {
-            let z = corners.map(|(down, column)| rows[down][column]);
-            let spread =
-                z.iter().fold(f32::MIN, |a, b| a.max(*b)) - z.iter().fold(f32::MAX, |a, b| a.min(*b));
-            if z.iter().all(|z| z.is_finite()) && spread <= step {
-                face(corners)?;
-            }
-        }
+/// Which triangles there are between the row before `row` and this one, right of each column: 1 = the one with two upper corners
+/// (upper, lower, upper right), 2 = the one with two lower corners (upper right, lower, lower right), 3 = both.
+fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
+    let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
+    marks.fill(0);
+    let joined = |a: f32, b: f32, c: f32| {
+        // NaN propagates through the sum, but not through the extremes.
+        let spread = a.max(b).max(c) - a.min(b).min(c);
+        u8::from((a + b + c).is_finite() & (spread <= step))
+    };
+    let corners = upper.iter().zip(upper.iter().skip(1)).zip(lower.iter().zip(lower.iter().skip(1)));
+    for (mark, ((above, above_right), (below, below_right))) in marks.iter_mut().zip(corners) {
+        *mark = joined(*above, *below, *above_right) | joined(*above_right, *below, *below_right) << 1;
     }
-    Ok(())
 }
 
 #[cfg(test)]

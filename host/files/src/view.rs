@@ -1,12 +1,10 @@
 //! `view.png`: a depth map as a person likes to look at it - near is warm, far is cold, grey where there is no
 //! value, with a scale bar in mm.
 
-use std::io::Cursor;
-
 use image::{Rgb, RgbImage};
 use ndarray::ArrayView2;
 
-use crate::{EncodeError, text::Writer};
+use crate::{EncodeError, image_file::encode_to, quantiles::Quantiles, text::Writer};
 
 /// Small maps are enlarged to at least this height, by a whole number of pixels.
 const MIN_HEIGHT_PX: usize = 320;
@@ -36,11 +34,11 @@ pub fn view_png_in(
     depth: ArrayView2<f32>,
     confidence: ArrayView2<f32>,
 ) -> Result<Vec<u8>, EncodeError> {
-    let mut png = Cursor::new(Vec::new());
-    draw(unit, depth, confidence)?
-        .write_to(&mut png, image::ImageFormat::Png)
-        .map_err(EncodeError::of("view.png"))?;
-    Ok(png.into_inner())
+    let mut png = Vec::new();
+    let picture = draw(unit, depth, confidence)?;
+    let size = (picture.height() as usize, picture.width() as usize);
+    encode_to(picture.as_raw(), size, image::ExtendedColorType::Rgb8, &mut png)?;
+    Ok(png)
 }
 
 fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage, EncodeError> {
@@ -55,11 +53,15 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     let canvas_width = bar_left + BAR_PX + 14 + label_width + MARGIN_PX;
     let mut canvas = RgbImage::from_pixel(canvas_width, height + 2 * MARGIN_PX, BACKGROUND);
 
-    for (x, y, pixel) in canvas.enumerate_pixels_mut() {
-        let (Some(x), Some(y)) = (x.checked_sub(MARGIN_PX), y.checked_sub(MARGIN_PX)) else { continue };
-        if x < width && y < height {
-            let at = [(y / zoom) as usize, (x / zoom) as usize];
-            *pixel = faded(range.colour(depth_mm[at]), confidence[at]);
+    let colours = Colours::new(&range);
+    let map_rows = canvas.rows_mut().skip(MARGIN_PX as usize).take(height as usize);
+    for (y, row) in map_rows.enumerate() {
+        let values = depth_mm.row(y / zoom as usize);
+        let confidences = confidence.row(y / zoom as usize);
+        let mut pixels = row.skip(MARGIN_PX as usize);
+        for (depth, confidence) in values.iter().zip(confidences) {
+            let colour = faded(colours.of(*depth), *confidence);
+            pixels.by_ref().take(zoom as usize).for_each(|pixel| *pixel = colour);
         }
     }
     let Some((near, far)) = range.0 else {
@@ -89,19 +91,44 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     Ok(canvas)
 }
 
+/// The colours of a range, computed once: the scale takes longer than all else of a large picture.
+struct Colours {
+    /// Nearest depth, and colours per mm.
+    line: Option<[f32; 2]>,
+    colours: Vec<Rgb<u8>>,
+}
+
+impl Colours {
+    /// Far finer than the steps between two colours.
+    const NUMBER: usize = 4096;
+
+    fn new(range: &Range) -> Self {
+        let Some((near, far)) = range.0 else { return Self { line: None, colours: Vec::new() } };
+        let last = (Self::NUMBER - 1) as f32;
+        let depth = |i: usize| near + (far - near) * i as f32 / last;
+        let colours = (0..Self::NUMBER).map(|i| range.colour(depth(i))).collect();
+        Self { line: Some([near, last / (far - near)]), colours }
+    }
+
+    fn of(&self, depth_mm: f32) -> Rgb<u8> {
+        let Some([near, per_mm]) = self.line.filter(|_| depth_mm.is_finite()) else { return NO_VALUE };
+        // A float below 0 becomes 0.
+        let index = ((depth_mm - near) * per_mm + 0.5) as usize;
+        self.colours[index.min(Self::NUMBER - 1)]
+    }
+}
+
 /// Nearest and farthest depth that the colours span; `None` for a map without values.
 struct Range(Option<(f32, f32)>);
 
 impl Range {
     fn of(depth_mm: ArrayView2<f32>) -> Self {
-        let mut finite: Vec<f32> = depth_mm.iter().copied().filter(|value| value.is_finite()).collect();
-        if finite.is_empty() {
+        let quantiles = Quantiles::new(depth_mm);
+        let last = quantiles.finite().saturating_sub(1);
+        let quantile = |part: f64| quantiles.at((part * last as f64) as usize);
+        let (Some(near), Some(far)) = (quantile(OUTLIERS), quantile(1.0 - OUTLIERS)) else {
             return Self(None);
-        }
-        let last = finite.len() - 1;
-        let mut quantile =
-            |part: f64| *finite.select_nth_unstable_by((part * last as f64) as usize, f32::total_cmp).1;
-        let (near, far) = (quantile(OUTLIERS), quantile(1.0 - OUTLIERS));
+        };
         let middle = 0.5 * (near + far);
         // A plane has noise, not structure: never spread less than a thousandth of the distance over all colours.
         let half = (0.5 * (far - near)).max(5e-4 * middle.abs());
@@ -120,8 +147,9 @@ impl Range {
 /// A colour that is believed so much: what is unsure goes to the grey of what is unknown, but keeps a tint.
 fn faded(colour: Rgb<u8>, confidence: f32) -> Rgb<u8> {
     let kept = FAINTEST + (1.0 - FAINTEST) * (confidence / CONFIDENT).clamp(0.0, 1.0);
+    // Positive, so that half more and no fraction is the nearest.
     let mix =
-        |value: u8, grey: u8| (f32::from(grey) + (f32::from(value) - f32::from(grey)) * kept).round() as u8;
+        |value: u8, grey: u8| (f32::from(grey) + (f32::from(value) - f32::from(grey)) * kept + 0.5) as u8;
     Rgb(std::array::from_fn(|channel| mix(colour[channel], NO_VALUE[channel])))
 }
 

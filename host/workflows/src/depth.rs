@@ -34,7 +34,7 @@ use crate::{
     psf::PsfSource,
     request::{self, PathKind, Request},
 };
-use farnear_files::image_file::Samples;
+use farnear_files::{image_file::Samples, quantiles::Quantiles};
 use method::{Method, Prepared};
 use noise::{CameraNoise, Source, Uncertainty};
 use output::{Outputs, Results};
@@ -482,12 +482,8 @@ fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correcti
 
 /// Median of the values that there are, NaN where there are none.
 fn median(map: &Array2<f32>) -> f64 {
-    let mut finite: Vec<f32> = map.iter().copied().filter(|value| value.is_finite()).collect();
-    if finite.is_empty() {
-        return f64::NAN;
-    }
-    let middle = finite.len() / 2;
-    f64::from(*finite.select_nth_unstable_by(middle, f32::total_cmp).1)
+    let quantiles = Quantiles::new(map.view());
+    quantiles.at(quantiles.finite() / 2).map_or(f64::NAN, f64::from)
 }
 
 #[cfg(test)]

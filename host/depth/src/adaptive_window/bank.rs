@@ -1,14 +1,11 @@
 //! The filters in front of the windows: the residual's four parts and the matched filter, for either kind of operators.
 
-use ndarray::{Array2, ArrayView2};
-
 use super::whitened::Whitened;
 use crate::depth_of_alpha::DepthOfAlpha;
-use crate::filter::convolve;
 use crate::kernel::Kernel;
 use crate::operators::{DesignError, Operators, linearise};
 use crate::optics::Optics;
-use crate::simd::Backend;
+use crate::simd::{self, Backend, MAX_ROWS, Plane, Taps};
 
 /// A set of filters.
 #[derive(Debug, Clone)]
@@ -17,12 +14,6 @@ pub enum Bank {
     Whitened(Box<Whitened>),
     /// Rational operators behind their pre-filter.
     Rational(Box<Operators>),
-}
-
-/// What the filters make of a part of a pair: c0 to c3 are window sums of `rho[k] u`.
-pub(super) struct Filtered {
-    pub rho: [Option<Array2<f32>>; 4],
-    pub matched: Array2<f32>,
 }
 
 impl Bank {
@@ -115,37 +106,120 @@ impl Bank {
             Self::Rational(operators) => DepthOfAlpha::new(operators, optics),
         }
     }
+}
 
-    /// Filters the far image's and the near image's part; both hold what they have beyond their mean.
-    pub(super) fn filter(&self, far: ArrayView2<f32>, near: ArrayView2<f32>, backend: Backend) -> Filtered {
-        let by = |image: &Array2<f32>, kernel: &Kernel| {
-            let mut output = Array2::zeros(image.dim());
-            convolve(image.view(), kernel, backend, output.view_mut());
-            output
-        };
-        let [difference, sum] = [&far - &near, &far + &near];
-        match self {
-            Self::Whitened(filters) => {
+/// The filters at work on rows that come in blocks, and what they make of them: c0 to c3 are window sums of `rho[k] u`.
+pub(super) enum Filters {
+    /// R0 to R3 and U0.
+    Whitened {
+        /// One for each, with the rows that it has begun.
+        taps: Box<[Taps; 5]>,
+        /// Their output.
+        rho: Box<[Plane; 5]>,
+    },
+    /// Pre-filters of difference and sum, then Gm1, Gp1 and Gp2.
+    Rational {
+        /// Of the difference and of the sum.
+        prefilters: Box<[Taps; 2]>,
+        /// Their output.
+        filtered: Box<[Plane; 2]>,
+        /// The operators.
+        taps: Box<[Taps; 3]>,
+        /// Their output.
+        rho: Box<[Plane; 3]>,
+    },
+}
+
+impl Filters {
+    /// For rows of at most `width` columns; `ring` rows of output are there at a time.
+    pub(super) fn new(bank: &Bank, ring: usize, width: usize) -> Self {
+        let taps = |kernel: &Kernel| Taps::new(kernel, width);
+        let plane = || Plane::new(ring, width);
+        match bank {
+            Bank::Whitened(filters) => {
                 let [r0, r1, r2, r3] = &filters.residual;
-                let rho = [(&difference, r0), (&sum, r1), (&difference, r2), (&sum, r3)];
-                Filtered {
-                    rho: rho.map(|(image, kernel)| Some(by(image, kernel))),
-                    matched: by(&sum, &filters.matched),
+                Self::Whitened {
+                    taps: Box::new([r0, r1, r2, r3, &filters.matched].map(taps)),
+                    rho: Box::new([(); 5].map(|()| plane())),
                 }
             }
-            Self::Rational(operators) => {
-                let [difference, sum] = [difference, sum].map(|image| by(&image, operators.prefilter()));
-                let p1 = by(&sum, operators.gp1());
-                Filtered {
-                    rho: [
-                        Some(by(&difference, operators.gm1())),
-                        Some(p1.clone()),
-                        None,
-                        Some(by(&sum, operators.gp2())),
-                    ],
-                    matched: p1,
+            Bank::Rational(operators) => Self::Rational {
+                prefilters: Box::new([operators.prefilter(), operators.prefilter()].map(taps)),
+                filtered: Box::new([(); 2].map(|()| Plane::new(MAX_ROWS, width))),
+                taps: Box::new([operators.gm1(), operators.gp1(), operators.gp2()].map(taps)),
+                rho: Box::new([(); 3].map(|()| plane())),
+            },
+        }
+    }
+
+    /// Forgets the rows before.
+    pub(super) fn reset(&mut self) {
+        match self {
+            Self::Whitened { taps, .. } => taps.iter_mut().for_each(Taps::reset),
+            Self::Rational { prefilters, taps, .. } => {
+                prefilters.iter_mut().chain(taps.iter_mut()).for_each(Taps::reset);
+            }
+        }
+    }
+
+    /// Filters `count` rows of `columns` columns of the pair's difference and sum, from row `first` on, into the same rows of the
+    /// output. These are of the pixel [`Bank::reach_px`] further up and to the right.
+    pub(super) fn feed(
+        &mut self,
+        backend: Backend,
+        [difference, sum]: [&Plane; 2],
+        first: usize,
+        count: usize,
+        columns: usize,
+    ) {
+        fn rows(plane: &Plane, first: usize, count: usize) -> [&[f32]; MAX_ROWS] {
+            std::array::from_fn(|y| if y < count { plane.row(first + y) } else { &[] })
+        }
+        let filter =
+            |taps: &mut Taps, from: [&[f32]; MAX_ROWS], to: &mut Plane, first: usize, left: usize| {
+                let stride = to.stride();
+                let mut output: [&mut [f32]; MAX_ROWS] = Default::default();
+                let planes = to.all_mut()[first * stride..].chunks_exact_mut(stride);
+                output[..count].iter_mut().zip(planes).for_each(|(to, row)| *to = row);
+                simd::convolve_rows(backend, taps, &from[..count], &mut output[..count], left);
+            };
+        match self {
+            Self::Whitened { taps, rho } => {
+                let inputs = [difference, sum, difference, sum, sum];
+                for ((taps, input), to) in taps.iter_mut().zip(inputs).zip(rho.iter_mut()) {
+                    let left = columns + 1 - taps.size();
+                    filter(taps, rows(input, first, count), to, first, left);
                 }
             }
+            Self::Rational { prefilters, filtered, taps, rho } => {
+                for ((taps, input), to) in
+                    prefilters.iter_mut().zip([difference, sum]).zip(filtered.iter_mut())
+                {
+                    let left = columns + 1 - taps.size();
+                    filter(taps, rows(input, first, count), to, 0, left);
+                }
+                let [difference, sum] = &**filtered;
+                for ((taps, input), to) in taps.iter_mut().zip([difference, sum, sum]).zip(rho.iter_mut()) {
+                    let left = columns + 2 - prefilters[0].size() - taps.size();
+                    filter(taps, rows(input, 0, count), to, first, left);
+                }
+            }
+        }
+    }
+
+    /// The residual's parts; `None` is 0 everywhere.
+    pub(super) fn rho(&self) -> [Option<&Plane>; 4] {
+        match self {
+            Self::Whitened { rho, .. } => [Some(&rho[0]), Some(&rho[1]), Some(&rho[2]), Some(&rho[3])],
+            Self::Rational { rho, .. } => [Some(&rho[0]), Some(&rho[1]), None, Some(&rho[2])],
+        }
+    }
+
+    /// The matched filter's output.
+    pub(super) fn matched(&self) -> &Plane {
+        match self {
+            Self::Whitened { rho, .. } => &rho[4],
+            Self::Rational { rho, .. } => &rho[1],
         }
     }
 }

@@ -1,16 +1,23 @@
-//! One band of rows: filters, products, window sums, roots, the choice among windows, median.
+//! One tile: a stripe of a band of rows, whose rows stream through filters, window sums, roots, the choice among windows and the
+//! median. Each row's filtered values stay in rings of as many rows as the windows see, so that they are read from the cache.
+//!
+//! Beyond the image's borders the pair is reflected. Filters and windows are symmetric, so that everything that follows is
+//! reflected too, and no later stage has to know of borders.
 
 use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
-use super::bank::{Bank, Filtered};
+use super::bank::{Bank, Filters};
+use super::scales::Scales;
 use super::{ADAPTIVE_PX, SAFE_PX, Window, WindowSettings};
 use crate::border::reflect;
+use crate::depth_of_alpha::DepthOfAlpha;
 use crate::optics::Optics;
-use crate::prepare::noise::PairNoise;
-use crate::simd::{self, Backend, Choice, CubicSums, Found, Plane, Weighing};
+use crate::simd::{self, Backend, Choice, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual, Weighing};
 
 /// Rows of a band: its halo of some 20 rows on either side is computed twice.
-const ROWS: usize = 128;
+const ROWS: usize = 256;
+/// Columns of a tile, for the same reason as many as the cache lets be.
+const COLUMNS: usize = 512;
 /// Rows and columns over which the misfit is averaged.
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Rim in which filters and windows see reflections, which no model explains, px.
@@ -27,6 +34,10 @@ const SAYS_NOTHING: f32 = 0.045;
 const CERTAIN: f32 = 0.035;
 /// What the median of 3x3 leaves of the variance, and wider ones.
 const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
+/// Rows after which window sums are recomputed, so that rounding errors do not accumulate.
+const RECOMPUTED: isize = 16;
+/// Rows of alpha and of the residual that are waiting for a median and a mean.
+const WAITING: usize = 8;
 
 /// Rows of a band for an image of this size: enough bands for all threads.
 pub(super) fn rows((height, _): (usize, usize)) -> usize {
@@ -34,41 +45,13 @@ pub(super) fn rows((height, _): (usize, usize)) -> usize {
     height.div_ceil(height.div_ceil(ROWS).next_multiple_of(threads)).max(32)
 }
 
-/// What makes pixels dimensionless: their mean, and the noise in its units.
-pub(super) struct Scales {
-    mean: f32,
-    gain: f32,
-    /// Variance of a pixel of brightness b (in means): `constant + per_unit b`.
-    noise: [f32; 2],
-    least_noise: f32,
+/// Columns of a tile of an image of this width.
+fn columns(width: usize) -> usize {
+    width.div_ceil(width.div_ceil(COLUMNS))
 }
 
-impl Scales {
-    pub(super) fn new(far: ArrayView2<f32>, near: ArrayView2<f32>, noise: PairNoise) -> Self {
-        let both = far.iter().chain(near.iter()).filter(|v| v.is_finite());
-        let [sum, squares, count] = both.fold([0.0_f64; 3], |[sum, squares, count], v| {
-            let v = f64::from(*v);
-            [sum + v, squares + v * v, count + 1.0]
-        });
-        let mean = sum / count;
-        let spread = (squares / count - mean * mean).max(0.0).sqrt();
-        // An image may be centred on 0; then its spread is the scale.
-        let scale = if mean.abs() > spread { mean.abs() } else { spread }.max(f64::MIN_POSITIVE);
-        let square = scale * scale;
-        Self {
-            mean: mean as f32,
-            gain: scale.recip() as f32,
-            noise: [
-                ((noise.constant + noise.per_unit * mean) / square) as f32,
-                (noise.per_unit * scale / square) as f32,
-            ],
-            least_noise: (noise.variance(mean) / square * 0.1).max(1e-14) as f32,
-        }
-    }
-}
-
-/// A band of rows that begins at `top`.
-pub(super) struct Band<'a> {
+/// What all tiles of a pair have in common.
+pub(super) struct Job<'a> {
     pub far: ArrayView2<'a, f32>,
     pub near: ArrayView2<'a, f32>,
     pub bank: &'a Bank,
@@ -76,21 +59,54 @@ pub(super) struct Band<'a> {
     pub settings: &'a WindowSettings,
     pub scales: &'a Scales,
     pub backend: Backend,
-    pub top: usize,
 }
 
-/// The filtered rows that a band needs, and the index of the first in the image.
-struct Source {
-    first: usize,
-    /// `rho_k u` for k = 0..4, `u u`, and the pair's mean brightness; `None` is 0 everywhere.
-    products: [Option<Array2<f32>>; 6],
-    filtered: Filtered,
-    holes: Option<Array2<bool>>,
+/// A band's rows of the maps; without depth where only the others are used.
+pub(super) struct Maps<'a> {
+    pub depth_mm: Option<ArrayViewMut2<'a, f32>>,
+    pub deviation_mm: ArrayViewMut2<'a, f32>,
+    pub misfit: ArrayViewMut2<'a, f32>,
 }
+
+/// The buffers of a tile, used for one after the other.
+pub(super) struct Tile<'a> {
+    job: &'a Job<'a>,
+    sides: Vec<usize>,
+    /// Rows and columns around the tile whose alpha median and misfit see.
+    around: [usize; 2],
+    /// Half the largest window.
+    radius: usize,
+    /// Rows of the rings.
+    ring: usize,
+    /// Difference and sum of the pair, made dimensionless.
+    difference: Plane,
+    sum: Plane,
+    filters: Filters,
+    /// Of each size of window.
+    columns: Vec<Columns>,
+    row: Row,
+    alpha: Plane,
+    residual: Plane,
+    work: Plane,
+    sorted: Plane,
+    zeros: Vec<f32>,
+    depth_of: DepthOfAlpha,
+    deviation: Deviation,
+    of_residual: Residual,
+}
+
+/// Sums over a window's rows of `rho_k u`, `u u` and the pair's brightness, for each column.
+struct Columns {
+    side: usize,
+    sums: Plane,
+}
+
+/// Rows of `Columns::sums`.
+const ENERGY: usize = 4;
+const BRIGHTNESS: usize = 5;
 
 /// What a row of windows has in the making.
 struct Row {
-    values: Vec<f32>,
     work: Vec<f32>,
     sums: [Vec<f32>; 5],
     alpha: Vec<f32>,
@@ -99,349 +115,387 @@ struct Row {
     chosen: [Vec<f32>; 5],
 }
 
-impl Band<'_> {
-    /// Fills the band's rows of the maps. Gives the sums over their pixels of the residual's square, of what noise
-    /// leaves of it, and of the texture's.
-    pub(super) fn run(
-        &self,
-        mut depth_mm: ArrayViewMut2<f32>,
-        mut deviation_mm: ArrayViewMut2<f32>,
-        mut misfit: ArrayViewMut2<f32>,
-    ) -> [f64; 3] {
-        let (height, width) = self.far.dim();
-        let rows = depth_mm.nrows();
-        let around = (self.settings.median_px / 2).max(MISFIT_PX[0] / 2);
-        let [from, to] = [self.top.saturating_sub(around), (self.top + rows + around).min(height)];
-        let source = self.source(from, to);
-        let [mut alpha, mut variance] = [(); 2].map(|()| Array2::<f32>::zeros((to - from, width)));
-        self.windows(&source, from, &mut alpha, &mut variance);
-        self.depth(&alpha, from, &mut depth_mm);
-        let wide = source
-            .holes
-            .as_ref()
-            .map(|holes| crate::metrics::dilate_square(holes, self.bank.reach_px() + self.settings_reach()));
-        let (residual, sums) = self.residual(&source, from, rows, &alpha, wide.as_ref());
-        let gain = MEDIAN_GAIN[self.settings.median_px / 2] * self.bank.variance_factor();
-        let of_residual = self.bank.residual_gain();
-        let slope = SlopeOfDepth::new(self);
-        for y in 0..rows {
-            let at = self.top + y - from;
-            for x in 0..width {
-                let a = alpha[(at, x)];
-                let noise = polynomial(of_residual, a * a);
-                deviation_mm[(y, x)] = (gain * noise * variance[(at, x)]).sqrt() * slope.at(a);
+/// Where a tile lies, and where it is in its work.
+#[derive(Clone, Copy)]
+struct Place {
+    top: usize,
+    left: usize,
+    rows: usize,
+    columns: usize,
+}
+
+impl<'a> Tile<'a> {
+    pub(super) fn new(job: &'a Job<'a>) -> Self {
+        let sides = match job.settings.window {
+            Window::Fixed(side) => vec![side],
+            Window::Adaptive => ADAPTIVE_PX.to_vec(),
+            Window::Safe => SAFE_PX.to_vec(),
+        };
+        let radius = sides.iter().copied().max().unwrap_or(1) / 2;
+        let median = job.settings.median_px / 2;
+        let around = [median.max(MISFIT_PX[0] / 2), median.max(MISFIT_PX[1] / 2)];
+        let reach = job.bank.reach_px();
+        // What a window sees, the row that it leaves, the pixels in the middle of its filters, and a block of new rows.
+        let ring = (2 * radius + 2 + reach + MAX_ROWS).next_multiple_of(MAX_ROWS);
+        let wide = columns(job.far.ncols()) + 2 * around[1];
+        let (products, input) = (wide + 2 * radius, wide + 2 * radius + 2 * reach);
+        let gain = MEDIAN_GAIN[median] * job.bank.variance_factor();
+        let [offset, slope] = job.optics.defocus_line_mm();
+        let of_residual = Residual {
+            gain: job.bank.residual_gain(),
+            noise: job.scales.noise,
+            least_noise: job.scales.least_noise,
+        };
+        Self {
+            job,
+            around,
+            radius,
+            ring,
+            difference: Plane::new(ring, input),
+            sum: Plane::new(ring, input),
+            filters: Filters::new(job.bank, ring, input),
+            columns: sides
+                .iter()
+                .map(|side| Columns { side: *side, sums: Plane::new(6, products) })
+                .collect(),
+            sides,
+            row: Row {
+                work: vec![0.0; 2 * products],
+                sums: [(); 5].map(|()| vec![0.0; wide]),
+                alpha: vec![0.0; wide],
+                variance: vec![0.0; wide],
+                noise: vec![0.0; wide],
+                chosen: [(); 5].map(|()| vec![0.0; wide]),
+            },
+            alpha: Plane::new(WAITING, wide),
+            residual: Plane::new(WAITING, wide),
+            work: Plane::new(3, wide),
+            sorted: Plane::new(job.settings.median_px, wide),
+            zeros: vec![0.0; products],
+            depth_of: job.bank.depth_of(job.optics),
+            deviation: Deviation {
+                gain,
+                of_residual: of_residual.gain,
+                squared: job.optics.focal_length_mm().powi(2) as f32,
+                offset: offset as f32,
+                slope: slope as f32,
+            },
+            of_residual,
+        }
+    }
+
+    /// Fills a band's rows of the maps, which begin at `top`. Gives the sums over their pixels of the residual's square, of what
+    /// noise leaves of it, and of the texture's.
+    pub(super) fn band(&mut self, top: usize, maps: Maps<'_>) -> [f64; 3] {
+        let Maps { mut depth_mm, mut deviation_mm, mut misfit } = maps;
+        let (rows, width) = misfit.dim();
+        let mut sums = [0.0; 3];
+        for left in (0..width).step_by(columns(width)) {
+            let columns = columns(width).min(width - left);
+            let part = s![.., left..left + columns];
+            let maps = Maps {
+                depth_mm: depth_mm.as_mut().map(|map| map.slice_mut(part)),
+                deviation_mm: deviation_mm.slice_mut(part),
+                misfit: misfit.slice_mut(part),
+            };
+            let of_tile = self.run(Place { top, left, rows, columns }, maps);
+            sums.iter_mut().zip(of_tile).for_each(|(sum, value)| *sum += value);
+        }
+        sums
+    }
+
+    fn run(&mut self, place: Place, mut maps: Maps<'_>) -> [f64; 3] {
+        let [above, beside] = self.around;
+        let reach = self.job.bank.reach_px();
+        let halo = [above, beside].map(|around| around + self.radius + reach);
+        let wide = place.columns + 2 * beside;
+        let products = wide + 2 * self.radius;
+        let [inputs, input] = [place.rows + 2 * halo[0], place.columns + 2 * halo[1]];
+        let holes = self.holes(place, halo);
+        self.filters.reset();
+        let mut sums = [0.0; 3];
+        let mut next = 0;
+        for begin in (0..inputs).step_by(MAX_ROWS) {
+            let count = MAX_ROWS.min(inputs - begin);
+            let first = begin % self.ring;
+            for y in 0..count {
+                let row = (place.top + begin + y) as isize - halo[0] as isize;
+                self.load(first + y, row, place.left as isize - halo[1] as isize, input);
+            }
+            let inputs = [&self.difference, &self.sum];
+            self.filters.feed(self.job.backend, inputs, first, count, input);
+            // A row of windows needs filter input from `radius + 2 reach` rows further down.
+            while next < place.rows + 2 * above && next + 2 * self.radius + 2 * reach < begin + count {
+                self.windows(place, next, wide, products);
+                self.residual_row(next, wide);
+                if let Some(y) = next.checked_sub(above).filter(|y| *y < place.rows) {
+                    self.own_row(place, y, holes.as_ref(), &mut maps, &mut sums);
+                }
+                self.finish(place, next, wide, &mut maps);
+                next += 1;
             }
         }
-        self.misfit(&residual, from, &mut misfit);
-        if let Some(wide) = &wide {
-            for y in 0..rows {
-                for x in 0..width {
-                    if wide[(self.top + y - source.first, x)] {
-                        depth_mm[(y, x)] = f32::NAN;
-                        deviation_mm[(y, x)] = f32::NAN;
-                    }
+        if let Some(holes) = holes {
+            for (at, _) in holes.indexed_iter().filter(|(_, hole)| **hole) {
+                maps.deviation_mm[at] = f32::NAN;
+                if let Some(depth_mm) = &mut maps.depth_mm {
+                    depth_mm[at] = f32::NAN;
                 }
             }
         }
         sums
     }
 
-    fn sides(&self) -> Vec<usize> {
-        match self.settings.window {
-            Window::Fixed(side) => vec![side],
-            Window::Adaptive => ADAPTIVE_PX.to_vec(),
-            Window::Safe => SAFE_PX.to_vec(),
+    /// The tile's pixels whose smallest window sees a pixel without a value: larger ones that contain a hole see it as mean
+    /// brightness, a seventh of their pixels. `None` without holes.
+    fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Array2<bool>> {
+        if self.job.scales.whole {
+            return None;
+        }
+        let Job { far, near, .. } = self.job;
+        let (height, width) = far.dim();
+        let holes =
+            Array2::from_shape_fn((place.rows + 2 * halo[0], place.columns + 2 * halo[1]), |(y, x)| {
+                let y = reflect((place.top + y) as isize - halo[0] as isize, height);
+                let x = reflect((place.left + x) as isize - halo[1] as isize, width);
+                !(far[(y, x)].is_finite() && near[(y, x)].is_finite())
+            });
+        holes.iter().any(|hole| *hole).then(|| {
+            let wide = crate::metrics::dilate_square(&holes, self.job.bank.reach_px() + self.sides[0] / 2);
+            let own = s![halo[0]..halo[0] + place.rows, halo[1]..halo[1] + place.columns];
+            wide.slice(own).to_owned()
+        })
+    }
+
+    /// Loads a row of the image into a row of the rings, from column `left` on; both may lie beyond the image.
+    fn load(&mut self, to: usize, row: isize, left: isize, columns: usize) {
+        let Job { far, near, scales, backend, .. } = self.job;
+        let (height, width) = far.dim();
+        let row = reflect(row, height);
+        let [difference, sum] = [self.difference.row_mut(to), self.sum.row_mut(to)];
+        let inside = (-left).max(0) as usize..(width as isize - left).clamp(0, columns as isize) as usize;
+        let from = (left + inside.start as isize) as usize;
+        let part = s![row, from..from + inside.len()];
+        let [far_part, near_part] = [far.slice(part), near.slice(part)];
+        if let (Some(far), Some(near)) = (far_part.as_slice(), near_part.as_slice()) {
+            let to = [&mut difference[inside.clone()], &mut sum[inside.clone()]];
+            simd::dimensionless_row(*backend, far, near, [scales.mean, scales.gain], to);
+        }
+        for x in (0..inside.start).chain(inside.end..columns) {
+            let column = reflect(left + x as isize, width);
+            let at = column as isize - left;
+            [difference[x], sum[x]] = if at >= 0 && inside.contains(&(at as usize)) {
+                [difference[at as usize], sum[at as usize]]
+            } else {
+                let [a, b] = [far, near].map(|image| (image[(row, column)] - scales.mean) * scales.gain);
+                if a.is_finite() && b.is_finite() { [a - b, a + b] } else { [0.0; 2] }
+            };
         }
     }
 
-    /// Half the smallest window: larger ones that contain a hole see it as mean brightness, a seventh of their pixels.
-    fn settings_reach(&self) -> usize {
-        self.sides()[0] / 2
+    /// Alpha, its variance and the noise of a row, counted from the first that the median sees.
+    fn windows(&mut self, place: Place, row: usize, wide: usize, products: usize) {
+        for index in 0..self.columns.len() {
+            self.advance(place, index, row, products);
+            self.row(index, wide);
+        }
+        let [alpha, variance, ..] = &mut self.row.chosen;
+        self.alpha.row_mut(row % WAITING)[..wide].copy_from_slice(&alpha[..wide]);
+        variance[..wide].iter_mut().zip(&self.row.noise).for_each(|(v, noise)| *v *= noise);
     }
 
-    /// Filters the rows that windows around `from..to` see.
-    fn source(&self, from: usize, to: usize) -> Source {
-        let height = self.far.nrows();
-        let largest = self.sides().into_iter().max().unwrap_or(1);
-        let halo = self.bank.reach_px() + largest / 2;
-        let [first, last] = [from.saturating_sub(halo), (to + halo).min(height)];
-        let part = s![first..last, ..];
-        let mut any = false;
-        let Scales { mean, gain, .. } = *self.scales;
-        let mut normal = |image: ArrayView2<f32>| {
-            image.slice(part).mapv(|v| {
-                any |= !v.is_finite();
-                if v.is_finite() { (v - mean) * gain } else { 0.0 }
-            })
-        };
-        let [mut far, mut near] = [normal(self.far), normal(self.near)];
-        let holes = any.then(|| {
-            let mut holes = Array2::from_elem(far.dim(), false);
-            let (of_far, of_near) = (self.far.slice(part), self.near.slice(part));
-            for (at, hole) in holes.indexed_iter_mut() {
-                *hole = !(of_far[at].is_finite() && of_near[at].is_finite());
-                if *hole {
-                    (far[at], near[at]) = (0.0, 0.0);
+    /// Moves windows to the next row.
+    fn advance(&mut self, place: Place, index: usize, row: usize, products: usize) {
+        let Self { job, radius, ring, filters, columns, sum, .. } = self;
+        let backend = job.backend;
+        let Columns { side, sums } = &mut columns[index];
+        let (half, reach) = (*side / 2, job.bank.reach_px());
+        let image_row = (place.top + row) as isize - self.around[0] as isize;
+        // Rows of the rings: a filtered row lies `2 reach` below the first pixel that it saw, and `reach` below the middle.
+        let filtered = |d: isize| (row as isize + *radius as isize + d + 2 * reach as isize) as usize % *ring;
+        let bright = |d: isize| (row as isize + *radius as isize + d + reach as isize) as usize % *ring;
+        let with_brightness = job.scales.noise[1] > 0.0;
+        let half = half as isize;
+        let u = filters.matched();
+        let factors = filters.rho().into_iter().chain([Some(u)]).enumerate();
+        if row == 0 || image_row.rem_euclid(RECOMPUTED) == 0 {
+            sums.all_mut().fill(0.0);
+            for (k, rho) in factors.filter_map(|(k, rho)| Some((k, rho?))) {
+                for d in -half..=half {
+                    let [rho, u] = [rho, u].map(|plane| &plane.row(filtered(d))[..products]);
+                    simd::add_products(backend, rho, u, &mut sums.row_mut(k)[..products]);
                 }
             }
-            holes
-        });
-        let filtered = self.bank.filter(far.view(), near.view(), self.backend);
-        let u = &filtered.matched;
-        let [p0, p1, p2, p3] = filtered.rho.each_ref().map(|rho| rho.as_ref().map(|rho| rho * u));
-        let per_unit = self.scales.noise[1];
-        let brightness = (per_unit > 0.0).then(|| (&far + &near) * 0.5);
-        let products = [p0, p1, p2, p3, Some(u * u), brightness];
-        Source { first, products, filtered, holes }
-    }
-
-    /// Alpha and its variance (without the factors of bank and median) for the rows of `alpha`, which begin at `from`.
-    fn windows(&self, source: &Source, from: usize, alpha: &mut Array2<f32>, variance: &mut Array2<f32>) {
-        let (rows, width) = alpha.dim();
-        let sides = self.sides();
-        let mut columns: Vec<Columns> =
-            sides.iter().map(|side| Columns::new(*side, width, self.far.nrows())).collect();
-        let largest = sides.iter().copied().max().unwrap_or(1);
-        let padded = width + largest;
-        let mut row = Row {
-            values: vec![0.0; padded],
-            work: vec![0.0; 2 * padded],
-            sums: [(); 5].map(|()| vec![0.0; width]),
-            alpha: vec![0.0; width],
-            variance: vec![0.0; width],
-            noise: vec![0.0; width],
-            chosen: [(); 5].map(|()| vec![0.0; width]),
-        };
-        for y in 0..rows {
-            for (index, columns) in columns.iter_mut().enumerate() {
-                columns.advance(source, from + y);
-                self.row(columns, index, &mut row);
+            for d in -half..=half {
+                if with_brightness {
+                    let from = &sum.row(bright(d))[reach..reach + products];
+                    sums.row_mut(BRIGHTNESS).iter_mut().zip(from).for_each(|(to, from)| *to += 0.5 * from);
+                }
             }
-            for ((a, v), x) in row.chosen[0].iter().zip(&row.chosen[1]).zip(0..width) {
-                alpha[(y, x)] = *a;
-                variance[(y, x)] = v * row.noise[x];
-            }
+            return;
+        }
+        let [gone, come] = [filtered(-half - 1), filtered(half)];
+        for (k, rho) in factors.filter_map(|(k, rho)| Some((k, rho?))) {
+            let [gone, come] = [gone, come].map(|row| [rho, u].map(|plane| &plane.row(row)[..products]));
+            simd::move_products(backend, gone, come, &mut sums.row_mut(k)[..products]);
+        }
+        if with_brightness {
+            let [gone, come] =
+                [bright(-half - 1), bright(half)].map(|row| &sum.row(row)[reach..reach + products]);
+            let to = sums.row_mut(BRIGHTNESS)[..products].iter_mut();
+            to.zip(gone).zip(come).for_each(|((to, gone), come)| *to += 0.5 * come - 0.5 * gone);
         }
     }
 
     /// One row of windows of one size, and what of it is chosen.
-    fn row(&self, columns: &Columns, index: usize, row: &mut Row) {
-        let (side, width) = (columns.side, row.alpha.len());
-        let of = |sums: &[f32], values: &mut [f32], work: &mut [f32], result: &mut [f32]| {
-            let r = side / 2;
-            values[r..r + width].copy_from_slice(sums);
-            for d in 1..=r as isize {
-                values[r - d as usize] = sums[reflect(-d, width)];
-                values[r + width - 1 + d as usize] = sums[reflect(width as isize - 1 + d, width)];
-            }
-            simd::row_sums(self.backend, &values[..width + side - 1], side, work, result);
-        };
-        for (sums, result) in columns.sums.iter().zip(&mut row.sums) {
-            match sums {
-                Some(sums) => of(sums, &mut row.values, &mut row.work, result),
-                None => result.fill(0.0),
-            }
+    fn row(&mut self, index: usize, wide: usize) {
+        let Self { job, row, radius, .. } = self;
+        let Columns { side, sums } = &self.columns[index];
+        let (side, backend, scales, bank) = (*side, job.backend, job.scales, job.bank);
+        let from = *radius - side / 2;
+        let of = |k: usize| &sums.row(k)[from..from + wide + side - 1];
+        for k in 0..=ENERGY {
+            simd::row_sums(backend, of(k), side, &mut row.work, &mut row.sums[k][..wide]);
         }
+        let noise = &mut row.noise[..wide];
         if index == 0 {
             let area = (side * side) as f32;
-            let [constant, per_unit] = self.scales.noise;
-            match &columns.sums[5] {
-                Some(sums) => {
-                    of(sums, &mut row.values, &mut row.work, &mut row.noise);
-                    let least = self.scales.least_noise;
-                    row.noise.iter_mut().for_each(|b| *b = (constant + per_unit * *b / area).max(least));
-                }
-                None => row.noise.fill(constant.max(self.scales.least_noise)),
+            let [constant, per_unit] = scales.noise;
+            if per_unit > 0.0 {
+                simd::row_sums(backend, of(BRIGHTNESS), side, &mut row.work, noise);
+                noise.iter_mut().for_each(|b| *b = (constant + per_unit * *b / area).max(scales.least_noise));
+            } else {
+                noise.fill(constant.max(scales.least_noise));
             }
         }
-        let [c0, c1, c2, c3, energy] = &row.sums;
-        let sums = CubicSums { c: [c0, c1, c2, c3], energy };
-        let found = Found { alpha: &mut row.alpha, variance: &mut row.variance };
-        simd::roots(self.backend, sums, self.bank.least_slope(), found);
+        let [c0, c1, c2, c3, energy] = row.sums.each_ref().map(|sums| &sums[..wide]);
+        let (alpha, variance) = (&mut row.alpha[..wide], &mut row.variance[..wide]);
+        let found = Found { alpha: &mut *alpha, variance: &mut *variance };
+        simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
         // Energy that is noise is no evidence.
-        let of_noise = self.bank.noise_energy() * (side * side) as f32;
-        for ((variance, energy), noise) in row.variance.iter_mut().zip(energy).zip(&row.noise) {
-            let evidence = (energy - of_noise * noise).max(LEAST_EVIDENCE * energy).max(f32::MIN_POSITIVE);
-            *variance *= (energy / evidence).powi(2);
-        }
-        let [chosen, of_chosen, low, high, open] = &mut row.chosen;
+        let of_noise = bank.noise_energy() * (side * side) as f32;
+        simd::without_noise(backend, energy, noise, [of_noise, LEAST_EVIDENCE], variance);
+        let [chosen, of_chosen, low, high, open] = row.chosen.each_mut().map(|values| &mut values[..wide]);
         if index == 0 {
-            chosen.copy_from_slice(&row.alpha);
-            of_chosen.copy_from_slice(&row.variance);
+            chosen.copy_from_slice(alpha);
+            of_chosen.copy_from_slice(variance);
             low.fill(-10.0);
             high.fill(10.0);
             open.fill(1.0);
         }
-        match self.settings.window {
+        match job.settings.window {
             Window::Fixed(_) => {}
             Window::Adaptive => {
-                let factor = self.bank.weighing_factor();
+                let factor = bank.weighing_factor();
                 let weighing = Weighing {
-                    gamma: GAMMA,
+                    gamma: GAMMA * factor.sqrt(),
                     floor: FLOOR * FLOOR / factor,
                     largest: SAYS_NOTHING * SAYS_NOTHING / factor,
                 };
-                let weighing = Weighing { gamma: weighing.gamma * factor.sqrt(), ..weighing };
                 let choice = Choice { alpha: chosen, variance: of_chosen, low, high, open };
-                simd::choose(self.backend, &row.alpha, &row.variance, &row.noise, weighing, choice);
+                simd::choose(backend, alpha, variance, noise, weighing, choice);
             }
             Window::Safe if index > 0 => {
-                let largest = CERTAIN * CERTAIN / self.bank.weighing_factor();
-                simd::choose_safe(
-                    self.backend,
-                    &row.alpha,
-                    &row.variance,
-                    &row.noise,
-                    largest,
-                    chosen,
-                    of_chosen,
-                );
+                let largest = CERTAIN * CERTAIN / bank.weighing_factor();
+                simd::choose_safe(backend, alpha, variance, noise, largest, chosen, of_chosen);
             }
             Window::Safe => {}
         }
     }
 
-    /// Median of alpha, as depth.
-    fn depth(&self, alpha: &Array2<f32>, from: usize, depth_mm: &mut ArrayViewMut2<f32>) {
-        let (height, width) = self.far.dim();
-        let side = self.settings.median_px;
-        let r = side / 2;
-        let full = width + 2 * r;
-        let (mut window, mut sorted) = (Plane::new(side, full), Plane::new(side, full));
-        let depth_of = self.bank.depth_of(self.optics);
-        let mut depth = vec![0.0; full + Plane::PADDING];
-        for (y, mut row) in depth_mm.rows_mut().into_iter().enumerate() {
-            for i in 0..side {
-                let at = reflect((self.top + y + i) as isize - r as isize, height) - from;
-                let to = window.row_mut(i);
-                for (x, to) in to[..full].iter_mut().enumerate() {
-                    *to = alpha[(at, reflect(x as isize - r as isize, width))];
-                }
-            }
-            let rows: [&[f32]; 7] = std::array::from_fn(|i| window.row(i.min(side - 1)));
-            simd::median_row(self.backend, &rows[..side], &mut sorted, depth_of, &mut depth, width);
-            row.iter_mut().zip(&depth).for_each(|(to, value)| *to = *value);
-        }
-    }
-
-    /// Square of the residual at each pixel's alpha, relative to what noise alone leaves; and the band's own sums.
-    fn residual(
-        &self,
-        source: &Source,
-        from: usize,
-        rows: usize,
-        alpha: &Array2<f32>,
-        wide: Option<&Array2<bool>>,
-    ) -> (Array2<f32>, [f64; 3]) {
-        let gain = self.bank.residual_gain();
-        let [constant, per_unit] = self.scales.noise;
-        let least = self.scales.least_noise;
-        let mut sums = [0.0_f64; 3];
-        let (height, width) = self.far.dim();
-        let own = self.top - from..self.top - from + rows;
-        let residual = Array2::from_shape_fn(alpha.dim(), |(y, x)| {
-            let at = (from + y - source.first, x);
-            let a = alpha[(y, x)];
-            let rho = source.filtered.rho.each_ref().map(|rho| rho.as_ref().map_or(0.0, |rho| rho[at]));
-            let left = ((rho[3] * a + rho[2]) * a + rho[1]) * a + rho[0];
-            let brightness = source.products[5].as_ref().map_or(0.0, |b| b[at]);
-            let noise = (constant + per_unit * brightness).max(least);
-            let gain = polynomial(gain, a * a);
-            let inside = (BORDER_PX..height.saturating_sub(BORDER_PX)).contains(&(from + y))
-                && (BORDER_PX..width.saturating_sub(BORDER_PX)).contains(&x);
-            if inside && own.contains(&y) && wide.is_none_or(|wide| !wide[at]) {
-                let of_pixel = [left * left, gain * noise, rho[1] * rho[1]];
-                sums.iter_mut().zip(of_pixel).for_each(|(sum, value)| *sum += f64::from(value));
-            }
-            left * left / (gain * noise)
+    /// Square of the residual at a row's alpha, relative to what noise alone leaves.
+    fn residual_row(&mut self, row: usize, wide: usize) {
+        let Self { job, radius, ring, filters, sum, zeros, work, of_residual, .. } = self;
+        let reach = job.bank.reach_px();
+        let rho = filters.rho().map(|plane| match plane {
+            Some(plane) => &plane.row((row + *radius + 2 * reach) % *ring)[*radius..*radius + wide],
+            None => &zeros[..wide],
         });
-        (residual, sums)
+        let left = *radius + reach;
+        let sum = &sum.row((row + *radius + reach) % *ring)[left..left + wide];
+        let alpha = &self.alpha.row(row % WAITING)[..wide];
+        let stride = work.stride();
+        let (squares, rest) = work.all_mut().split_at_mut(stride);
+        let to = [&mut self.residual.row_mut(row % WAITING)[..wide], &mut squares[..wide], &mut rest[..wide]];
+        simd::residual_row(job.backend, *of_residual, rho, sum, alpha, to);
     }
 
-    fn misfit(&self, residual: &Array2<f32>, from: usize, misfit: &mut ArrayViewMut2<f32>) {
-        let (height, width) = self.far.dim();
+    /// The standard deviation of a row of the tile's own, and its part of the sums.
+    fn own_row(
+        &mut self,
+        place: Place,
+        y: usize,
+        holes: Option<&Array2<bool>>,
+        maps: &mut Maps<'_>,
+        sums: &mut [f64; 3],
+    ) {
+        let [above, beside] = self.around;
+        let own = beside..beside + place.columns;
+        let row = y + above;
+        let alpha = &self.alpha.row(row % WAITING)[own.clone()];
+        let variance = &self.row.chosen[1][own.clone()];
+        if let Some(to) = maps.deviation_mm.row_mut(y).as_slice_mut() {
+            simd::deviation_row(self.job.backend, self.deviation, alpha, variance, to);
+        }
+        let (height, width) = self.job.far.dim();
+        if !(BORDER_PX..height.saturating_sub(BORDER_PX)).contains(&(place.top + y)) {
+            return;
+        }
+        let from = BORDER_PX.saturating_sub(place.left).min(place.columns);
+        let to = width.saturating_sub(BORDER_PX).saturating_sub(place.left).clamp(from, place.columns);
+        let reach = self.job.bank.reach_px();
+        let texture = self.filters.rho()[1].map_or(&self.zeros[..], |plane| {
+            &plane.row((row + self.radius + 2 * reach) % self.ring)[self.radius + beside..]
+        });
+        let [squares, expected] = [0, 1].map(|i| &self.work.row(i)[own.clone()]);
+        match holes {
+            None => {
+                let part = from..to;
+                let of_row = [&squares[part.clone()], &expected[part.clone()]].map(simd::sum);
+                let texture = simd::sum_of_squares(&texture[part]);
+                sums.iter_mut().zip([of_row[0], of_row[1], texture]).for_each(|(sum, value)| *sum += value);
+            }
+            Some(holes) => {
+                for x in (from..to).filter(|x| !holes[(y, *x)]) {
+                    let of_pixel = [squares[x], expected[x], texture[x] * texture[x]];
+                    sums.iter_mut().zip(of_pixel).for_each(|(sum, value)| *sum += f64::from(value));
+                }
+            }
+        }
+    }
+
+    /// The rows of depth and misfit that are complete once `row` is.
+    fn finish(&mut self, place: Place, row: usize, wide: usize, maps: &mut Maps<'_>) {
+        let [above, beside] = self.around;
+        let backend = self.job.backend;
+        let side = self.job.settings.median_px;
+        let complete = |half: usize| row.checked_sub(above + half).filter(|y| *y < place.rows);
+        if let (Some(y), Some(depth_mm)) = (complete(side / 2), &mut maps.depth_mm) {
+            let left = beside - side / 2;
+            let rows: [&[f32]; 7] = std::array::from_fn(|i| {
+                let row = y + above - side / 2 + i.min(side - 1);
+                &self.alpha.row(row % WAITING)[left..]
+            });
+            let depth = self.work.row_mut(2);
+            simd::median_row(backend, &rows[..side], &mut self.sorted, self.depth_of, depth, place.columns);
+            if let Some(to) = depth_mm.row_mut(y).as_slice_mut() {
+                to.copy_from_slice(&depth[..place.columns]);
+            }
+        }
         let [down, across] = MISFIT_PX;
-        let (r, share) = ((down / 2) as isize, 1.0 / (down * across) as f32);
-        let mut padded = vec![0.0_f32; width + across - 1];
-        let mut work = vec![0.0_f32; 2 * padded.len()];
-        let mut sums = vec![0.0_f32; width];
-        for (y, mut row) in misfit.rows_mut().into_iter().enumerate() {
-            padded.fill(0.0);
-            for d in -r..=r {
-                let at = reflect((self.top + y) as isize + d, height) - from;
-                for (x, sum) in padded.iter_mut().enumerate() {
-                    *sum += residual[(at, reflect(x as isize - (across / 2) as isize, width))];
-                }
-            }
-            simd::row_sums(self.backend, &padded, across, &mut work, &mut sums);
-            row.iter_mut().zip(&sums).for_each(|(to, sum)| *to = sum * share);
-        }
-    }
-}
-
-/// `g0 + g1 x + g2 x^2 + g3 x^3`.
-fn polynomial(gain: [f32; 4], x: f32) -> f32 {
-    ((gain[3] * x + gain[2]) * x + gain[1]) * x + gain[0]
-}
-
-/// Sums over a window's rows, for each column and product.
-struct Columns {
-    side: usize,
-    height: usize,
-    sums: [Option<Vec<f32>>; 6],
-    next: Option<usize>,
-}
-
-impl Columns {
-    fn new(side: usize, width: usize, height: usize) -> Self {
-        Self { side, height, sums: [(); 6].map(|()| Some(vec![0.0; width])), next: None }
-    }
-
-    /// Moves the windows to the row `y` of the image; rows come one after the other. Every sixteenth row is summed anew, so that
-    /// rounding does not grow.
-    fn advance(&mut self, source: &Source, y: usize) {
-        let r = (self.side / 2) as isize;
-        let row = |d: isize| reflect(y as isize + d, self.height) - source.first;
-        let anew = self.next != Some(y) || y.is_multiple_of(16);
-        for (sums, product) in self.sums.iter_mut().zip(&source.products) {
-            let Some(product) = product else {
-                *sums = None;
-                continue;
-            };
-            let Some(sums) = sums else { continue };
-            if anew {
-                sums.fill(0.0);
-                for d in -r..=r {
-                    sums.iter_mut().zip(product.row(row(d))).for_each(|(sum, value)| *sum += value);
-                }
-            } else {
-                let (gone, come) = (product.row(row(-r - 1)), product.row(row(r)));
-                sums.iter_mut().zip(gone).zip(come).for_each(|((sum, gone), come)| *sum += come - gone);
+        if let Some(y) = complete(down / 2) {
+            let rows: [&[f32]; MISFIT_PX[0]] =
+                std::array::from_fn(|i| &self.residual.row((y + above - down / 2 + i) % WAITING)[..wide]);
+            let left = beside - across / 2;
+            let stride = self.work.stride();
+            let sums = &mut self.work.all_mut()[2 * stride..][..wide];
+            simd::sum_rows(backend, rows, sums);
+            if let Some(to) = maps.misfit.row_mut(y).as_slice_mut() {
+                let seen = &sums[left..left + place.columns + across - 1];
+                simd::row_sums(backend, seen, across, &mut self.row.work, to);
+                let share = 1.0 / (down * across) as f32;
+                to.iter_mut().for_each(|sum| *sum *= share);
             }
         }
-        self.next = Some(y + 1);
-    }
-}
-
-/// Magnitude of the change of depth with alpha.
-struct SlopeOfDepth {
-    squared: f32,
-    offset: f32,
-    slope: f32,
-}
-
-impl SlopeOfDepth {
-    fn new(band: &Band<'_>) -> Self {
-        let [offset, slope] = band.optics.defocus_line_mm();
-        Self {
-            squared: band.optics.focal_length_mm().powi(2) as f32,
-            offset: offset as f32,
-            slope: slope as f32,
-        }
-    }
-
-    fn at(&self, alpha: f32) -> f32 {
-        let w = self.offset + self.slope * alpha;
-        self.squared * self.slope / (w * w)
     }
 }

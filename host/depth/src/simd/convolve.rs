@@ -25,6 +25,11 @@ impl Taps {
         Self { size: kernel.size(), octant, pending: Plane::new(kernel.size() - 1, width) }
     }
 
+    /// The kernel's side.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
     /// Forgets what was begun.
     pub fn reset(&mut self) {
         self.pending.all_mut().fill(0.0);

@@ -166,6 +166,187 @@ fn choose_safe_generic<L: Lanes>(
     }
 }
 
+dispatch! {
+    /// Difference and sum of a pair's row, less its mean and multiplied by the gain; 0 where a pixel has no value.
+    fn dimensionless_row(far: &[f32], near: &[f32], mean_and_gain: [f32; 2], to: [&mut [f32]; 2]) = dimensionless_generic
+}
+
+#[inline(always)]
+fn dimensionless_generic<L: Lanes>(
+    far: &[f32],
+    near: &[f32],
+    [mean, gain]: [f32; 2],
+    [difference, sum]: [&mut [f32]; 2],
+) {
+    let width = far.len();
+    let (near, difference, sum) = (&near[..width], &mut difference[..width], &mut sum[..width]);
+    for x in 0..width {
+        let (far, near) = ((far[x] - mean) * gain, (near[x] - mean) * gain);
+        let whole = far.is_finite() && near.is_finite();
+        difference[x] = if whole { far - near } else { 0.0 };
+        sum[x] = if whole { far + near } else { 0.0 };
+    }
+}
+
+dispatch! {
+    /// Adds the products of two rows.
+    fn add_products(a: &[f32], b: &[f32], sums: &mut [f32]) = add_products_generic
+}
+
+#[inline(always)]
+fn add_products_generic<L: Lanes>(a: &[f32], b: &[f32], sums: &mut [f32]) {
+    let width = sums.len();
+    let (a, b) = (&a[..width], &b[..width]);
+    for x in 0..width {
+        sums[x] += a[x] * b[x];
+    }
+}
+
+dispatch! {
+    /// Adds the products of the rows that come into the windows and subtracts those of the rows that go.
+    fn move_products(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &mut [f32]) = move_products_generic
+}
+
+#[inline(always)]
+fn move_products_generic<L: Lanes>(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &mut [f32]) {
+    let width = sums.len();
+    let [[gone_a, gone_b], [come_a, come_b]] = [gone, come].map(|rows| rows.map(|row| &row[..width]));
+    for x in 0..width {
+        sums[x] += come_a[x] * come_b[x] - gone_a[x] * gone_b[x];
+    }
+}
+
+dispatch! {
+    /// Widens variances by the part of the energy that is noise: `of_noise` times the noise, of which at least the part `least` of
+    /// the energy is left.
+    fn without_noise(energy: &[f32], noise: &[f32], of_noise_and_least: [f32; 2], variance: &mut [f32]) =
+        without_noise_generic
+}
+
+#[inline(always)]
+fn without_noise_generic<L: Lanes>(
+    energy: &[f32],
+    noise: &[f32],
+    [of_noise, least]: [f32; 2],
+    variance: &mut [f32],
+) {
+    let width = variance.len();
+    let (energy, noise) = (&energy[..width], &noise[..width]);
+    for x in 0..width {
+        let evidence = (energy[x] - of_noise * noise[x]).max(least * energy[x]).max(f32::MIN_POSITIVE);
+        let widened = energy[x] / evidence;
+        variance[x] *= widened * widened;
+    }
+}
+
+/// What the residual is compared with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Residual {
+    /// Its mean square for noise of unit variance, a polynomial in alpha^2.
+    pub gain: [f32; 4],
+    /// Variance of the noise of a pixel of brightness b: `constant + per_unit b`.
+    pub noise: [f32; 2],
+    /// And its least.
+    pub least_noise: f32,
+}
+
+dispatch! {
+    /// Square of the residual relative to that of noise, the square itself, and that of noise; `sum` is of the pair's brightness.
+    fn residual_row(of: Residual, rho: [&[f32]; 4], sum: &[f32], alpha: &[f32], to: [&mut [f32]; 3]) = residual_generic
+}
+
+#[inline(always)]
+fn residual_generic<L: Lanes>(
+    of: Residual,
+    rho: [&[f32]; 4],
+    sum: &[f32],
+    alpha: &[f32],
+    [relative, squares, expected]: [&mut [f32]; 3],
+) {
+    let width = alpha.len();
+    let ([r0, r1, r2, r3], sum) = (rho.map(|rho| &rho[..width]), &sum[..width]);
+    let (relative, squares, expected) =
+        (&mut relative[..width], &mut squares[..width], &mut expected[..width]);
+    let [constant, per_unit] = of.noise;
+    for x in 0..width {
+        let a = alpha[x];
+        let left = ((r3[x] * a + r2[x]) * a + r1[x]) * a + r0[x];
+        let noise = (constant + per_unit * (0.5 * sum[x])).max(of.least_noise);
+        squares[x] = left * left;
+        expected[x] = polynomial(of.gain, a * a) * noise;
+        relative[x] = squares[x] / expected[x];
+    }
+}
+
+/// What turns a variance of alpha into a standard deviation of depth.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Deviation {
+    /// A factor of the variance.
+    pub gain: f32,
+    /// The residual's mean square for noise of unit variance, a polynomial in alpha^2.
+    pub of_residual: [f32; 4],
+    /// Depth changes with alpha by `squared slope / (offset + slope alpha)^2`.
+    pub squared: f32,
+    pub offset: f32,
+    pub slope: f32,
+}
+
+dispatch! {
+    /// Standard deviations of depth, mm.
+    fn deviation_row(of: Deviation, alpha: &[f32], variance: &[f32], to: &mut [f32]) = deviation_generic
+}
+
+#[inline(always)]
+fn deviation_generic<L: Lanes>(of: Deviation, alpha: &[f32], variance: &[f32], to: &mut [f32]) {
+    let width = to.len();
+    let (alpha, variance) = (&alpha[..width], &variance[..width]);
+    for x in 0..width {
+        let a = alpha[x];
+        let noise = polynomial(of.of_residual, a * a);
+        let w = of.offset + of.slope * a;
+        to[x] = (of.gain * noise * variance[x]).sqrt() * (of.squared * of.slope / (w * w));
+    }
+}
+
+/// `g0 + g1 x + g2 x^2 + g3 x^3`.
+#[inline(always)]
+fn polynomial(gain: [f32; 4], x: f32) -> f32 {
+    ((gain[3] * x + gain[2]) * x + gain[1]) * x + gain[0]
+}
+
+dispatch! {
+    /// Sums of seven rows.
+    fn sum_rows(rows: [&[f32]; 7], sums: &mut [f32]) = sum_rows_generic
+}
+
+#[inline(always)]
+fn sum_rows_generic<L: Lanes>(rows: [&[f32]; 7], sums: &mut [f32]) {
+    let width = sums.len();
+    let [a, b, c, d, e, f, g] = rows.map(|row| &row[..width]);
+    for x in 0..width {
+        sums[x] = a[x] + b[x] + c[x] + d[x] + e[x] + f[x] + g[x];
+    }
+}
+
+/// Sum of a row, of eight sums side by side.
+pub(crate) fn sum(values: &[f32]) -> f64 {
+    sum_of(values, |value| value)
+}
+
+/// Sum of a row's squares.
+pub(crate) fn sum_of_squares(values: &[f32]) -> f64 {
+    sum_of(values, |value| value * value)
+}
+
+fn sum_of(values: &[f32], each: impl Fn(f32) -> f32) -> f64 {
+    let (parts, rest) = values.as_chunks::<8>();
+    let mut sums = [0.0_f32; 8];
+    for part in parts {
+        sums.iter_mut().zip(part).for_each(|(sum, value)| *sum += each(*value));
+    }
+    sums.into_iter().chain(rest.iter().map(|value| each(*value))).map(f64::from).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,7 @@ use farnear_depth::{
     prepare::{Prepared, noise::PairNoise},
     uncertainty::{Noise, standard_deviation_mm},
 };
-use farnear_files::image_file::Samples;
+use farnear_files::{image_file::Samples, quantiles::Quantiles};
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 
@@ -192,11 +192,10 @@ pub fn deviation(
             *deviation *= (farther - nearer).abs() / SLOPE_STEP_MM;
         });
     }
-    let mut finite: Vec<f32> = deviation.iter().copied().filter(|value| value.is_finite()).collect();
-    finite.sort_unstable_by(f32::total_cmp);
+    let quantiles = Quantiles::new(deviation.view());
     let quantile = |part: f64| {
-        let last = finite.len().checked_sub(1).map_or(0, |last| (part * last as f64).round() as usize);
-        rounded(finite.get(last).map_or(f64::NAN, |value| f64::from(*value)), 4)
+        let last = quantiles.finite().saturating_sub(1);
+        rounded(quantiles.at((part * last as f64).round() as usize).map_or(f64::NAN, f64::from), 4)
     };
     let found =
         Uncertainty { noise: noise.to_string(), median_sd_mm: quantile(0.5), p95_sd_mm: quantile(0.95) };

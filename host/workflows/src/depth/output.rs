@@ -11,7 +11,7 @@ use std::{
 
 use farnear_files::{
     exr,
-    image_file::png_to,
+    image_file::{png_to, png8_to},
     map::{self, Scale},
     mesh::{self, Projection},
     npy,
@@ -184,7 +184,7 @@ impl<'a> Results<'a> {
     }
 
     fn reasons(&self, to: &mut Sink) -> io::Result<()> {
-        png_to(self.computed.reasons.mapv(u16::from).view(), 8, to).map_err(io::Error::other)
+        png8_to(self.computed.reasons.view(), to).map_err(io::Error::other)
     }
 
     fn view(&self, to: &mut Sink) -> io::Result<()> {
