@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""A client for a farnear rig, real or emulated, written from docs/protocol.md: moves the piezo and tells where it went.
+"""A client for a farnear rig, real or emulated, written from docs/protocol.md: moves the piezo and prints where it
+is. It repeats requests that get no answer, reads lost events again, answers the keep-alive, and stops the move at a deadline.
 
     farnear-sim run                      # prints {"port": "/dev/pts/3", ...}
     python3 examples/client.py /dev/pts/3 20000
 """
+import collections
 import secrets
 import struct
 import sys
@@ -14,9 +16,11 @@ import serial  # pip install pyserial
 
 VERSION = 3
 REQUEST, RESPONSE, ERROR, EVENT = 1, 2, 3, 4
-HELLO, STATUS, MOVE, OPEN_SESSION = 0, 1, 3, 30  # places in the table of requests
+HELLO, STATUS, MOVE, STOP, READ_EVENT, OPEN_SESSION = 0, 1, 3, 4, 7, 30  # places in the table of requests
+EVENT_ANSWER, EVENT_GONE = 3, 9  # places in the tables of answers and errors
 STARTED, HOMED, MOVE_DONE, FAILED, STILL_THERE = 0, 1, 2, 5, 9  # places in the table of events
 SENSOR_FINE = 1
+QUIET_S, MOVE_S = 1.0, 30.0  # without an event so long, one may be lost; longest time for a move
 REPLY_S, ATTEMPTS = 2.0, 4  # a real board answers within 50 ms; an emulated one takes what the computer takes
 
 
@@ -67,10 +71,18 @@ def read_zigzag(body, at):
     return (value >> 1) ^ -(value & 1), at
 
 
+class Refused(RuntimeError):
+    def __init__(self, body):
+        super().__init__(f"refused: variant {body[0]}, {body[1:].hex()}")
+        self.body = body
+
+
 class Rig:
     def __init__(self, port):
         self.line = serial.Serial(port, 2_000_000, timeout=0.05, exclusive=True)
-        self.boot, self.session, self.last_id, self.rest, self.events = 0, 0, 0, b"", []
+        self.boot, self.session, self.last_id, self.rest = 0, 0, 0, b""
+        self.waiting = collections.deque()  # frames that were received and not used yet
+        self.events, self.due = {}, None  # events by number, and the number that is due
         hello = self.ask(bytes([HELLO]))
         # variant, two versions, schema key, board and firmware as texts, unique id: then comes the boot number.
         _, at = read_varint(hello, 3)
@@ -86,6 +98,7 @@ class Rig:
         self.last_id, _ = read_varint(hello, last)
         self.session = secrets.randbelow(2**32 - 1) + 1
         self.ask(bytes([OPEN_SESSION]))
+        self.due = self.read_event(2**32 - 1)  # the next event's number
 
     def ask(self, request):
         """Sends a request, the same bytes again where no answer comes; gives the answer's body."""
@@ -96,47 +109,83 @@ class Rig:
             self.line.write(frame)
             until = time.monotonic() + REPLY_S
             while time.monotonic() < until:
-                for kind, number, body in self.frames():
+                self.receive()
+                # One read may hold an answer and events behind it: what is not used now stays in the queue.
+                while self.waiting:
+                    kind, number, body = self.waiting.popleft()
                     if kind == EVENT:
-                        self.events.append((number, body))
+                        self.events[number] = body
                     elif number == self.last_id and kind == ERROR:
-                        raise RuntimeError(f"refused: variant {body[0]}, {body[1:].hex()}")
+                        raise Refused(body)
                     elif number == self.last_id and kind == RESPONSE:
                         return body
         raise TimeoutError("the board does not answer")
 
-    def frames(self):
-        """The good frames that have come: kind, id and body."""
+    def receive(self):
+        """Reads what has arrived and queues the good frames: kind, id and body."""
         self.rest += self.line.read(max(1, self.line.in_waiting))
         *frames, self.rest = self.rest.split(b"\0")
         for frame in frames:
             content = cobs_decode(frame)
             if len(content) >= 14 and zlib.crc32(content[:-4]) == struct.unpack("<I", content[-4:])[0]:
                 _, kind, number, _ = struct.unpack("<BBII", content[:10])
-                yield kind, number, content[10:-4]
+                self.waiting.append((kind, number, content[10:-4]))
+
+    def read_event(self, number):
+        """Reads an event again, which is queued if the board has it; gives the number of the event after the last one."""
+        try:
+            body = self.ask(bytes([READ_EVENT]) + varint(number))
+        except Refused as refused:
+            if refused.body[0] != EVENT_GONE:
+                raise
+            oldest, at = read_varint(refused.body, 1)
+            if self.due is not None and number < oldest:
+                raise RuntimeError(f"event {number} is lost: the board remembers {oldest} and later ones") from None
+            return read_varint(refused.body, at)[0]
+        if body[0] == EVENT_ANSWER:
+            self.events[number] = body[1:]
+        return number + 1
+
+    def next_event(self, until):
+        """The next event, in order and without a gap; stops the rig where none comes until then."""
+        quiet_since = time.monotonic()
+        while self.due not in self.events:
+            now = time.monotonic()
+            if now >= until:
+                self.ask(bytes([STOP]))
+                raise TimeoutError("the move did not end in time; the rig was stopped")
+            self.receive()
+            while self.waiting:
+                kind, number, body = self.waiting.popleft()
+                if kind == EVENT:
+                    self.events[number] = body
+            lost = any(number > self.due for number in self.events) or now - quiet_since > QUIET_S
+            if self.due not in self.events and lost:
+                self.read_event(self.due)
+                quiet_since = now
+        self.due += 1
+        return self.events.pop(self.due - 1)
 
     def move_fine(self, target_nm):
         """Moves the piezo; gives the measured position in nanometres."""
         self.ask(bytes([MOVE, SENSOR_FINE]) + zigzag(target_nm) + varint(10_000_000))
-        request = self.last_id
+        request, until = self.last_id, time.monotonic() + MOVE_S
         while True:
-            self.events += [(number, body) for kind, number, body in self.frames() if kind == EVENT]
-            while self.events:
-                _, body = self.events.pop(0)
-                _, at = read_varint(body, 0)  # the board's time
-                kind, at = body[at], at + 1
-                if kind == STILL_THERE:
-                    self.ask(bytes([STATUS]))
-                elif kind in (MOVE_DONE, FAILED):
-                    named, at = read_varint(body, at)
-                    if named == request and kind == FAILED:
-                        raise RuntimeError(f"the move failed: {body[at:].hex()}")
-                    if named == request:
-                        _, at = read_zigzag(body, at + 1)  # the axis, and what was asked
-                        return read_zigzag(body, at)[0]
+            body = self.next_event(until)
+            _, at = read_varint(body, 0)  # the board's time
+            kind, at = body[at], at + 1
+            if kind == STILL_THERE:
+                self.ask(bytes([STATUS]))
+            elif kind in (MOVE_DONE, FAILED):
+                named, at = read_varint(body, at)
+                if named == request and kind == FAILED:
+                    raise RuntimeError(f"the move failed: {body[at:].hex()}")
+                if named == request:
+                    _, at = read_zigzag(body, at + 1)  # the axis, and the target
+                    return read_zigzag(body, at)[0]
 
 
 if __name__ == "__main__":
     rig = Rig(sys.argv[1])
     print(f"{rig.board}, boot {rig.boot}, {'emulated' if rig.emulated else 'real'}")
-    print(f"the piezo stands at {rig.move_fine(int(sys.argv[2]))} nm")
+    print(f"the piezo is at {rig.move_fine(int(sys.argv[2]))} nm")

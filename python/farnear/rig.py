@@ -6,6 +6,8 @@ import json
 import os
 import shutil
 import subprocess
+import time
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Iterable, Iterator, Mapping, Optional, Sequence, Union
@@ -73,7 +75,7 @@ class Rig:
         return self._client
 
     @property
-    def _eye(self) -> str:
+    def _camera_address(self) -> str:
         if self._camera is None:
             raise FarnearError("the rig was opened without a camera; name one, as in Rig(port, camera='folder:DIR')")
         return self._camera
@@ -121,7 +123,7 @@ class Rig:
         for begin in range(0, len(shots), most):
             part = shots[begin : begin + most]
             exposure_us = round(1000 * exposure_ms)
-            images = self._open.expose(self._eye, part, exposure_us=exposure_us, wait_s=wait_s)
+            images = self._open.expose(self._camera_address, part, exposure_us=exposure_us, wait_s=wait_s)
             taken.extend(_exposure(*image) for image in images)
         return taken
 
@@ -130,37 +132,73 @@ class Rig:
     ) -> tuple[Exposure, Exposure]:
         """The far- and the near-focused image for some optics, as `farnear.depth` takes them: homes where needed, brings the stage
         near, exposes both by piezo."""
-        pair = self._open.capture_pair(self._eye, optics, exposure_us=round(1000 * exposure_ms), wait_s=wait_s)
+        pair = self._open.capture_pair(self._camera_address, optics, exposure_us=round(1000 * exposure_ms), wait_s=wait_s)
         far, near = (_exposure(*image) for image in pair)
         return far, near
 
     def run_sequence(self, sequence: useq.MDASequence, *, axis: str = "fine", wait_s: float = 30.0) -> Iterator[Exposure]:
-        """Runs a `useq` sequence whose `z` positions (um) are those of an axis, as pymmcore-plus would: events of one exposure time
-        go to the board as one program. `exposure` is in ms, 5 without it. Other axes than z and t are refused, for the rig has none;
-        times are not kept, exposures follow each other as fast as they settle."""
+        """Runs a `useq` sequence whose `z` positions (um) are those of an axis.
+
+        Done are `z_plan`, `exposure` (ms, default 5) and `time_plan`: an event with `min_start_time` (s since the start, or since the
+        last event with `reset_event_timer`) waits for it. Events of one exposure and one start time run as one program on the board.
+        Everything else that an event can ask for (channels, stage positions, autofocus, custom actions, properties, SLM images) is
+        refused with `FarnearError` before anything moves, as are positions and exposures outside the limits."""
         events = list(sequence)
+        info = self.info()
         for event in events:
-            _check(event)
+            _check(event, axis, info)
+        return self._run_events(events, axis, wait_s)
+
+    def _run_events(self, events: list[Any], axis: str, wait_s: float) -> Iterator[Exposure]:
+        begin = time.monotonic()
         while events:
-            same = 1
-            while same < len(events) and events[same].exposure == events[0].exposure:
+            first, same = events[0], 1
+            while same < len(events) and _program(events[same]) == _program(first) and not events[same].reset_event_timer:
                 same += 1
             part, events = events[:same], events[same:]
+            if first.reset_event_timer:
+                begin = time.monotonic()
+            if first.min_start_time is not None:
+                late_s = time.monotonic() - begin - first.min_start_time
+                if late_s < 0:
+                    time.sleep(-late_s)
+                elif late_s > LATE_S:
+                    warnings.warn(f"event {dict(first.index)} starts {late_s:.1f} s late", stacklevel=2)
             positions = [(axis, float(event.z_pos)) for event in part]
-            exposure_ms = 5.0 if part[0].exposure is None else float(part[0].exposure)
-            for event, taken in zip(part, self.expose(positions, exposure_ms=exposure_ms, wait_s=wait_s)):
-                yield Exposure(taken.image, taken.bits, taken.record, dict(event.index))
+            exposure_ms = 5.0 if first.exposure is None else float(first.exposure)
+            taken = self.expose(positions, exposure_ms=exposure_ms, wait_s=wait_s)
+            for event, exposure in zip(part, taken):
+                yield Exposure(exposure.image, exposure.bits, exposure.record, dict(event.index))
 
 
-def _check(event: Any) -> None:
+LATE_S = 0.5
+"""A time lapse that is later than this warns."""
+
+
+def _program(event: Any) -> tuple[Any, Any]:
+    return event.exposure, event.min_start_time
+
+
+def _check(event: Any, axis: str, info: Mapping[str, Any]) -> None:
+    name = f"event {dict(event.index)}"
+    action = getattr(event.action, "type", "acquire_image") if event.action is not None else "acquire_image"
+    if action != "acquire_image":
+        raise FarnearError(f"{name} asks for the action {action!r}; expected images only. Find the focus with `farnear rig focus` before")
+    asked = {"x_pos": event.x_pos, "y_pos": event.y_pos, "channel": event.channel, "slm_image": event.slm_image}
+    others = [what for what, value in asked.items() if value is not None]
+    others += [what for what in ("properties", "keep_shutter_open") if getattr(event, what)]
+    if others:
+        raise FarnearError(f"{name} asks for {', '.join(others)}; the rig has z and time only")
     if event.z_pos is None:
-        raise FarnearError(f"event {dict(event.index)} has no z position; give the sequence a z_plan")
-    others = [name for name in ("x_pos", "y_pos") if getattr(event, name) is not None]
-    if event.channel is not None:
-        others.append("channel")
-    if others or event.min_start_time:
-        what = ", ".join(others) or "min_start_time"
-        raise FarnearError(f"event {dict(event.index)} asks for {what}; the rig has z alone, and waits for nothing but settling")
+        raise FarnearError(f"{name} has no z position; give the sequence a z_plan")
+    exposure_ms = 5.0 if event.exposure is None else float(event.exposure)
+    for what, value, limits in [
+        (f"the {axis} position", float(event.z_pos), info.get(f"{axis}_um")),
+        ("the exposure", exposure_ms, info.get("exposure_ms")),
+    ]:
+        if limits is not None and not limits[0] <= value <= limits[1]:
+            unit = "ms" if what == "the exposure" else "um"
+            raise FarnearError(f"{name}: {what} {value:g} {unit} is outside {limits[0]:g} to {limits[1]:g} {unit}")
 
 
 def _exposure(image: NDArray[np.uint16], bits: int, record: dict[str, Any]) -> Exposure:

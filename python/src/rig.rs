@@ -103,6 +103,8 @@ impl RigClient {
         said.set_item("firmware", hello.firmware.as_str())?;
         said.set_item("emulated", hello.emulated)?;
         said.set_item("shots_max", limits.shots_max)?;
+        let ms = |exposure: Micros| f64::from(exposure.0) / 1e3;
+        said.set_item("exposure_ms", (ms(limits.exposure_min), ms(limits.exposure_max)))?;
         for (name, min, max) in [
             ("coarse_um", limits.coarse_min, limits.coarse_max),
             ("fine_um", limits.fine_min, limits.fine_max),

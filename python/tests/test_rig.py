@@ -1,6 +1,8 @@
 """The emulated rig as a fixture: what a test of one's own measuring program looks like. Also the rig's client itself."""
 
 import numpy as np
+import time
+
 import pytest
 
 import farnear
@@ -39,8 +41,30 @@ def test_a_sequence_of_micro_manager_goes_through_the_focus(emulated_rig):
     assert [exposure.index["z"] for exposure in taken] == [0, 1, 2] * 2
     begins = [exposure.record["strobe_start_us"] for exposure in taken]
     assert begins == sorted(begins) and len(set(begins)) == 6
-    with pytest.raises(farnear.FarnearError, match="channel"):
-        list(emulated_rig.run_sequence(useq.MDASequence(channels=["DAPI"], z_plan={"range": 2, "step": 1})))
+
+
+def test_a_time_lapse_keeps_its_interval(emulated_rig):
+    useq = pytest.importorskip("useq")
+    begin = time.monotonic()
+    lapse = useq.MDASequence(z_plan={"bottom": 20, "top": 40, "step": 20}, time_plan={"interval": 1, "loops": 2})
+    assert len(list(emulated_rig.run_sequence(lapse))) == 4
+    assert time.monotonic() - begin >= 1
+
+
+def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
+    useq = pytest.importorskip("useq")
+    for event, what in [
+        (useq.MDAEvent(z_pos=3, channel="DAPI"), "channel"),
+        (useq.MDAEvent(z_pos=3, x_pos=1), "x_pos"),
+        (useq.MDAEvent(z_pos=3, properties=[("device", "name", "1")]), "properties"),
+        (useq.MDAEvent(z_pos=3, action=useq.HardwareAutofocus(autofocus_motor_offset=1)), "autofocus"),
+        (useq.MDAEvent(z_pos=3, action=useq.CustomAction(name="shake")), "custom"),
+        (useq.MDAEvent(z_pos=3, exposure=1e6), "exposure"),
+        (useq.MDAEvent(z_pos=1e5), "outside"),
+        (useq.MDAEvent(), "z position"),
+    ]:
+        with pytest.raises(farnear.FarnearError, match=what):
+            emulated_rig.run_sequence([useq.MDAEvent(z_pos=3), event])
 
 
 def test_a_rig_that_was_left_is_closed(emulated_rig):
