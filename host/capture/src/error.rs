@@ -146,7 +146,7 @@ pub enum ClientError {
     },
     /// No answer came in time, however often it was asked.
     #[error(
-        "no answer from {port} while {during}: asked {attempts} times within {waited:?}{}",
+        "no answer from {port} while {during}: asked {attempts} times within {waited:?}, the last time after the port was opened anew{}",
         what_came(*bad_frames, *bytes)
     )]
     Silent {

@@ -119,6 +119,17 @@ impl Link {
         Ok(())
     }
 
+    fn renew(&mut self, during: &str) -> Result<(), ClientError> {
+        let renewed = match &mut self.transport {
+            Some(transport) => transport.renew(self.rate),
+            None => Err(ErrorKind::NotConnected.into()),
+        };
+        renewed.map_err(|source| self.gone(source, during))?;
+        self.decoder = Decoder::new();
+        self.unread = 0..0;
+        Ok(())
+    }
+
     /// Closes the port. As long as a program holds a port that has gone, the system gives the board that comes back another
     /// name.
     pub(crate) fn close(&mut self) {
@@ -178,7 +189,11 @@ impl Link {
         }
         let begin = Instant::now();
         let (bytes_before, bad_frames) = (self.bytes, self.bad_frames);
-        for wait in waits {
+        for (attempt, wait) in waits.iter().enumerate() {
+            // Before the last attempt: another program may have changed the port's settings.
+            if attempt > 0 && attempt + 1 == waits.len() {
+                self.renew(during)?;
+            }
             // One write for all of them, so that an emulated board never sees one alone.
             let open = asked.iter().filter(|one| one.answer.is_none());
             let bytes: Vec<u8> = open.flat_map(|one| one.bytes.iter().copied()).collect();

@@ -29,6 +29,11 @@ pub trait Transport: Send {
         Ok(())
     }
 
+    /// Opens the line anew with its own settings, which another program may have changed. A pipe without settings does nothing.
+    fn renew(&mut self, _: LinkRate) -> io::Result<()> {
+        Ok(())
+    }
+
     /// Name of the port behind it, where that may be another one than was asked for.
     fn port(&self) -> Option<&str> {
         None
@@ -37,7 +42,8 @@ pub trait Transport: Send {
 
 /// A serial port, held exclusively: a second program that opens it gets [`PortError::Busy`].
 pub struct SerialTransport {
-    port: Box<dyn SerialPort>,
+    /// Absent only while it is opened anew.
+    port: Option<Box<dyn SerialPort>>,
     name: String,
 }
 
@@ -49,7 +55,14 @@ impl SerialTransport {
             .timeout(Duration::from_millis(50))
             .open()
             .map_err(|error| explain(path, error))?;
-        Ok(Self { port, name: path.into() })
+        Ok(Self { port: Some(port), name: path.into() })
+    }
+
+    fn open_port(&mut self) -> io::Result<&mut dyn SerialPort> {
+        match &mut self.port {
+            Some(port) => Ok(port.as_mut()),
+            None => Err(io::ErrorKind::NotConnected.into()),
+        }
     }
 }
 
@@ -178,8 +191,9 @@ fn explain(path: &str, error: serialport::Error) -> PortError {
 
 impl Transport for SerialTransport {
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
-        self.port.set_timeout(wait.max(Duration::from_millis(1)))?;
-        match self.port.read(buffer) {
+        let port = self.open_port()?;
+        port.set_timeout(wait.max(Duration::from_millis(1)))?;
+        match port.read(buffer) {
             // Readable, yet without bytes: the other side has hung up.
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(count) => Ok(count),
@@ -198,8 +212,9 @@ impl Transport for SerialTransport {
             if left.is_zero() {
                 return Err(io::ErrorKind::TimedOut.into());
             }
-            self.port.set_timeout(left)?;
-            match self.port.write(rest) {
+            let port = self.open_port()?;
+            port.set_timeout(left)?;
+            match port.write(rest) {
                 Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
                 Ok(count) => rest = &rest[count..],
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -210,11 +225,21 @@ impl Transport for SerialTransport {
     }
 
     fn discard_input(&mut self) -> io::Result<()> {
-        Ok(self.port.clear(ClearBuffer::Input)?)
+        Ok(self.open_port()?.clear(ClearBuffer::Input)?)
     }
 
     fn set_rate(&mut self, rate: LinkRate) -> io::Result<()> {
-        Ok(self.port.set_baud_rate(rate.baud())?)
+        Ok(self.open_port()?.set_baud_rate(rate.baud())?)
+    }
+
+    fn renew(&mut self, rate: LinkRate) -> io::Result<()> {
+        self.port = None; // it is held exclusively, also against this program
+        let mut anew = Self::open(&self.name).map_err(io::Error::other)?;
+        if rate != LinkRate::START {
+            anew.set_rate(rate)?;
+        }
+        *self = anew;
+        Ok(())
     }
 
     fn port(&self) -> Option<&str> {

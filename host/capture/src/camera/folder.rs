@@ -2,7 +2,6 @@
 //! that synchronises) puts an image file into it for each trigger.
 
 use std::{
-    cmp::Ordering,
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},

@@ -144,3 +144,17 @@ proptest! {
         prop_assert_eq!(peer.board().acts, 6);
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn recovers_when_another_program_changes_the_ports_settings() {
+    let (port, board) = farnear_scripted_board::plug_in(Faults::default());
+    let client = farnear_capture::Client::open(&port).unwrap();
+    client.status().unwrap();
+    // Echo and line editing, as a login shell wants them: frames have no ends of lines.
+    let set = std::process::Command::new("stty").args(["-F", &port, "sane"]).status().unwrap();
+    assert!(set.success());
+    client.status().unwrap();
+    client.status().unwrap();
+    assert_eq!(board.board().acts, 0);
+}
