@@ -1,5 +1,5 @@
 // What can be set on the camera beside its exposure: gain, black level, pixel format, region.
-import { act, drives, ended, on } from "./link.js";
+import { act, hasControl, ended, on } from "./link.js";
 import { h, button, choice, field, rows } from "./ui.js";
 
 /** @typedef {{ name: string, value: string, range: string }} Control */
@@ -13,9 +13,9 @@ export function make() {
   const place = h("div", { class: "details" });
   const set = button("Set", () => look([...place.querySelectorAll("[name]")].filter((control) => control.value !== control.dataset.was).map((control) => `${control.name}=${control.value.trim()}`)));
   const element = h("details", { class: "camera" }, h("summary", {}, "Gain, region and what else it has"), place);
-  element.addEventListener("toggle", () => element.open && drives() && look([]));
+  element.addEventListener("toggle", () => element.open && hasControl() && look([]));
   on("state", ({ rig, live, job }) => {
-    set.disabled = !drives() || !(rig.phase === "ready" || live.camera_alone) || job?.phase === "running";
+    set.disabled = !hasControl() || !(rig.phase === "ready" || live.camera_alone) || job?.phase === "running";
   });
 
   async function look(wishes) {

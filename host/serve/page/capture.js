@@ -1,5 +1,5 @@
 // Capturing: a pair, a series, a still, a stack; and depth at once where that is wished.
-import { act, drives, ended, on, store } from "./link.js";
+import { act, hasControl, ended, on, store } from "./link.js";
 import { h, button, choice, field, panel } from "./ui.js";
 import { key } from "./keys.js";
 
@@ -45,7 +45,7 @@ export function make() {
     button("Stack", () => take({ kind: "stack", axis: axis.value, from_um: value(from), to_um: value(to), steps: value(steps) }, false), { "data-capture": "" }),
   ];
   on("state", (state) => {
-    const able = drives() && state.rig.phase === "ready" && state.job?.phase !== "running";
+    const able = hasControl() && state.rig.phase === "ready" && state.job?.phase !== "running";
     for (const control of all) control.disabled = !able;
   });
   key("c", "Capture a pair", () => !pair.disabled && pair.click());

@@ -1,5 +1,5 @@
 // Guides with pictures: first power-up, point spread function, flat series, and people before the camera.
-import { act, call, drives, ended, get, on, store } from "./link.js";
+import { act, call, hasControl, ended, get, on, store } from "./link.js";
 import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 import * as people from "./people.js";
@@ -40,8 +40,8 @@ export function make(host) {
     if (!host.hidden) history.replaceState(null, "", `#guides/${found[0]}`);
   };
   on("state", ({ rig, job, computation }) => {
-    for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !drives() || rig.phase !== "ready" || job?.phase === "running";
-    for (const control of host.querySelectorAll("[data-needs=seat]")) control.disabled = !store.seat || computation?.phase === "running";
+    for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !hasControl() || rig.phase !== "ready" || job?.phase === "running";
+    for (const control of host.querySelectorAll("[data-needs=client]")) control.disabled = !store.client || computation?.phase === "running";
   });
   pick("power");
   return { shown: (name) => pick(name ?? place.dataset.guide) };
@@ -132,7 +132,7 @@ function psf() {
   const element = h("div", { class: "guide-body" },
     step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target, square to the rig: at the far or the near focus, or at a distance that you know. With several distances p and k are told apart better.")),
     step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), h("div", { class: "buttons" }, button("Capture pair", capture, { "data-needs": "rig" }))),
-    step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "seat" })), result));
+    step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "client" })), result));
   return { element, shown };
 }
 
@@ -185,7 +185,7 @@ function series() {
   const element = h("div", { class: "guide-body" },
     step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves by itself. A series that was broken off goes on where it stood."),
       field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", forget, { "data-needs": "rig" })), captured),
-    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), h("div", { class: "buttons" }, button("Learn", learn, { class: "primary", "data-needs": "seat" }))),
+    step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), h("div", { class: "buttons" }, button("Learn", learn, { class: "primary", "data-needs": "client" }))),
     panel("Result", result));
   return { element, shown };
 }

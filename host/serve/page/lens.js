@@ -1,5 +1,5 @@
 // The optics as they are typed, drawn to scale, and what follows from them.
-import { act, call, drives, get, on } from "./link.js";
+import { act, call, hasControl, get, on } from "./link.js";
 import { h, s, button, choice, field, number, panel, rows } from "./ui.js";
 import { Plot } from "./plot.js";
 
@@ -62,7 +62,7 @@ export function make(host) {
       complete = null;
       wrong.textContent = error.message;
     }
-    use.disabled = !complete || !drives();
+    use.disabled = !complete || !hasControl();
   }
 
   function show(found) {
@@ -100,7 +100,7 @@ export function make(host) {
   }
   let loaded = -1;
   on("state", (state) => {
-    use.disabled = !complete || !drives();
+    use.disabled = !complete || !hasControl();
     if (state.optics !== loaded && !host.contains(document.activeElement)) load();
     loaded = state.optics;
   });

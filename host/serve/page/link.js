@@ -2,16 +2,18 @@
 import { notice } from "./ui.js";
 
 /**
- * What is known: the state as it was told last, and the own seat.
- * @type {{ state: import("./state").State | null, seat: import("./state").Hello | null, connected: boolean }}
+ * The last state received, and this client.
+ * @type {{ state: import("./state").State | null, client: import("./state").Hello | null, connected: boolean }}
  */
-export const store = { state: null, seat: null, connected: false };
+export const store = { state: null, client: null, connected: false };
 
 /** @type {Map<string, Set<(...values: any[]) => void>>} */
 const listeners = new Map();
 /** @type {WebSocket | null} */
 let socket = null;
 let wait = 250;
+/** Where the secret of this page survives a reload. */
+const SECRET = "farnear-client";
 
 /** Listens to `state`, `image`, `depth` or `link`; gives what ends it. */
 export function on(event, listener) {
@@ -24,19 +26,21 @@ function emit(event, ...values) {
   for (const listener of listeners.get(event) ?? []) listener(...values);
 }
 
-/** Whether this browser drives. */
-export function drives() {
-  return store.connected && store.state?.seats.driver === store.seat?.seat;
+/** Whether this browser has control. */
+export function hasControl() {
+  return store.connected && store.state?.control.holder === store.client?.client;
 }
 
 /** Opens the socket, and opens it again whenever it breaks. */
 export function open() {
-  socket = new WebSocket(`ws://${location.host}/api/socket`);
+  // After a reload the page keeps control: it shows that it is the same page.
+  const before = sessionStorage.getItem(SECRET);
+  socket = new WebSocket(`ws://${location.host}/api/socket${before ? `?resume=${before}` : ""}`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => (typeof data === "string" ? told(JSON.parse(data)) : pictured(data));
   socket.onclose = () => {
     store.connected = false;
-    store.seat = null;
+    store.client = null;
     emit("link");
     setTimeout(open, wait);
     wait = Math.min(2 * wait, 4000);
@@ -45,7 +49,8 @@ export function open() {
 
 function told(message) {
   if (message.type === "hello") {
-    store.seat = message.hello;
+    store.client = message.hello;
+    sessionStorage.setItem(SECRET, message.hello.secret);
     store.connected = true;
     wait = 250;
     emit("link");
@@ -66,7 +71,7 @@ function pictured(data) {
 
 /** Asks for something; throws what went wrong, with `hint`. */
 export async function call(method, path, body) {
-  const headers = { "x-farnear-seat": store.seat?.secret ?? "" };
+  const headers = { "x-farnear-client": store.client?.secret ?? "" };
   if (body !== undefined) headers["content-type"] = "application/json";
   let answer;
   try {
@@ -104,11 +109,11 @@ export async function bytes(path) {
   return answer.ok ? answer.arrayBuffer() : null;
 }
 
-/** Waits for the end of a job. `lane` is `job` (on the rig) or `computation`. */
-export function ended(lane, id) {
+/** Waits for the end of a job. `queue` is `job` (on the rig) or `computation`. */
+export function ended(queue, id) {
   return new Promise((done) => {
     const look = (state) => {
-      const job = state?.[lane];
+      const job = state?.[queue];
       if (job && (job.id > id || (job.id === id && job.phase !== "running"))) {
         off();
         done(job);

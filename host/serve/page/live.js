@@ -1,5 +1,5 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
-import { act, drives, ended, get, on, store } from "./link.js";
+import { act, hasControl, ended, get, on, store } from "./link.js";
 import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
@@ -83,14 +83,14 @@ export function make(host) {
     off.setAttribute("aria-pressed", live.mode === "image");
     deep.setAttribute("aria-pressed", live.mode === "depth");
     const seen = rig.phase === "ready" || live.camera_alone;
-    for (const control of [off, exposure, measure]) control.disabled = !drives() || !seen;
-    deep.disabled = !drives() || rig.phase !== "ready";
+    for (const control of [off, exposure, measure]) control.disabled = !hasControl() || !seen;
+    deep.disabled = !hasControl() || rig.phase !== "ready";
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
     measure.value = live.measure;
     const playing = state.computation?.kind === "play" && state.computation.phase === "running";
     resting.hidden = live.mode !== "off" || !seen || playing || shown;
     depth.element.hidden = live.mode !== "depth" && !playing;
-    record.disabled = !drives() || live.mode !== "depth";
+    record.disabled = !hasControl() || live.mode !== "depth";
     record.setAttribute("aria-pressed", Boolean(live.recording));
     write(record, live.recording ? "Stop recording" : "Record");
     if (before?.live.recording !== live.recording) listed();

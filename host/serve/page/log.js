@@ -1,5 +1,5 @@
 // What was said, and the alarms that the board keeps, each with what to do.
-import { act, drives, get, on, store } from "./link.js";
+import { act, hasControl, get, on, store } from "./link.js";
 import { h, button, number, panel } from "./ui.js";
 
 /** Makes the view. */
@@ -19,7 +19,7 @@ export function make(host) {
       const { figures } = await get("/api/rig/alarms");
       alarms.replaceChildren(...figures.alarms.map((alarm) => h("li", { class: alarm.number === figures.latched ? "latched" : "" },
         h("p", {}, h("b", {}, `${alarm.number}`), ` ${alarm.text}`), h("p", { class: "dim" }, `boot ${alarm.boot}, after ${number(alarm.time_s, 3)} s`),
-        alarm.number === figures.latched && drives() ? button("Clear", () => act("/api/rig/alarms/clear", { number: alarm.number })) : null)));
+        alarm.number === figures.latched && hasControl() ? button("Clear", () => act("/api/rig/alarms/clear", { number: alarm.number })) : null)));
       if (!figures.alarms.length) alarms.append(h("li", { class: "dim" }, "None."));
     } catch (error) {
       alarms.replaceChildren(h("li", { class: "dim" }, error.message));

@@ -1,5 +1,5 @@
-// The page: views, the way to the rig, who drives, alarms, the job under way.
-import { act, drives, on, open, stop, store } from "./link.js";
+// The page: views, connection to the rig, control, alarms, running jobs.
+import { act, hasControl, on, open, stop, store } from "./link.js";
 import { h, ask, button, keep, notice } from "./ui.js";
 import { help, key, listen } from "./keys.js";
 import * as rig from "./rig.js";
@@ -74,36 +74,36 @@ function showLink() {
   link.textContent = words[phase];
 }
 
-function showSeats(state) {
+function showControl(state) {
   const who = $("who");
-  const { driver, asking, count } = state.seats;
+  const { holder, requested_by: asking, clients: count } = state.control;
   const watchers = count > 1 ? ` · ${count} browsers` : "";
-  const [seat, mine, waits] = [store.seat?.seat, drives(), asking != null && asking === store.seat?.seat];
-  keep(who, [seat, mine, waits, driver, count], () => {
-    if (mine) return [`you drive${watchers}`];
-    if (!seat) return [""];
-    return [h("span", {}, driver ? "another browser drives" : "nobody drives"),
-      button(waits ? "asked …" : "Ask for controls", () => act("/api/seat/ask"), { disabled: waits, class: "quiet" })];
+  const [known, mine, waits] = [store.client?.client, hasControl(), asking != null && asking === store.client?.client];
+  keep(who, [known, mine, waits, holder, count], () => {
+    if (mine) return [`you have control${watchers}`];
+    if (!known) return [""];
+    return [h("span", {}, holder ? "another browser has control" : "no browser has control"),
+      button(waits ? "asked …" : "Ask for control", () => act("/api/control/request"), { disabled: waits, class: "quiet" })];
   });
 }
 
 let asked = null;
 async function handOver(state) {
-  const { asking } = state.seats;
-  if (!drives() || asking == null || asking === asked) {
+  const asking = state.control.requested_by;
+  if (!hasControl() || asking == null || asking === asked) {
     if (asking == null) asked = null;
     return;
   }
   asked = asking;
-  const given = await ask("Another browser asks for the controls.", { yes: "Give", no: "Keep" });
-  act("/api/seat/answer", { give: given !== null });
+  const given = await ask("Another browser asks for control.", { yes: "Hand over", no: "Keep" });
+  act("/api/control/answer", { to: asking, give: given !== null });
 }
 
 function showAlarm({ rig: { info } }) {
   const alarm = $("alarm");
-  const words = info?.alarm ? [h("strong", {}, `Alarm ${info.alarm}`), h("span", {}, info.alarm_text), button("Clear", () => act("/api/rig/alarms/clear", { number: info.alarm }), { disabled: !drives() })]
+  const words = info?.alarm ? [h("strong", {}, `Alarm ${info.alarm}`), h("span", {}, info.alarm_text), button("Clear", () => act("/api/rig/alarms/clear", { number: info.alarm }), { disabled: !hasControl() })]
     : info?.emergency_stop ? [h("strong", {}, "Emergency stop is pressed"), h("span", {}, "Release it to go on.")] : null;
-  const text = `${words?.map((part) => part.textContent).join(" ") ?? ""} ${drives()}`;
+  const text = `${words?.map((part) => part.textContent).join(" ") ?? ""} ${hasControl()}`;
   if (alarm.dataset.text === text) return;
   alarm.dataset.text = text;
   alarm.hidden = !words;
@@ -129,7 +129,7 @@ function showJob(state, before) {
     if (total) bar.value = done / total;
     else bar.removeAttribute("value");
   });
-  for (const lane of ["job", "computation"]) ended(state[lane], before?.[lane]);
+  for (const queue of ["job", "computation"]) ended(state[queue], before?.[queue]);
 }
 
 function ended(job, before) {
@@ -143,7 +143,7 @@ let question = null;
 async function showQuestion(state) {
   if (state.question === question) return;
   question = state.question;
-  if (!question || !drives()) return;
+  if (!question || !hasControl()) return;
   const answer = await ask(question, { text: true, yes: "Answer", no: "Give up" });
   if (answer === null) stop();
   else act("/api/answer", { text: answer });
@@ -170,10 +170,10 @@ function begin() {
     parts.again,
     (header, pixels) => { parts.fresh(header, pixels); go("depth", header.capture); },
   );
-  on("link", () => { showLink(); if (store.state) showSeats(store.state); });
+  on("link", () => { showLink(); if (store.state) showControl(store.state); });
   on("state", (state, before) => {
     showLink();
-    showSeats(state);
+    showControl(state);
     showAlarm(state);
     showJob(state, before);
     handOver(state);

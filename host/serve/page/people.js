@@ -27,7 +27,7 @@ function videos() {
     // Names on the rig's computer are plain.
     const name = video.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^\.+/, "").slice(-80) || "video";
     try {
-      const answer = await fetch(`/api/people/videos/${name}`, { method: "PUT", body: video, headers: { "x-farnear-seat": store.seat?.secret ?? "" } });
+      const answer = await fetch(`/api/people/videos/${name}`, { method: "PUT", body: video, headers: { "x-farnear-client": store.client?.secret ?? "" } });
       const given = await answer.json().catch(() => ({}));
       if (!answer.ok) throw Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint });
       said.textContent = `${name} is there`;
@@ -52,12 +52,12 @@ export function activity() {
   const past = [];
   // The answer for the whole stays: pictures that were on the way may come after it.
   let answered = false;
-  const start = async (wish, lane) => {
+  const start = async (wish, queue) => {
     past.length = 0;
     answered = false;
     const begun = await act("/api/people/recognise", wish);
     if (!begun) return;
-    const job = await ended(lane, begun.job);
+    const job = await ended(queue, begun.job);
     if (job.phase !== "done" || !job.result) return;
     answered = true;
     tell(job.result, `of all ${job.result.frames} frames`);
@@ -77,7 +77,7 @@ export function activity() {
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "What somebody does"),
       h("p", {}, "A camera that stands still and one person who moves. The first frames teach the background. Stop ends it."), video.parts, known,
-      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "seat" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
+      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "client" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
     panel("Answer", h("div", { class: "person-answer" }, canvas, h("div", {}, answer, strip, details))));
   const shown = async () => {
     await video.shown();
@@ -155,7 +155,7 @@ export function shadow() {
       field("Height", inputs.height, "m"), field("Looks to", inputs.azimuth, "°"), field("Down by", inputs.pitch, "°"), field("Focal length", inputs.focal, "mm"), field("Pixel", inputs.pixel, "µm"),
       h("p", { class: "dim" }, "Looks to: anticlockwise from north."))),
     h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "3. The video"), video.parts,
-      h("div", { class: "buttons" }, button("Take the shadow off", start, { class: "primary", "data-needs": "seat" })))),
+      h("div", { class: "buttons" }, button("Take the shadow off", start, { class: "primary", "data-needs": "client" })))),
     panel("Masks with and without shadow", results));
   return { element, shown: () => { video.shown(); shown(); } };
 }

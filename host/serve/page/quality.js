@@ -47,6 +47,6 @@ export function make(host) {
       notice(error.message, "error", error.hint);
     }
   }
-  on("state", (state) => { start.disabled = state.rig.phase !== "ready" || state.job?.phase === "running" || state.seats.driver !== store.seat?.seat; });
+  on("state", (state) => { start.disabled = state.rig.phase !== "ready" || state.job?.phase === "running" || state.control.holder !== store.client?.client; });
   return { shown: refresh };
 }

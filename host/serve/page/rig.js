@@ -1,5 +1,5 @@
 // The rig: how it is, and moving it. Always in reach.
-import { act, call, drives, get, on, store } from "./link.js";
+import { act, call, hasControl, get, on, store } from "./link.js";
 import { h, button, choice, keep, notice, number, rows } from "./ui.js";
 import { draw } from "./stages.js";
 import { key } from "./keys.js";
@@ -13,14 +13,14 @@ export function mount(host) {
   const phase = h("div", { class: "phase" });
   const axes = h("div", { class: "axes" }, axis("coarse", "Coarse", 100), axis("fine", "Piezo", 1), axis("lens", "Lens", 100));
   const whole = h("div", { class: "buttons" },
-    button("Home", () => act("/api/rig/home", { axes: [] }), { title: "Homes all stages (H)", "data-needs": "drive" }),
-    button("Far focus", () => act("/api/rig/goto", { focus: "far" }), { title: "F", "data-needs": "drive" }),
-    button("Near focus", () => act("/api/rig/goto", { focus: "near" }), { title: "N", "data-needs": "drive" }),
-    button("Find focus", () => act("/api/rig/focus", {}), { title: "Searches for the sharpest image", "data-needs": "drive" }));
+    button("Home", () => act("/api/rig/home", { axes: [] }), { title: "Homes all stages (H)", "data-needs": "control" }),
+    button("Far focus", () => act("/api/rig/goto", { focus: "far" }), { title: "F", "data-needs": "control" }),
+    button("Near focus", () => act("/api/rig/goto", { focus: "near" }), { title: "N", "data-needs": "control" }),
+    button("Find focus", () => act("/api/rig/focus", {}), { title: "Searches for the sharpest image", "data-needs": "control" }));
   const facts = h("div", {});
   const more = h("details", {}, h("summary", {}, "More"), h("div", { class: "details" }, facts, h("div", { class: "buttons" },
-    button("Bring-up checklist", () => act("/api/rig/check"), { "data-needs": "drive" }),
-    button("Reset the board", () => act("/api/rig/reset"), { "data-needs": "drive" }),
+    button("Bring-up checklist", () => act("/api/rig/check"), { "data-needs": "control" }),
+    button("Reset the board", () => act("/api/rig/reset"), { "data-needs": "control" }),
     button("Emergency stop", () => act("/api/halt"), { class: "danger" }))));
   host.append(h("h2", { class: "visually-hidden" }, "Rig"), phase, stages, whole, axes, more);
 
@@ -30,8 +30,8 @@ export function mount(host) {
     if (rig.info) draw(stages, rig.info, range);
     stages.hidden = !rig.info;
     if (more.open) facts.replaceChildren(details(rig));
-    const able = drives() && rig.phase === "ready";
-    for (const control of host.querySelectorAll("[data-needs=drive]")) control.disabled = !able;
+    const able = hasControl() && rig.phase === "ready";
+    for (const control of host.querySelectorAll("[data-needs=control]")) control.disabled = !able;
   };
   on("state", (state, before) => {
     if (!before || state.optics !== before.optics) measure().then(() => store.state && show(store.state));
@@ -56,7 +56,7 @@ async function measure() {
 }
 
 function phaseWords(rig) {
-  const again = button("Connect again", () => act("/api/rig/connect"), { "data-needs": "seat" });
+  const again = button("Connect again", () => act("/api/rig/connect"), { "data-needs": "client" });
   if (rig.phase === "absent") return [h("p", { class: "dim" }, "No rig: captures only. Start farnear serve with --rig sim or a port to drive one.")];
   if (rig.phase === "connecting") return [h("p", {}, `Connecting to ${rig.name} …`)];
   if (rig.phase === "lost") return [h("p", { class: "bad" }, rig.error ?? "The rig does not answer."), again];
@@ -75,10 +75,10 @@ function axis(name, label, usual) {
   };
   input.addEventListener("keydown", (event) => { if (event.key === "Enter") go(); });
   return h("div", { class: "axis" }, h("span", { class: "axis-name" }, label), input,
-    button("Go", go, { "data-needs": "drive", "aria-label": `${label}: go` }),
-    button("−", () => step(name, -1), { "data-needs": "drive", "aria-label": `${label}: a step towards the lens` }),
+    button("Go", go, { "data-needs": "control", "aria-label": `${label}: go` }),
+    button("−", () => step(name, -1), { "data-needs": "control", "aria-label": `${label}: a step towards the lens` }),
     choice(STEPS, usual, (value) => { chosen[name] = Number(value); }, { "aria-label": `${label}: step in µm`, title: "Step in µm" }),
-    button("+", () => step(name, 1), { "data-needs": "drive", "aria-label": `${label}: a step away from the lens` }));
+    button("+", () => step(name, 1), { "data-needs": "control", "aria-label": `${label}: a step away from the lens` }));
 }
 
 function step(name, sign) {

@@ -33,14 +33,14 @@ export interface State {
     /** A camera without a rig: its image can be seen live. */
     camera_alone: boolean;
   };
-  seats: { driver: number | null; asking: number | null; count: number };
+  control: { holder: number | null; requested_by: number | null; clients: number };
   question: string | null;
   captures: number;
   optics: number;
   log: number;
 }
 export interface Hello {
-  seat: number;
+  client: number;
   secret: string;
   version: string;
 }

@@ -15,8 +15,8 @@ use crate::{app::App, failure::Failure};
 
 /// Where a request's answer lies in the document.
 const SCHEMAS: &str = "/components/schemas";
-/// The header that carries a seat's secret.
-pub const SEAT_HEADER: &str = "x-farnear-seat";
+/// The header that carries a client's secret.
+pub const CLIENT_HEADER: &str = "x-farnear-client";
 
 /// Routes, and what the document says of them.
 pub struct Api {
@@ -25,15 +25,15 @@ pub struct Api {
     generator: SchemaGenerator,
 }
 
-/// Who may ask for a route.
+/// Who may use a route.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum For {
-    /// Everybody who may talk to this program.
+    /// Every client that the guard admits.
     All,
-    /// The one that drives.
-    Driver,
-    /// Whoever has a seat.
-    Seated,
+    /// The client that has control.
+    Control,
+    /// Any connected client.
+    Client,
 }
 
 impl Default for Api {
@@ -105,7 +105,7 @@ impl Api {
             "summary": about,
             "requestBody": { "required": true, "content": { "application/octet-stream": {} } },
             "responses": responses(answer),
-            "parameters": [seat("Secret of a seat, from the first message on the socket.")],
+            "parameters": [client("Secret of a client, from the first message on the socket.")],
         });
         self.add(path, "put", put(handler).layer(DefaultBodyLimit::max(bytes_max)), operation)
     }
@@ -125,9 +125,9 @@ impl Api {
             "responses": responses(answer),
         });
         if who != For::All {
-            operation["parameters"] = json!([seat(match who {
-                For::Driver => "Secret of the seat that drives.",
-                _ => "Secret of a seat, from the first message on the socket.",
+            operation["parameters"] = json!([client(match who {
+                For::Control => "Secret of the client that has control.",
+                _ => "Secret of a client, from the first message on the socket.",
             })]);
         }
         self.add(path, method, route, operation)
@@ -188,10 +188,10 @@ impl Api {
     }
 }
 
-/// The header that says who asks.
-fn seat(about: &str) -> Value {
+/// The header that identifies the client.
+fn client(about: &str) -> Value {
     json!({
-        "name": SEAT_HEADER,
+        "name": CLIENT_HEADER,
         "in": "header",
         "required": true,
         "description": about,

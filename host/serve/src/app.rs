@@ -1,4 +1,4 @@
-//! What all requests share: settings, rig, jobs, seats, log, and the state that every browser is told.
+//! What all requests share: settings, rig, jobs, control, log, and the state that every browser is told.
 
 use std::{
     collections::VecDeque,
@@ -29,11 +29,11 @@ use tokio::sync::watch;
 
 use crate::{
     guard::Guard,
-    lane::{Lane, Task},
-    seats::Seats,
+    job_queue::{JobQueue, Task},
+    control::ControlLock,
     server::ServeSettings,
     stopping::{Stop, Stops},
-    view::{LiveMode, LiveState, Phase, RigState, SeatsState, State},
+    view::{LiveMode, LiveState, Phase, RigState, ControlState, State},
 };
 
 /// Lines of the log that are kept.
@@ -53,10 +53,10 @@ pub struct App {
     rig: Mutex<Option<OpenRig>>,
     camera: Mutex<CameraSettings>,
     /// Jobs on the rig.
-    pub rig_lane: Lane,
+    pub rig_jobs: JobQueue,
     /// Computations.
-    pub computing: Lane,
-    seats: Mutex<Seats>,
+    pub computing: JobQueue,
+    control: Mutex<ControlLock>,
     state: Mutex<State>,
     told: watch::Sender<Arc<str>>,
     /// The newest live picture, as it is sent.
@@ -70,6 +70,8 @@ pub struct App {
     ending: watch::Sender<bool>,
     /// Whether the rig is to be connected to.
     reconnect: AtomicBool,
+    /// Why the rig was stopped, if not by a person.
+    stop_reason: Mutex<Option<String>>,
     /// Stops on their way to the board.
     pub stops: Arc<Stops>,
 }
@@ -123,9 +125,9 @@ impl App {
             address: rig,
             rig: Mutex::default(),
             camera: Mutex::new(camera),
-            rig_lane: Lane::default(),
-            computing: Lane::default(),
-            seats: Mutex::default(),
+            rig_jobs: JobQueue::default(),
+            computing: JobQueue::default(),
+            control: Mutex::default(),
             told: watch::Sender::new(Arc::from("")),
             pictures: watch::Sender::new(Bytes::new()),
             state: Mutex::new(state),
@@ -134,6 +136,7 @@ impl App {
             answer: Mutex::default(),
             recorder: Mutex::default(),
             ending: watch::Sender::new(false),
+            stop_reason: Mutex::default(),
             stops: Arc::default(),
         }))
     }
@@ -239,13 +242,13 @@ impl App {
         receiver
     }
 
-    /// Works with the seats, and tells what came of it.
-    pub fn with_seats<T>(&self, work: impl FnOnce(&mut Seats) -> T) -> T {
-        let mut seats = lock(&self.seats);
-        let given = work(&mut seats);
-        let (driver, asking, count) = (seats.driver(), seats.asking(), seats.count());
-        drop(seats);
-        self.change(|state| state.seats = SeatsState { driver, asking, count });
+    /// Works with the control lock, and publishes the result.
+    pub fn with_control<T>(&self, work: impl FnOnce(&mut ControlLock) -> T) -> T {
+        let mut control = lock(&self.control);
+        let given = work(&mut control);
+        let (holder, requested_by, clients) = (control.holder(), control.requested_by(), control.clients());
+        drop(control);
+        self.change(|state| state.control = ControlState { holder, requested_by, clients });
         given
     }
 
@@ -276,7 +279,7 @@ impl App {
         self.change(|state| state.live.recording = None);
     }
 
-    /// Ends it for a reason that nobody wished; what was recorded stays.
+    /// Ends the recording because of an error; what was recorded is kept.
     pub fn break_recording(&self, why: &str) {
         let name = self.state().live.recording.unwrap_or_default();
         let ended = format!("The recording {name} has ended: {why}; what was recorded before is kept");
@@ -285,10 +288,21 @@ impl App {
         self.change(|state| state.live.recording_ended = Some(ended));
     }
 
+    /// As [`Self::begin_stop`], for a reason that the stopped job reports.
+    pub fn begin_stop_because(&self, reason: &str) -> Stop {
+        *lock(&self.stop_reason) = Some(reason.into());
+        self.begin_stop()
+    }
+
+    /// The reason of the last stop, once.
+    pub fn take_stop_reason(&self) -> Option<String> {
+        lock(&self.stop_reason).take()
+    }
+
     /// Ends jobs and live depth; what this gives tells the board, which may take a while, and nothing begins meanwhile.
     pub fn begin_stop(&self) -> Stop {
         let stop = self.stops.begin(self.rig());
-        self.rig_lane.cancel();
+        self.rig_jobs.cancel();
         // Depth moves the piezo; an image does not.
         self.set_live(|live| {
             if live.mode == LiveMode::Depth {
@@ -335,7 +349,8 @@ impl App {
     /// # Errors
     /// What is under way, in words.
     pub fn begin_on_rig(&self, task: Task) -> Result<u64, String> {
-        let begun = self.rig_lane.begin(task, |job| self.change(|state| state.job = Some(job)));
+        let _ = self.take_stop_reason(); // of an earlier stop
+        let begun = self.rig_jobs.begin(task, |job| self.change(|state| state.job = Some(job)));
         if begun.is_ok() {
             self.interrupt_live();
         }
@@ -376,7 +391,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
             recording_ended: None,
             camera_alone: address.is_none() && camera.address != CameraAddress::Emulated,
         },
-        seats: SeatsState { driver: None, asking: None, count: 0 },
+        control: ControlState { holder: None, requested_by: None, clients: 0 },
         question: None,
         captures: 0,
         optics: 0,

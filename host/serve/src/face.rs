@@ -9,7 +9,7 @@ use farnear_workflows::{Cancel, Progress, Questions, WorkflowError};
 
 use crate::{
     app::{App, lock},
-    lane::Place,
+    job_queue::Place,
     view::JobProgress,
 };
 
@@ -20,7 +20,7 @@ const WARNINGS: usize = 20;
 /// From one count that is told to the next, except the last: the whole state is told with it, and nobody reads faster.
 const COUNT: Duration = Duration::from_millis(100);
 
-/// The face of one lane's job.
+/// The face of one queue's job.
 pub struct Face<'a> {
     /// Where the state is.
     pub app: &'a App,

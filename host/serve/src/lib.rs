@@ -3,14 +3,14 @@
 //! The rig in a browser. A page of plain ES modules, embedded, talks to a typed HTTP and WebSocket interface that describes itself
 //! at `/openapi.json`; both only parse, show and ask: what is done lies in `farnear-workflows`.
 //!
-//! - [`app`]: what all requests share; [`lane`]: one job after the other on the rig, and one beside it that computes;
+//! - [`app`]: what all requests share; [`job_queue`]: one job at a time on the rig, and one computation at a time;
 //!   [`live`]: images and depth between jobs; [`rig_watch`]: how the rig is, ten times a second.
-//! - [`seats`]: one browser drives, others watch; [`guard`]: who may talk to this program at all.
+//! - [`control`]: one browser has control, others watch; [`guard`]: which requests are admitted.
 //! - [`api`]: the table of routes and the document that follows from it; [`routes`]: one file per subject; [`socket`]: what is
 //!   told without being asked.
 //! - [`assets`]: the page.
 //!
-//! A browser that goes away leaves nothing moving: when the socket of the one that drives ends, the rig is stopped.
+//! A browser that disconnects leaves nothing moving: when the client that has control does not return, the rig is stopped.
 
 pub mod api;
 pub mod app;
@@ -19,12 +19,12 @@ pub mod depth_message;
 pub mod face;
 pub mod failure;
 pub mod guard;
-pub mod lane;
+pub mod job_queue;
 pub mod live;
 pub mod picture_message;
 pub mod rig_watch;
 pub mod routes;
-pub mod seats;
+pub mod control;
 pub mod server;
 pub mod socket;
 pub mod stopping;

@@ -31,7 +31,7 @@ const NEWEST: f64 = 0.15;
 /// Looks until something else is wanted. What goes wrong is told, and nothing is looked at until somebody wants it again.
 pub fn look(app: &App) {
     let live = app.live();
-    // After that was read: a stop that is wished from now on ends what is seen.
+    // After `live` was read: a stop requested from now on ends this look.
     app.stops.wait();
     let rig = app.rig();
     if rig.is_none() && !app.has_camera_alone() {
@@ -52,9 +52,9 @@ pub fn look(app: &App) {
         (LiveMode::Depth, Some(rig)) => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
     };
     // Something else may be wanted already: then the rig's word of the stop is no news, and must not end what comes next.
-    let wished = context.cancel.is_cancelled() || app.is_ending();
+    let cancelled = context.cancel.is_cancelled() || app.is_ending();
     match ended {
-        Err(error) if !error.is_cancelled() && !wished => {
+        Err(error) if !error.is_cancelled() && !cancelled => {
             app.note(format!("live: {error}"));
             app.set_live(|live| live.mode = LiveMode::Off);
             app.change(|state| state.live.error = Some(error.to_string()));
@@ -65,7 +65,7 @@ pub fn look(app: &App) {
 
 /// Nobody looks any more.
 fn enough(app: &App) -> Result<()> {
-    if app.is_ending() || app.state().seats.count == 0 {
+    if app.is_ending() || app.state().control.clients == 0 {
         return Err(WorkflowError::Cancelled { during: "watching".into() });
     }
     Ok(())

@@ -39,7 +39,7 @@ fn run(app: &App) {
         if let Some(rig) = app.rig() {
             ask(app, &rig);
         }
-        let pause = if app.state().seats.count > 0 { OFTEN } else { SELDOM };
+        let pause = if app.state().control.clients > 0 { OFTEN } else { SELDOM };
         let mut left = pause;
         while !left.is_zero() && !app.is_ending() {
             std::thread::sleep(left.min(LOOK));

@@ -25,7 +25,7 @@ use axum::{
 use serde::de::DeserializeOwned;
 
 use crate::{
-    api::{Api, SEAT_HEADER},
+    api::{Api, CLIENT_HEADER},
     app::App,
     assets,
     failure::Failure,
@@ -113,33 +113,33 @@ impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
     }
 }
 
-/// Refuses who does not drive.
+/// Refuses a client that does not have control.
 ///
 /// # Errors
 /// A failure that says how to.
-pub fn driver(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
+pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     let secret = secret(headers);
-    if app.with_seats(|seats| seats.drives(secret)) {
+    if app.with_control(|control| control.has_control(secret)) {
         return Ok(());
     }
-    Err(Failure::new(StatusCode::FORBIDDEN, "another browser drives the rig")
-        .with_hint("Ask for the controls first."))
+    Err(Failure::new(StatusCode::FORBIDDEN, "another browser has control of the rig")
+        .with_hint("Ask for control first."))
 }
 
-/// Refuses who has no seat.
+/// Refuses a request without the secret of a connected client.
 ///
 /// # Errors
-/// A failure that says where seats come from.
-pub fn seated(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
-    match app.with_seats(|seats| seats.number_of(secret(headers))) {
+/// 403.
+pub fn require_client(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
+    match app.with_control(|control| control.id_of(secret(headers))) {
         Some(_) => Ok(()),
-        None => Err(Failure::new(StatusCode::FORBIDDEN, "no such seat; a seat comes with a socket")),
+        None => Err(Failure::new(StatusCode::FORBIDDEN, "unknown client: send the secret of a connected socket in x-farnear-client")),
     }
 }
 
-/// The secret of a seat; empty where there is none.
+/// The secret of the client; empty without one.
 pub fn secret(headers: &HeaderMap) -> &str {
-    headers.get(SEAT_HEADER).and_then(|value| value.to_str().ok()).unwrap_or_default()
+    headers.get(CLIENT_HEADER).and_then(|value| value.to_str().ok()).unwrap_or_default()
 }
 
 /// Does what takes a while, in a thread of its own.

@@ -10,10 +10,10 @@ use farnear_workflows::{
 use crate::{
     app::App,
     guard::{Guard, Listen},
-    lane, rig_watch, routes,
+    job_queue, rig_watch, routes,
 };
 
-/// From one look at the wish to end to the next.
+/// Interval between checks of the cancellation.
 const LOOK: Duration = Duration::from_millis(50);
 /// Longest wait for requests that are under way at the end.
 const FAREWELL: Duration = Duration::from_secs(2);
@@ -74,7 +74,7 @@ pub fn serve(
     let bound = listener.local_addr()?;
     let guard = Guard::new(&settings.listen);
     let app = App::new(settings, guard)?;
-    let lanes = lane::start(&app)?;
+    let workers = job_queue::start(&app)?;
     let watch = rig_watch::start(&app)?;
     let service = routes::service(&app).into_make_service();
     ready(&format!("http://{bound}/"));
@@ -91,7 +91,7 @@ pub fn serve(
         }
     });
     app.stop_everything();
-    lanes.join();
+    workers.join();
     let _ = watch.join(); // it never panics
     runtime.shutdown_timeout(FAREWELL);
     Ok(served?)

@@ -1,10 +1,10 @@
-//! What is told without being asked: a socket per browser, with a seat that ends with it.
+//! State and pictures, pushed to each browser over its WebSocket.
 
 use std::{sync::Arc, time::Duration};
 
 use axum::{
     extract::{
-        State, WebSocketUpgrade,
+        Query, State, WebSocketUpgrade,
         ws::{Message, WebSocket},
     },
     response::Response,
@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
-use crate::{app::App, routes::Shared, view::Hello};
+use crate::{app::App, control::RESERVED, routes::Shared, view::Hello};
 
 /// From one question whether the browser is still there to the next.
 const ASK: Duration = Duration::from_secs(1);
@@ -24,6 +24,8 @@ const SILENCE: Duration = Duration::from_secs(5);
 const ON_THE_WAY: u32 = 2;
 /// A browser that says nothing of what it has seen gets a picture in this time.
 const UNSEEN: Duration = Duration::from_secs(1);
+/// Why a job was stopped by [`run`].
+const DISCONNECTED: &str = "the browser that had control has disconnected";
 /// Longest message of a browser.
 const MESSAGE_MAX: usize = 4096;
 
@@ -37,26 +39,44 @@ enum Said {
     Seen,
 }
 
+/// Query of a socket.
+#[derive(Deserialize)]
+pub struct Resume {
+    /// Secret of the same page before it was reloaded.
+    resume: Option<String>,
+}
+
 /// Opens a socket.
-pub async fn open(State(app): Shared, upgrade: WebSocketUpgrade) -> Response {
+pub async fn open(
+    State(app): Shared,
+    Query(Resume { resume }): Query<Resume>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     upgrade
         .max_message_size(MESSAGE_MAX)
         .max_frame_size(MESSAGE_MAX)
-        .on_upgrade(move |socket| run(socket, app))
+        .on_upgrade(move |socket| run(socket, app, resume))
 }
 
-async fn run(mut socket: WebSocket, app: Arc<App>) {
-    let Ok(seat) = app.with_seats(crate::seats::Seats::join) else { return };
+async fn run(mut socket: WebSocket, app: Arc<App>, resumed: Option<String>) {
+    let Ok(client) = app.with_control(|control| control.join(resumed.as_deref())) else { return };
     let version = env!("CARGO_PKG_VERSION").into();
-    let hello = Hello { seat: seat.number, secret: seat.secret, version };
+    let hello = Hello { client: client.id, secret: client.secret, version };
     let hello = json!({ "type": "hello", "hello": hello }).to_string();
     if send(&mut socket, Message::text(hello)).await {
         talk(&mut socket, &app).await;
     }
-    // Before anybody else can sit down and begin something.
-    let stop = app.with_seats(|seats| seats.leave(seat.number).then(|| app.begin_stop()));
+    if !app.with_control(|control| control.leave(client.id)) {
+        return;
+    }
+    tokio::select! {
+        () = tokio::time::sleep(RESERVED) => {}
+        () = app.ended() => {}
+    }
+    // Stops before the next holder can begin something.
+    let stop = app.with_control(|control| control.expire(client.id).then(|| app.begin_stop_because(DISCONNECTED)));
     if let Some(stop) = stop {
-        app.note("the browser that drove has gone: stopping");
+        app.note(format!("{DISCONNECTED}: stopping"));
         let _ = tokio::task::spawn_blocking(move || stop.tell()).await; // the board has its deadline
     }
 }

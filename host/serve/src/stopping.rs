@@ -13,7 +13,7 @@ pub struct Stops {
     arrived: Condvar,
 }
 
-/// A stop that was wished; it has arrived when this is dropped.
+/// A requested stop; it has reached the board when this is dropped.
 pub struct Stop {
     stops: Arc<Stops>,
     rig: Option<OpenRig>,

@@ -17,9 +17,9 @@ pub struct State {
     pub computation: Option<Job>,
     /// Live image or depth.
     pub live: LiveState,
-    /// Who drives.
-    pub seats: SeatsState,
-    /// A question that a job asks the driver.
+    /// Which browser has control.
+    pub control: ControlState,
+    /// A question of a job to the browser that has control.
     pub question: Option<String>,
     /// Grows with every change of captures, notes or maps.
     pub captures: u64,
@@ -140,23 +140,23 @@ pub enum LiveMode {
     Depth,
 }
 
-/// Who drives.
+/// Which browser has control.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, JsonSchema)]
-pub struct SeatsState {
-    /// The number of the seat that drives.
-    pub driver: Option<u32>,
-    /// The number of the seat that asks to.
-    pub asking: Option<u32>,
-    /// Browsers that are here.
-    pub count: usize,
+pub struct ControlState {
+    /// Number of the client that has control.
+    pub holder: Option<u32>,
+    /// Number of the client that requests control.
+    pub requested_by: Option<u32>,
+    /// Number of connected browsers.
+    pub clients: usize,
 }
 
 /// The first message on a socket.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 pub struct Hello {
-    /// The seat's number.
-    pub seat: u32,
-    /// Its secret, for the header `x-farnear-seat`.
+    /// The client's number.
+    pub client: u32,
+    /// Its secret, for the header `x-farnear-client`.
     pub secret: String,
     /// This program.
     pub version: String,

@@ -155,20 +155,20 @@ test("a page that is loaded again goes on where it was", async () => {
   await page.reload();
   await page.locator("canvas[data-layer=depth]").waitFor();
   assert.match(page.url(), /#depth\/pair-001$/);
-  await page.locator("#who", { hasText: "you drive" }).waitFor();
+  await page.locator("#who", { hasText: "you have control" }).waitFor();
   await page.context().close();
 });
 
 test("a second browser watches, asks, and is given the controls", async () => {
   const first = await open(browser, server.address);
-  await first.locator("#who", { hasText: "you drive" }).waitFor();
+  await first.locator("#who", { hasText: "you have control" }).waitFor();
   const second = await open(browser, server.address);
-  await second.locator("#who", { hasText: "another browser drives" }).waitFor();
+  await second.locator("#who", { hasText: "another browser has control" }).waitFor();
   assert.ok(await second.getByRole("button", { name: "Home", exact: true }).isDisabled());
-  await second.getByRole("button", { name: "Ask for controls" }).click();
-  await first.getByRole("button", { name: "Give" }).click();
-  await second.locator("#who", { hasText: "you drive" }).waitFor();
-  await first.locator("#who", { hasText: "another browser drives" }).waitFor();
+  await second.getByRole("button", { name: "Ask for control" }).click();
+  await first.getByRole("button", { name: "Hand over" }).click();
+  await second.locator("#who", { hasText: "you have control" }).waitFor();
+  await first.locator("#who", { hasText: "another browser has control" }).waitFor();
   assert.ok(await first.getByRole("button", { name: "Home", exact: true }).isDisabled());
   await first.context().close();
   await second.context().close();

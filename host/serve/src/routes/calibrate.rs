@@ -27,12 +27,12 @@ use farnear_workflows::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, driver, seated};
+use super::{Body, Shared, aside, require_client, require_control};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     routes::rig::{begin, connected, figures},
     view::{Begun, Nothing},
 };
@@ -58,7 +58,7 @@ pub struct Target {
 /// What the point spread function is found from.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PsfWish {
+pub struct PsfRequest {
     /// Pairs of flat targets.
     #[serde(default)]
     pub targets: Vec<Target>,
@@ -72,7 +72,7 @@ pub struct PsfWish {
 /// Where flat targets are captured.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SeriesWish {
+pub struct SeriesRequest {
     /// Their distances from the lens; the working range in equal steps without any.
     #[serde(default)]
     pub distances_mm: Vec<f64>,
@@ -81,7 +81,7 @@ pub struct SeriesWish {
 /// What a correction is learned by.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CorrectionWish {
+pub struct CorrectionRequest {
     /// As `farnear calibrate correction --method` names it.
     pub method: String,
 }
@@ -100,27 +100,27 @@ pub struct Taught {
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Taught, _, _>("/api/calibrate", "What this session has been taught.", taught)
-        .post::<PsfWish, Begun, _, _>(
+        .post::<PsfRequest, Begun, _, _>(
             "/api/calibrate/psf",
-            For::Seated,
+            For::Client,
             "Finds the point spread function from one pair or several of flat targets.",
             find_psf,
         )
-        .post::<SeriesWish, Begun, _, _>(
+        .post::<SeriesRequest, Begun, _, _>(
             "/api/calibrate/series",
-            For::Driver,
+            For::Control,
             "Captures flat targets at several distances; at a real rig somebody places them and answers.",
             series,
         )
         .post::<Nothing, Begun, _, _>(
             "/api/calibrate/series/forget",
-            For::Driver,
+            For::Control,
             "Forgets the flat series and the correction, to begin anew.",
             forget,
         )
-        .post::<CorrectionWish, Begun, _, _>(
+        .post::<CorrectionRequest, Begun, _, _>(
             "/api/calibrate/correction",
-            For::Seated,
+            For::Client,
             "Learns a correction from the flat series.",
             learn,
         )
@@ -149,21 +149,21 @@ async fn taught(State(app): Shared) -> Result<Json<Taught>, Failure> {
 async fn find_psf(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<PsfWish>,
+    Body(asked): Body<PsfRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    seated(&app, &headers)?;
+    require_client(&app, &headers)?;
     let bad = |error: String| Failure::new(StatusCode::BAD_REQUEST, error);
-    let model: Model = wish.model.parse().map_err(|error| bad(format!("model {:?}: {error}", wish.model)))?;
+    let model: Model = asked.model.parse().map_err(|error| bad(format!("model {:?}: {error}", asked.model)))?;
     let mut request =
         CalibratePsfRequest { optics: app.optics_file(), model, ..CalibratePsfRequest::default() };
     let mut add = |folder: &FsPath, depth_mm: f64| {
         request.images.extend(["far.png", "near.png"].map(|name| folder.join(name)));
         request.depth_mm.push(depth_mm);
     };
-    for Target { capture, depth_mm } in wish.targets {
+    for Target { capture, depth_mm } in asked.targets {
         add(&sessions::folder_of(&app.session, &capture)?, depth_mm.unwrap_or(0.0));
     }
-    if wish.series {
+    if asked.series {
         for (map, mm) in patterns(&app)? {
             add(map.parent().unwrap_or(FsPath::new("")), mm);
         }
@@ -184,9 +184,9 @@ fn compute(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
 async fn series(
     State(app): Shared,
     headers: HeaderMap,
-    Body(SeriesWish { distances_mm }): Body<SeriesWish>,
+    Body(SeriesRequest { distances_mm }): Body<SeriesRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let open = connected(&app)?;
     // Nobody can put a target before the emulated rig that is seen: one is started before each target instead.
     let (rig, ask) = match &app.address {
@@ -213,7 +213,7 @@ async fn forget(
     headers: HeaderMap,
     Body(Nothing {}): Body<Nothing>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let work = move |app: &App, _: &Context<'_>| {
         let (series, file) = (app.session.join(SERIES), app.session.join(CORRECTION));
         for (path, gone) in [(&series, fs::remove_dir_all(&series)), (&file, fs::remove_file(&file))] {
@@ -232,9 +232,9 @@ async fn forget(
 async fn learn(
     State(app): Shared,
     headers: HeaderMap,
-    Body(CorrectionWish { method }): Body<CorrectionWish>,
+    Body(CorrectionRequest { method }): Body<CorrectionRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    seated(&app, &headers)?;
+    require_client(&app, &headers)?;
     let wrong = |error| Failure::new(StatusCode::BAD_REQUEST, format!("method {method:?}: {error}"));
     let settings = CalibrateCorrectionRequest {
         patterns: app.session.join(SERIES).join(LIST),

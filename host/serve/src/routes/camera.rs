@@ -16,12 +16,12 @@ use farnear_workflows::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Body, Shared, driver};
+use super::{Body, Shared, require_control};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     routes::rig::{begin, connected, figures},
     view::Begun,
 };
@@ -29,7 +29,7 @@ use crate::{
 /// What is set on the camera; what is not named stays.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CameraWish {
+pub struct CameraRequest {
     /// As on the command line: `gain=2`, `region=0,0,640,480`.
     #[serde(default)]
     pub set: Vec<String>,
@@ -37,9 +37,9 @@ pub struct CameraWish {
 
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
-    api.post::<CameraWish, Begun, _, _>(
+    api.post::<CameraRequest, Begun, _, _>(
         "/api/camera",
-        For::Driver,
+        For::Control,
         "Sets something on the camera, for everything that looks through it from now on; the job's result has all that can be set, with its range.",
         set,
     )
@@ -48,12 +48,12 @@ pub fn routes(api: Api) -> Api {
 async fn set(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<CameraWish>,
+    Body(request): Body<CameraRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, reason);
     let wished: Vec<Setting> =
-        wish.set.iter().map(|text| Setting::from_str(text)).collect::<Result<_, _>>().map_err(wrong)?;
+        request.set.iter().map(|text| Setting::from_str(text)).collect::<Result<_, _>>().map_err(wrong)?;
     let alone = app.has_camera_alone();
     let rig = if alone { None } else { Some(RigAddress::Open(connected(&app)?)) };
     let mut camera = app.camera();

@@ -20,13 +20,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, driver, seated};
+use super::{Body, Shared, aside, require_client, require_control};
 use crate::{
     api::{Api, For},
     app::App,
     depth_message::show_fresh,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     routes::rig::{begin, connected, figures},
     view::{AxisName, Begun, DONE, Done},
 };
@@ -37,7 +37,7 @@ const STACK_MAX: usize = 500;
 /// What to capture.
 #[derive(Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-pub enum Wish {
+pub enum CaptureRequest {
     /// A far- and a near-focused image.
     Pair {
         /// The new capture's name; the next free number without one.
@@ -115,16 +115,16 @@ pub struct NoteBody {
 pub fn routes(api: Api) -> Api {
     api.get::<Captures, _, _>("/api/captures", "The captures of the session, by name.", list)
         .query("/api/captures", "search", "Words that record, optics or note hold.")
-        .post::<Wish, Capturing, _, _>(
+        .post::<CaptureRequest, Capturing, _, _>(
             "/api/captures",
-            For::Driver,
+            For::Control,
             "Captures a pair, a series, a still or a stack.",
             capture,
         )
         .get::<OneCapture, _, _>("/api/captures/{capture}", "One capture.", one)
         .put::<NoteBody, Done, _, _>(
             "/api/captures/{capture}/note",
-            For::Seated,
+            For::Client,
             "Rating and note of a capture.",
             note,
         )
@@ -154,7 +154,7 @@ async fn note(
     headers: HeaderMap,
     Body(NoteBody { rating, text }): Body<NoteBody>,
 ) -> Result<Json<Done>, Failure> {
-    seated(&app, &headers)?;
+    require_client(&app, &headers)?;
     let folder = sessions::folder_of(&app.session, &name)?;
     sessions::write_note(&folder, &Note { rating, text })?;
     app.change(|state| state.captures += 1);
@@ -164,14 +164,14 @@ async fn note(
 async fn capture(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<Wish>,
+    Body(request): Body<CaptureRequest>,
 ) -> Result<Json<Capturing>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let (camera, optics) = (app.camera(), app.optics_file());
     let free = |kind, count| sessions::free_names(&app.session, kind, count);
-    let (task, out) = match wish {
-        Wish::Pair { name, averaged } => {
+    let (task, out) = match request {
+        CaptureRequest::Pair { name, averaged } => {
             let out = match name {
                 Some(name) => sessions::folder_of(&app.session, &name)?,
                 None => free("pair", 1)?.remove(0),
@@ -186,7 +186,7 @@ async fn capture(
             };
             (Task { kind: "pair", title: "Capture a pair".into(), work: Box::new(work) }, vec![out])
         }
-        Wish::Series { pairs } => {
+        CaptureRequest::Series { pairs } => {
             if !(1..=STACK_MAX).contains(&pairs) {
                 return Err(Failure::new(
                     StatusCode::BAD_REQUEST,
@@ -201,7 +201,7 @@ async fn capture(
             };
             (Task { kind: "series", title: format!("Capture {pairs} pairs"), work: Box::new(work) }, out)
         }
-        Wish::Still {} => {
+        CaptureRequest::Still {} => {
             let info = app.state().rig.info;
             let fine_um =
                 info.as_ref().and_then(|info| info["fine"]["asked_um"].as_f64()).unwrap_or_default();
@@ -218,7 +218,7 @@ async fn capture(
             };
             (Task { kind: "still", title: "Capture a still".into(), work: Box::new(work) }, vec![out])
         }
-        Wish::Stack { axis, from_um, to_um, steps } => {
+        CaptureRequest::Stack { axis, from_um, to_um, steps } => {
             if !(1..=STACK_MAX).contains(&steps) {
                 return Err(Failure::new(
                     StatusCode::BAD_REQUEST,

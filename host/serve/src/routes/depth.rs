@@ -18,12 +18,12 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{Body, Shared, aside, calibrate, seated};
+use super::{Body, Shared, aside, calibrate, require_client};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     routes::rig::figures,
     view::Begun,
 };
@@ -101,7 +101,7 @@ pub struct Figures {
 pub fn routes(api: Api) -> Api {
     api.post::<CaptureDepthRequest, Begun, _, _>(
         "/api/captures/{capture}/depth",
-        For::Seated,
+        For::Client,
         "Computes the depth of a pair, with its standard deviation.",
         compute,
     )
@@ -137,7 +137,7 @@ async fn compute(
     headers: HeaderMap,
     Body(asked): Body<CaptureDepthRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    seated(&app, &headers)?;
+    require_client(&app, &headers)?;
     let folder = sessions::folder_of(&app.session, &name)?;
     let CaptureDepthRequest { corrected, variant, mut options } = asked;
     let operators = options.remove("operators").filter(|value| !value.is_null());

@@ -1,4 +1,4 @@
-//! State, log, seats, stopping, answers, the socket, the token.
+//! State, log, control, stopping, answers, the socket, the token.
 
 use axum::{
     Json,
@@ -9,10 +9,11 @@ use axum::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, driver, secret};
+use super::{Body, Shared, aside, require_control, secret};
 use crate::{
     api::{Api, For},
     app::lock,
+    control::HandOverError,
     failure::Failure,
     socket,
     view::{self, DONE, Done, Nothing},
@@ -25,11 +26,13 @@ pub struct Log {
     pub lines: Vec<String>,
 }
 
-/// What the driver says to who asked.
+/// Answer to a request for control.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandOver {
-    /// Whether they may drive now.
+    /// Number of the client that requested control.
+    pub to: u32,
+    /// Whether it gets control.
     pub give: bool,
 }
 
@@ -55,7 +58,7 @@ pub fn routes(api: Api) -> Api {
         .get::<Log, _, _>("/api/log", "What was said, the oldest line first.", log)
         .get_bytes(
             "/api/socket",
-            "A WebSocket: first a Hello with a seat, then the State at every change, and live pictures (u32 length of a JSON \
+            "A WebSocket: first a Hello with the client's secret, then the State at every change, and live pictures (u32 length of a JSON \
              header, header, pixels), among them the depth of a pair that was just taken (type fresh). {\"type\":\"stop\"} stops the rig; {\"type\":\"seen\"} after each picture lets the next one come at once, \
              without it they come once a second.",
             "application/json",
@@ -69,9 +72,9 @@ pub fn routes(api: Api) -> Api {
             halt,
         )
         .post::<Nothing, Done, _, _>("/api/cancel", For::All, "Ends the computation that is under way.", cancel)
-        .post::<Answer, Done, _, _>("/api/answer", For::Driver, "Answers the question of a job.", answer)
-        .post::<Nothing, Done, _, _>("/api/seat/ask", For::Seated, "Asks for the controls.", ask)
-        .post::<HandOver, Done, _, _>("/api/seat/answer", For::Driver, "Gives the controls, or keeps them.", hand_over)
+        .post::<Answer, Done, _, _>("/api/answer", For::Control, "Answers the question of a job.", answer)
+        .post::<Nothing, Done, _, _>("/api/control/request", For::Client, "Requests control.", ask)
+        .post::<HandOver, Done, _, _>("/api/control/answer", For::Control, "Grants or refuses a request for control.", hand_over)
         .post::<Login, Done, _, _>("/login", For::All, "Lets a browser in, by a cookie.", login)
 }
 
@@ -94,7 +97,7 @@ async fn halt(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Jso
     app.note("emergency stop");
     aside(move || {
         let halted = rig.halt();
-        app.rig_lane.cancel();
+        app.rig_jobs.cancel();
         Ok(halted?)
     })
     .await?;
@@ -111,7 +114,7 @@ async fn answer(
     headers: HeaderMap,
     Body(given): Body<Answer>,
 ) -> Result<Json<Done>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     if app.state().question.is_none() {
         return Err(Failure::new(StatusCode::CONFLICT, "nothing was asked"));
     }
@@ -124,19 +127,25 @@ async fn ask(
     headers: HeaderMap,
     Body(Nothing {}): Body<Nothing>,
 ) -> Result<Json<Done>, Failure> {
-    if app.with_seats(|seats| seats.ask(secret(&headers))) {
+    if app.with_control(|control| control.request(secret(&headers))) {
         return Ok(Json(DONE));
     }
-    Err(Failure::new(StatusCode::FORBIDDEN, "no such seat; a seat comes with a socket"))
+    Err(Failure::new(StatusCode::FORBIDDEN, "unknown client: send the secret of a connected socket in x-farnear-client"))
 }
 
 async fn hand_over(
     State(app): Shared,
     headers: HeaderMap,
-    Body(HandOver { give }): Body<HandOver>,
+    Body(HandOver { to, give }): Body<HandOver>,
 ) -> Result<Json<Done>, Failure> {
-    driver(&app, &headers)?;
-    app.with_seats(|seats| seats.answer(secret(&headers), give));
+    let answered = app.with_control(|control| control.answer(secret(&headers), to, give));
+    answered.map_err(|error| {
+        let status = match error {
+            HandOverError::NotHolder => StatusCode::FORBIDDEN,
+            HandOverError::NotRequested(_) => StatusCode::CONFLICT,
+        };
+        Failure::new(status, error.to_string())
+    })?;
     Ok(Json(DONE))
 }
 

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, driver};
+use super::{Body, Shared, require_control};
 use crate::{
     api::{Api, For},
     failure::Failure,
@@ -54,7 +54,7 @@ pub fn routes(api: Api) -> Api {
     api.get::<Optics, _, _>("/api/optics", "The optics that captures are taken with.", read)
         .put::<Optics, Done, _, _>(
             "/api/optics",
-            For::Driver,
+            For::Control,
             "Takes captures with other optics from now on.",
             write,
         )
@@ -76,7 +76,7 @@ async fn write(
     headers: HeaderMap,
     Body(given): Body<Optics>,
 ) -> Result<Json<Done>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     // Checked and completed: what does not fit is refused before the file changes.
     let checked = lens_table::calculate(&given.optics, Readings::default())?.optics;
     let text = toml::to_string(&checked).map_err(WorkflowError::from)?;

@@ -24,12 +24,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, driver, seated};
+use super::{Body, Shared, aside, require_client, require_control};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     picture_message::person,
     routes::rig::{begin, connected, figures},
     view::{Begun, DONE, Done},
@@ -45,7 +45,7 @@ const USUAL_MODEL: &str = "everyday";
 /// What is recognised.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RecogniseWish {
+pub struct RecogniseRequest {
     /// A video that was sent; without it what the rig's camera sees, until somebody stops it.
     #[serde(default)]
     pub video: Option<String>,
@@ -82,7 +82,7 @@ pub struct Standing {
 /// A video of somebody with a shadow.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ShadowWish {
+pub struct ShadowRequest {
     /// A video that was sent.
     pub video: String,
     /// Where and when.
@@ -124,9 +124,9 @@ pub struct Removing {
 pub fn routes(api: Api) -> Api {
     api.get::<People, _, _>("/api/people", "Videos that were sent, activities that are known.", people)
         .put_bytes::<Done, _, _>("/api/people/videos/{video}", "Sends a video.", VIDEO_MAX_BYTES, receive)
-        .post::<RecogniseWish, Begun, _, _>(
+        .post::<RecogniseRequest, Begun, _, _>(
             "/api/people/recognise",
-            For::Driver,
+            For::Control,
             "Recognises what somebody does; the running answer comes by the socket.",
             recognise,
         )
@@ -136,9 +136,9 @@ pub fn routes(api: Api) -> Api {
             "Where the sun stands and what shadow it throws; nothing is changed.",
             sunlight,
         )
-        .post::<ShadowWish, Removing, _, _>(
+        .post::<ShadowRequest, Removing, _, _>(
             "/api/people/shadow",
-            For::Seated,
+            For::Client,
             "Makes silhouettes of a video and takes the shadow off them.",
             shadow,
         )
@@ -177,7 +177,7 @@ async fn receive(
     headers: HeaderMap,
     bytes: Bytes,
 ) -> Result<Json<Done>, Failure> {
-    seated(&app, &headers)?;
+    require_client(&app, &headers)?;
     let path = sessions::folder_of(&folder(&app), &name)?;
     aside(move || {
         let folder = folder(&app);
@@ -191,9 +191,9 @@ async fn receive(
 async fn recognise(
     State(app): Shared,
     headers: HeaderMap,
-    Body(RecogniseWish { video }): Body<RecogniseWish>,
+    Body(RecogniseRequest { video }): Body<RecogniseRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let title = |what: &str| format!("Recognise {what}");
     let Some(name) = video else {
         let settings = LiveSettings { rig: RigAddress::Open(connected(&app)?), camera: app.camera() };
@@ -238,13 +238,13 @@ async fn sunlight(Body(given): Body<Sunlight>) -> Result<Json<Shadow>, Failure> 
 async fn shadow(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<ShadowWish>,
+    Body(request): Body<ShadowRequest>,
 ) -> Result<Json<Removing>, Failure> {
-    seated(&app, &headers)?;
-    let video = video_of(&app, &wish.video)?;
+    require_client(&app, &headers)?;
+    let video = video_of(&app, &request.video)?;
     let out = sessions::free_names(&folder(&app), "shadow", 1)?.remove(0);
     let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = wish.camera;
+    let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = request.camera;
     let camera = camera::Camera {
         height_m,
         azimuth_deg,
@@ -262,12 +262,12 @@ async fn shadow(
             subject: camera::SubjectPrior::default(),
             standard_deviations: camera::StandardDeviations::default(),
         },
-        moment: moment(&wish.sun)?,
+        moment: moment(&request.sun)?,
         rate_hz: None,
         out,
     };
     let work = move |_: &App, context: &Context<'_>| figures(video::remove_from_video(&settings, context)?);
-    let title = format!("Shadow of {}", wish.video);
+    let title = format!("Shadow of {}", request.video);
     let task = Task { kind: "shadow", title, work: Box::new(work) };
     let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
     Ok(Json(Removing { job, shadow: name }))

@@ -12,12 +12,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, driver};
+use super::{Body, Shared, aside, require_control};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     routes::rig::{begin, connected, figures},
     view::Begun,
 };
@@ -28,7 +28,7 @@ const RECORD: &str = "quality.toml";
 /// What is measured.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct QualityWish {
+pub struct QualityRequest {
     /// Pairs, 2 to 50.
     pub pairs: usize,
     /// How far the target is, where that is known.
@@ -46,9 +46,9 @@ pub struct Records {
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Records, _, _>("/api/quality", "The measurements of depth quality so far.", list)
-        .post::<QualityWish, Begun, _, _>(
+        .post::<QualityRequest, Begun, _, _>(
             "/api/quality",
-            For::Driver,
+            For::Control,
             "Measures fill rate, plane fit, noise and accuracy on a flat target.",
             measure,
         )
@@ -66,9 +66,9 @@ async fn list(State(app): Shared) -> Result<Json<Records>, Failure> {
 async fn measure(
     State(app): Shared,
     headers: HeaderMap,
-    Body(QualityWish { pairs, true_mm }): Body<QualityWish>,
+    Body(QualityRequest { pairs, true_mm }): Body<QualityRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let settings = QualitySettings {
         rig: RigAddress::Open(connected(&app)?),
         camera: app.camera(),

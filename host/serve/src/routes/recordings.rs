@@ -11,12 +11,12 @@ use farnear_workflows::{Context, WorkflowError, optics::GivenOptics, rig::record
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, driver, seated};
+use super::{Body, Shared, aside, require_client, require_control};
 use crate::{
     api::{Api, For},
     app::{App, lock},
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     live,
     routes::rig::figures,
     view::{Begun, DONE, Done, LiveMode},
@@ -30,7 +30,7 @@ const ENDING: &str = ".pairs";
 /// Whether live depth is recorded.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RecordWish {
+pub struct RecordRequest {
     /// From now on, or no more.
     pub on: bool,
 }
@@ -38,7 +38,7 @@ pub struct RecordWish {
 /// What is played, and how.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PlayWish {
+pub struct PlayRequest {
     /// Name of the recording.
     pub recording: String,
     /// As fast as depth is computed, instead of as it was recorded.
@@ -65,15 +65,15 @@ pub struct Recordings {
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Recordings, _, _>("/api/recordings", "Recordings of live depth.", list)
-        .post::<RecordWish, Done, _, _>(
+        .post::<RecordRequest, Done, _, _>(
             "/api/recordings",
-            For::Driver,
+            For::Control,
             "Begins to record live depth, or ends it.",
             record,
         )
-        .post::<PlayWish, Begun, _, _>(
+        .post::<PlayRequest, Begun, _, _>(
             "/api/recordings/play",
-            For::Seated,
+            For::Client,
             "Plays a recording: depth is computed anew and comes by the socket as when it is live.",
             play,
         )
@@ -103,9 +103,9 @@ async fn list(State(app): Shared) -> Result<Json<Recordings>, Failure> {
 async fn record(
     State(app): Shared,
     headers: HeaderMap,
-    Body(RecordWish { on }): Body<RecordWish>,
+    Body(RecordRequest { on }): Body<RecordRequest>,
 ) -> Result<Json<Done>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     if !on {
         app.finish_recording();
         return Ok(Json(DONE));
@@ -131,9 +131,9 @@ async fn record(
 async fn play(
     State(app): Shared,
     headers: HeaderMap,
-    Body(PlayWish { recording, fast }): Body<PlayWish>,
+    Body(PlayRequest { recording, fast }): Body<PlayRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    seated(&app, &headers)?;
+    require_client(&app, &headers)?;
     let path = sessions::folder_of(&folder(&app), &recording)?;
     if !path.is_file() {
         return Err(Failure::missing(&format!("recording {recording}")));

@@ -21,12 +21,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Body, Shared, aside, driver};
+use super::{Body, Shared, aside, require_control};
 use crate::{
     api::{Api, For},
     app::App,
     failure::Failure,
-    lane::Task,
+    job_queue::Task,
     view::{AxisName, Begun, DONE, Done, LiveMode, Nothing},
 };
 
@@ -103,7 +103,7 @@ fn half_a_millimetre() -> f64 {
 /// What is to be seen live. What is not named stays.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LiveWish {
+pub struct LiveRequest {
     /// What.
     #[serde(default)]
     pub mode: Option<LiveMode>,
@@ -132,30 +132,30 @@ pub struct Alarms {
 
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
-    api.post::<Nothing, Done, _, _>("/api/rig/connect", For::Driver, "Connects to the rig again.", connect)
-        .post::<Home, Begun, _, _>("/api/rig/home", For::Driver, "Homes axes.", home)
-        .post::<Move, Begun, _, _>("/api/rig/move", For::Driver, "Moves axes to absolute positions.", move_to)
-        .post::<Goto, Begun, _, _>("/api/rig/goto", For::Driver, "Moves to the far or the near focus.", go)
+    api.post::<Nothing, Done, _, _>("/api/rig/connect", For::Control, "Connects to the rig again.", connect)
+        .post::<Home, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)
+        .post::<Move, Begun, _, _>("/api/rig/move", For::Control, "Moves axes to absolute positions.", move_to)
+        .post::<Goto, Begun, _, _>("/api/rig/goto", For::Control, "Moves to the far or the near focus.", go)
         .post::<Seek, Begun, _, _>(
             "/api/rig/focus",
-            For::Driver,
+            For::Control,
             "Finds the focus of a target and stays there.",
             seek,
         )
         .post::<Nothing, Begun, _, _>(
             "/api/rig/check",
-            For::Driver,
+            For::Control,
             "The bring-up checklist, step by step.",
             checklist,
         )
-        .post::<Nothing, Begun, _, _>("/api/rig/reset", For::Driver, "Resets the board.", reset)
-        .post::<LiveWish, Done, _, _>("/api/live", For::Driver, "What is to be seen live, and how.", live)
+        .post::<Nothing, Begun, _, _>("/api/rig/reset", For::Control, "Resets the board.", reset)
+        .post::<LiveRequest, Done, _, _>("/api/live", For::Control, "What is to be seen live, and how.", live)
         .get::<Alarms, _, _>(
             "/api/rig/alarms",
             "The alarms that the board keeps, the last one first.",
             list_alarms,
         )
-        .post::<Clear, Begun, _, _>("/api/rig/alarms/clear", For::Driver, "Clears the latched alarm.", clear)
+        .post::<Clear, Begun, _, _>("/api/rig/alarms/clear", For::Control, "Clears the latched alarm.", clear)
 }
 
 /// The rig, where it is connected.
@@ -194,11 +194,11 @@ async fn connect(
     headers: HeaderMap,
     Body(Nothing {}): Body<Nothing>,
 ) -> Result<Json<Done>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     if app.address.is_none() {
         connected(&app)?;
     }
-    if app.rig_lane.is_busy() {
+    if app.rig_jobs.is_busy() {
         return Err(Failure::busy("a job on the rig"));
     }
     app.interrupt_live();
@@ -209,11 +209,11 @@ async fn connect(
 async fn home(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<Home>,
+    Body(request): Body<Home>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
-    let axes: Vec<Axis> = wish.axes.into_iter().map(Into::into).collect();
+    let axes: Vec<Axis> = request.axes.into_iter().map(Into::into).collect();
     let work = move |_: &App, context: &Context<'_>| figures(motion::home(&rig, &axes, context)?);
     begin(&app, Task { kind: "home", title: "Home".into(), work: Box::new(work) })
 }
@@ -221,12 +221,12 @@ async fn home(
 async fn move_to(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<Move>,
+    Body(request): Body<Move>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let targets: Vec<(Axis, f64)> =
-        wish.targets.iter().map(|target| (target.axis.into(), target.to_um)).collect();
+        request.targets.iter().map(|target| (target.axis.into(), target.to_um)).collect();
     let twice = targets
         .iter()
         .enumerate()
@@ -242,15 +242,15 @@ async fn move_to(
     }
     let words: Vec<_> =
         targets.iter().map(|(axis, to_um)| format!("{} to {to_um:.3} um", axis.name())).collect();
-    let settings = MoveSettings { rig, targets, home: wish.home };
+    let settings = MoveSettings { rig, targets, home: request.home };
     let work = move |_: &App, context: &Context<'_>| figures(motion::move_to(&settings, context)?);
     begin(&app, Task { kind: "move", title: format!("Move {}", words.join(", ")), work: Box::new(work) })
 }
 
-async fn go(State(app): Shared, headers: HeaderMap, Body(wish): Body<Goto>) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+async fn go(State(app): Shared, headers: HeaderMap, Body(request): Body<Goto>) -> Result<Json<Begun>, Failure> {
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
-    let (focus, title) = match wish.focus {
+    let (focus, title) = match request.focus {
         FocusName::Far => (goto::Focus::Far, "Go to the far focus"),
         FocusName::Near => (goto::Focus::Near, "Go to the near focus"),
     };
@@ -269,12 +269,12 @@ fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Fai
 async fn seek(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<Seek>,
+    Body(request): Body<Seek>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
-    if !(wish.range_mm > 0.0 && wish.range_mm <= 10.0) {
-        let error = format!("range_mm {}: expected more than 0 and at most 10 mm", wish.range_mm);
+    if !(request.range_mm > 0.0 && request.range_mm <= 10.0) {
+        let error = format!("range_mm {}: expected more than 0 and at most 10 mm", request.range_mm);
         return Err(Failure::new(StatusCode::BAD_REQUEST, error));
     }
     let settings = FocusSettings {
@@ -282,9 +282,9 @@ async fn seek(
         camera: app.camera(),
         optics: app.optics_file(),
         start_mm: None,
-        range_mm: wish.range_mm,
-        measure: wish.measure.as_deref().map_or(Ok(app.live().measure), measure)?,
-        region: wish.region,
+        range_mm: request.range_mm,
+        measure: request.measure.as_deref().map_or(Ok(app.live().measure), measure)?,
+        region: request.region,
     };
     let work = move |_: &App, context: &Context<'_>| figures(focus::focus(&settings, context)?);
     begin(&app, Task { kind: "focus", title: "Find the focus".into(), work: Box::new(work) })
@@ -295,7 +295,7 @@ async fn checklist(
     headers: HeaderMap,
     Body(Nothing {}): Body<Nothing>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = connected(&app)?;
     let actuation = !rig.is_emulated();
     let settings =
@@ -309,7 +309,7 @@ async fn reset(
     headers: HeaderMap,
     Body(Nothing {}): Body<Nothing>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let work = move |_: &App, context: &Context<'_>| figures(board::reset(&rig, context)?);
     begin(&app, Task { kind: "reset", title: "Reset the board".into(), work: Box::new(work) })
@@ -318,17 +318,17 @@ async fn reset(
 async fn live(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<LiveWish>,
+    Body(request): Body<LiveRequest>,
 ) -> Result<Json<Done>, Failure> {
-    driver(&app, &headers)?;
-    if let Some(us) = wish.exposure_us.filter(|us| !(1..=EXPOSURE_MAX_US).contains(us)) {
+    require_control(&app, &headers)?;
+    if let Some(us) = request.exposure_us.filter(|us| !(1..=EXPOSURE_MAX_US).contains(us)) {
         let error = format!("exposure_us {us}: expected 1 to {EXPOSURE_MAX_US} us");
         return Err(Failure::new(StatusCode::BAD_REQUEST, error));
     }
-    let measure = wish.measure.as_deref().map(measure).transpose()?;
+    let measure = request.measure.as_deref().map(measure).transpose()?;
     app.set_live(|live| {
-        live.mode = wish.mode.unwrap_or(live.mode);
-        live.exposure = wish.exposure_us.map_or(live.exposure, Micros);
+        live.mode = request.mode.unwrap_or(live.mode);
+        live.exposure = request.exposure_us.map_or(live.exposure, Micros);
         live.measure = measure.unwrap_or(live.measure);
     });
     Ok(Json(DONE))
@@ -344,11 +344,11 @@ async fn list_alarms(State(app): Shared) -> Result<Json<Alarms>, Failure> {
 async fn clear(
     State(app): Shared,
     headers: HeaderMap,
-    Body(wish): Body<Clear>,
+    Body(request): Body<Clear>,
 ) -> Result<Json<Begun>, Failure> {
-    driver(&app, &headers)?;
+    require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let work =
-        move |_: &App, context: &Context<'_>| figures(alarms::alarms(&rig, Some(wish.number), context)?);
-    begin(&app, Task { kind: "alarm", title: format!("Clear alarm {}", wish.number), work: Box::new(work) })
+        move |_: &App, context: &Context<'_>| figures(alarms::alarms(&rig, Some(request.number), context)?);
+    begin(&app, Task { kind: "alarm", title: format!("Clear alarm {}", request.number), work: Box::new(work) })
 }

@@ -10,7 +10,7 @@ use super::client::{Served, Socket};
 
 const RECORD: &str = include_str!("../../../workflows/src/sessions/capture.toml");
 
-/// A capture of a textured plane; the near image is a little softer.
+/// A capture of a textured pqueue; the near image is a little softer.
 fn put(served: &Served, name: &str, seed: usize) {
     let folder = served.session.join(name);
     fs::create_dir_all(&folder).unwrap();
@@ -21,8 +21,8 @@ fn put(served: &Served, name: &str, seed: usize) {
     fs::write(folder.join("near.png"), encode_png(sharp.view(), 8).unwrap()).unwrap();
 }
 
-fn computed(served: &Served, seat: &str, name: &str, wish: &Value) -> Value {
-    let begun = served.post(&format!("/api/captures/{name}/depth"), seat, &wish.to_string());
+fn computed(served: &Served, client: &str, name: &str, request: &Value) -> Value {
+    let begun = served.post(&format!("/api/captures/{name}/depth"), client, &request.to_string());
     assert_eq!(begun.status, 200, "{begun:?}");
     served.ended("computation", &begun.json()["job"])
 }
@@ -30,18 +30,18 @@ fn computed(served: &Served, seat: &str, name: &str, wish: &Value) -> Value {
 #[test]
 fn depth_is_computed_measured_compared_and_taken_along() {
     let served = Served::captures_only();
-    let seat = Socket::open(&served).secret.clone();
+    let client = Socket::open(&served).secret.clone();
     let socket = Socket::open(&served);
-    assert_eq!(served.post("/api/captures/pair-001/depth", &seat, "{}").status, 403, "its socket has gone");
-    let seat = socket.secret.clone();
+    assert_eq!(served.post("/api/captures/pair-001/depth", &client, "{}").status, 403, "its socket has gone");
+    let client = socket.secret.clone();
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 77);
     for name in ["pair-001", "pair-002"] {
-        let job = computed(&served, &seat, name, &json!({}));
+        let job = computed(&served, &client, name, &json!({}));
         assert_eq!(job["phase"], "done", "{job:#}");
         assert_eq!((&job["result"]["width"], &job["result"]["height"]), (&96.into(), &64.into()));
     }
-    let job = computed(&served, &seat, "pair-001", &json!({ "method": "subbarao", "variant": "subbarao" }));
+    let job = computed(&served, &client, "pair-001", &json!({ "method": "subbarao", "variant": "subbarao" }));
     assert_eq!(job["phase"], "done", "{job:#}");
     let map = served.get("/api/captures/pair-001/variants/subbarao/depth.npy");
     assert!(map.status == 200 && map.body.starts_with(b"\x93NUMPY"));
@@ -78,13 +78,13 @@ fn notes_are_kept_and_searched_and_broken_captures_are_said() {
     put(&served, "pair-002", 1);
     fs::write(served.session.join("pair-002/capture.toml"), "format = \"?\"").unwrap();
     let socket = Socket::open(&served);
-    let seat = [("x-farnear-seat", socket.secret.as_str())];
+    let client = [("x-farnear-client", socket.secret.as_str())];
     let note = json!({ "rating": 5, "text": "sandpaper" }).to_string();
     assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &[], &note).status, 403);
-    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &seat, &note).status, 200);
-    assert_eq!(served.ask("PUT", "/api/captures/absent/note", &seat, &note).status, 404);
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &client, &note).status, 200);
+    assert_eq!(served.ask("PUT", "/api/captures/absent/note", &client, &note).status, 404);
     let too_good = json!({ "rating": 6, "text": "" }).to_string();
-    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &seat, &too_good).status, 400);
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &client, &too_good).status, 400);
     let found = served.get("/api/captures?search=SandPaper").json();
     assert_eq!(found["captures"].as_array().unwrap().len(), 1);
     let all = served.get("/api/captures").json();
@@ -112,14 +112,14 @@ fn no_name_leads_out_of_the_session() {
 fn optics_are_checked_before_they_are_kept() {
     let served = Served::captures_only();
     let socket = Socket::open(&served);
-    let seat = [("x-farnear-seat", socket.secret.as_str())];
+    let client = [("x-farnear-client", socket.secret.as_str())];
     let mut optics = served.get("/api/optics").json();
     optics["optics"]["focus"]["far_mm"] = json!(800.0);
-    assert_eq!(served.ask("PUT", "/api/optics", &seat, &optics.to_string()).status, 200);
+    assert_eq!(served.ask("PUT", "/api/optics", &client, &optics.to_string()).status, 200);
     assert!(fs::read_to_string(served.session.join("optics.toml")).unwrap().contains("far_mm = 800.0"));
     let before = fs::read(served.session.join("optics.toml")).unwrap();
     optics["optics"]["focus"]["far_mm"] = json!(20.0);
-    let refused = served.ask("PUT", "/api/optics", &seat, &optics.to_string());
+    let refused = served.ask("PUT", "/api/optics", &client, &optics.to_string());
     assert!(refused.status == 400 && refused.error().contains("far_mm"), "{refused:?}");
     assert_eq!(fs::read(served.session.join("optics.toml")).unwrap(), before);
     let typed =
@@ -161,8 +161,8 @@ fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
     // Nothing else suffers: what is there is shown, and a note is small enough.
     assert_eq!(served.get("/api/captures/pair-001/files/far.png").status, 200);
     let note = json!({ "rating": 1, "text": "the disk is full" }).to_string();
-    let seat = [("x-farnear-seat", socket.secret.as_str())];
-    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &seat, &note).status, 200);
+    let client = [("x-farnear-client", socket.secret.as_str())];
+    assert_eq!(served.ask("PUT", "/api/captures/pair-001/note", &client, &note).status, 200);
 }
 
 #[test]

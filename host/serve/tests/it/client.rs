@@ -66,9 +66,9 @@ impl Served {
         let listen = listen(folder.path());
         let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen };
         let (cancel, (sender, address)) = (Cancel::default(), channel());
-        let wish = cancel.clone();
+        let request = cancel.clone();
         let thread = std::thread::spawn(move || {
-            let context = Context::new(&Unattended, &Unattended, wish);
+            let context = Context::new(&Unattended, &Unattended, request);
             serve(settings, &context, |address| sender.send(address.to_owned()).unwrap()).unwrap();
         });
         let address = address.recv_timeout(PATIENCE).unwrap();
@@ -114,8 +114,8 @@ impl Served {
         self.ask("GET", path, &[], "")
     }
 
-    pub fn post(&self, path: &str, seat: &str, body: &str) -> Answer {
-        self.ask("POST", path, &[("x-farnear-seat", seat)], body)
+    pub fn post(&self, path: &str, client: &str, body: &str) -> Answer {
+        self.ask("POST", path, &[("x-farnear-client", client)], body)
     }
 
     /// The state, once `fits`.
@@ -137,9 +137,9 @@ impl Served {
     }
 
     /// The job of this number, ended.
-    pub fn ended(&self, lane: &str, job: &Value) -> Value {
-        let state = self.state_when(|state| state[lane]["id"] == *job && state[lane]["phase"] != "running");
-        state[lane].clone()
+    pub fn ended(&self, queue: &str, job: &Value) -> Value {
+        let state = self.state_when(|state| state[queue]["id"] == *job && state[queue]["phase"] != "running");
+        state[queue].clone()
     }
 }
 
@@ -179,16 +179,25 @@ impl Answer {
 /// A socket, as RFC 6455 has it, without what a test does not need.
 pub struct Socket {
     stream: TcpStream,
-    pub seat: u64,
+    pub client: u64,
     pub secret: String,
 }
 
 impl Socket {
     pub fn open(served: &Served) -> Self {
+        Self::at(served, "/api/socket")
+    }
+
+    /// As a page that is reloaded: `secret` is from before.
+    pub fn resume(served: &Served, secret: &str) -> Self {
+        Self::at(served, &format!("/api/socket?resume={secret}"))
+    }
+
+    fn at(served: &Served, path: &str) -> Self {
         let mut stream = TcpStream::connect(&served.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let request = format!(
-            "GET /api/socket HTTP/1.1\r\nhost: {}\r\nconnection: upgrade\r\nupgrade: websocket\r\n\
+            "GET {path} HTTP/1.1\r\nhost: {}\r\nconnection: upgrade\r\nupgrade: websocket\r\n\
              sec-websocket-version: 13\r\nsec-websocket-key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
             served.address
         );
@@ -200,9 +209,9 @@ impl Socket {
             headers.push(byte[0]);
         }
         assert!(headers.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&headers));
-        let mut socket = Self { stream, seat: 0, secret: String::new() };
+        let mut socket = Self { stream, client: 0, secret: String::new() };
         let hello = socket.told("hello");
-        socket.seat = hello["hello"]["seat"].as_u64().unwrap();
+        socket.client = hello["hello"]["client"].as_u64().unwrap();
         socket.secret = hello["hello"]["secret"].as_str().unwrap().into();
         socket
     }

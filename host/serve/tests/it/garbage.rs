@@ -75,14 +75,14 @@ fn ten_thousand_malformed_messages_change_nothing() {
             socket.say([1, 2, 9, 10][dice.below(4)], &payload);
         }
     }
-    // Nobody sat in a driver's seat, so nothing was begun; and who comes now is served.
-    served.state_when(|state| state["seats"]["count"] == 0);
+    // No request had control, so nothing was begun; a new client is served.
+    served.state_when(|state| state["control"]["clients"] == 0);
     let state = served.get("/api/state").json();
     assert!(state["job"].is_null(), "{state:#}");
     assert_eq!(state["rig"]["phase"], "ready");
-    let driver = Socket::open(&served);
-    let wish = r#"{"targets":[{"axis":"fine","to_um":20}]}"#;
-    let begun = served.post("/api/rig/move", &driver.secret, wish).json();
+    let holder = Socket::open(&served);
+    let targets = r#"{"targets":[{"axis":"fine","to_um":20}]}"#;
+    let begun = served.post("/api/rig/move", &holder.secret, targets).json();
     assert_eq!(served.ended("job", &begun["job"])["phase"], "done");
 }
 

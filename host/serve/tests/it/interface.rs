@@ -51,7 +51,7 @@ fn the_document_describes_the_routes_and_refers_to_nothing_that_is_not_there() {
 fn body_of(method: &str, path: &str) -> &'static str {
     match (method, path) {
         ("post", "/api/answer") => r#"{"text":""}"#,
-        ("post", "/api/seat/answer") => r#"{"give":false}"#,
+        ("post", "/api/control/answer") => r#"{"to":1,"give":false}"#,
         ("post", "/login") => r#"{"token":"x"}"#,
         ("post", "/api/rig/move") => r#"{"targets":[{"axis":"fine","to_um":20}]}"#,
         ("post", "/api/rig/goto") => r#"{"focus":"far"}"#,
@@ -96,8 +96,8 @@ fn every_route_answers_in_its_own_words() {
                 path.replace("{capture}", "absent").replace("{other}", "other").replace("{file}", "a.png");
             let place = place.replace("{variant}", "favaro").replace("{video}", "absent.y4m");
             let place = place.replace("{shadow}", "absent").replace("{masks}", "with-shadow");
-            let seat = [("x-farnear-seat", socket.secret.as_str())];
-            let answer = served.ask(&method.to_uppercase(), &place, &seat, body_of(method, path));
+            let client = [("x-farnear-client", socket.secret.as_str())];
+            let answer = served.ask(&method.to_uppercase(), &place, &client, body_of(method, path));
             asked += 1;
             let fits = match answer.status {
                 200 => true,

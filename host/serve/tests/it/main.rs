@@ -4,6 +4,6 @@
 
 mod captures;
 mod client;
-mod driving;
+mod control;
 mod garbage;
 mod interface;

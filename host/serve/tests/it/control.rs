@@ -1,4 +1,4 @@
-//! One drives, others watch; and nothing moves once the one who drove has gone.
+//! One browser has control; nothing moves once it has disconnected.
 
 use farnear_scripted_board::Faults;
 
@@ -7,51 +7,83 @@ use super::client::{Served, Socket};
 const FINE: &str = r#"{"targets":[{"axis":"fine","to_um":50}]}"#;
 
 #[test]
-fn one_browser_drives_and_hands_over_when_it_is_asked() {
+fn one_browser_has_control_and_hands_it_over_on_request() {
     let served = Served::with_board(Faults::default());
     served.ready();
     let (first, second) = (Socket::open(&served), Socket::open(&served));
     let refused = served.post("/api/rig/move", &second.secret, FINE);
-    assert_eq!((refused.status, refused.error().as_str()), (403, "another browser drives the rig"));
+    assert_eq!((refused.status, refused.error().as_str()), (403, "another browser has control of the rig"));
     let begun = served.post("/api/rig/move", &first.secret, FINE);
     assert_eq!(begun.status, 200, "{begun:?}");
     let job = served.ended("job", &begun.json()["job"]);
     assert_eq!((&job["phase"], &job["result"]["asked_um"]), (&"done".into(), &50.0.into()), "{job:#}");
 
-    assert_eq!(served.post("/api/seat/ask", "made up", "{}").status, 403);
-    assert_eq!(served.post("/api/seat/ask", &second.secret, "{}").status, 200);
-    served.state_when(|state| state["seats"]["asking"] == second.seat);
-    assert_eq!(served.post("/api/seat/answer", &second.secret, r#"{"give":true}"#).status, 403);
-    assert_eq!(served.post("/api/seat/answer", &first.secret, r#"{"give":true}"#).status, 200);
-    served.state_when(|state| state["seats"]["driver"] == second.seat);
+    assert_eq!(served.post("/api/control/request", "made up", "{}").status, 403);
+    assert_eq!(served.post("/api/control/request", &second.secret, "{}").status, 200);
+    served.state_when(|state| state["control"]["requested_by"] == second.client);
+    let give = format!(r#"{{"to":{},"give":true}}"#, second.client);
+    assert_eq!(served.post("/api/control/answer", &second.secret, &give).status, 403);
+    assert_eq!(served.post("/api/control/answer", &first.secret, &give).status, 200);
+    served.state_when(|state| state["control"]["holder"] == second.client);
     assert_eq!(served.post("/api/rig/move", &first.secret, FINE).status, 403);
 }
 
 #[test]
-fn a_browser_that_goes_away_leaves_nothing_moving() {
+fn a_browser_that_disconnects_leaves_nothing_moving() {
     let served = Served::with_board(Faults { never_ends: true, ..Faults::default() });
     served.ready();
-    let driver = Socket::open(&served);
-    let begun = served.post("/api/rig/move", &driver.secret, FINE).json();
-    let busy = served.post("/api/rig/home", &driver.secret, "{}");
+    let holder = Socket::open(&served);
+    let begun = served.post("/api/rig/move", &holder.secret, FINE).json();
+    let busy = served.post("/api/rig/home", &holder.secret, "{}");
     assert_eq!((busy.status, busy.error().as_str()), (409, "busy: Move fine to 50.000 um"));
-    drop(driver);
+    drop(holder);
     let job = served.ended("job", &begun["job"]);
     assert_eq!(job["phase"], "stopped", "{job:#}");
     let log = served.get("/api/log").json().to_string();
-    assert!(log.contains("the browser that drove has gone: stopping"), "{log}");
-    // Who comes next drives: a page that is loaded again goes on.
+    assert!(log.contains("the browser that had control has disconnected: stopping"), "{log}");
+    assert_eq!(job["error"], "the browser that had control has disconnected", "{job:#}");
     let next = Socket::open(&served);
-    served.state_when(|state| state["seats"]["driver"] == next.seat);
+    served.state_when(|state| state["control"]["holder"] == next.client);
+}
+
+#[test]
+fn a_reloaded_page_keeps_control_and_its_job_while_another_browser_watches() {
+    let served = Served::with_board(Faults { never_ends: true, ..Faults::default() });
+    served.ready();
+    let (holder, watcher) = (Socket::open(&served), Socket::open(&served));
+    let begun = served.post("/api/rig/move", &holder.secret, FINE).json();
+    let before = holder.secret.clone();
+    drop(holder);
+    served.state_when(|state| state["control"]["clients"] == 1);
+    let again = Socket::resume(&served, &before);
+    served.state_when(|state| state["control"]["holder"] == again.client);
+    std::thread::sleep(farnear_serve::control::RESERVED + std::time::Duration::from_millis(500));
+    let state = served.get("/api/state").json();
+    assert_eq!((&state["job"]["id"], &state["job"]["phase"]), (&begun["job"], &"running".into()), "{state:#}");
+    assert_eq!(served.post("/api/rig/home", &watcher.secret, "{}").status, 403);
+    served.post("/api/stop", "", "{}");
+}
+
+#[test]
+fn control_is_given_to_the_browser_named_in_the_answer() {
+    let served = Served::captures_only();
+    let [holder, b, c] = [0; 3].map(|_| Socket::open(&served));
+    for client in [&b, &c] {
+        assert_eq!(served.post("/api/control/request", &client.secret, "{}").status, 200);
+    }
+    let answer = |to: u64| format!(r#"{{"to":{to},"give":true}}"#);
+    assert_eq!(served.post("/api/control/answer", &holder.secret, &answer(99)).status, 409);
+    assert_eq!(served.post("/api/control/answer", &holder.secret, &answer(b.client)).status, 200);
+    served.state_when(|state| state["control"]["holder"] == b.client);
 }
 
 #[test]
 fn anybody_may_stop_and_it_does_not_wait_for_the_job() {
     let served = Served::with_board(Faults { never_ends: true, ..Faults::default() });
     served.ready();
-    let (driver, mut watcher) = (Socket::open(&served), Socket::open(&served));
+    let (holder, mut watcher) = (Socket::open(&served), Socket::open(&served));
     for by_socket in [false, true] {
-        let begun = served.post("/api/rig/move", &driver.secret, FINE).json();
+        let begun = served.post("/api/rig/move", &holder.secret, FINE).json();
         if by_socket {
             watcher.say(1, br#"{"type":"stop"}"#);
         } else {
@@ -66,7 +98,7 @@ fn anybody_may_stop_and_it_does_not_wait_for_the_job() {
 fn what_cannot_be_is_refused_before_anything_moves() {
     let served = Served::with_board(Faults::default());
     served.ready();
-    let driver = Socket::open(&served);
+    let holder = Socket::open(&served);
     for (path, body, words) in [
         ("/api/rig/move", r#"{"targets":[]}"#, "one target or more"),
         (
@@ -89,7 +121,7 @@ fn what_cannot_be_is_refused_before_anything_moves() {
         ),
         ("/api/answer", r#"{"text":""}"#, "nothing was asked"),
     ] {
-        let answer = served.post(path, &driver.secret, body);
+        let answer = served.post(path, &holder.secret, body);
         assert!((400..500).contains(&answer.status), "{path} {body}: {answer:?}");
         assert!(answer.error().contains(words), "{path} {body}: {}", answer.error());
     }
@@ -102,24 +134,24 @@ fn a_rig_that_is_not_there_is_said_and_can_be_tried_again() {
     let served = Served::start(Some(rig), None, |_| farnear_serve::Listen::Loopback { port: 0 });
     let state = served.state_when(|state| state["rig"]["phase"] == "lost");
     assert!(state["rig"]["error"].as_str().unwrap().contains("/dev/farnear-no-such-port"), "{state:#}");
-    let driver = Socket::open(&served);
-    let refused = served.post("/api/rig/home", &driver.secret, "{}");
+    let holder = Socket::open(&served);
+    let refused = served.post("/api/rig/home", &holder.secret, "{}");
     assert_eq!(refused.status, 503);
     assert!(refused.json()["hint"].as_str().unwrap().contains("connect again"));
-    assert_eq!(served.post("/api/rig/connect", &driver.secret, "{}").status, 200);
+    assert_eq!(served.post("/api/rig/connect", &holder.secret, "{}").status, 200);
 }
 
 #[test]
 fn a_refusal_of_the_board_reaches_the_page_with_what_to_do() {
     let served = Served::with_board(Faults::default());
     served.ready();
-    let driver = Socket::open(&served);
+    let holder = Socket::open(&served);
     let coarse = r#"{"targets":[{"axis":"coarse","to_um":100}]}"#;
-    let begun = served.post("/api/rig/move", &driver.secret, coarse).json();
+    let begun = served.post("/api/rig/move", &holder.secret, coarse).json();
     let job = served.ended("job", &begun["job"]);
     assert_eq!((&job["phase"], &job["hint"]), (&"failed".into(), &"Press Home first.".into()), "{job:#}");
-    let begun = served.post("/api/rig/home", &driver.secret, "{}").json();
+    let begun = served.post("/api/rig/home", &holder.secret, "{}").json();
     assert_eq!(served.ended("job", &begun["job"])["phase"], "done");
-    let begun = served.post("/api/rig/move", &driver.secret, coarse).json();
+    let begun = served.post("/api/rig/move", &holder.secret, coarse).json();
     assert_eq!(served.ended("job", &begun["job"])["phase"], "done");
 }

@@ -1,5 +1,5 @@
-//! Jobs one after the other: one lane on the rig, one beside it that computes. A lane takes a job or says what is under way; it
-//! keeps no queue, so nothing moves later than somebody expects.
+//! Two job queues of length one: jobs on the rig, and computations. A queue accepts a job or reports the one that is running, so
+//! nothing moves later than expected.
 
 use std::{
     io,
@@ -39,7 +39,7 @@ pub struct Task {
 
 /// One job at a time.
 #[derive(Default)]
-pub struct Lane {
+pub struct JobQueue {
     inner: Mutex<Inner>,
 }
 
@@ -50,17 +50,17 @@ struct Inner {
     last: u64,
 }
 
-/// A job on its way to the lane's thread.
+/// A job on its way to the worker thread.
 pub struct Begun {
     job: Job,
     cancel: Cancel,
     work: Work,
 }
 
-/// The threads of both lanes.
-pub struct Lanes(Vec<JoinHandle<()>>);
+/// The threads of both queues.
+pub struct Workers(Vec<JoinHandle<()>>);
 
-impl Lanes {
+impl Workers {
     /// Waits until both have ended.
     pub fn join(self) {
         for thread in self.0 {
@@ -69,7 +69,7 @@ impl Lanes {
     }
 }
 
-impl Lane {
+impl JobQueue {
     /// Begins a job and gives its number.
     ///
     /// # Errors
@@ -103,7 +103,7 @@ impl Lane {
         Ok(job.id)
     }
 
-    /// Wishes the job that is under way to end.
+    /// Cancels the running job.
     pub fn cancel(&self) {
         if let Some((_, cancel)) = &lock(&self.inner).running {
             cancel.cancel();
@@ -126,18 +126,18 @@ impl Lane {
     }
 }
 
-/// Starts the thread of each lane. They end with the program.
+/// Starts the thread of each queue. They end with the program.
 ///
 /// # Errors
 /// Where the system starts no threads.
-pub fn start(app: &Arc<App>) -> io::Result<Lanes> {
-    let (on_rig, computing) = (app.rig_lane.open(), app.computing.open());
+pub fn start(app: &Arc<App>) -> io::Result<Workers> {
+    let (on_rig, computing) = (app.rig_jobs.open(), app.computing.open());
     let (rig, computer) = (Arc::clone(app), Arc::clone(app));
     let threads = [
         Builder::new().name("rig jobs".into()).spawn(move || run_rig(&rig, &on_rig))?,
         Builder::new().name("computing".into()).spawn(move || run_computing(&computer, &computing))?,
     ];
-    Ok(Lanes(threads.into()))
+    Ok(Workers(threads.into()))
 }
 
 /// Jobs on the rig, and what is seen live between them.
@@ -145,7 +145,7 @@ fn run_rig(app: &App, jobs: &Receiver<Begun>) {
     loop {
         let seen = app.live().mode != LiveMode::Off
             && (app.rig().is_some() || app.has_camera_alone())
-            && app.state().seats.count > 0;
+            && app.state().control.clients > 0;
         let begun = if seen && !app.is_ending() {
             match jobs.try_recv() {
                 Ok(begun) => Some(begun),
@@ -163,7 +163,7 @@ fn run_rig(app: &App, jobs: &Receiver<Begun>) {
         };
         if let Some(begun) = begun {
             app.stops.wait();
-            run(app, begun, &app.rig_lane, |state| &mut state.job);
+            run(app, begun, &app.rig_jobs, |state| &mut state.job);
         }
     }
 }
@@ -178,18 +178,19 @@ fn run_computing(app: &App, jobs: &Receiver<Begun>) {
     }
 }
 
-/// Where a lane's job stands in the state.
+/// Selects the job of a queue in the state.
 pub type Place = fn(&mut State) -> &mut Option<Job>;
 
-fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
+fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
     let Begun { job, cancel, work } = begun;
     app.note(job.title.clone());
     let face = Face { app, place, counted: Mutex::default() };
     let context = Context::new(&face, &face, cancel);
     let ended = work(app, &context);
-    // The rig may have told of the stop before the work saw the wish.
+    // The board may report the stop before the work notices the cancellation.
     let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();
-    lane.free();
+    queue.free();
+    let reason = ended.as_ref().err().filter(|error| stopped(error)).and_then(|_| app.take_stop_reason());
     if let Err(error) = &ended {
         app.note(format!("{}: {error}", job.title));
     }
@@ -204,7 +205,7 @@ fn run(app: &App, begun: Begun, lane: &Lane, place: Place) {
             Err(error) => {
                 job.phase = if stopped(&error) { JobPhase::Stopped } else { JobPhase::Failed };
                 job.hint = failure::hint(&error).map(Into::into);
-                job.error = Some(error.to_string());
+                job.error = Some(reason.unwrap_or_else(|| error.to_string()));
             }
         }
     });
