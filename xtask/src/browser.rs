@@ -34,15 +34,16 @@ pub struct Counts {
 /// A runner that cannot be started, though it is there.
 pub fn run() -> Result<Counts> {
     let folder = &ROOT.join("host/serve/tests-browser");
-    let tests = folder.join("page.test.mjs");
     if let Some(missing) = missing(folder) {
-        let text = std::fs::read_to_string(&tests).context("the page's tests are not there")?;
+        let read =
+            |name: &str| std::fs::read_to_string(folder.join(name)).context("the page's tests are not there");
+        let text = read("page.test.mjs")? + &read("rows.test.mjs")?;
         eprintln!("skipped: the page in a browser ({missing})");
         return Ok(Counts { skipped: written(&text), ended_well: true, ..Counts::default() });
     }
     let said = limited::run(
         Command::new("node")
-            .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs"])
+            .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs", "rows.test.mjs"])
             .current_dir(folder)
             .env("FARNEAR", target_folder().join("debug/farnear")),
     )?;

@@ -6,11 +6,12 @@ import { bars } from "./plot.js";
 import { NAMES, bar, paint, range } from "./maps.js";
 import { parse } from "./npy.js";
 import * as measure from "./measure.js";
+import { REASONS, REASON_COLOURS } from "./reasons.js";
 
-const LAYERS = [["depth", "Depth"], ["confidence", "Confidence"], ["deviation", "Deviation"], ["far", "Far image"], ["near", "Near image"], ["surface", "3-D"]];
-const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "uncertainty.npy", far: "far.png", near: "near.png" };
-const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "" };
-const METHODS = [["ro", "Rational operators"], ["whitened", "Whitened (noise limit)"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
+const LAYERS = [["depth", "Depth"], ["confidence", "Confidence"], ["deviation", "Deviation"], ["far", "Far image"], ["near", "Near image"], ["reason", "Reason"], ["surface", "3-D"]];
+const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "uncertainty.npy", far: "far.png", near: "near.png", reason: "reason.png" };
+const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "", reason: "" };
+const METHODS = [["whitened", "Whitened (noise limit)"], ["ro", "Rational operators"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
 
 /** Makes the view. `open(name)` shows a capture. */
 export function make(host, remember) {
@@ -24,19 +25,27 @@ export function make(host, remember) {
   const tools = h("div", { class: "group", role: "group", "aria-label": "Tool" }, [["pan", "Probe"], ["line", "Profile"], ["region", "Region"]].map(([name, text]) => button(text, () => use(name), { "data-tool": name })));
   const legend = h("canvas", { class: "legend-bar", role: "img", "aria-label": "colours, without a map yet" });
   const [low, high] = [h("span", {}), h("span", {})];
+  const reasons = h("div", { class: "reasons" });
+  const [least, most] = ["Low", "High"].map((text) => h("input", { type: "number", step: "any", placeholder: "auto", "aria-label": `${text} end of the colours, mm`, onchange: () => refresh() }));
+  /** Ends of the colours that were typed. @returns {[number, number] | null} */
+  const manual = () => (least.value !== "" && most.value !== "" && Number(least.value) < Number(most.value) ? [Number(least.value), Number(most.value)] : null);
   const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "distribution of the values" });
   const empty = h("p", { class: "empty" }, "No depth yet. Capture a pair in Live, or compute one here.");
   const other = h("select", { "aria-label": "Compare with", onchange: (event) => { show.other = event.target.value; refresh(); } });
   const wipe = h("input", { type: "range", min: 0, max: 100, value: 50, "aria-label": "Wipe", oninput: () => { viewer.wipe = wipe.value / 100; viewer.draw(); } });
   const against = h("div", {});
-  const settings = compute(() => show.name, () => open(show.name, true));
+  const settings = compute(() => show.name, (variant) => {
+    show.layer = "depth";
+    show.other = variant ? `variant:${variant}` : show.other;
+    open(show.name, true);
+  });
 
   host.append(h("div", { class: "split" },
     h("div", { class: "stage" },
       h("div", { class: "toolbar" }, captures, layers, tools),
       h("div", { class: "viewers" }, viewer.element, surface, empty),
-      h("div", { class: "legend" }, low, legend, high, choice(NAMES, "viridis", (name) => { show.colours = name; refresh(); }, { "aria-label": "Colours" }))),
-    h("div", { class: "side" }, side.elements, panel("Distribution", histogram),
+      h("div", { class: "legend" }, low, legend, high, reasons, choice(NAMES, "viridis", (name) => { show.colours = name; refresh(); }, { "aria-label": "Colours" }))),
+    h("div", { class: "side" }, side.elements, panel("Distribution", histogram, field("Colours from", least, "mm"), field("to", most, "mm")),
       panel("Compare", field("With", other), field("Wipe", wipe), against), settings,
       panel("Files", links(() => show.name)))));
 
@@ -60,16 +69,18 @@ export function make(host, remember) {
   };
 
   async function list() {
-    const found = (await get("/api/captures")).captures.filter((capture) => capture.kind === "pair");
-    captures.replaceChildren(...found.map((capture) => h("option", { value: capture.name, selected: capture.name === show.name }, capture.name + (capture.has_depth ? "" : " (no depth)"))));
+    const found = (await get("/api/captures")).captures.filter((capture) => !capture.broken);
+    captures.replaceChildren(...found.map((capture) => h("option", { value: capture.name, selected: capture.name === show.name }, capture.name + (capture.has_depth ? "" : capture.kind === "pair" ? " (no depth)" : ` (${capture.images.length} image${capture.images.length === 1 ? "" : "s"})`))));
     const present = show.other;
     const option = (value, text) => h("option", { value, selected: value === present }, text);
     const own = found.find((capture) => capture.name === show.name);
     other.replaceChildren(option("", "nothing"),
-      ...LAYERS.slice(0, 5).map(([name, text]) => option(`layer:${name}`, text)),
+      ...LAYERS.slice(0, 6).map(([name, text]) => option(`layer:${name}`, text)),
       ...(own?.variants ?? []).map((name) => option(`variant:${name}`, `this, by ${name}`)),
+      ...(own?.variants ?? []).map((name) => option(`minus:${name}`, `difference: ${name} minus this`)),
       ...found.filter((capture) => capture.has_depth && capture.name !== show.name).flatMap((capture) => [option(`depth:${capture.name}`, `depth of ${capture.name}`), option(`difference:${capture.name}`, `difference to ${capture.name}`)]));
-    if (!show.name && found.length) open(found.at(-1).name);
+    const pairs = found.filter((capture) => capture.kind === "pair");
+    if (!show.name && found.length) open((pairs.at(-1) ?? found.at(-1)).name);
     return found;
   }
 
@@ -79,15 +90,17 @@ export function make(host, remember) {
     show.name = name;
     remember(name);
     try {
-      const { capture } = await get(`/api/captures/${name}`);
+      const { capture } = await get(`/api/captures/${encodeURIComponent(name)}`);
       const names = Object.keys(FILES).filter((layer) => capture.files.includes(FILES[layer]));
       if (loading !== show.loading) return;
       show.capture = capture;
+      pages(capture);
+      if (capture.kind !== "pair") return stack(name, capture, loading);
       if (!names.includes(show.layer) && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
       // What is looked at comes first, the rest after it is on the screen.
       const first = names.filter((layer) => layer === show.layer || layer === "confidence" || (show.layer === "surface" && layer === "depth"));
       for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
-        const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${name}/files/${FILES[layer]}`)));
+        const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${encodeURIComponent(name)}/files/${FILES[layer]}`)));
         if (loading !== show.loading) return;
         if (part === first) [show.maps, show.mesh, viewer.shape] = [{}, null, null];
         part.forEach((layer, at) => { show.maps[layer] = loaded[at]; });
@@ -97,6 +110,29 @@ export function make(host, remember) {
     } catch (error) {
       notice(error.message, "error", error.hint);
     }
+  }
+
+  /** Images of a still or a stack are chosen by a slider. */
+  const index = h("input", { type: "range", min: 0, value: 0, "aria-label": "Image of the stack" });
+  const which = h("span", { class: "dim" });
+  const slider = h("div", { class: "toolbar", hidden: true }, index, which);
+  host.querySelector(".stage .toolbar").after(slider);
+  index.addEventListener("input", () => show.capture && stack(show.name, show.capture, show.loading));
+
+  function pages({ kind, images }) {
+    slider.hidden = kind === "pair" || images.length < 2;
+    index.max = String(images.length - 1);
+    index.value = "0";
+  }
+
+  async function stack(name, capture, loading) {
+    const file = capture.images[Number(index.value)];
+    const map = await load(`/api/captures/${encodeURIComponent(name)}/files/${encodeURIComponent(file)}`);
+    if (loading !== show.loading) return;
+    [show.maps, show.mesh, viewer.shape, show.layer] = [{ far: map }, null, null, "far"];
+    which.textContent = `${Number(index.value) + 1} of ${capture.images.length}: ${file}`;
+    await refresh();
+    await list();
   }
 
   /** Depth of a pair that was just taken; what is measured and kept is computed from its files, and follows. */
@@ -121,16 +157,24 @@ export function make(host, remember) {
     const solid = layer === "surface" && maps.depth;
     surface.hidden = !solid;
     viewer.element.hidden = Boolean(solid);
-    if (solid) return turn();
+    if (solid) {
+      const ends = range(maps.depth, 0);
+      bar(legend, "viridis", ends, "mm");
+      [low.textContent, high.textContent] = ends.map((mm) => number(mm, 2, "mm"));
+      bars(histogram, counts(maps.depth, ends));
+      return turn();
+    }
     turning?.();
     turning = null;
     const map = maps[layer];
     if (!map) return;
     const ends = limits(layer, map);
-    const picture = paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
+    const picture = layer === "reason" ? paintReasons(map) : paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
+    reasons.replaceChildren(...(layer === "reason" ? reasonLegend(map) : []));
+    for (const part of [low, legend, high]) part.hidden = layer === "reason";
     viewer.wipe = wipe.value / 100;
     viewer.onpainted = () => { performance.mark("depth-shown"); aged?.(); [viewer.onpainted, aged] = [undefined, undefined]; };
-    viewer.show(picture, await beside(ends));
+    viewer.show(picture, await beside());
     viewer.canvas.dataset.layer = layer;
     bar(legend, colours(layer), ends, UNITS[layer]);
     const decimals = layer === "confidence" ? 1 : 2;
@@ -139,22 +183,38 @@ export function make(host, remember) {
     bars(histogram, counts(map, ends));
   }
 
+  /** Another map minus this one, with its figures. */
+  function minus(map) {
+    const own = show.maps.depth;
+    const data = map.data.map((value, at) => value - own.data[at]);
+    const found = data.filter(Number.isFinite);
+    const mean = found.reduce((sum, value) => sum + value, 0) / found.length;
+    const sd = Math.sqrt(found.reduce((sum, value) => sum + (value - mean) ** 2, 0) / found.length);
+    const difference = { ...map, data };
+    const most = Math.max(...range(difference, 0.02).map(Math.abs));
+    against.replaceChildren(h("p", { class: "dim" }, `${found.length} pixels: mean ${number(mean, 3)}, SD ${number(sd, 3)}, RMS ${number(Math.hypot(mean, sd), 3)} mm; blue to red = ∓${number(most, 1)} mm`));
+    return paint(difference, [-most, most], "difference");
+  }
+
   const colours = (layer) => (layer === "far" || layer === "near" ? "grey" : show.colours);
-  const limits = (layer, map) => (layer === "confidence" ? [0, 1] : layer === "far" || layer === "near" ? [0, 255] : layer === "deviation" ? [0, range(map, 0.03)[1]] : range(map));
+  const limits = (layer, map) => (layer === "confidence" ? [0, 1] : layer === "reason" ? [0, REASONS.length - 1] : layer === "depth" && manual() ? /** @type {[number, number]} */ (manual()) : layer === "far" || layer === "near" ? [0, 255] : layer === "deviation" ? [0, range(map, 0.03)[1]] : range(map));
 
   /** What is right of the wipe. */
-  async function beside(ends) {
+  async function beside() {
     against.replaceChildren();
     const [kind, name] = show.other.split(":");
     if (!name) return null;
     if (kind === "layer") {
       const map = show.maps[name];
-      return map ? paint(map, limits(name, map), colours(name)) : null;
+      return !map ? null : name === "reason" ? paintReasons(map) : paint(map, limits(name, map), colours(name));
     }
-    if (kind === "variant") return paint(await load(`/api/captures/${show.name}/variants/${name}/depth.npy`), ends, show.colours);
-    if (kind === "depth") return paint(await load(`/api/captures/${name}/files/depth.npy`), ends, show.colours);
+    // Depth has the scale of this depth, whatever layer is on the left.
+    const depths = (map) => paint(map, show.maps.depth ? limits("depth", show.maps.depth) : range(map), show.colours);
+    if (kind === "minus" && show.maps.depth) return minus(await load(`/api/captures/${encodeURIComponent(show.name ?? "")}/variants/${encodeURIComponent(name)}/depth.npy`));
+    if (kind === "variant") return depths(await load(`/api/captures/${encodeURIComponent(show.name ?? "")}/variants/${encodeURIComponent(name)}/depth.npy`));
+    if (kind === "depth") return depths(await load(`/api/captures/${encodeURIComponent(name)}/files/depth.npy`));
     try {
-      const path = `/api/captures/${show.name}/difference/${name}`;
+      const path = `/api/captures/${encodeURIComponent(show.name ?? "")}/difference/${encodeURIComponent(name)}`;
       const { figures } = await get(path);
       const map = await load(`${path}/map.npy`);
       const most = Math.max(...range(map, 0.02).map(Math.abs));
@@ -168,7 +228,7 @@ export function make(host, remember) {
 
   async function turn() {
     // One request, however often this is asked for while it is on its way.
-    const mesh = (show.mesh ??= bytes(`/api/captures/${show.name}/mesh.ply`));
+    const mesh = (show.mesh ??= bytes(`/api/captures/${encodeURIComponent(show.name ?? "")}/mesh.ply`));
     const { show: begin, sorry } = await import("./mesh.js");
     try {
       const buffer = await mesh;
@@ -219,6 +279,21 @@ function decoded({ width, height, low_mm, high_mm }, pixels) {
   };
 }
 
+/** @param {import("./maps.js").NumberMap} map */
+function paintReasons({ width, height, data }) {
+  const image = new ImageData(width, height);
+  const colours = REASON_COLOURS.map((text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16)));
+  data.forEach((code, at) => image.data.set([...(colours[code] ?? colours[9]), 255], 4 * at));
+  return image;
+}
+
+/** The reasons that occur, with their part of the map. @param {import("./maps.js").NumberMap} map */
+function reasonLegend({ data }) {
+  const found = REASONS.map(() => 0);
+  for (const code of data) if (code in found) found[code]++;
+  return REASONS.flatMap((text, code) => (found[code] ? [h("span", {}, h("i", { style: { background: REASON_COLOURS[code] } }), `${text} ${number((100 * found[code]) / data.length, 1)} %`)] : []));
+}
+
 /** A map or an image as numbers. */
 async function load(path) {
   const buffer = await bytes(path);
@@ -242,7 +317,7 @@ function counts({ data }, [low, high]) {
 
 /** The panel that computes depth anew, beside the capture's own map or in its place. */
 function compute(name, done) {
-  const method = choice(METHODS, "ro", () => {});
+  const method = choice(METHODS, "whitened", () => {});
   const smooth = h("input", { type: "number", placeholder: "default", min: 1, max: 63, step: 2 });
   const median = choice([["1", "none"], ["3", "3 × 3"], ["5", "5 × 5"], ["7", "7 × 7"]], "3", () => {});
   const filled = h("input", { type: "checkbox" });
@@ -254,16 +329,16 @@ function compute(name, done) {
     if (smooth.value) wish.window = smooth.value;
     if (["ro", "whitened"].includes(method.value)) wish.uncertainty = "estimated";
     if (keep.checked) wish.variant = `${method.value}-${smooth.value || "default"}-${median.value}${filled.checked ? "-filled" : ""}${corrected.checked ? "-corrected" : ""}`;
-    const begun = await act(`/api/captures/${name()}/depth`, wish);
-    if (begun && (await ended("computation", begun.job)).phase === "done") done();
+    const begun = await act(`/api/captures/${encodeURIComponent(name())}/depth`, wish);
+    if (begun && (await ended("computation", begun.job)).phase === "done") done(wish.variant);
   };
   return panel("Compute", field("Method", method), field("Window", smooth, "px"), field("Median", median),
     h("label", { class: "check" }, filled, "fill low texture"), h("label", { class: "check" }, corrected, "correction of this session"),
-    h("label", { class: "check" }, keep, "keep beside, to compare"),
+    h("label", { class: "check" }, keep, "keep as another map, to compare"),
     button("Compute depth", start));
 }
 
 function links(name) {
-  const go = (path) => () => name() && window.open(`/api/captures/${name()}/${path}`, "_blank", "noopener");
+  const go = (path) => () => name() && window.open(`/api/captures/${encodeURIComponent(name())}/${path}`, "_blank", "noopener");
   return h("div", { class: "buttons" }, button("Report", go("report.html")), button("ZIP", go("zip")));
 }

@@ -1,9 +1,9 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
 import { act, hasControl, ended, get, on, store } from "./link.js";
-import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
+import { h, button, choice, field, keep, notice, number, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
-import { paintCodes } from "./maps.js";
+import { bar, paintCodes } from "./maps.js";
 import { key } from "./keys.js";
 import * as capture from "./capture.js";
 import * as camera from "./camera.js";
@@ -29,6 +29,39 @@ export function make(host) {
   const place = h("div", {});
   const plot = new Plot(place, { label: "focus value over the last frames", height: 110, names: ["focus"] });
   const resting = h("p", { class: "empty", hidden: true }, "The live image is off: L begins it.");
+  const [least, most, probe] = [h("span", {}), h("span", {}), h("output", { "aria-label": "Depth under the pointer" })];
+  const colours = h("canvas", { class: "legend-bar", role: "img", "aria-label": "colours of live depth" });
+  const scale = h("div", { class: "legend", hidden: true }, least, colours, most, probe);
+  /** The last live map. @type {{ codes: Uint16Array, width: number, low_mm: number, high_mm: number } | null} */
+  let live = null;
+  const lead = h("div", { class: "lead", role: "status", hidden: true });
+  let pictured = performance.now();
+  const homeAndFocus = async () => {
+    const homing = await act("/api/rig/home", { axes: [] });
+    if (homing && (await ended("job", homing.job)).phase === "done") act("/api/rig/goto", { focus: "far" });
+  };
+  /** What keeps the image from being useful, with the way out. */
+  const advise = () => {
+    const state = store.state;
+    if (!state) return;
+    const { rig, live, job } = state;
+    const running = job?.phase === "running";
+    const unhomed = rig.phase === "ready" && [rig.info?.coarse, rig.info?.lens].some((stage) => stage && stage.state === "unknown");
+    const silent = live.mode !== "off" && !running && rig.phase !== "connecting" && (rig.phase === "ready" || live.camera_alone) && performance.now() - pictured > 3000;
+    const what = running ? ["job", job.title, job.said] : live.error ? ["error", live.error] : silent ? ["silent", Math.floor((performance.now() - pictured) / 1000)] : unhomed ? ["unhomed"] : null;
+    lead.hidden = !what;
+    image.element.style.opacity = what?.[0] === "silent" || what?.[0] === "error" ? "0.35" : "";
+    keep(lead, [what, hasControl()], () => {
+      if (!what) return [];
+      const retry = button("Try again", () => act("/api/live", { mode: "image" }), { disabled: !hasControl() });
+      if (what[0] === "job") return [h("strong", {}, String(what[1])), h("span", {}, String(what[2] ?? "starting"))];
+      if (what[0] === "error") return [h("span", {}, `No image: ${live.error}`), retry];
+      if (what[0] === "silent") return [h("span", {}, `No image for ${what[1]} s. Check the camera.`), retry];
+      return [h("span", {}, "Stages are not homed: the image is out of focus."), button("Home and focus", homeAndFocus, { class: "primary", disabled: !hasControl() })];
+    });
+  };
+  setInterval(advise, 1000);
+  on("state", advise);
   const values = [];
   let best = 0;
   let read = -READ;
@@ -67,13 +100,18 @@ export function make(host) {
     h("div", { class: "stage" },
       h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), record, saturation.label, peaking.label,
         h("span", { class: "grow" }), status),
-      h("div", { class: "viewers" }, image.element, depth.element, resting)),
+      scale,
+      h("div", { class: "viewers" }, image.element, depth.element, resting, lead)),
     h("div", { class: "side" },
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
       panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
       panel("Camera", field("Exposure", exposure, "µs"), histogram, figures, warnings, camera.make()))));
   depth.element.hidden = true;
+  depth.onprobe = (at) => {
+    const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
+    probe.textContent = at ? (code && live ? number(live.low_mm + ((code - 1) * (live.high_mm - live.low_mm)) / 65534, 2, "mm") : "no depth") : "";
+  };
   key("l", "Live image on or off", () => mode("image"));
 
   const mode = (wanted) => act("/api/live", { mode: store.state?.live.mode === wanted ? "off" : wanted });
@@ -90,6 +128,7 @@ export function make(host) {
     const playing = state.computation?.kind === "play" && state.computation.phase === "running";
     resting.hidden = live.mode !== "off" || !seen || playing || shown;
     depth.element.hidden = live.mode !== "depth" && !playing;
+    if (depth.element.hidden) scale.hidden = true;
     record.disabled = !hasControl() || live.mode !== "depth";
     record.setAttribute("aria-pressed", Boolean(live.recording));
     write(record, live.recording ? "Stop recording" : "Record");
@@ -106,6 +145,7 @@ export function make(host) {
     if (host.hidden) return;
     const found = header.figures;
     shown = true;
+    pictured = performance.now();
     image.show(shade(blank(found, reused.image), pixels, saturation.box.checked, peaking.box.checked));
     time(image, header);
     values.push(found.focus ?? null);
@@ -127,6 +167,11 @@ export function make(host) {
     const count = width * height;
     const codes = new Uint16Array(pixels.buffer, pixels.byteOffset, count);
     shown = true;
+    pictured = performance.now();
+    live = { codes, width, low_mm, high_mm };
+    scale.hidden = false;
+    bar(colours, "viridis", [low_mm, high_mm], "mm");
+    [least.textContent, most.textContent] = [number(low_mm, 0, "mm"), number(high_mm, 0, "mm")];
     depth.show(paintCodes(blank(header, reused.depth), codes, pixels.subarray(2 * count, 3 * count), "viridis"));
     image.show(shade(blank(header, reused.image), pixels.subarray(3 * count, 4 * count), false, false));
     time(depth, header);

@@ -1,6 +1,6 @@
 // The page: views, connection to the rig, control, alarms, running jobs.
 import { act, hasControl, on, open, stop, store } from "./link.js";
-import { h, ask, button, keep, notice } from "./ui.js";
+import { h, ask, button, dropErrors, keep, notice } from "./ui.js";
 import { help, key, listen } from "./keys.js";
 import * as rig from "./rig.js";
 import * as live from "./live.js";
@@ -42,7 +42,7 @@ function addView(name, title, make) {
 }
 
 /** Shows a view; the address remembers it, with the capture that is open. */
-function go(name, detail) {
+function go(name, detail, back = false) {
   const view = views.get(name) ?? views.get("live");
   for (const [other, { host, tab }] of views) {
     host.hidden = views.get(other) !== view;
@@ -53,7 +53,9 @@ function go(name, detail) {
   // On a small screen not all tabs are beside each other.
   const { tab } = view;
   if (tab.parentElement.scrollWidth > tab.parentElement.clientWidth) tab.parentElement.scrollLeft = tab.offsetLeft - tab.parentElement.offsetLeft - 40;
-  history.replaceState(null, "", `#${current}${detail ? `/${detail}` : ""}`);
+  const address = `#${current}${detail ? `/${encodeURIComponent(detail)}` : ""}`;
+  if (!back && location.hash && location.hash !== address) history.pushState(null, "", address);
+  else history.replaceState(null, "", address);
   view.parts?.shown?.(detail);
 }
 
@@ -129,14 +131,30 @@ function showJob(state, before) {
     if (total) bar.value = done / total;
     else bar.removeAttribute("value");
   });
-  for (const queue of ["job", "computation"]) ended(state[queue], before?.[queue]);
+  for (const queue of ["job", "computation"]) ended(state[queue], before?.[queue], !before);
 }
 
-function ended(job, before) {
-  if (!job || job.phase === "running" || !before || before.id !== job.id || before.phase === job.phase) return;
-  if (job.phase === "failed") notice(`${job.title}: ${job.error}`, "error", job.hint);
-  else if (job.phase === "stopped") notice(`${job.title}: stopped`);
-  else for (const warning of job.warnings) notice(warning, "warning");
+/** Warnings of the last job stay until they are closed or the next job ends. */
+function showWarnings({ title, warnings }) {
+  const place = $("warnings");
+  place.hidden = false;
+  place.replaceChildren(h("strong", {}, title), h("ul", {}, warnings.map((text) => h("li", {}, text))), button("×", () => { place.hidden = true; }, { class: "quiet", "aria-label": "Close warnings" }));
+}
+
+/** The last job of each kind whose end was reported. @type {Map<string, number>} */
+const seen = new Map();
+
+function ended(job, before, fresh) {
+  if (!job || job.phase === "running") return;
+  // A job that ends at once was never seen running: its number is new.
+  const known = before?.id === job.id && before.phase !== "running";
+  if (known || seen.get(job.kind) === job.id) return;
+  seen.set(job.kind, job.id);
+  if (fresh) return; // ended before this page was opened
+  dropErrors(job.kind);
+  if (job.phase === "failed") notice(`${job.title}: ${job.error}`, "error", job.hint, job.kind);
+  else if (job.phase === "stopped") notice(`${job.title}: stopped${/cancel|stopp/i.test(job.error ?? "") ? "" : ` (${job.error})`}`);
+  else if (job.warnings.length) showWarnings(job);
 }
 
 let question = null;
@@ -154,7 +172,7 @@ function begin() {
   $("waiting").remove(); // what an old browser keeps, which gets no further than the page's text
   rig.mount($("rig"));
   addView("live", "Live", live.make);
-  addView("depth", "Depth", (host) => depth.make(host, (name) => current === "depth" && history.replaceState(null, "", `#depth/${name}`)));
+  addView("depth", "Depth", (host) => depth.make(host, (name) => current === "depth" && history.replaceState(null, "", `#depth/${encodeURIComponent(name)}`)));
   addView("optics", "Optics", lens.make);
   addView("captures", "Captures", (host) => sessions.make(host, (name) => go("depth", name)));
   addView("quality", "Quality", quality.make);
@@ -181,8 +199,12 @@ function begin() {
   });
   listen();
   open();
-  const [name, detail] = location.hash.slice(1).split("/");
-  go(name || "live", detail);
+  const addressed = (back) => {
+    const [name, detail] = location.hash.slice(1).split("/");
+    go(name || "live", detail && decodeURIComponent(detail), back);
+  };
+  addEventListener("popstate", () => addressed(true));
+  addressed(false);
 }
 
 // What stands in the page itself is painted before its views are built.

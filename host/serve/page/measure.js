@@ -1,7 +1,8 @@
 // Figures of a map at the side: what is under the pointer, a profile, a region with its plane.
 import { act } from "./link.js";
-import { h, number, panel, rows } from "./ui.js";
+import { h, button, number, panel, rows } from "./ui.js";
 import { Plot } from "./plot.js";
+import { REASONS } from "./reasons.js";
 
 /** The panels, and what fills them. */
 export function make() {
@@ -9,7 +10,13 @@ export function make() {
   const place = h("div", {});
   const region = h("div", {});
   const plot = new Plot(place, { label: "depth along the line, with its deviation", x: "px along the line", y: "mm", height: 170, names: ["depth", "plus deviation", "minus deviation"], band: true });
-  const profile = panel("Profile", place);
+  /** @type {any[]} */
+  let points = [];
+  const save = button("CSV", () => download("profile.csv", `at_px,depth_mm,deviation_mm\n${points.map((p) => [p.at_px, p.depth_mm ?? "", p.deviation_mm ?? ""].join(",")).join("\n")}\n`), { title: "Saves the profile" });
+  const profile = panel("Profile", place, h("div", { class: "buttons" }, save));
+  /** The region before the last one. @type {any} */
+  let earlier = null;
+  let last = null;
   const area = panel("Region", region);
   profile.hidden = true;
   area.hidden = true;
@@ -18,15 +25,15 @@ export function make() {
   const under = (maps, at) => {
     const value = (name) => (at && maps[name] ? maps[name].data[at[1] * maps[name].width + at[0]] : null);
     probe.replaceChildren(h("output", { class: "big" }, number(value("depth"), 2, "mm")),
-      rows([["pixel", at ? `${at[0]}, ${at[1]}` : "–"], ["± deviation", number(value("deviation"), 2, "mm")], ["confidence", number(value("confidence"), 2)]]));
+      rows([["pixel", at ? `${at[0]}, ${at[1]}` : "–"], ["± deviation", number(value("deviation"), 2, "mm")], ["confidence", number(value("confidence"), 2)], maps.reason && ["no depth because", value("reason") ? REASONS[value("reason")] : "–"]]));
   };
 
   /** Of a shape that was drawn. */
   const shape = async (capture, kind, from, to) => {
     if (kind === "line") {
-      const found = await act(`/api/captures/${capture}/profile`, { from, to });
+      const found = await act(`/api/captures/${encodeURIComponent(capture)}/profile`, { from, to });
       if (!found) return;
-      const { points } = found.figures;
+      points = found.figures.points;
       profile.hidden = false;
       const band = (sign) => points.map((p) => (p.depth_mm == null || p.deviation_mm == null ? null : p.depth_mm + sign * p.deviation_mm));
       plot.set([points.map((p) => p.at_px), points.map((p) => p.depth_mm), band(1), band(-1)]);
@@ -34,13 +41,27 @@ export function make() {
       return;
     }
     const [x, y] = [Math.min(from[0], to[0]), Math.min(from[1], to[1])];
-    const found = await act(`/api/captures/${capture}/region`, { x, y, width: Math.abs(to[0] - from[0]) + 1, height: Math.abs(to[1] - from[1]) + 1 });
+    const found = await act(`/api/captures/${encodeURIComponent(capture)}/region`, { x, y, width: Math.abs(to[0] - from[0]) + 1, height: Math.abs(to[1] - from[1]) + 1 });
     if (!found) return;
     area.hidden = false;
-    region.replaceChildren(figuresOf(found.figures));
+    [earlier, last] = [last?.capture === capture ? last : null, { capture, ...found.figures }];
+    region.replaceChildren(figuresOf(found.figures), earlier ? stepOf(earlier, last) : h("p", { class: "dim" }, "Draw a second region for the step between the two."));
   };
   under({}, null);
   return { elements: [panel("Under the pointer", probe), profile, area], under, shape, plot };
+}
+
+/** Step from one region to the next: difference of their means, with its standard deviation. */
+function stepOf(first, second) {
+  const variance = ({ standard_deviation_mm: sd, region, fill_rate }) => sd ** 2 / Math.max(1, region.width * region.height * fill_rate);
+  return rows([["step to the region before", number(second.mean_mm - first.mean_mm, 3, "mm")], ["± of the means", number(Math.sqrt(variance(first) + variance(second)), 3, "mm")]]);
+}
+
+/** Saves a text as a file. */
+function download(name, text) {
+  const link = h("a", { href: URL.createObjectURL(new Blob([text], { type: "text/csv" })), download: name });
+  link.click();
+  URL.revokeObjectURL(link.href);
 }
 
 /** Rows of a region's figures. */

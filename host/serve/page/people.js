@@ -55,6 +55,9 @@ export function activity() {
   const start = async (wish, queue) => {
     past.length = 0;
     answered = false;
+    answer.textContent = "–";
+    details.replaceChildren();
+    delete details.dataset.key;
     const begun = await act("/api/people/recognise", wish);
     if (!begun) return;
     const job = await ended(queue, begun.job);
@@ -63,8 +66,11 @@ export function activity() {
     tell(job.result, `of all ${job.result.frames} frames`);
   };
   const tell = (found, of) => {
-    answer.replaceChildren(found.activity ?? "unknown", h("small", {}, ` ${number(100 * found.confidence, 0)} % ${of}`));
-    keep(details, [found.best, found.flags], () => [rows(found.best.map(({ activity: name, share }) => [name, h("meter", { min: 0, max: 1, value: share, "aria-label": name }, `${number(100 * share, 0)} %`)])),
+    const [first] = found.best ?? [];
+    const likely = first?.probability ?? first?.share;
+    if (found.activity || likely == null) answer.replaceChildren(found.activity ?? "unknown", h("small", {}, ` ${number(100 * found.confidence, 0)} % ${of}`));
+    else answer.replaceChildren(`probably ${first.activity} (${number(100 * likely, 0)} %), below the threshold`, h("small", {}, ` ${of}`));
+    keep(details, [found.best, found.flags], () => [rows(found.best.map(({ activity: name, probability, share = probability }) => [name, h("meter", { min: 0, max: 1, value: share, "aria-label": name }, `${number(100 * share, 0)} %`)])),
       found.flags?.length ? h("p", { class: "dim" }, found.flags.join(", ")) : ""]);
   };
   on("person", ({ width, height, answer: found }, pixels) => {

@@ -1,6 +1,6 @@
 // The captures of the session: what they show, what was noted, and what can be taken along.
 import { act, get, on, store } from "./link.js";
-import { h, button, notice, number } from "./ui.js";
+import { ask, h, button, choice, notice, number } from "./ui.js";
 
 /** Makes the view. `open(name)` shows a capture's depth. */
 export function make(host, open) {
@@ -8,6 +8,9 @@ export function make(host, open) {
   const count = h("span", { class: "dim" });
   const list = h("ul", { class: "captures" });
   host.append(h("div", { class: "toolbar" }, search, count), list);
+  const kinds = choice([["", "all kinds"], ["pair", "pairs"], ["sequence", "stills and stacks"], ["depth", "with depth"], ["rated", "rated"]], "", () => refresh(), { "aria-label": "Show" });
+  search.after(kinds);
+  const wanted = (capture) => !kinds.value || kinds.value === capture.kind || (kinds.value === "depth" && capture.has_depth) || (kinds.value === "rated" && capture.note.rating > 0);
   let waiting = 0;
   search.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(refresh, 200); });
 
@@ -15,7 +18,7 @@ export function make(host, open) {
     try {
       const { captures } = await get(`/api/captures?search=${encodeURIComponent(search.value)}`);
       count.textContent = captures.length === 1 ? "1 capture" : `${captures.length} captures`;
-      list.replaceChildren(...captures.reverse().map((capture) => card(capture, open)));
+      list.replaceChildren(...captures.filter(wanted).sort((a, b) => b.written_unix_s - a.written_unix_s || b.name.localeCompare(a.name)).map((capture) => card(capture, open)));
       if (!captures.length) list.append(h("li", { class: "empty" }, search.value ? "Nothing holds all of these words." : "Nothing captured yet."));
     } catch (error) {
       notice(error.message, "error", error.hint);
@@ -32,16 +35,22 @@ export function make(host, open) {
 
 function card(capture, open) {
   const file = capture.has_depth ? "view.png" : capture.images[0];
-  const path = `/api/captures/${capture.name}`;
+  const path = `/api/captures/${encodeURIComponent(capture.name)}`;
   const focus = capture.optics?.focus;
-  const facts = [capture.kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time];
+  const facts = [capture.kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time ?? (capture.written_unix_s && new Date(1000 * capture.written_unix_s).toLocaleString())];
   return h("li", { class: "capture-card" },
     h("button", { type: "button", class: "thumbnail", onclick: () => open(capture.name), "aria-label": `Open ${capture.name}` },
-      capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/files/${file}`, alt: "", loading: "lazy" })),
+      capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/files/${encodeURIComponent(file)}`, alt: "", loading: "lazy" })),
     h("div", { class: "capture-words" }, h("h3", {}, capture.name), h("p", { class: "dim" }, capture.broken ?? facts.filter(Boolean).join(" · ")),
       stars(capture), note(capture)),
     h("div", { class: "buttons" }, h("a", { class: "button", href: `${path}/report.html`, target: "_blank", rel: "noopener" }, "Report"),
-      h("a", { class: "button", href: `${path}/zip`, download: `${capture.name}.zip` }, "ZIP")));
+      h("a", { class: "button", href: `${path}/zip`, download: `${capture.name}.zip` }, "ZIP"),
+      button("Rename", async () => {
+        const name = await ask(`New name of ${capture.name}`, { text: true, yes: "Rename" });
+        if (name) act(`${path}/rename`, { name: name.trim() });
+      }), button("Delete", async () => {
+        if ((await ask(`Delete ${capture.name} with all of its files?`, { yes: "Delete", no: "Keep" })) !== null) act(path, {}, "DELETE");
+      }, { class: "danger" })));
 }
 
 function stars(capture) {
@@ -65,4 +74,4 @@ function note(capture) {
   return text;
 }
 
-const save = (capture) => act(`/api/captures/${capture.name}/note`, capture.note, "PUT");
+const save = (capture) => act(`/api/captures/${encodeURIComponent(capture.name)}/note`, capture.note, "PUT");

@@ -58,14 +58,19 @@ export function rows(pairs) {
 }
 
 /** Tells something that goes away by itself; an error stays until it is closed. */
-export function notice(text, kind = "info", hint) {
+export function notice(text, kind = "info", hint, about = "") {
   const place = /** @type {HTMLElement} */ (document.getElementById("notices"));
   const close = () => box.remove();
-  const box = h("div", { class: `notice ${kind}` }, h("p", {}, text), hint ? h("p", { class: "dim" }, hint) : null,
+  const box = h("div", { class: `notice ${kind}`, "data-about": about }, h("p", {}, text), hint ? h("p", { class: "dim" }, hint) : null,
     button("×", close, { "aria-label": "Close", class: "quiet" }));
   for (const old of [...place.children].slice(0, -2)) old.remove();
   place.append(box);
   if (kind !== "error") setTimeout(close, 5000);
+}
+
+/** Removes errors that are obsolete: of an earlier job of this kind. @param {string} about */
+export function dropErrors(about) {
+  for (const old of document.querySelectorAll("#notices .notice.error")) if (/** @type {HTMLElement} */ (old).dataset.about === about) old.remove();
 }
 
 /** What is drawn with on a canvas. @param {HTMLCanvasElement} canvas */

@@ -1,12 +1,13 @@
 //! The table of routes, and the OpenAPI document that follows from it: a route that is not described cannot be added.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use axum::{
     Router,
     extract::DefaultBodyLimit,
     handler::Handler,
-    routing::{MethodRouter, get, post, put},
+    http::Method,
+    routing::{MethodRouter, delete, get, post, put},
 };
 use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
@@ -22,6 +23,7 @@ pub const CLIENT_HEADER: &str = "x-farnear-client";
 pub struct Api {
     router: Router<Arc<App>>,
     paths: Map<String, Value>,
+    access: Access,
     generator: SchemaGenerator,
 }
 
@@ -36,13 +38,21 @@ pub enum For {
     Client,
 }
 
+/// Who may use each route: checked before the body is read.
+pub type Access = HashMap<(String, Method), For>;
+
 impl Default for Api {
     fn default() -> Self {
         let settings = SchemaSettings::draft2020_12().with(|settings| {
             settings.definitions_path = SCHEMAS.into();
             settings.meta_schema = None;
         });
-        Self { router: Router::new(), paths: Map::new(), generator: settings.into_generator() }
+        Self {
+            router: Router::new(),
+            paths: Map::new(),
+            access: Access::new(),
+            generator: settings.into_generator(),
+        }
     }
 }
 
@@ -92,12 +102,11 @@ impl Api {
         self.changing::<B, R>(path, "put", who, about, put(handler))
     }
 
-    /// A route that takes bytes as they are, at most so many.
+    /// A route that receives a file, limited by the upload quota.
     pub fn put_bytes<R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
         mut self,
         path: &str,
         about: &str,
-        bytes_max: usize,
         handler: H,
     ) -> Self {
         let answer = self.json_of::<R>();
@@ -105,9 +114,21 @@ impl Api {
             "summary": about,
             "requestBody": { "required": true, "content": { "application/octet-stream": {} } },
             "responses": responses(answer),
-            "parameters": [client("Secret of a client, from the first message on the socket.")],
+            "parameters": [client("Secret of the client that has control.")],
         });
-        self.add(path, "put", put(handler).layer(DefaultBodyLimit::max(bytes_max)), operation)
+        self.access.insert((path.into(), Method::PUT), For::Control);
+        self.add(path, "put", put(handler).layer(DefaultBodyLimit::disable()), operation)
+    }
+
+    /// A route that deletes something.
+    pub fn delete<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
+        self,
+        path: &str,
+        who: For,
+        about: &str,
+        handler: H,
+    ) -> Self {
+        self.changing::<B, R>(path, "delete", who, about, delete(handler))
     }
 
     fn changing<B: JsonSchema, R: JsonSchema>(
@@ -119,6 +140,14 @@ impl Api {
         route: MethodRouter<Arc<App>>,
     ) -> Self {
         let (body, answer) = (self.json_of::<B>(), self.json_of::<R>());
+        let of = if method == "put" {
+            Method::PUT
+        } else if method == "delete" {
+            Method::DELETE
+        } else {
+            Method::POST
+        };
+        self.access.insert((path.into(), of), who);
         let mut operation = json!({
             "summary": about,
             "requestBody": { "required": true, "content": body },
@@ -169,7 +198,7 @@ impl Api {
     }
 
     /// The routes, and the document.
-    pub fn finish(mut self) -> (Router<Arc<App>>, Value) {
+    pub fn finish(mut self) -> (Router<Arc<App>>, Value, Access) {
         let _ = self.generator.subschema_for::<Failure>();
         let schemas = self.generator.take_definitions(true);
         let document = json!({
@@ -184,7 +213,7 @@ impl Api {
             "paths": self.paths,
             "components": { "schemas": schemas },
         });
-        (self.router, document)
+        (self.router, document, self.access)
     }
 }
 

@@ -28,12 +28,13 @@ use farnear_workflows::{
 use tokio::sync::watch;
 
 use crate::{
-    guard::Guard,
-    job_queue::{JobQueue, Task},
+    connections::Limits,
     control::ControlLock,
+    guard::{Guard, Throttle},
+    job_queue::{JobQueue, Task},
     server::ServeSettings,
     stopping::{Stop, Stops},
-    view::{LiveMode, LiveState, Phase, RigState, ControlState, State},
+    view::{ControlState, LiveMode, LiveState, Phase, RigState, State},
 };
 
 /// Lines of the log that are kept.
@@ -45,6 +46,10 @@ const USUAL_OPTICS: &str = include_str!("optics.toml");
 pub struct App {
     /// Who may talk to this program.
     pub guard: Guard,
+    /// Time-outs and limits.
+    pub limits: Limits,
+    /// Delays guesses of the token.
+    pub throttle: Throttle,
     /// The folder of captures.
     pub session: PathBuf,
     /// The rig's address, where there is one.
@@ -100,7 +105,7 @@ impl App {
     /// # Errors
     /// [`WorkflowError::Folder`], [`WorkflowError::Staging`], and optics that are none.
     pub fn new(settings: ServeSettings, guard: Guard) -> Result<Arc<Self>, WorkflowError> {
-        let ServeSettings { rig, camera, session, optics, .. } = settings;
+        let ServeSettings { rig, camera, session, optics, limits, .. } = settings;
         fs::create_dir_all(&session)
             .map_err(|source| WorkflowError::Folder { folder: session.clone(), source })?;
         let own = session.join("optics.toml");
@@ -120,6 +125,8 @@ impl App {
         let state = beginning(rig.as_ref(), &camera, &live);
         Ok(Arc::new(Self {
             guard,
+            limits,
+            throttle: Throttle::default(),
             session,
             reconnect: AtomicBool::new(rig.is_some()),
             address: rig,

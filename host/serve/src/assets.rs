@@ -35,7 +35,7 @@ const ASSETS: &[Asset] = assets![
     SVG "icon.svg",
     JS "main.js", JS "link.js", JS "ui.js", JS "keys.js", JS "login.js",
     JS "rig.js", JS "stages.js", JS "live.js", JS "camera.js", JS "plot.js", JS "viewer.js",
-    JS "lens.js", JS "capture.js", JS "depth.js", JS "measure.js", JS "maps.js", JS "npy.js", JS "mesh.js",
+    JS "lens.js", JS "capture.js", JS "depth.js", JS "measure.js", JS "reasons.js", JS "maps.js", JS "npy.js", JS "mesh.js",
     JS "sessions.js", JS "log.js", JS "quality.js", JS "guides.js", JS "guide-pictures.js", JS "people.js",
     JS "vendor/three.js", JS "vendor/uplot.js",
     TEXT "vendor/LICENSES.txt",

@@ -64,7 +64,11 @@ impl ControlLock {
         self.last += 1;
         let client = Client { id: self.last, secret };
         let before = resumed.and_then(|secret| {
-            self.clients.iter().chain(&self.disconnected).find(|other| other.has(secret)).map(|other| other.id)
+            self.clients
+                .iter()
+                .chain(&self.disconnected)
+                .find(|other| other.has(secret))
+                .map(|other| other.id)
         });
         self.clients.push(client.clone());
         if self.holder.is_none() || (before.is_some() && before == self.holder) {
@@ -170,7 +174,9 @@ mod tests {
         let mut lock = ControlLock::default();
         let [first, second] = joined(&mut lock);
         assert_ne!(first.secret, second.secret);
-        assert!(lock.has_control(&first.secret) && !lock.has_control(&second.secret) && !lock.has_control(""));
+        assert!(
+            lock.has_control(&first.secret) && !lock.has_control(&second.secret) && !lock.has_control("")
+        );
         assert!(lock.request(&second.secret) && !lock.has_control(&second.secret));
         assert_eq!(lock.answer(&second.secret, second.id, true), Err(HandOverError::NotHolder));
         assert_eq!(lock.answer(&first.secret, second.id, false), Ok(()));

@@ -4,18 +4,25 @@
 //! at. A name from the public DNS could be made to lead here, and is refused unless it was allowed.
 
 use std::{
+    collections::HashSet,
     fmt, fs,
     net::{IpAddr, Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
+    sync::Mutex,
+    time::Duration,
 };
 
-use axum::http::{HeaderMap, header};
+use axum::http::{HeaderMap, Uri, header};
 use subtle::ConstantTimeEq;
+
+use crate::app::lock;
 
 /// Shortest token: 16 characters of hexadecimal are 64 bits.
 const SHORTEST: usize = 16;
 /// Longest token.
 const LONGEST: usize = 256;
+/// Delay after a wrong token.
+const GUESS: Duration = Duration::from_secs(1);
 /// The cookie that carries the token.
 const COOKIE: &str = "farnear-token";
 
@@ -116,6 +123,9 @@ pub enum Refused {
     /// It was sent to a name that is not this computer's.
     #[error("this computer is not known by that name; use its address, or allow the name with --name")]
     Host,
+    /// `Host` or `Origin` occurs twice.
+    #[error("the header Host or Origin occurs twice; expected one of each")]
+    Doubled,
     /// A page from elsewhere sent it.
     #[error("a page from elsewhere may not talk to the rig")]
     Origin,
@@ -139,10 +149,15 @@ impl Guard {
     ///
     /// # Errors
     /// [`Refused::Host`], [`Refused::Origin`].
-    pub fn check_names(&self, headers: &HeaderMap) -> Result<(), Refused> {
+    pub fn check_names(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
+        if [header::HOST, header::ORIGIN].iter().any(|name| headers.get_all(name).iter().count() > 1) {
+            return Err(Refused::Doubled);
+        }
         let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
         let host = text(header::HOST).ok_or(Refused::Host)?;
-        if !self.is_ours(host) {
+        // `GET http://name/path`: the name of the request line must be that of the header.
+        let same = uri.authority().is_none_or(|authority| authority.as_str() == host);
+        if !self.is_ours(host) || !same {
             return Err(Refused::Host);
         }
         match text(header::ORIGIN) {
@@ -162,6 +177,13 @@ impl Guard {
         let cookies = text(header::COOKIE).flat_map(|value| value.split(';'));
         let cookie = cookies.filter_map(|pair| pair.trim().strip_prefix(COOKIE)?.strip_prefix('='));
         if bearer.chain(cookie).any(|given| token.is(given)) { Ok(()) } else { Err(Refused::Token) }
+    }
+
+    /// Whether a request carries a token at all, right or wrong.
+    pub fn has_token(headers: &HeaderMap) -> bool {
+        let cookie = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
+        headers.contains_key(header::AUTHORIZATION)
+            || cookie.flat_map(|value| value.split(';')).any(|pair| pair.trim().starts_with(COOKIE))
     }
 
     /// The cookie for who typed the token; `None` for another text.
@@ -190,6 +212,39 @@ impl Guard {
     }
 }
 
+/// Delays wrong tokens: one guess a second from each address.
+#[derive(Debug, Default)]
+pub struct Throttle(Mutex<HashSet<IpAddr>>);
+
+impl Throttle {
+    /// Waits after a wrong token; `false`, without waiting, while an earlier guess of this address waits.
+    pub async fn delay(&self, address: IpAddr) -> bool {
+        if !lock(&self.0).insert(address) {
+            return false;
+        }
+        let _waiting = Waiting { throttle: self, address };
+        tokio::time::sleep(GUESS).await;
+        true
+    }
+
+    /// Whether a guess of this address waits.
+    pub fn is_delayed(&self, address: IpAddr) -> bool {
+        lock(&self.0).contains(&address)
+    }
+}
+
+/// Ends also when the client disconnects.
+struct Waiting<'a> {
+    throttle: &'a Throttle,
+    address: IpAddr,
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        lock(&self.throttle.0).remove(&self.address);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,7 +263,7 @@ mod tests {
     #[test]
     fn loopback_answers_to_loopback_names_only() {
         let guard = Guard::default();
-        let asked = |host: &str| guard.check_names(&headers(&[("host", host)]));
+        let asked = |host: &str| guard.check_names(&Uri::default(), &headers(&[("host", host)]));
         for host in ["localhost", "localhost:8080", "127.0.0.1:8080", "[::1]:8080", "[::1]"] {
             assert_eq!(asked(host), Ok(()), "{host}");
         }
@@ -222,13 +277,13 @@ mod tests {
         ] {
             assert_eq!(asked(host), Err(Refused::Host), "{host}");
         }
-        assert_eq!(guard.check_names(&HeaderMap::new()), Err(Refused::Host));
+        assert_eq!(guard.check_names(&Uri::default(), &HeaderMap::new()), Err(Refused::Host));
     }
 
     #[test]
     fn the_network_answers_to_addresses_local_names_and_allowed_ones() {
         let guard = network();
-        let asked = |host: &str| guard.check_names(&headers(&[("host", host)]));
+        let asked = |host: &str| guard.check_names(&Uri::default(), &headers(&[("host", host)]));
         for host in
             ["192.168.0.7:8080", "[fe80::1]:8080", "rig:8080", "rig.local", "rig.lab.example:80", "localhost"]
         {
@@ -242,8 +297,9 @@ mod tests {
     #[test]
     fn pages_from_elsewhere_are_refused() {
         let guard = Guard::default();
-        let asked =
-            |origin: &str| guard.check_names(&headers(&[("host", "localhost:1"), ("origin", origin)]));
+        let asked = |origin: &str| {
+            guard.check_names(&Uri::default(), &headers(&[("host", "localhost:1"), ("origin", origin)]))
+        };
         assert_eq!(asked("http://localhost:1"), Ok(()));
         for origin in
             ["http://localhost:2", "https://localhost:1", "null", "http://evil.example", "localhost:1"]
@@ -269,6 +325,22 @@ mod tests {
         assert_eq!(Guard::default().check_token(&HeaderMap::new()), Ok(()));
         assert!(guard.cookie(SECRET).is_some_and(|cookie| cookie.contains("HttpOnly")));
         assert_eq!(guard.cookie("0123456789abcdef0124"), None);
+    }
+
+    #[test]
+    fn doubled_headers_and_other_names_in_the_request_line_are_refused() {
+        let guard = Guard::default();
+        for name in ["host", "origin"] {
+            let mut twice = headers(&[("host", "localhost:1"), ("origin", "http://localhost:1")]);
+            twice.append(name, "http://evil.example".parse().unwrap());
+            assert_eq!(guard.check_names(&Uri::default(), &twice), Err(Refused::Doubled), "{name}");
+        }
+        let headers = headers(&[("host", "localhost:1")]);
+        let asked = |uri: &'static str| guard.check_names(&Uri::from_static(uri), &headers);
+        assert_eq!(asked("http://localhost:1/api/state"), Ok(()));
+        for uri in ["http://evil.example/api/state", "http://localhost:2/", "http://user@localhost:1/"] {
+            assert_eq!(asked(uri), Err(Refused::Host), "{uri}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! - [`control`]: one browser has control, others watch; [`guard`]: which requests are admitted.
 //! - [`api`]: the table of routes and the document that follows from it; [`routes`]: one file per subject; [`socket`]: what is
 //!   told without being asked.
+//! - [`connections`]: time-outs and limits; [`transfer`]: files sent and received a piece at a time.
 //! - [`assets`]: the page.
 //!
 //! A browser that disconnects leaves nothing moving: when the client that has control does not return, the rig is stopped.
@@ -15,6 +16,8 @@
 pub mod api;
 pub mod app;
 pub mod assets;
+pub mod connections;
+pub mod control;
 pub mod depth_message;
 pub mod face;
 pub mod failure;
@@ -24,11 +27,12 @@ pub mod live;
 pub mod picture_message;
 pub mod rig_watch;
 pub mod routes;
-pub mod control;
 pub mod server;
 pub mod socket;
 pub mod stopping;
+pub mod transfer;
 pub mod view;
 
+pub use connections::Limits;
 pub use guard::{Listen, Token, TokenError};
 pub use server::{ServeError, ServeSettings, serve};

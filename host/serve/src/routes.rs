@@ -16,24 +16,28 @@ use std::sync::Arc;
 
 use axum::{
     Json, Router,
-    extract::{DefaultBodyLimit, FromRequest, Request, State},
-    http::{HeaderMap, HeaderValue, StatusCode, header},
-    middleware::{Next, from_fn_with_state},
+    body::Bytes,
+    extract::{ConnectInfo, DefaultBodyLimit, FromRequest, MatchedPath, Request, State},
+    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    middleware::{Next, from_fn},
     response::{IntoResponse, Response},
     routing::get,
 };
 use serde::de::DeserializeOwned;
 
 use crate::{
-    api::{Api, CLIENT_HEADER},
+    api::{Access, Api, CLIENT_HEADER, For},
     app::App,
     assets,
+    connections::{Connection, Peer},
     failure::Failure,
-    guard::Refused,
+    guard::{Guard, Refused},
 };
 
 /// Longest body of a request: a note, a program.
 const BODY_MAX: usize = 256 * 1024;
+/// Keeps images of captures from being embedded by pages of other sites.
+const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 /// What a page may load: its own files, and pictures it makes itself.
 const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; \
                       frame-ancestors 'none'; form-action 'self'";
@@ -42,7 +46,7 @@ const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; object-src
 pub type Shared = State<Arc<App>>;
 
 /// All routes with what belongs to them, and the document about them.
-pub fn api() -> (Router<Arc<App>>, serde_json::Value) {
+pub fn api() -> (Router<Arc<App>>, serde_json::Value, Access) {
     let api = general::routes(Api::default());
     let api = rig::routes(api);
     let api = camera::routes(api);
@@ -59,7 +63,11 @@ pub fn api() -> (Router<Arc<App>>, serde_json::Value) {
 
 /// Everything that answers a request.
 pub fn service(app: &Arc<App>) -> Router {
-    let (routes, document) = api();
+    let (routes, document, access) = api();
+    let access = Arc::new(access);
+    let shared = Arc::clone(app);
+    let guarded =
+        move |request: Request, next: Next| guarded(Arc::clone(&shared), Arc::clone(&access), request, next);
     let document = Json(document);
     routes
         .route("/openapi.json", get(move || std::future::ready(document.clone())))
@@ -73,30 +81,74 @@ pub fn service(app: &Arc<App>) -> Router {
             )
         })
         .layer(DefaultBodyLimit::max(BODY_MAX))
-        .layer(from_fn_with_state(Arc::clone(app), guarded))
+        .layer(from_fn(guarded))
         .with_state(Arc::clone(app))
 }
 
 /// Lets through what the guard allows, and says what a page may load.
-async fn guarded(State(app): Shared, request: Request, next: Next) -> Response {
+async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Next) -> Response {
     let headers = request.headers();
-    let allowed = app.guard.check_names(headers).and_then(|()| match request.uri().path() {
+    let peer =
+        request.extensions().get::<ConnectInfo<Peer>>().map(|ConnectInfo(Peer(peer))| Arc::clone(peer));
+    let allowed = app.guard.check_names(request.uri(), headers).and_then(|()| match request.uri().path() {
         "/login" | "/login.js" | "/style.css" => Ok(()),
         _ => app.guard.check_token(headers),
     });
+    if allowed.is_ok()
+        && let Some(peer) = &peer
+    {
+        peer.begin_request();
+    }
     let mut response = match allowed {
-        Ok(()) => next.run(request).await,
+        Ok(()) => match permitted(&app, &access, &request) {
+            Ok(()) => next.run(request).await,
+            Err(failure) => failure.into_response(),
+        },
+        Err(Refused::Token) if Guard::has_token(headers) && !delayed(&app, peer.as_deref()).await => {
+            too_many()
+        }
         Err(Refused::Token) if request.uri().path() == "/" => assets::login_page(),
         Err(Refused::Token) => {
             Failure::new(StatusCode::UNAUTHORIZED, Refused::Token.to_string()).into_response()
         }
         Err(refused) => Failure::new(StatusCode::FORBIDDEN, refused.to_string()).into_response(),
     };
+    if let Some(peer) = &peer {
+        match response.status() {
+            StatusCode::SWITCHING_PROTOCOLS => peer.upgrade(),
+            _ => peer.end_request(),
+        }
+    }
     let headers = response.headers_mut();
     headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(HeaderValue::from_static(POLICY));
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(RESOURCE_POLICY, HeaderValue::from_static("same-origin"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     response
+}
+
+/// Whether the client may use the route, before the body is read.
+fn permitted(app: &App, access: &Access, request: &Request) -> Result<(), Failure> {
+    let Some(path) = request.extensions().get::<MatchedPath>() else { return Ok(()) };
+    match access.get(&(path.as_str().to_owned(), request.method().clone())) {
+        Some(For::Control) => require_control(app, request.headers()),
+        Some(For::Client) => require_client(app, request.headers()),
+        Some(For::All) | None => Ok(()),
+    }
+}
+
+/// Delays a wrong token; `false` if an earlier one of this address waits.
+pub async fn delayed(app: &App, peer: Option<&Connection>) -> bool {
+    match peer {
+        Some(peer) => app.throttle.delay(peer.address()).await,
+        None => true,
+    }
+}
+
+/// The answer while an earlier guess waits.
+pub fn too_many() -> Response {
+    Failure::new(StatusCode::TOO_MANY_REQUESTS, "too many wrong tokens: try again in a second")
+        .into_response()
 }
 
 /// A JSON body; what is wrong with it is said in JSON too.
@@ -106,11 +158,37 @@ impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
     type Rejection = Failure;
 
     async fn from_request(request: Request, app: &Arc<App>) -> Result<Self, Failure> {
-        match Json::<T>::from_request(request, app).await {
+        let json = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
+        // A form of another site cannot send this type.
+        if !json.is_some_and(|media| media.split(';').next() == Some("application/json")) {
+            let error = "expected the header Content-Type: application/json";
+            return Err(Failure::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, error));
+        }
+        let within = app.limits.body_timeout;
+        let body = tokio::time::timeout(within, Bytes::from_request(request, app)).await;
+        let late = |_| {
+            Failure::new(
+                StatusCode::REQUEST_TIMEOUT,
+                format!("the body took longer than {} s", within.as_secs()),
+            )
+        };
+        let bytes = body.map_err(late)?.map_err(|error| Failure::new(error.status(), error.body_text()))?;
+        match Json::<T>::from_bytes(&bytes) {
             Ok(Json(body)) => Ok(Self(body)),
-            Err(rejection) => Err(Failure::new(rejection.status(), rejection.body_text())),
+            Err(rejection) => Err(Failure::new(rejection.status(), plain(&rejection.body_text()))),
         }
     }
+}
+
+/// The reason without the name of the library's step.
+fn plain(text: &str) -> String {
+    [
+        "Failed to deserialize the JSON body into the target type: ",
+        "Failed to parse the request body as JSON: ",
+    ]
+    .iter()
+    .find_map(|start| text.strip_prefix(start))
+    .map_or_else(|| text.to_owned(), |reason| format!("request body: {reason}"))
 }
 
 /// Refuses a client that does not have control.
@@ -133,7 +211,10 @@ pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
 pub fn require_client(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     match app.with_control(|control| control.id_of(secret(headers))) {
         Some(_) => Ok(()),
-        None => Err(Failure::new(StatusCode::FORBIDDEN, "unknown client: send the secret of a connected socket in x-farnear-client")),
+        None => Err(Failure::new(
+            StatusCode::FORBIDDEN,
+            "unknown client: send the secret of a connected socket in x-farnear-client",
+        )),
     }
 }
 

@@ -9,6 +9,7 @@ use farnear_workflows::{
 
 use crate::{
     app::App,
+    connections::{LimitedListener, Limits, Peer},
     guard::{Guard, Listen},
     job_queue, rig_watch, routes,
 };
@@ -31,6 +32,8 @@ pub struct ServeSettings {
     pub optics: Option<PathBuf>,
     /// Where to listen.
     pub listen: Listen,
+    /// Time-outs and limits.
+    pub limits: Limits,
 }
 
 /// The page cannot be served.
@@ -76,10 +79,11 @@ pub fn serve(
     let app = App::new(settings, guard)?;
     let workers = job_queue::start(&app)?;
     let watch = rig_watch::start(&app)?;
-    let service = routes::service(&app).into_make_service();
+    let service = routes::service(&app).into_make_service_with_connect_info::<Peer>();
     ready(&format!("http://{bound}/"));
     let ending = ended(context.cancel.clone(), Arc::clone(&app));
     let served = runtime.block_on(async {
+        let listener = LimitedListener::new(listener, Arc::clone(&app));
         let server = axum::serve(listener, service).with_graceful_shutdown(ending).into_future();
         let patience = async {
             app.ended().await;

@@ -74,7 +74,8 @@ async fn run(mut socket: WebSocket, app: Arc<App>, resumed: Option<String>) {
         () = app.ended() => {}
     }
     // Stops before the next holder can begin something.
-    let stop = app.with_control(|control| control.expire(client.id).then(|| app.begin_stop_because(DISCONNECTED)));
+    let stop =
+        app.with_control(|control| control.expire(client.id).then(|| app.begin_stop_because(DISCONNECTED)));
     if let Some(stop) = stop {
         app.note(format!("{DISCONNECTED}: stopping"));
         let _ = tokio::task::spawn_blocking(move || stop.tell()).await; // the board has its deadline

@@ -17,6 +17,21 @@ use crate::error::{About, Result, WorkflowError};
 const NOTE_FILE: &str = "note.toml";
 /// Longest note, bytes: a note, not a file store.
 const NOTE_MAX: usize = 64 * 1024;
+/// Begin of the names of folders with another map of a capture.
+const VARIANT: &str = "variant-";
+/// Names in a session's folder that are not captures.
+const RESERVED: &[&str] = &[
+    "people",
+    "recordings",
+    "flat-series",
+    "optics.toml",
+    "quality.toml",
+    "correction.toml",
+    "con",
+    "nul",
+    "aux",
+    "prn",
+];
 /// Best rating.
 const BEST: u8 = 5;
 
@@ -45,6 +60,8 @@ pub struct Capture {
     pub files: Vec<String>,
     /// Other maps of the same pair: folders in the capture's with a `depth.npy`.
     pub variants: Vec<String>,
+    /// When its record was written, seconds since 1970.
+    pub written_unix_s: u64,
     /// When it was taken; only of real hardware.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
@@ -77,13 +94,79 @@ pub struct Capture {
 pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
     let mut parts = Path::new(name).components();
     let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
-    let letters = name.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c));
-    if !plain || !letters || name.starts_with('.') || name.len() > 100 {
-        let expected =
-            "expected a name of letters, digits, -, _ and . (at most 100, not beginning with a dot)";
+    let letters = !name.chars().any(|c| c.is_control() || "/\\:*?\"<>|".contains(c));
+    if !plain || !letters || name.starts_with('.') || name.trim() != name || name.len() > 100 {
+        let expected = "expected a name of at most 100 bytes that does not begin with a dot or a blank, without control characters \
+                        and / \\ : * ? \" < > |";
         return Err(WorkflowError::parameter("capture", name, expected));
     }
     Ok(session.join(name))
+}
+
+/// The folder of a new capture.
+///
+/// # Errors
+/// As [`folder_of`], and for a name that is taken, reserved for other files of a session, or contains a dot.
+pub fn new_capture(session: &Path, name: &str) -> Result<PathBuf> {
+    let folder = folder_of(session, name)?;
+    let taken = if RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(name)) {
+        "expected another name: the session's own files have this one"
+    } else if name.contains('.') {
+        "expected a name without a dot"
+    } else if fs::symlink_metadata(&folder).is_ok() {
+        "expected a name that no capture of the session has"
+    } else {
+        return Ok(folder);
+    };
+    Err(WorkflowError::parameter("capture", name, taken))
+}
+
+/// The folder of a capture that exists. Links, FIFOs and devices are refused: they lead out of the session or never end.
+///
+/// # Errors
+/// As [`folder_of`]; [`WorkflowError::Read`] for a folder without a capture or with entries that are not regular.
+pub fn existing(session: &Path, name: &str) -> Result<PathBuf> {
+    let folder = folder_of(session, name)?;
+    check_regular(&folder)?;
+    Ok(folder)
+}
+
+fn check_regular(folder: &Path) -> Result<()> {
+    let failed = WorkflowError::read("the capture", folder);
+    let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
+    let is_dir = fs::symlink_metadata(folder).is_ok_and(|found| found.is_dir());
+    let has_record = fs::symlink_metadata(folder.join(CAPTURE_FILE)).is_ok();
+    if !is_dir || !has_record {
+        return Err(missing());
+    }
+    let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
+    let odd = entries.and_then(|entries| {
+        let odd = entries
+            .into_iter()
+            .find(|entry| entry.file_type().is_ok_and(|kind| !kind.is_file() && !kind.is_dir()));
+        match odd {
+            None => Ok(()),
+            Some(entry) => {
+                let name = entry.file_name();
+                let text = format!("{} is a link, FIFO or device; expected a regular file", name.display());
+                Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, text))
+            }
+        }
+    });
+    odd.map_err(failed)
+}
+
+/// The folder of another map of a capture.
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for a name that is not of letters, digits and hyphens.
+pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
+    let letters = variant.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
+    if variant.is_empty() || !letters || variant.len() > 60 {
+        let expected = "expected 1 to 60 letters, digits and hyphens";
+        return Err(WorkflowError::parameter("variant", variant, expected));
+    }
+    Ok(capture.join(format!("{VARIANT}{variant}")))
 }
 
 /// The first free names `KIND-001`, `KIND-002` and so on. A name is free until something has it.
@@ -118,12 +201,15 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
     for entry in entries {
         let path = entry.map_err(WorkflowError::read("the session", session))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if name.starts_with('.') || !path.join(CAPTURE_FILE).is_file() {
+        let is_dir = fs::symlink_metadata(&path).is_ok_and(|found| found.is_dir());
+        if name.starts_with('.') || !is_dir || fs::symlink_metadata(path.join(CAPTURE_FILE)).is_err() {
             continue;
         }
         // Somebody may take the folder away while it is read: that is a broken capture, not a broken list.
         let capture = read(&path).unwrap_or_else(|error| broken(&name, &error));
-        if matches(&path, &capture, search) {
+        if capture.broken.is_some() && search.trim().is_empty()
+            || capture.broken.is_none() && matches(&path, &capture, search)
+        {
             found.push(capture);
         }
     }
@@ -137,18 +223,19 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
 /// [`WorkflowError::Record`], [`WorkflowError::Read`] where it is none.
 pub fn read(folder: &Path) -> Result<Capture> {
     let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
-    if !folder.is_dir() {
-        return Err(missing());
-    }
+    check_regular(folder)?;
     let record: CaptureRecord = read_record(folder)?.ok_or_else(missing)?;
     let (mut files, mut variants) = (Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).map_err(WorkflowError::read("the capture", folder))? {
         let entry = entry.map_err(WorkflowError::read("the capture", folder))?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        if entry.path().is_file() && !name.starts_with('.') {
+        let is_file = |path: &Path| fs::symlink_metadata(path).is_ok_and(|found| found.is_file());
+        if is_file(&entry.path()) && !name.starts_with('.') {
             files.push(name);
-        } else if entry.path().join("depth.npy").is_file() {
-            variants.push(name);
+        } else if let Some(variant) = name.strip_prefix(VARIANT)
+            && is_file(&entry.path().join("depth.npy"))
+        {
+            variants.push(variant.to_owned());
         }
     }
     files.sort();
@@ -162,6 +249,7 @@ pub fn read(folder: &Path) -> Result<Capture> {
         has_depth: files.iter().any(|file| file == "depth.npy"),
         files,
         variants,
+        written_unix_s: written(folder),
         time: record.time,
         width: record.camera.width,
         height: record.camera.height,
@@ -174,6 +262,30 @@ pub fn read(folder: &Path) -> Result<Capture> {
     })
 }
 
+fn written(folder: &Path) -> u64 {
+    let modified = fs::metadata(folder.join(CAPTURE_FILE)).and_then(|found| found.modified()).ok();
+    let since = modified.and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
+    since.map_or(0, |since| since.as_secs())
+}
+
+/// Deletes a capture with all of its files.
+///
+/// # Errors
+/// As [`existing`]; [`WorkflowError::Folder`] if the system refuses.
+pub fn delete(session: &Path, name: &str) -> Result<()> {
+    let folder = existing(session, name)?;
+    fs::remove_dir_all(&folder).map_err(|source| WorkflowError::Folder { folder, source })
+}
+
+/// Renames a capture.
+///
+/// # Errors
+/// As [`existing`] and [`new_capture`]; [`WorkflowError::Folder`] if the system refuses.
+pub fn rename(session: &Path, name: &str, to: &str) -> Result<()> {
+    let (folder, target) = (existing(session, name)?, new_capture(session, to)?);
+    fs::rename(&folder, &target).map_err(|source| WorkflowError::Folder { folder, source })
+}
+
 fn broken(name: &str, error: &WorkflowError) -> Capture {
     Capture {
         name: name.into(),
@@ -181,6 +293,7 @@ fn broken(name: &str, error: &WorkflowError) -> Capture {
         images: Vec::new(),
         files: Vec::new(),
         variants: Vec::new(),
+        written_unix_s: 0,
         time: None,
         width: 0,
         height: 0,

@@ -5,7 +5,7 @@ use std::{net::SocketAddr, path::PathBuf, time::Duration};
 use anyhow::{Result, bail};
 use clap::Args;
 use farnear_protocol::Micros;
-use farnear_serve::{Listen, ServeSettings, Token, serve};
+use farnear_serve::{Limits, Listen, ServeSettings, Token, serve};
 use farnear_workflows::{
     operator_cache::data_folder,
     rig::{RigAddress, camera::CameraSettings},
@@ -21,7 +21,7 @@ use crate::{
 /// The port that is tried where none is named.
 const PORT: u16 = 8080;
 
-/// Serve the page: the rig in a browser. Only this computer can reach it, unless --listen says otherwise.
+/// Serve the page: the rig in a browser. Listens on localhost only, unless --listen names an address.
 #[derive(Args)]
 #[command(after_help = "Example: farnear serve --rig sim --open\n\
                         \x20        farnear serve --rig /dev/ttyACM0 --camera folder:shots/ --session captures/")]
@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Port of the page; 0 = any that is free.
     #[arg(long, default_value_t = PORT)]
     port: u16,
-    /// Listen at this address for the network too; asks for --token-file.
+    /// Listen at this address of the network; requires --token-file.
     #[arg(long, value_name = "ADDRESS:PORT", requires = "token_file", conflicts_with = "port")]
     listen: Option<SocketAddr>,
     /// File with the token that a browser must know.
@@ -56,6 +56,24 @@ pub struct Arguments {
     /// A name of this computer in the network's DNS; may be repeated.
     #[arg(long, value_name = "NAME", requires = "listen")]
     name: Vec<String>,
+    /// Longest time in which a client may send the headers of a request.
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    header_timeout_s: u64,
+    /// Longest time for the body of a request, and longest pause within an upload.
+    #[arg(long, value_name = "S", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    body_timeout_s: u64,
+    /// Close connections that are idle for this time.
+    #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    idle_timeout_s: u64,
+    /// Most connections at a time; above it idle ones are closed.
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=100_000))]
+    max_connections: u32,
+    /// Most connections of one address; a browser needs about 7.
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(8..=100_000))]
+    max_connections_per_address: u32,
+    /// Most megabytes of uploaded videos in the session.
+    #[arg(long, value_name = "MB", default_value_t = 2048)]
+    upload_quota_mb: u32,
     /// Open the page in the browser.
     #[arg(long)]
     open: bool,
@@ -104,6 +122,14 @@ pub fn run(arguments: Arguments) -> Result<()> {
         session,
         optics: arguments.optics,
         listen,
+        limits: Limits {
+            header_timeout: Duration::from_secs(arguments.header_timeout_s),
+            body_timeout: Duration::from_secs(arguments.body_timeout_s),
+            idle_timeout: Duration::from_secs(arguments.idle_timeout_s),
+            connections: arguments.max_connections as usize,
+            connections_per_address: arguments.max_connections_per_address as usize,
+            upload_quota_bytes: u64::from(arguments.upload_quota_mb) << 20,
+        },
     };
     let context = terminal::context()?;
     serve(settings, &context, |address| {

@@ -161,7 +161,7 @@ async fn find_psf(
         request.depth_mm.push(depth_mm);
     };
     for Target { capture, depth_mm } in asked.targets {
-        add(&sessions::folder_of(&app.session, &capture)?, depth_mm.unwrap_or(0.0));
+        add(&sessions::existing(&app.session, &capture)?, depth_mm.unwrap_or(0.0));
     }
     if asked.series {
         for (map, mm) in patterns(&app)? {

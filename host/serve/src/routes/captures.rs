@@ -28,7 +28,7 @@ use crate::{
     failure::Failure,
     job_queue::Task,
     routes::rig::{begin, connected, figures},
-    view::{AxisName, Begun, DONE, Done},
+    view::{AxisName, Begun, DONE, Done, Nothing},
 };
 
 /// Most images of a stack.
@@ -111,6 +111,14 @@ pub struct NoteBody {
     pub text: String,
 }
 
+/// A new name.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RenameRequest {
+    /// Of a capture that does not exist yet.
+    pub name: String,
+}
+
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Captures, _, _>("/api/captures", "The captures of the session, by name.", list)
@@ -122,6 +130,18 @@ pub fn routes(api: Api) -> Api {
             capture,
         )
         .get::<OneCapture, _, _>("/api/captures/{capture}", "One capture.", one)
+        .delete::<Nothing, Done, _, _>(
+            "/api/captures/{capture}",
+            For::Control,
+            "Deletes a capture with all of its files.",
+            delete,
+        )
+        .post::<RenameRequest, Done, _, _>(
+            "/api/captures/{capture}/rename",
+            For::Control,
+            "Renames a capture.",
+            rename,
+        )
         .put::<NoteBody, Done, _, _>(
             "/api/captures/{capture}/note",
             For::Client,
@@ -143,9 +163,44 @@ async fn list(
 }
 
 async fn one(State(app): Shared, Path(name): Path<String>) -> Result<Json<OneCapture>, Failure> {
-    let folder = sessions::folder_of(&app.session, &name)?;
+    let folder = sessions::existing(&app.session, &name)?;
     let capture = aside(move || Ok(figures(sessions::read(&folder)?)?)).await?;
     Ok(Json(OneCapture { capture }))
+}
+
+async fn delete(
+    State(app): Shared,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    Body(Nothing {}): Body<Nothing>,
+) -> Result<Json<Done>, Failure> {
+    require_control(&app, &headers)?;
+    idle(&app)?;
+    sessions::delete(&app.session, &name)?;
+    app.note(format!("deleted {name}"));
+    app.change(|state| state.captures += 1);
+    Ok(Json(DONE))
+}
+
+async fn rename(
+    State(app): Shared,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    Body(RenameRequest { name: to }): Body<RenameRequest>,
+) -> Result<Json<Done>, Failure> {
+    require_control(&app, &headers)?;
+    idle(&app)?;
+    sessions::rename(&app.session, &name, &to)?;
+    app.change(|state| state.captures += 1);
+    Ok(Json(DONE))
+}
+
+/// Files of a capture do not change under a job.
+fn idle(app: &App) -> Result<(), Failure> {
+    match app.rig_jobs.is_busy() || app.computing.is_busy() {
+        true => Err(Failure::busy("a job that may use the capture")),
+        false => Ok(()),
+    }
 }
 
 async fn note(
@@ -155,7 +210,7 @@ async fn note(
     Body(NoteBody { rating, text }): Body<NoteBody>,
 ) -> Result<Json<Done>, Failure> {
     require_client(&app, &headers)?;
-    let folder = sessions::folder_of(&app.session, &name)?;
+    let folder = sessions::existing(&app.session, &name)?;
     sessions::write_note(&folder, &Note { rating, text })?;
     app.change(|state| state.captures += 1);
     Ok(Json(DONE))
@@ -173,7 +228,7 @@ async fn capture(
     let (task, out) = match request {
         CaptureRequest::Pair { name, averaged } => {
             let out = match name {
-                Some(name) => sessions::folder_of(&app.session, &name)?,
+                Some(name) => sessions::new_capture(&app.session, &name)?,
                 None => free("pair", 1)?.remove(0),
             };
             let settings = PairSettings { rig, camera, optics, averaged, frames: None, out: out.clone() };

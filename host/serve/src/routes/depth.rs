@@ -18,7 +18,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{Body, Shared, aside, calibrate, require_client};
+use super::{Body, Shared, aside, calibrate, require_control};
 use crate::{
     api::{Api, For},
     app::App,
@@ -101,7 +101,7 @@ pub struct Figures {
 pub fn routes(api: Api) -> Api {
     api.post::<CaptureDepthRequest, Begun, _, _>(
         "/api/captures/{capture}/depth",
-        For::Client,
+        For::Control,
         "Computes the depth of a pair, with its standard deviation.",
         compute,
     )
@@ -137,8 +137,8 @@ async fn compute(
     headers: HeaderMap,
     Body(asked): Body<CaptureDepthRequest>,
 ) -> Result<Json<Begun>, Failure> {
-    require_client(&app, &headers)?;
-    let folder = sessions::folder_of(&app.session, &name)?;
+    require_control(&app, &headers)?;
+    let folder = sessions::existing(&app.session, &name)?;
     let CaptureDepthRequest { corrected, variant, mut options } = asked;
     let operators = options.remove("operators").filter(|value| !value.is_null());
     let refused = |message: String| Failure::new(StatusCode::BAD_REQUEST, message);
@@ -157,7 +157,7 @@ async fn compute(
         ),
     };
     let out = match &variant {
-        Some(variant) => sessions::folder_of(&folder, variant)?,
+        Some(variant) => sessions::variant_of(&folder, variant)?,
         None => folder.clone(),
     };
     let request = DepthRequest {
@@ -184,7 +184,7 @@ async fn region(
     Path(name): Path<String>,
     Body(Region { x, y, width, height }): Body<Region>,
 ) -> Result<Json<Figures>, Failure> {
-    let folder = sessions::folder_of(&app.session, &name)?;
+    let folder = sessions::existing(&app.session, &name)?;
     let at = Rectangle { x, y, width, height };
     let figures = aside(move || Ok(figures(measure::region(&Measured::read(&folder)?, at)?)?)).await?;
     Ok(Json(Figures { figures }))
@@ -195,14 +195,14 @@ async fn profile(
     Path(name): Path<String>,
     Body(Line { from, to }): Body<Line>,
 ) -> Result<Json<Figures>, Failure> {
-    let folder = sessions::folder_of(&app.session, &name)?;
+    let folder = sessions::existing(&app.session, &name)?;
     let figures = aside(move || Ok(figures(measure::profile(&Measured::read(&folder)?, from, to)?)?)).await?;
     Ok(Json(Figures { figures }))
 }
 
 /// The depth maps of two captures, to be compared.
 fn both(app: &App, names: [&str; 2]) -> Result<[std::path::PathBuf; 2], Failure> {
-    let [first, second] = names.map(|name| sessions::folder_of(&app.session, name));
+    let [first, second] = names.map(|name| sessions::existing(&app.session, name));
     Ok([first?.join("depth.npy"), second?.join("depth.npy")])
 }
 
@@ -234,7 +234,7 @@ async fn difference_map(
 }
 
 async fn mesh(State(app): Shared, Path(name): Path<String>) -> Result<Response, Failure> {
-    let folder = sessions::folder_of(&app.session, &name)?;
+    let folder = sessions::existing(&app.session, &name)?;
     let bytes = aside(move || Ok(measure::mesh(&folder, MESH_PIXELS)?)).await?;
     Ok(bytes.into_response())
 }

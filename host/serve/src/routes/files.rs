@@ -1,9 +1,6 @@
 //! A capture's files, alone, as one ZIP, and as a page.
 
-use std::{
-    io::{Cursor, Write},
-    path::PathBuf,
-};
+use std::path::PathBuf;
 
 use axum::{
     extract::{Path, State},
@@ -11,10 +8,13 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use farnear_workflows::{report, sessions};
-use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use super::{Shared, aside};
-use crate::{api::Api, failure::Failure};
+use crate::{
+    api::Api,
+    failure::Failure,
+    transfer::{file_body, regular_file, zip_body},
+};
 
 /// What a report may load: what stands in it.
 const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
@@ -43,21 +43,21 @@ pub fn routes(api: Api) -> Api {
 }
 
 async fn file(State(app): Shared, Path((name, file)): Path<(String, String)>) -> Result<Response, Failure> {
-    send(sessions::folder_of(&app.session, &name)?, file).await
+    send(sessions::existing(&app.session, &name)?, file).await
 }
 
 async fn variant(
     State(app): Shared,
     Path((name, variant, file)): Path<(String, String, String)>,
 ) -> Result<Response, Failure> {
-    send(sessions::folder_of(&sessions::folder_of(&app.session, &name)?, &variant)?, file).await
+    send(sessions::variant_of(&sessions::existing(&app.session, &name)?, &variant)?, file).await
 }
 
 async fn send(folder: PathBuf, file: String) -> Result<Response, Failure> {
     let path = sessions::folder_of(&folder, &file)?;
     let missing = format!("file {file} in {}", folder.file_name().unwrap_or_default().to_string_lossy());
-    let bytes = aside(move || match std::fs::read(&path) {
-        Ok(bytes) => Ok(bytes),
+    let opened = aside(move || match regular_file(&path) {
+        Ok(file) => Ok(file),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(Failure::missing(&missing)),
         Err(error) => Err(Failure::new(StatusCode::INTERNAL_SERVER_ERROR, format!("{missing}: {error}"))),
     })
@@ -68,29 +68,27 @@ async fn send(folder: PathBuf, file: String) -> Result<Response, Failure> {
         _ => "application/octet-stream",
     };
     // A map may be computed anew under the same name.
-    Ok(([(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")], bytes).into_response())
+    Ok(([(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")], file_body(opened))
+        .into_response())
 }
 
 async fn zipped(State(app): Shared, Path(name): Path<String>) -> Result<Response, Failure> {
-    let folder = sessions::folder_of(&app.session, &name)?;
-    let inside = name.clone();
-    let bytes = aside(move || {
-        let capture = sessions::read(&folder)?;
-        let failed =
-            |error: String| Failure::new(StatusCode::INTERNAL_SERVER_ERROR, format!("{inside}: {error}"));
-        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-        // Pictures are compressed already, and maps of noise hardly can be.
-        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-        for file in &capture.files {
-            let content = std::fs::read(folder.join(file)).map_err(|error| failed(error.to_string()))?;
-            archive
-                .start_file(format!("{inside}/{file}"), options)
-                .map_err(|error| failed(error.to_string()))?;
-            archive.write_all(&content).map_err(|error| failed(error.to_string()))?;
+    let folder = sessions::existing(&app.session, &name)?;
+    let read = folder.clone();
+    let files = aside(move || {
+        let capture = sessions::read(&read)?;
+        let mut files = capture.files;
+        for variant in &capture.variants {
+            let of = sessions::variant_of(&read, variant)?;
+            let entries = std::fs::read_dir(&of).into_iter().flatten().flatten();
+            let regular = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
+            let inside = of.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            files.extend(regular.map(|entry| format!("{inside}/{}", entry.file_name().display())));
         }
-        Ok(archive.finish().map_err(|error| failed(error.to_string()))?.into_inner())
+        Ok(files)
     })
     .await?;
+    let body = zip_body(folder, name.clone(), files);
     let disposition = format!("attachment; filename=\"{name}.zip\"");
     let headers: [(HeaderName, HeaderValue); 2] = [
         (header::CONTENT_TYPE, HeaderValue::from_static("application/zip")),
@@ -99,11 +97,11 @@ async fn zipped(State(app): Shared, Path(name): Path<String>) -> Result<Response
             HeaderValue::try_from(disposition).unwrap_or(HeaderValue::from_static("attachment")),
         ),
     ];
-    Ok((headers, bytes).into_response())
+    Ok((headers, body).into_response())
 }
 
 async fn page(State(app): Shared, Path(name): Path<String>) -> Result<Response, Failure> {
-    let folder = sessions::folder_of(&app.session, &name)?;
+    let folder = sessions::existing(&app.session, &name)?;
     let page = aside(move || Ok(report::html(&folder)?)).await?;
     let headers = [
         (header::CONTENT_TYPE, "text/html; charset=utf-8"),

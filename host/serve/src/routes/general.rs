@@ -2,17 +2,18 @@
 
 use axum::{
     Json,
-    extract::State,
+    extract::{ConnectInfo, State},
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Shared, aside, require_control, secret};
+use super::{Body, Shared, aside, delayed, require_control, secret, too_many};
 use crate::{
     api::{Api, For},
     app::lock,
+    connections::Peer,
     control::HandOverError,
     failure::Failure,
     socket,
@@ -130,7 +131,10 @@ async fn ask(
     if app.with_control(|control| control.request(secret(&headers))) {
         return Ok(Json(DONE));
     }
-    Err(Failure::new(StatusCode::FORBIDDEN, "unknown client: send the secret of a connected socket in x-farnear-client"))
+    Err(Failure::new(
+        StatusCode::FORBIDDEN,
+        "unknown client: send the secret of a connected socket in x-farnear-client",
+    ))
 }
 
 async fn hand_over(
@@ -149,9 +153,20 @@ async fn hand_over(
     Ok(Json(DONE))
 }
 
-async fn login(State(app): Shared, Body(Login { token }): Body<Login>) -> Response {
+async fn login(
+    State(app): Shared,
+    ConnectInfo(Peer(peer)): ConnectInfo<Peer>,
+    Body(Login { token }): Body<Login>,
+) -> Response {
+    if app.throttle.is_delayed(peer.address()) {
+        return too_many();
+    }
     match app.guard.cookie(&token) {
         Some(cookie) => ([(header::SET_COOKIE, cookie)], Json(DONE)).into_response(),
-        None => Failure::new(StatusCode::UNAUTHORIZED, "this is not the token").into_response(),
+        None if delayed(&app, Some(&peer)).await => {
+            app.note(format!("warning: wrong token from {}", peer.address()));
+            Failure::new(StatusCode::UNAUTHORIZED, "this is not the token").into_response()
+        }
+        None => too_many(),
     }
 }

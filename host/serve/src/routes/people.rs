@@ -4,12 +4,11 @@ use std::{fs, path::PathBuf};
 
 use axum::{
     Json,
-    body::Bytes,
+    body::Body as AxumBody,
     extract::{Path, State},
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use farnear_files::staging::write_file;
 use farnear_shadow::sun::Model as SunModel;
 use farnear_shadow::{CameraFile, camera};
 use farnear_workflows::{
@@ -32,13 +31,14 @@ use crate::{
     job_queue::Task,
     picture_message::person,
     routes::rig::{begin, connected, figures},
+    transfer,
     view::{Begun, DONE, Done},
 };
 
 /// The folder of videos and masks in the session's.
 const FOLDER: &str = "people";
 /// Longest video that a browser may send.
-const VIDEO_MAX_BYTES: usize = 256 << 20;
+const VIDEO_MAX_BYTES: u64 = 256 << 20;
 /// The model that comes with the program.
 const USUAL_MODEL: &str = "everyday";
 
@@ -123,7 +123,7 @@ pub struct Removing {
 /// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<People, _, _>("/api/people", "Videos that were sent, activities that are known.", people)
-        .put_bytes::<Done, _, _>("/api/people/videos/{video}", "Sends a video.", VIDEO_MAX_BYTES, receive)
+        .put_bytes::<Done, _, _>("/api/people/videos/{video}", "Uploads a video.", receive)
         .post::<RecogniseRequest, Begun, _, _>(
             "/api/people/recognise",
             For::Control,
@@ -175,17 +175,22 @@ async fn receive(
     State(app): Shared,
     Path(name): Path<String>,
     headers: HeaderMap,
-    bytes: Bytes,
+    body: AxumBody,
 ) -> Result<Json<Done>, Failure> {
-    require_client(&app, &headers)?;
+    require_control(&app, &headers)?;
     let path = sessions::folder_of(&folder(&app), &name)?;
-    aside(move || {
-        let folder = folder(&app);
-        fs::create_dir_all(&folder).map_err(|source| WorkflowError::Folder { folder, source })?;
-        write_file(&path, &bytes).map_err(WorkflowError::from)?;
-        Ok(Json(DONE))
+    let (within, limits) = (folder(&app), app.limits);
+    let used = aside(move || {
+        fs::create_dir_all(&within)
+            .map_err(|source| WorkflowError::Folder { folder: within.clone(), source })?;
+        let entries = fs::read_dir(&within).into_iter().flatten().flatten();
+        let files = entries.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);
+        Ok(files.map(|file| file.len()).sum::<u64>())
     })
-    .await
+    .await?;
+    let left = limits.upload_quota_bytes.saturating_sub(used).min(VIDEO_MAX_BYTES);
+    transfer::receive(body, &path, left, limits.body_timeout).await?;
+    Ok(Json(DONE))
 }
 
 async fn recognise(

@@ -90,7 +90,8 @@ async fn list(State(app): Shared) -> Result<Json<Recordings>, Failure> {
             .filter_map(|entry| {
                 let name = entry.file_name().to_string_lossy().into_owned();
                 let bytes = entry.metadata().ok()?.len();
-                let whole = name.ends_with(ENDING) && !name.starts_with('.');
+                let regular = entry.file_type().is_ok_and(|kind| kind.is_file());
+                let whole = regular && name.ends_with(ENDING) && !name.starts_with('.');
                 whole.then(|| OneRecording { name, megabytes: (bytes as f64 / 1e5).round() / 10.0 })
             })
             .collect();

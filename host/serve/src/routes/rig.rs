@@ -134,7 +134,12 @@ pub struct Alarms {
 pub fn routes(api: Api) -> Api {
     api.post::<Nothing, Done, _, _>("/api/rig/connect", For::Control, "Connects to the rig again.", connect)
         .post::<Home, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)
-        .post::<Move, Begun, _, _>("/api/rig/move", For::Control, "Moves axes to absolute positions.", move_to)
+        .post::<Move, Begun, _, _>(
+            "/api/rig/move",
+            For::Control,
+            "Moves axes to absolute positions.",
+            move_to,
+        )
         .post::<Goto, Begun, _, _>("/api/rig/goto", For::Control, "Moves to the far or the near focus.", go)
         .post::<Seek, Begun, _, _>(
             "/api/rig/focus",
@@ -247,7 +252,11 @@ async fn move_to(
     begin(&app, Task { kind: "move", title: format!("Move {}", words.join(", ")), work: Box::new(work) })
 }
 
-async fn go(State(app): Shared, headers: HeaderMap, Body(request): Body<Goto>) -> Result<Json<Begun>, Failure> {
+async fn go(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(request): Body<Goto>,
+) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
     let (focus, title) = match request.focus {
@@ -350,5 +359,8 @@ async fn clear(
     let rig = RigAddress::Open(connected(&app)?);
     let work =
         move |_: &App, context: &Context<'_>| figures(alarms::alarms(&rig, Some(request.number), context)?);
-    begin(&app, Task { kind: "alarm", title: format!("Clear alarm {}", request.number), work: Box::new(work) })
+    begin(
+        &app,
+        Task { kind: "alarm", title: format!("Clear alarm {}", request.number), work: Box::new(work) },
+    )
 }

@@ -11,7 +11,7 @@ use super::client::{Served, Socket};
 const RECORD: &str = include_str!("../../../workflows/src/sessions/capture.toml");
 
 /// A capture of a textured pqueue; the near image is a little softer.
-fn put(served: &Served, name: &str, seed: usize) {
+pub fn put(served: &Served, name: &str, seed: usize) {
     let folder = served.session.join(name);
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join("capture.toml"), RECORD).unwrap();
@@ -31,8 +31,13 @@ fn computed(served: &Served, client: &str, name: &str, request: &Value) -> Value
 fn depth_is_computed_measured_compared_and_taken_along() {
     let served = Served::captures_only();
     let client = Socket::open(&served).secret.clone();
+    served.state_when(|state| state["control"]["holder"].is_null());
     let socket = Socket::open(&served);
-    assert_eq!(served.post("/api/captures/pair-001/depth", &client, "{}").status, 403, "its socket has gone");
+    assert_eq!(
+        served.post("/api/captures/pair-001/depth", &client, "{}").status,
+        403,
+        "its socket has closed"
+    );
     let client = socket.secret.clone();
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 77);
@@ -198,4 +203,26 @@ fn what_another_program_does_to_the_session_is_seen_and_said() {
     fs::remove_dir_all(&served.session).unwrap();
     assert_eq!(served.get("/api/state").status, 200);
     assert!(served.get("/api/captures/moved").status >= 400);
+}
+
+#[test]
+fn captures_with_blanks_are_opened_renamed_and_deleted_by_the_browser_in_control() {
+    let served = Served::captures_only();
+    let (holder, watcher) = (Socket::open(&served), Socket::open(&served));
+    put(&served, "a & b", 0);
+    put(&served, "taken", 0);
+    assert_eq!(served.get("/api/captures/a%20%26%20b").status, 200);
+    assert_eq!(served.get("/api/captures/a%20%26%20b/files/far.png").status, 200);
+    let rename = |client: &str, to: &str| {
+        served.post("/api/captures/a%20%26%20b/rename", client, &json!({ "name": to }).to_string()).status
+    };
+    assert_eq!(rename(&watcher.secret, "c"), 403);
+    assert_eq!((rename(&holder.secret, "taken"), rename(&holder.secret, "people")), (400, 400));
+    assert_eq!(rename(&holder.secret, "step 2 mm"), 200);
+    assert!(served.session.join("step 2 mm/far.png").is_file());
+    let delete = |client: &str| {
+        served.ask("DELETE", "/api/captures/step%202%20mm", &[("x-farnear-client", client)], "{}").status
+    };
+    assert_eq!((delete(&watcher.secret), delete(&holder.secret), delete(&holder.secret)), (403, 200, 404));
+    assert!(!served.session.join("step 2 mm").exists() && served.session.join("taken").exists());
 }

@@ -13,7 +13,7 @@ use std::{
 
 use farnear_protocol::Micros;
 use farnear_scripted_board::{Faults, plug_in};
-use farnear_serve::{Listen, ServeSettings, serve};
+use farnear_serve::{Limits, Listen, ServeSettings, serve};
 use farnear_workflows::{
     Cancel, Context, Unattended,
     rig::{
@@ -53,6 +53,15 @@ impl Served {
         board: Option<Box<dyn std::any::Any>>,
         listen: impl FnOnce(&Path) -> Listen,
     ) -> Self {
+        Self::limited(rig, board, listen, Limits::default())
+    }
+
+    pub fn limited(
+        rig: Option<RigAddress>,
+        board: Option<Box<dyn std::any::Any>>,
+        listen: impl FnOnce(&Path) -> Listen,
+        limits: Limits,
+    ) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let session = folder.path().join("session");
         let shots = folder.path().join("shots");
@@ -64,7 +73,7 @@ impl Served {
             settings: Vec::new(),
         };
         let listen = listen(folder.path());
-        let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen };
+        let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen, limits };
         let (cancel, (sender, address)) = (Cancel::default(), channel());
         let request = cancel.clone();
         let thread = std::thread::spawn(move || {
@@ -160,11 +169,14 @@ pub struct Answer {
 }
 
 impl Answer {
-    fn parse(bytes: &[u8]) -> Self {
+    pub fn parse(bytes: &[u8]) -> Self {
         let split = bytes.windows(4).position(|four| four == b"\r\n\r\n").unwrap_or(bytes.len());
         let headers = String::from_utf8_lossy(&bytes[..split]).into_owned();
         let status = headers.split(' ').nth(1).and_then(|text| text.parse().ok()).unwrap_or(0);
-        Self { status, headers, body: bytes[(split + 4).min(bytes.len())..].to_vec() }
+        let body = &bytes[(split + 4).min(bytes.len())..];
+        let chunked = headers.to_ascii_lowercase().contains("transfer-encoding: chunked");
+        let body = if chunked { unchunked(body) } else { body.to_vec() };
+        Self { status, headers, body }
     }
 
     pub fn json(&self) -> Value {
@@ -174,6 +186,20 @@ impl Answer {
     pub fn error(&self) -> String {
         self.json()["error"].as_str().unwrap_or_default().to_owned()
     }
+}
+
+/// The parts of a chunked body, as far as it came.
+fn unchunked(mut rest: &[u8]) -> Vec<u8> {
+    let mut body = Vec::new();
+    while let Some(end) = rest.windows(2).position(|two| two == b"\r\n") {
+        let size =
+            std::str::from_utf8(&rest[..end]).ok().and_then(|text| usize::from_str_radix(text, 16).ok());
+        let Some(size) = size.filter(|size| *size > 0) else { break };
+        let from = end + 2;
+        body.extend(&rest[from..(from + size).min(rest.len())]);
+        rest = rest.get(from + size + 2..).unwrap_or_default();
+    }
+    body
 }
 
 /// A socket, as RFC 6455 has it, without what a test does not need.

@@ -59,7 +59,11 @@ fn a_reloaded_page_keeps_control_and_its_job_while_another_browser_watches() {
     served.state_when(|state| state["control"]["holder"] == again.client);
     std::thread::sleep(farnear_serve::control::RESERVED + std::time::Duration::from_millis(500));
     let state = served.get("/api/state").json();
-    assert_eq!((&state["job"]["id"], &state["job"]["phase"]), (&begun["job"], &"running".into()), "{state:#}");
+    assert_eq!(
+        (&state["job"]["id"], &state["job"]["phase"]),
+        (&begun["job"], &"running".into()),
+        "{state:#}"
+    );
     assert_eq!(served.post("/api/rig/home", &watcher.secret, "{}").status, 403);
     served.post("/api/stop", "", "{}");
 }

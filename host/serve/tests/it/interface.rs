@@ -64,6 +64,7 @@ fn body_of(method: &str, path: &str) -> &'static str {
             r#"{"optics":{"lens":{"focal_length_mm":50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900,"max_blur_px":2.7}}}"#
         }
         ("post", "/api/captures") => r#"{"kind":"still"}"#,
+        ("post", "/api/captures/{capture}/rename") => r#"{"name":"renamed"}"#,
         ("put", "/api/captures/{capture}/note") => r#"{"rating":1,"text":"n"}"#,
         ("post", "/api/captures/{capture}/region") => r#"{"x":0,"y":0,"width":2,"height":2}"#,
         ("post", "/api/captures/{capture}/profile") => r#"{"from":[0,0],"to":[3,3]}"#,

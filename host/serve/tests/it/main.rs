@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 #![cfg(target_os = "linux")] // where a pseudo-terminal holds the board
 
+mod attacks;
 mod captures;
 mod client;
 mod control;

@@ -1,0 +1,201 @@
+//! Files to and from a client, a piece at a time: memory does not grow with the size of a file or with the number of slow clients.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Read, Write},
+    path::{Path, PathBuf},
+    pin::{Pin, pin},
+    sync::{Arc, Mutex},
+    task::{Context, Poll},
+    time::Duration,
+};
+
+use axum::{
+    body::{Body, Bytes},
+    http::StatusCode,
+};
+use futures_core::Stream;
+use zip::{
+    CompressionMethod, ZipWriter,
+    write::{SimpleFileOptions, StreamWriter},
+};
+
+use crate::{app::lock, failure::Failure};
+
+/// Bytes of a piece.
+const PIECE: usize = 64 * 1024;
+
+/// An open file as the body of an answer.
+pub fn file_body(file: File) -> Body {
+    Body::from_stream(FileStream { file, buffer: vec![0; PIECE] })
+}
+
+struct FileStream {
+    file: File,
+    buffer: Vec<u8>,
+}
+
+impl Stream for FileStream {
+    type Item = io::Result<Bytes>;
+
+    fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        let Self { file, buffer } = &mut *self;
+        Poll::Ready(match file.read(buffer) {
+            Ok(0) => None,
+            Ok(count) => buffer.get(..count).map(|piece| Ok(Bytes::copy_from_slice(piece))),
+            Err(error) => Some(Err(error)),
+        })
+    }
+}
+
+/// The written part of an archive that has not been sent.
+#[derive(Clone, Default)]
+struct Unsent(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Unsent {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        lock(&self.0).extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Files of `folder` as a ZIP; `files` are the paths below it, `name` is the folder in the archive.
+pub fn zip_body(folder: PathBuf, name: String, mut files: Vec<String>) -> Body {
+    files.reverse();
+    let unsent = Unsent::default();
+    let archive = Some(ZipWriter::new_stream(unsent.clone()));
+    Body::from_stream(ZipStream {
+        folder,
+        name,
+        files,
+        current: None,
+        archive,
+        unsent,
+        buffer: vec![0; PIECE],
+    })
+}
+
+struct ZipStream {
+    folder: PathBuf,
+    name: String,
+    /// The next one last.
+    files: Vec<String>,
+    current: Option<File>,
+    archive: Option<ZipWriter<StreamWriter<Unsent>>>,
+    unsent: Unsent,
+    buffer: Vec<u8>,
+}
+
+impl ZipStream {
+    /// Writes the next piece into the archive; `false` after the last.
+    fn step(&mut self) -> io::Result<bool> {
+        let Some(archive) = &mut self.archive else { return Ok(false) };
+        if let Some(file) = &mut self.current {
+            match file.read(&mut self.buffer)? {
+                0 => self.current = None,
+                count => archive.write_all(self.buffer.get(..count).unwrap_or_default())?,
+            }
+            return Ok(true);
+        }
+        if let Some(file) = self.files.pop() {
+            // Images are compressed already, and noise in maps hardly compresses.
+            let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+            archive.start_file(format!("{}/{file}", self.name), options)?;
+            self.current = Some(regular_file(&self.folder.join(file))?);
+            return Ok(true);
+        }
+        if let Some(archive) = self.archive.take() {
+            archive.finish()?;
+        }
+        Ok(true)
+    }
+}
+
+impl Stream for ZipStream {
+    type Item = io::Result<Bytes>;
+
+    fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        loop {
+            match self.step() {
+                Err(error) => {
+                    self.archive = None;
+                    return Poll::Ready(Some(Err(error)));
+                }
+                Ok(more) => {
+                    let piece = std::mem::take(&mut *lock(&self.unsent.0));
+                    if !piece.is_empty() {
+                        return Poll::Ready(Some(Ok(piece.into())));
+                    }
+                    if !more {
+                        return Poll::Ready(None);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Opens a regular file; a link, FIFO or device is not found.
+///
+/// # Errors
+/// [`io::Error`] of the system.
+pub fn regular_file(path: &Path) -> io::Result<File> {
+    match fs::symlink_metadata(path)?.is_file() {
+        true => File::open(path),
+        false => Err(io::ErrorKind::NotFound.into()),
+    }
+}
+
+/// Writes an uploaded body to `path`; nothing is left of an upload that fails.
+///
+/// # Errors
+/// 413 above `bytes_max`, 408 after a pause longer than `pause_max`, 500 for errors of the disk.
+pub async fn receive(body: Body, path: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
+    let part =
+        path.with_file_name(format!(".{}.part", path.file_name().unwrap_or_default().to_string_lossy()));
+    let received = receive_part(body, &part, bytes_max, pause_max).await;
+    let moved = received.and_then(|bytes| {
+        fs::rename(&part, path).map_err(|error| disk(path, &error))?;
+        Ok(bytes)
+    });
+    if moved.is_err() {
+        let _ = fs::remove_file(&part); // it may not have been created
+    }
+    moved
+}
+
+fn disk(path: &Path, error: &io::Error) -> Failure {
+    Failure::new(StatusCode::INTERNAL_SERVER_ERROR, format!("cannot write {}: {error}", path.display()))
+}
+
+async fn receive_part(body: Body, part: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
+    let opened = OpenOptions::new().write(true).create(true).truncate(true).open(part);
+    let mut file = opened.map_err(|error| disk(part, &error))?;
+    let mut stream = pin!(body.into_data_stream());
+    let mut bytes = 0;
+    loop {
+        let next = std::future::poll_fn(|cx| stream.as_mut().poll_next(cx));
+        let piece = match tokio::time::timeout(pause_max, next).await {
+            Ok(None) => return Ok(bytes),
+            Ok(Some(Ok(piece))) => piece,
+            Ok(Some(Err(error))) => {
+                return Err(Failure::new(StatusCode::BAD_REQUEST, format!("the upload broke off: {error}")));
+            }
+            Err(_) => {
+                let error = format!("the upload paused for more than {} s", pause_max.as_secs());
+                return Err(Failure::new(StatusCode::REQUEST_TIMEOUT, error));
+            }
+        };
+        bytes += piece.len() as u64;
+        if bytes > bytes_max {
+            let error = format!("the upload is larger than {} MB, the space left", bytes_max >> 20);
+            return Err(Failure::new(StatusCode::PAYLOAD_TOO_LARGE, error)
+                .with_hint("Delete videos in the session's folder people, or raise --upload-quota."));
+        }
+        file.write_all(&piece).map_err(|error| disk(part, &error))?;
+    }
+}
