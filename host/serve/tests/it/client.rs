@@ -90,8 +90,8 @@ impl Served {
         self.exchange(bytes, true)
     }
 
-    /// A server takes the end of what is sent for a client that has gone, and gives up what it was doing.
-    fn exchange(&self, bytes: &[u8], ends: bool) -> Vec<u8> {
+    /// Sends these bytes and gives all that comes back. A server takes the end of what is sent for a client that has gone, and gives up what it was doing.
+    pub fn exchange(&self, bytes: &[u8], ends: bool) -> Vec<u8> {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let _ = stream.write_all(bytes); // it may refuse to hear more
