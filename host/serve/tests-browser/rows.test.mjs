@@ -37,7 +37,7 @@ test("the first view leads: home and focus in one click, with progress in the im
 test("a job that fails at once is reported with the next step, and the error goes when the next one ends well", async () => {
   const page = await open(browser, `${server.address}#guides/psf`);
   await post(page, "/api/calibrate/psf", { targets: [], series: false, model: "gaussian" });
-  await post(page, "/api/calibrate/correction", { method: "planar" });
+  await post(page, "/api/calibrate/correction", { method: "cdc" });
   await page.locator(".notice.error").first().waitFor();
   await page.context().close();
 });
