@@ -153,7 +153,8 @@ async fn find_psf(
 ) -> Result<Json<Begun>, Failure> {
     require_client(&app, &headers)?;
     let bad = |error: String| Failure::new(StatusCode::BAD_REQUEST, error);
-    let model: Model = asked.model.parse().map_err(|error| bad(format!("model {:?}: {error}", asked.model)))?;
+    let model: Model =
+        asked.model.parse().map_err(|error| bad(format!("model {:?}: {error}", asked.model)))?;
     let mut request =
         CalibratePsfRequest { optics: app.optics_file(), model, ..CalibratePsfRequest::default() };
     let mut add = |folder: &FsPath, depth_mm: f64| {
