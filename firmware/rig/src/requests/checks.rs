@@ -62,12 +62,43 @@ impl Rig {
 
     /// The lowest that an axis comes on the way it is on.
     pub(super) fn lowest(&self, axis: Axis) -> Nanometres {
-        self.stage.stepper(axis).map_or_else(|| self.stage.fine.lowest(), Stepper::lowest)
+        let Some(stepper) = self.stage.stepper(axis) else { return self.stage.fine.lowest() };
+        let lowest = stepper.lowest();
+        let homes = !stepper.is_still() && lowest <= stepper.lowest_of_homing();
+        if homes { self.below_carried(axis, lowest) } else { lowest }
     }
 
-    /// The lowest that an axis comes to where it is homed; the piezo, where it is relaxed.
+    /// The lowest that an axis comes to where it is homed with the piezo where it is; the piezo, where it is relaxed.
     pub(super) fn lowest_of_homing(&self, axis: Axis) -> Nanometres {
-        self.stage.stepper(axis).map_or(Nanometres(0), Stepper::lowest_of_homing)
+        let lowest = self.stage.stepper(axis).map_or(Nanometres(0), Stepper::lowest_of_homing);
+        self.below_carried(axis, lowest)
+    }
+
+    /// The piezo carries the tab of stage A's home switch, so that the switch is met lower by the piezo's extension.
+    fn below_carried(&self, axis: Axis, lowest: Nanometres) -> Nanometres {
+        let carried = self.stage.carried(axis).unwrap_or(self.stage.measured(Axis::SensorFine));
+        Nanometres(lowest.0.saturating_sub(carried.0.max(0)))
+    }
+
+    /// A routine keeps sensor and lens apart with every axis that it moves at its extreme: one check for all of them, because
+    /// each axis alone may stay outside the limit while both together pass it.
+    pub(super) fn routine_must_not_come_close(&self, axes: &[Axis]) -> Result<(), RequestError> {
+        let piezo_relaxes = axes.contains(&Axis::SensorFine);
+        let extreme = |axis| {
+            let homing = match self.stage.stepper(axis) {
+                // The routine relaxes the piezo before it looks for the switch.
+                Some(stepper) if piezo_relaxes => stepper.lowest_of_homing(),
+                _ => self.lowest_of_homing(axis),
+            };
+            homing.min(self.lowest(axis))
+        };
+        let retreats = |axis: &Axis| {
+            self.stage.state(*axis) == PositionState::Homed && extreme(*axis) >= self.stage.measured(*axis)
+        };
+        if axes.iter().all(retreats) {
+            return Ok(());
+        }
+        self.must_be_apart(|axis| if axes.contains(&axis) { extreme(axis) } else { self.lowest(axis) })
     }
 
     /// The lowest that an axis comes on its way to a target.

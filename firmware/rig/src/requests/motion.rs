@@ -46,9 +46,7 @@ impl Rig {
         let work = Calibrating::new(routine).ok_or(RequestError::NoSuchRoutine)?;
         self.may_move(silence)?;
         self.all_must_be_free()?;
-        for axis in work.axes() {
-            self.must_not_come_close(*axis, self.lowest_of_homing(*axis))?;
-        }
+        self.routine_must_not_come_close(work.axes())?;
         self.works.whole = Some(Active { request, silence, work: WholeWork::Calibration(work) });
         Ok(Response::Accepted)
     }

@@ -349,6 +349,22 @@ fn homing_and_the_piezos_routines_are_kept_apart_as_far_as_they_go() {
 }
 
 #[test]
+fn the_distance_limit_holds_with_every_axis_of_a_routine_at_its_extreme() {
+    // Each axis alone stays outside the limit; both together pass it by 0.1 mm.
+    let mut bench = Bench::both_homed();
+    bench.work(&go(Axis::SensorFine, 195_000));
+    let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 46_900_000 };
+    bench.ask(&setting).1.expect("in range");
+    let refused = bench.ask(&Request::Calibrate { routine: Routine::Gauge, silence: bench::SILENCE }).1;
+    assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{refused:?}");
+    // The piezo carries the tab of the switch: homing goes lower by as much as the piezo is extended.
+    let refused = bench.ask(&home(Axis::SensorCoarse)).1;
+    assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{refused:?}");
+    let allowed = bench.ask(&Request::Calibrate { routine: Routine::Piezo, silence: bench::SILENCE }).1;
+    assert!(allowed.is_ok(), "the piezo alone stays outside it: {allowed:?}");
+}
+
+#[test]
 fn a_lens_below_its_zero_comes_up_before_the_sensor_is_homed() {
     // Campaign, seed 106916: a dead switch let the lens run below its zero, farther than homing goes.
     let mut bench = Bench::both_homed();
