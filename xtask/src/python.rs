@@ -19,8 +19,15 @@ use crate::{
 /// The package that only those compile who have Python.
 pub const PACKAGE: &str = "farnear-python";
 /// What the tests need beside the package.
-const NEEDS: [&str; 5] =
-    ["numpy>=1.23", "matplotlib>=3.6", "pytest>=7", "scikit-learn>=1.6", "useq-schema>=0.5"];
+const NEEDS: [&str; 7] = [
+    "numpy>=1.23",
+    "matplotlib>=3.6",
+    "pytest>=7",
+    "scikit-learn>=1.6",
+    "useq-schema>=0.5",
+    "mcap-ros2-support>=0.5",
+    "mypy>=1.10",
+];
 /// Says whether a Python is new enough and can make environments.
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
 

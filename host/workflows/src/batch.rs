@@ -7,10 +7,12 @@
 
 mod error;
 mod fields;
+mod generate;
 mod jobs;
 mod manifest;
 mod place;
 mod provenance;
+mod summary;
 mod tally;
 
 use std::{
@@ -20,15 +22,20 @@ use std::{
     time::{Instant, SystemTime},
 };
 
+use farnear_files::staging::write_file;
 use serde::Serialize;
 use serde_json::Value;
 
-pub use self::error::BatchError;
+pub use self::{
+    error::BatchError,
+    generate::{Pattern, generate},
+};
 use self::{
     fields::Fields,
     manifest::{Entry, Manifest},
     place::{Found, Place},
     provenance::{Provenance, Sums},
+    summary::Summary,
     tally::Tally,
 };
 use crate::{
@@ -54,6 +61,12 @@ pub struct BatchSettings {
     pub verify: bool,
     /// Where failures are written, a JSON line each; without it `NAME.failures.jsonl` beside the manifest.
     pub failures: Option<PathBuf>,
+    /// Table of all jobs of the shard with their figures, as CSV.
+    pub summary: Option<PathBuf>,
+    /// Report what would be done, and do nothing.
+    pub dry_run: bool,
+    /// Whether failed jobs leave the run a success: they are in the file of failures.
+    pub allow_failures: bool,
 }
 
 /// Every so-many-th job.
@@ -107,6 +120,8 @@ pub enum State {
     Done,
     /// Its result was there.
     Already,
+    /// It would be made: a dry run.
+    Todo,
     /// It has none.
     Failed,
 }
@@ -148,10 +163,17 @@ pub struct BatchFigures {
     pub done: usize,
     /// Made before.
     pub already: usize,
+    /// To be made, in a dry run.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub todo: usize,
     /// Without a result.
     pub failed: usize,
     /// For all.
     pub seconds: f64,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Does the jobs of a manifest; `on_job` is told of each as it ends, one at a time.
@@ -165,9 +187,20 @@ pub fn run(
     on_job: &(dyn Fn(&JobReport) -> io::Result<()> + Sync),
 ) -> Result<BatchFigures> {
     let start = Instant::now();
-    let total = settings.shard.share(Manifest::count(&settings.manifest)?);
+    let jobs = Manifest::count(&settings.manifest)?;
+    if jobs == 0 {
+        return Err(BatchError::Empty { path: settings.manifest.clone() }.into());
+    }
+    let total = settings.shard.share(jobs);
     let failures = settings.failures.clone().unwrap_or_else(|| failures_file(settings));
-    let tally = Tally::new(total, &failures, context, on_job)?;
+    let summary = Mutex::new(Summary::default());
+    let on_job = |report: &JobReport| {
+        if settings.summary.is_some() {
+            summary.lock().unwrap_or_else(PoisonError::into_inner).add(report);
+        }
+        on_job(report)
+    };
+    let tally = Tally::new(total, &failures, context, &on_job)?;
     let work = Work {
         settings,
         begun: SystemTime::now(),
@@ -181,11 +214,19 @@ pub fn run(
     };
     work.on_all_cores()?;
     let figures = BatchFigures { seconds: rounded(start.elapsed().as_secs_f64(), 3), ..tally.end() };
-    let BatchFigures { jobs, done, already, failed, seconds } = figures;
-    let sum = format!("{done} done, {already} already done, {failed} failed, of {jobs} jobs");
+    let BatchFigures { jobs, done, already, todo, failed, seconds } = figures;
+    let planned = if settings.dry_run { format!("{todo} to do, ") } else { String::new() };
+    let sum = format!("{planned}{done} done, {already} already done, {failed} failed, of {jobs} jobs");
     context.cancel.check(&format!("doing jobs ({sum}); the same command goes on where this one ended"))?;
     context.info(&format!("{sum}, in {seconds} s"));
-    if failed > 0 {
+    if let Some(path) = &settings.summary {
+        let table = summary.lock().unwrap_or_else(PoisonError::into_inner).csv();
+        write_file(
+            path,
+            &table.map_err(|error| BatchError::Write { path: path.clone(), source: error.into() })?,
+        )?;
+    }
+    if failed > 0 && !settings.allow_failures {
         return Err(BatchError::Failed { failed, jobs, failures }.into());
     }
     Ok(figures)
@@ -287,6 +328,9 @@ impl Work<'_> {
             Err(error) if error.is_cancelled() => return Ok(()),
             Err(error) => (State::Failed, None, Some(error.to_string())),
         };
+        if state == State::Failed && !self.settings.dry_run {
+            self.discard(&kind, out.as_deref());
+        }
         let seconds = rounded(start.elapsed().as_secs_f64(), 6);
         let mut warnings = warnings.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         // Said once.
@@ -294,6 +338,13 @@ impl Work<'_> {
             warnings.clear();
         }
         self.tally.tell(&JobReport { job: number, line, kind, out, state, seconds, figures, warnings, error })
+    }
+
+    /// Removes what an earlier run made of a job that has failed now.
+    fn discard(&self, kind: &str, out: Option<&str>) {
+        let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
+        // A result that cannot be removed is reported by the job's own error, which most likely has the same cause.
+        let _ = Place::new(self.base.join(out), kind.makes_file).discard(self.begun);
     }
 
     fn job(&self, kind: &str, fields: &mut Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
@@ -306,7 +357,8 @@ impl Work<'_> {
         let wanted = Provenance::new(kind.name, &wanted, input);
         let place = Place::new(out, kind.makes_file);
         match place.look(&wanted, self.begun, self.settings.verify)? {
-            Found::Done => Ok((State::Already, None)),
+            Found::Done(figures) => Ok((State::Already, figures)),
+            Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),
             Found::ToDo => {
                 let figures = place.fill(wanted, |out| work.run(out, context))?;
                 Ok((State::Done, Some(figures)))
@@ -360,6 +412,9 @@ mod tests {
             shard: shard.parse().expect("a shard"),
             verify: false,
             failures: None,
+            summary: None,
+            dry_run: false,
+            allow_failures: false,
         };
         assert_eq!(failures_file(&settings("1/1")), Path::new("a/pairs.failures.jsonl"));
         assert_eq!(failures_file(&settings("2/3")), Path::new("a/pairs.2of3.failures.jsonl"));

@@ -4,7 +4,7 @@ use std::{io, path::PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use farnear_workflows::batch::{self, BatchSettings, JobReport, Shard};
+use farnear_workflows::batch::{self, BatchSettings, JobReport, Pattern, Shard};
 
 use crate::{report, terminal};
 
@@ -34,7 +34,9 @@ use crate::{report, terminal};
 #[derive(Args)]
 #[command(
     verbatim_doc_comment,
-    after_help = "Example: farnear batch pairs.toml\n\
+    after_help = "Example: farnear batch pairs.csv --generate depth --field 'far=*/far.png' --field 'near=*/near.png' --field 'out=*/depth'\n\
+                  \x20        farnear batch pairs.csv --dry-run\n\
+                  \x20        farnear batch pairs.csv --summary figures.csv\n\
                   \x20        farnear batch clips.csv --shard 2/4 > clips-2.jsonl"
 )]
 pub struct Arguments {
@@ -49,9 +51,24 @@ pub struct Arguments {
     /// Look through results that are done already byte by byte, and make damaged ones again.
     #[arg(long)]
     verify: bool,
-    /// Where failures go [default: MANIFEST's name with .failures.jsonl].
+    /// File for failures, a JSON line each [default: MANIFEST's name with .failures.jsonl].
     #[arg(long, value_name = "FILE")]
     failures: Option<PathBuf>,
+    /// Write a table (CSV) with a row per job and a column per figure, of results made now and before.
+    #[arg(long, value_name = "FILE")]
+    summary: Option<PathBuf>,
+    /// Only report the state of each job: "todo", "already", or "failed" with its message.
+    #[arg(long)]
+    dry_run: bool,
+    /// Exit with 0 even if jobs failed; they are in the file of failures.
+    #[arg(long)]
+    allow_failures: bool,
+    /// Write MANIFEST (CSV) with a job for each file that the first --field matches, and do nothing else.
+    #[arg(long, value_name = "KIND", requires = "field")]
+    generate: Option<String>,
+    /// Field of the jobs to generate; each * is replaced by the match of the same * of the first field. May be repeated.
+    #[arg(long, value_name = "NAME=PATTERN", requires = "generate")]
+    field: Vec<Pattern>,
 }
 
 /// Runs the command.
@@ -59,8 +76,25 @@ pub struct Arguments {
 /// # Errors
 /// See [`batch::run`].
 pub fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { manifest, jobs, shard, verify, failures } = arguments;
-    let settings = BatchSettings { manifest, jobs, shard, verify, failures };
+    let Arguments {
+        manifest,
+        jobs,
+        shard,
+        verify,
+        failures,
+        summary,
+        dry_run,
+        allow_failures,
+        generate,
+        field,
+    } = arguments;
+    if let Some(kind) = generate {
+        let written = batch::generate(&manifest, &kind, &field)?;
+        eprintln!("wrote {} with {written} jobs", manifest.display());
+        return Ok(());
+    }
+    let settings =
+        BatchSettings { manifest, jobs, shard, verify, failures, summary, dry_run, allow_failures };
     let line =
         |told: &JobReport| report::print(told, true).map_err(|error| io::Error::other(format!("{error:#}")));
     batch::run(&settings, &terminal::long_work()?, &line)?;

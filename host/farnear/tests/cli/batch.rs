@@ -337,6 +337,69 @@ fn a_manifest_that_is_none_is_refused_before_anything_is_done() {
     fails(&mut farnear(&["batch", &folder.text("gone.toml")]), 1, &["gone.toml", "No such file"]);
     let manifest = folder.file("list.csv", "far,near\na,b\n");
     fails(&mut farnear(&["batch", &manifest]), 1, &["list.csv, line 1", "`do`"]);
-    // None at all is no failure.
-    assert!(states(&["batch", &folder.file("empty.toml", "")]).is_empty());
+    for (name, text) in [("empty.toml", ""), ("empty.csv", "do,far\n"), ("shared.toml", "[depth]\nwindow = 7\n")] {
+        fails(&mut farnear(&["batch", &folder.file(name, text)]), 1, &[name, "no jobs"]);
+    }
+}
+
+#[test]
+fn a_second_run_repeats_the_figures_of_the_first() {
+    let folder = Folder::new();
+    let manifest = pairs(&folder, 2);
+    let run = |more: &[&str]| {
+        let (stdout, _) = succeeds(farnear(&["batch", &manifest]).args(more));
+        lines(stdout.as_bytes())
+    };
+    let first = run(&[]);
+    assert!(first.iter().all(|line| line["state"] == "done" && line["figures"]["valid"].is_number()), "{first:?}");
+    let table = folder.text("figures.csv");
+    let second = run(&["--summary", &table]);
+    for (first, second) in first.iter().zip(&second) {
+        assert_eq!(second["state"], "already");
+        assert_eq!(first["figures"], second["figures"]);
+    }
+    let table = fs::read_to_string(&table).expect("a table");
+    assert_eq!(table.lines().count(), 3);
+    assert!(table.starts_with("job,line,do,out,state,error,") && table.contains("valid"), "{table}");
+}
+
+#[test]
+fn a_dry_run_reports_what_would_be_done_and_does_nothing() {
+    let folder = Folder::new();
+    let manifest = pairs(&folder, 2);
+    assert_eq!(states(&["batch", &manifest, "--dry-run"]), ["todo"; 2]);
+    assert!(!folder.path("maps").exists());
+    succeeds(&mut farnear(&["batch", &manifest, "--shard", "2/2"]));
+    assert_eq!(states(&["batch", &manifest, "--dry-run"]), ["todo", "already"]);
+}
+
+#[test]
+fn a_job_that_fails_leaves_no_result_of_an_earlier_run() {
+    let folder = Folder::new();
+    let manifest = pairs(&folder, 2);
+    succeeds(&mut farnear(&["batch", &manifest]));
+    fs::remove_file(folder.path("pair/near.png")).expect("the image is there");
+    let (stdout, _) = succeeds(&mut farnear(&["batch", &manifest, "--dry-run", "--allow-failures"]));
+    assert_eq!(lines(stdout.as_bytes()).len(), 2);
+    assert!(folder.path("maps/0/depth.npy").exists(), "a dry run removes nothing");
+    let (stdout, _) = succeeds(&mut farnear(&["batch", &manifest, "--allow-failures"]));
+    assert!(lines(stdout.as_bytes()).iter().all(|line| line["state"] == "failed"));
+    assert!(!folder.path("maps/0").exists() && !folder.path("maps/1").exists());
+    assert_eq!(fs::read_to_string(folder.path("pairs.failures.jsonl")).expect("failures").lines().count(), 2);
+}
+
+#[test]
+fn a_manifest_is_generated_from_patterns() {
+    let folder = Folder::new();
+    pairs(&folder, 0);
+    fs::copy(rig_optics(), folder.path("rig.toml")).expect("a writable folder");
+    let manifest = folder.text("all.csv");
+    let fields = ["far=*/far.png", "near=*/near.png", "out=*/depth", "optics=rig.toml", "write=npy"];
+    let fields: Vec<&str> = fields.iter().flat_map(|field| ["--field", *field]).collect();
+    succeeds(farnear(&["batch", &manifest, "--generate", "depth"]).args(fields));
+    // As a spreadsheet with a comma in numbers writes it.
+    let text = fs::read_to_string(&manifest).expect("a manifest").replace(',', ";");
+    fs::write(&manifest, text).expect("a writable folder");
+    assert_eq!(states(&["batch", &manifest]), ["done"]);
+    assert!(folder.path("pair/depth/depth.npy").exists());
 }

@@ -37,6 +37,15 @@ pub enum BatchError {
         /// What is wrong.
         reason: String,
     },
+    /// A manifest without jobs.
+    #[error("{} holds no jobs: expected [[job]] tables, or rows below the header of a CSV", path.display())]
+    Empty {
+        /// The manifest.
+        path: PathBuf,
+    },
+    /// A pattern for a new manifest that cannot be used.
+    #[error("{0}")]
+    Pattern(String),
     /// A job of a kind that is not known.
     #[error("there is no job `{name}`; expected {known}")]
     UnknownKind {

@@ -6,7 +6,7 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{BufRead, BufReader, Read},
+    io::{BufRead, BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -160,9 +160,24 @@ fn of_row(
     split(fields)
 }
 
-fn csv_source(file: File, path: &Path) -> Result<Source, BatchError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(file);
+/// The separator of a header line: spreadsheets of many countries write semicolons or tabs.
+fn separator(file: &mut File, path: &Path) -> Result<u8, BatchError> {
+    let unreadable = |source| BatchError::Read { path: path.into(), source };
+    let mut header = String::new();
+    // A header that is not UTF-8 is reported by the reader.
+    let _ = BufReader::new(file.by_ref().take(JOB_BYTES_MAX)).read_line(&mut header);
+    file.seek(SeekFrom::Start(0)).map_err(unreadable)?;
+    let count = |separator: u8| header.bytes().filter(|byte| *byte == separator).count();
+    Ok([b',', b';', b'\t'].into_iter().rev().max_by_key(|separator| count(*separator)).unwrap_or(b','))
+}
+
+fn csv_source(mut file: File, path: &Path) -> Result<Source, BatchError> {
+    let delimiter = separator(&mut file, path)?;
+    let mut reader =
+        csv::ReaderBuilder::new().delimiter(delimiter).trim(csv::Trim::All).flexible(true).from_reader(file);
     let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
+    // Spreadsheets begin a file with a byte order mark.
+    let names: csv::StringRecord = names.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
     if !names.iter().any(|name| name == KIND) {
         let header = names.iter().collect::<Vec<_>>().join(",");
         let reason =
@@ -268,6 +283,21 @@ mod tests {
         let of_toml = jobs(of_toml);
         assert_eq!(of_toml, jobs(of_csv));
         assert_eq!(of_toml[0].1["smooth"], ["9"]);
+    }
+
+    #[test]
+    fn semicolons_and_tabs_separate_as_commas_do() {
+        for (separator, list) in [(",", "x;y"), (";", "x"), ("\t", "x;y")] {
+            let text =
+                format!("\u{feff}do{separator}far{separator}views\ndepth{separator}a.png{separator}{list}\n");
+            let found = all("a.csv", &text);
+            let (kind, fields) = found[0].1.as_ref().expect("a job");
+            assert_eq!(
+                (kind.as_str(), fields.without("out")["far"].as_slice()),
+                ("depth", &["a.png".to_owned()][..])
+            );
+            assert_eq!(fields.without("out")["views"], [list]);
+        }
     }
 
     #[test]

@@ -8,6 +8,8 @@ use std::{
     time::SystemTime,
 };
 
+use serde_json::Value;
+
 use super::{BatchError, provenance::Provenance};
 use crate::error::Result;
 
@@ -23,8 +25,8 @@ pub(super) struct Place {
 
 /// What lies at a place.
 pub(super) enum Found {
-    /// The result, made from what it would be made from now.
-    Done,
+    /// The result, made from what it would be made from now, with its figures.
+    Done(Option<Value>),
     /// Nothing, or a result that was made from something else or is not whole.
     ToDo,
 }
@@ -44,7 +46,7 @@ impl Place {
         let (record, root) = (self.record(), self.root());
         if let Some(found) = Provenance::read(&record) {
             if found.fulfils(wanted, root, verify) {
-                return Ok(Found::Done);
+                return Ok(Found::Done(found.figures()));
             }
             let written = fs::metadata(&record).and_then(|record| record.modified());
             if written.is_ok_and(|written| written > begun) {
@@ -62,7 +64,7 @@ impl Place {
 
     /// Makes the result by `make`, which is given a place aside, and puts it in its place. What was killed on the way is cleared
     /// away first.
-    pub fn fill<T>(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+    pub fn fill(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<Value>) -> Result<Value> {
         let name = self.target.file_name().unwrap_or_default();
         let aside = self.beside(".", ".batch-partial");
         let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
@@ -74,10 +76,24 @@ impl Place {
         clear(&aside).map_err(unwritable)?;
         let made = aside.join(name);
         let found = make(&made)?;
-        let record = toml::to_string(&wanted.with_output(&made)?)?;
+        let record = toml::to_string(&wanted.with_figures(&found).with_output(&made)?)?;
         self.put(&aside, &made, &record).map_err(unwritable)?;
         drop(clearing);
         Ok(found)
+    }
+
+    /// Removes the result of an earlier run, so that a job that failed leaves nothing that could be taken for its result. What no batch
+    /// made, and what another job of this run (which began at `begun`) made, stays.
+    pub fn discard(&self, begun: SystemTime) -> io::Result<()> {
+        let record = self.record();
+        if Provenance::read(&record).is_none() || fs::metadata(&record)?.modified()? > begun {
+            return Ok(());
+        }
+        if self.is_file {
+            fs::remove_file(record)?;
+            return if self.target.exists() { fs::remove_file(&self.target) } else { Ok(()) };
+        }
+        fs::remove_dir_all(&self.target)
     }
 
     /// The folder aside, held by this process as long as it lives; two that make the same result must not mix.

@@ -8,6 +8,7 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::{BatchError, fields::Fields};
@@ -33,6 +34,9 @@ pub(super) struct Provenance {
     kind: String,
     /// The job's fields but `out`.
     settings: BTreeMap<String, Vec<String>>,
+    /// What the job printed, as JSON: a later run repeats it.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    figures: String,
     #[serde(default)]
     input: Vec<Summed>,
     #[serde(default)]
@@ -85,9 +89,20 @@ impl Provenance {
             made_by: MADE_BY.into(),
             kind: kind.into(),
             settings: fields.without("out"),
+            figures: String::new(),
             input,
             output: Vec::new(),
         }
+    }
+
+    /// The figures of the result; `None` in records of older versions.
+    pub fn figures(&self) -> Option<Value> {
+        serde_json::from_str(&self.figures).ok()
+    }
+
+    /// The same with the figures of the result.
+    pub fn with_figures(self, figures: &Value) -> Self {
+        Self { figures: figures.to_string(), ..self }
     }
 
     /// The same with what came of it: the file or the folder at `result`.

@@ -61,6 +61,7 @@ impl<'a> Tally<'a> {
         match report.state {
             State::Done => inner.figures.done += 1,
             State::Already => inner.figures.already += 1,
+            State::Todo => inner.figures.todo += 1,
             State::Failed => {
                 inner.figures.failed += 1;
                 self.keep(&mut inner.file, report)?;

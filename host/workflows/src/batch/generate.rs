@@ -1,0 +1,179 @@
+//! A new manifest from files: a row for each file that a pattern matches.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use farnear_files::staging::write_file;
+
+use super::{BatchError, jobs, manifest::KIND};
+use crate::error::Result;
+
+/// A field and its value, in which each `*` stands for what the same `*` of the first pattern matched.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Pattern {
+    name: String,
+    value: String,
+}
+
+impl FromStr for Pattern {
+    type Err = BatchError;
+
+    fn from_str(text: &str) -> std::result::Result<Self, BatchError> {
+        match text.split_once('=') {
+            Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+                Ok(Self { name: name.trim().into(), value: value.trim().into() })
+            }
+            _ => Err(BatchError::Pattern(format!(
+                "`{text}` is no field; expected NAME=VALUE, such as far=*/far.png"
+            ))),
+        }
+    }
+}
+
+/// Writes a manifest (CSV) with a job of `kind` for each file that the first pattern matches, in the order of their names; returns how
+/// many. Patterns are relative to the manifest's folder.
+///
+/// # Errors
+/// [`BatchError::Pattern`] for patterns that match nothing or have more `*` than the first one, [`BatchError::UnknownKind`], and a
+/// manifest that exists.
+pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize> {
+    jobs::kind(kind)?;
+    let pattern = |reason: String| BatchError::Pattern(reason);
+    if manifest.extension().is_none_or(|ending| ending != "csv") {
+        return Err(pattern(format!(
+            "{}: a manifest from patterns is CSV; name it with .csv",
+            manifest.display()
+        ))
+        .into());
+    }
+    if manifest.exists() {
+        return Err(pattern(format!("{} exists; remove it or name another one", manifest.display())).into());
+    }
+    let Some(first) = fields.first() else {
+        return Err(pattern("name a field with a pattern, such as far=*/far.png".into()).into());
+    };
+    let stars = first.value.matches('*').count();
+    if let Some(wrong) = fields.iter().find(|field| field.value.matches('*').count() > stars) {
+        let reason = format!(
+            "{}={} has more * than {}={}, which has {stars}",
+            wrong.name, wrong.value, first.name, first.value
+        );
+        return Err(pattern(reason).into());
+    }
+    let base = manifest.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut found = Vec::new();
+    let parts: Vec<&str> = first.value.split('/').collect();
+    search(
+        if first.value.starts_with('/') { Path::new("/") } else { base },
+        &parts,
+        &mut Vec::new(),
+        &mut found,
+    );
+    found.sort();
+    if found.is_empty() {
+        return Err(
+            pattern(format!("no file matches {}={} in {}", first.name, first.value, base.display())).into()
+        );
+    }
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let unwritable = |source: std::io::Error| BatchError::Write { path: PathBuf::from(manifest), source };
+    let header = std::iter::once(KIND).chain(fields.iter().map(|field| field.name.as_str()));
+    writer.write_record(header).map_err(|error| unwritable(error.into()))?;
+    for captured in &found {
+        let row =
+            std::iter::once(kind.to_owned()).chain(fields.iter().map(|field| filled(&field.value, captured)));
+        writer.write_record(row).map_err(|error| unwritable(error.into()))?;
+    }
+    let text = writer.into_inner().map_err(|error| unwritable(error.into_error()))?;
+    write_file(manifest, &text)?;
+    Ok(found.len())
+}
+
+fn filled(value: &str, captured: &[String]) -> String {
+    let mut parts = value.split('*');
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for (part, star) in parts.zip(captured) {
+        text.push_str(star);
+        text.push_str(part);
+    }
+    text
+}
+
+/// What the `*` of the parts of a path matched, for each file below `folder`.
+fn search(folder: &Path, parts: &[&str], captured: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
+    let Some((part, rest)) = parts.split_first() else { return };
+    if !part.contains('*') {
+        let path = folder.join(part);
+        return match rest.is_empty() {
+            true if path.is_file() => found.push(captured.clone()),
+            true => {}
+            false => search(&path, rest, captured, found),
+        };
+    }
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let Some(stars) = matched(part, &name) else { continue };
+        if name.starts_with('.') && !part.starts_with('.') {
+            continue;
+        }
+        let before = captured.len();
+        captured.extend(stars);
+        match rest.is_empty() {
+            true if entry.path().is_file() => found.push(captured.clone()),
+            true => {}
+            false => search(&entry.path(), rest, captured, found),
+        }
+        captured.truncate(before);
+    }
+}
+
+/// What each `*` of a pattern stands for in a name, the first ones as short as possible.
+fn matched(pattern: &str, name: &str) -> Option<Vec<String>> {
+    let Some((before, after)) = pattern.split_once('*') else { return (pattern == name).then(Vec::new) };
+    let rest = name.strip_prefix(before)?;
+    (0..=rest.len()).filter(|end| rest.is_char_boundary(*end)).find_map(|end| {
+        let mut stars = vec![rest[..end].to_owned()];
+        stars.extend(matched(after, &rest[end..])?);
+        Some(stars)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_manifest_is_written_from_a_pattern() {
+        let folder = tempfile::tempdir().unwrap();
+        for pair in ["b 2", "a1", ".hidden"] {
+            fs::create_dir_all(folder.path().join("shots").join(pair)).unwrap();
+            fs::write(folder.path().join("shots").join(pair).join("far_7.png"), "").unwrap();
+        }
+        fs::create_dir_all(folder.path().join("shots/c/far_8.png")).unwrap();
+        let manifest = folder.path().join("pairs.csv");
+        let fields: Vec<Pattern> =
+            ["far=shots/*/far_*.png", "near=shots/*/near_*.png", "out=depth/*", "optics=rig.toml"]
+                .map(|text| text.parse().unwrap())
+                .into();
+        assert_eq!(generate(&manifest, "depth", &fields).unwrap(), 2);
+        assert_eq!(
+            fs::read_to_string(&manifest).unwrap(),
+            "do,far,near,out,optics\n\
+             depth,shots/a1/far_7.png,shots/a1/near_7.png,depth/a1,rig.toml\n\
+             depth,shots/b 2/far_7.png,shots/b 2/near_7.png,depth/b 2,rig.toml\n"
+        );
+        let error = |kind: &str, fields: &[&str]| {
+            let fields: Vec<Pattern> = fields.iter().map(|text| text.parse().unwrap()).collect();
+            generate(&folder.path().join("new.csv"), kind, &fields).unwrap_err().to_string()
+        };
+        assert!(generate(&manifest, "depth", &fields).unwrap_err().to_string().contains("exists"));
+        assert!(error("depth", &["far=*/none.png"]).contains("no file matches"));
+        assert!(error("depth", &["far=a.png", "out=*"]).contains("more *"));
+        assert!(error("dept", &["far=*"]).contains("dept"));
+        assert!("far".parse::<Pattern>().is_err() && "=x".parse::<Pattern>().is_err());
+    }
+}
