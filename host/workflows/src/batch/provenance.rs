@@ -100,8 +100,12 @@ impl Provenance {
         serde_json::from_str(&self.figures).ok()
     }
 
-    /// The same with the figures of the result.
+    /// The same with the figures of the result, except its duration: a record depends on the inputs only.
     pub fn with_figures(self, figures: &Value) -> Self {
+        let mut figures = figures.clone();
+        if let Some(figures) = figures.as_object_mut() {
+            figures.remove("seconds");
+        }
         Self { figures: figures.to_string(), ..self }
     }
 
