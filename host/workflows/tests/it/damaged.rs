@@ -75,6 +75,9 @@ fn done(list: &Path) -> usize {
         shard: Shard::default(),
         verify: false,
         failures: None,
+        summary: None,
+        dry_run: false,
+        allow_failures: false,
     };
     let told = std::sync::atomic::AtomicUsize::new(0);
     let on_job = |_: &JobReport| {
