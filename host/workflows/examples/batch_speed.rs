@@ -110,8 +110,16 @@ fn by_batch(root: &Path, numbers: std::ops::Range<usize>) -> Result<()> {
     }
     let manifest = root.join("block.toml");
     fs::write(&manifest, text)?;
-    let settings =
-        BatchSettings { manifest, jobs: 1, shard: Default::default(), verify: false, failures: None, summary: None, dry_run: false, allow_failures: false };
+    let settings = BatchSettings {
+        manifest,
+        jobs: 1,
+        shard: Default::default(),
+        verify: false,
+        failures: None,
+        summary: None,
+        dry_run: false,
+        allow_failures: false,
+    };
     batch::run(&settings, &Context::unattended(), &|_| Ok(()))?;
     Ok(())
 }
