@@ -100,7 +100,7 @@ impl Recogniser {
         let said = PyDict::new(py);
         said.set_item("activity", answer.activity)?;
         said.set_item("confidence", answer.confidence)?;
-        said.set_item("strangeness", answer.outlier_score)?;
+        said.set_item("outlier_score", answer.outlier_score)?;
         let probabilities = PyDict::new(py);
         for (name, share) in answer.probabilities {
             probabilities.set_item(name, share)?;

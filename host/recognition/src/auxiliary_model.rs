@@ -1,4 +1,4 @@
-//! A second opinion: what another recogniser says of a clip, against what it said of the training clips of the activity answered.
+//! An auxiliary model: what another recogniser says of a clip, against what it said of the training clips of the activity answered.
 //!
 //! A recogniser knows the activities that it was taught, and what nobody taught often lies among them. Another one that knows many more
 //! activities - from synthetic people, whom everybody has - tells strangers from them better, though its own answer may be wrong: it need
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Another recogniser and what it says of the activities that were taught.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SecondOpinion {
+pub struct AuxiliaryModel {
     /// The other.
     pub recogniser: Arc<Recogniser>,
     /// Activities taught x activities of the other: square roots, each row of length 1.
@@ -26,7 +26,7 @@ pub struct SecondOpinion {
     pub limits: Limits,
 }
 
-impl SecondOpinion {
+impl AuxiliaryModel {
     /// Asks another recogniser about clips of so many classes. The limits are the conformal rule's for people who taught nothing: every
     /// clip is compared with other subjects' profile of its class (with a single subject, with that of the other clips), so that what is
     /// answered rightly is called unknown no more often than stated; a wrong answer oftener, and rightly.
@@ -64,9 +64,9 @@ impl SecondOpinion {
     }
 
     /// How strange what the other says of a clip is for the activity answered: above 1 is unknown.
-    pub(super) fn strangeness(&self, said: &Answer, answer: &Answer) -> f32 {
-        let shares: Vec<f32> = answer.probabilities.iter().map(|(_, share)| *share).collect();
-        let (class, _) = largest(&shares);
+    pub(super) fn outlier_score(&self, said: &Answer, answer: &Answer) -> f32 {
+        let probabilities: Vec<f32> = answer.probabilities.iter().map(|(_, probability)| *probability).collect();
+        let (class, _) = largest(&probabilities);
         self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
     }
 
@@ -87,7 +87,7 @@ fn roots(recogniser: &Recogniser, clip: &Clip) -> Result<Option<Array1<f32>>, Mo
 }
 
 fn roots_of(said: &Answer) -> Array1<f32> {
-    said.probabilities.iter().map(|(_, share)| share.max(0.0).sqrt()).collect()
+    said.probabilities.iter().map(|(_, probability)| probability.max(0.0).sqrt()).collect()
 }
 
 fn to_unit_length(sum: Array1<f32>) -> Array1<f32> {
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn distances_are_bhattacharyyas() {
-        let of = |shares: [f32; 3]| -> Array1<f32> { shares.iter().map(|share| share.sqrt()).collect() };
+        let of = |probabilities: [f32; 3]| -> Array1<f32> { probabilities.iter().map(|probability| probability.sqrt()).collect() };
         let same = distance(of([0.5, 0.3, 0.2]).view(), of([0.5, 0.3, 0.2]).view());
         assert!(same.abs() < 1e-6, "{same}"); // rounding
         // By hand: -ln(sqrt(0.5 * 0.2) + sqrt(0.3 * 0.3) + sqrt(0.2 * 0.5)) = 0.06993.

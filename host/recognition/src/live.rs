@@ -1,4 +1,4 @@
-//! Recognition while frames come in: a running answer over the last frames, and windows over a long recording.
+//! Recognition while frames come in: a streaming answer over the last frames, and windows over a long recording.
 
 use super::clip::Track;
 use super::model::{Answer, ModelError, Recogniser};

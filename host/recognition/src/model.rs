@@ -1,6 +1,6 @@
 //! A trained recogniser as one value, and what it answers; [`super::training`] makes it, [`super::model_file`] saves and reads it.
 
-use super::auxiliary_model::SecondOpinion;
+use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::softmax::softmax;
 use super::classifier::{Classifier, ClassifierKind, largest};
 use super::clip::Track;
@@ -54,14 +54,14 @@ pub struct Recogniser {
     pub space: Space,
     /// The classifier, trained on the patterns.
     pub classifier: Classifier,
-    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown where there is no second opinion.
+    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown where there is no auxiliary model.
     pub limits: Limits,
     /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
     pub patterns: Array2<f32>,
     /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
     pub labels: Vec<usize>,
     /// What another recogniser says, from which clips and windows are called unknown.
-    pub second: Option<SecondOpinion>,
+    pub second: Option<AuxiliaryModel>,
     /// Frames of a training clip, median: what a window over a long recording should hold.
     pub typical_frames: usize,
     /// How long its clips last, by class; empty in models of older formats.
@@ -78,7 +78,7 @@ pub struct Answer {
     /// Probability of every activity.
     pub probabilities: Vec<(String, f32)>,
     /// How far the clip is from what was learned over the largest such distance at which the activity still counts as known: above 1
-    /// is unknown. The distance is that of a second opinion from what it said of the activity's training clips, or the squared one
+    /// is unknown. The distance is that of an auxiliary model from what it said of the activity's training clips, or the squared one
     /// to the nearest training pattern.
     pub outlier_score: f32,
 }
@@ -180,7 +180,7 @@ pub enum ModelError {
     )]
     Unlabelled,
     /// The other recogniser in a model's file.
-    #[error("the model's second opinion: {0}")]
+    #[error("the model's auxiliary model: {0}")]
     Second(Box<ModelError>),
     /// Nothing to train on.
     #[error("a model needs clips of at least two activities, found {0}")]
@@ -198,7 +198,7 @@ impl Recogniser {
     /// Recognises one clip.
     ///
     /// A model of one view takes any number of views: the answers of all that see somebody count together. Whether the clip is unknown
-    /// says the second opinion, where the model has one.
+    /// says the auxiliary model, where the model has one.
     ///
     /// # Errors
     /// A clip with other views than the model's, or with cut-out silhouettes where the model knows full frames.
@@ -215,8 +215,8 @@ impl Recogniser {
             _ => Answer::joint(&answers),
         };
         let Some(second) = &self.second else { return Ok(answer) };
-        let strangeness = second.strangeness(&second.recogniser.recognise(views)?, &answer);
-        Ok(Answer::of(answer.probabilities, strangeness))
+        let outlier_score = second.outlier_score(&second.recogniser.recognise(views)?, &answer);
+        Ok(Answer::of(answer.probabilities, outlier_score))
     }
 
     /// Whether views fit the model.
@@ -248,7 +248,7 @@ impl Recogniser {
         if self.views > 1 {
             return vec![views.to_vec()];
         }
-        // A network was taught mirrors too: what it says of a clip's mirror is a second opinion.
+        // A network was taught mirrors too: what it says of a clip's mirror is an auxiliary model.
         let mirrors = matches!(self.space.pattern, Pattern::Network(_) | Pattern::Features(_));
         let both = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
         views.iter().flat_map(both).map(|view| vec![view]).collect()

@@ -1,11 +1,11 @@
 //! Models as files: bytes with a version and a checksum.
 //!
 //! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
-//! little-endian, then the body (postcard), the classes of its patterns, a second opinion or none, and how long clips last. Files of older
+//! little-endian, then the body (postcard), the classes of its patterns, an auxiliary model or none, and how long clips last. Files of older
 //! versions, which end earlier, are read too. Anything that does not fit is refused by name, never guessed; a body that decodes is also
 //! checked part against part, so that a crafted file cannot make recognition panic.
 
-use super::auxiliary_model::SecondOpinion;
+use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::Classifier;
 use super::clip::BOX_NUMBERS;
 use super::codebook::Codebook;
@@ -30,7 +30,7 @@ use std::sync::Arc;
 pub const FORMAT_VERSION: u32 = 6;
 /// The versions before, which are read: without lengths,
 const LENGTHLESS_VERSION: u32 = 5;
-/// with a second opinion in every file,
+/// with an auxiliary model in every file,
 const SECOND_VERSION: u32 = 4;
 /// with one in none,
 const SINGLE_VERSION: u32 = 3;
@@ -109,8 +109,8 @@ impl SavedPattern {
     }
 }
 
-/// A second opinion: the other recogniser's file, its profiles and limits.
-type SavedSecond = (Vec<u8>, Array2<f32>, Limits);
+/// An auxiliary model: the other recogniser's file, its profiles and limits.
+type SavedAuxiliary = (Vec<u8>, Array2<f32>, Limits);
 
 /// A body's bytes behind their header.
 fn framed(version: u32, body: &[u8]) -> Vec<u8> {
@@ -130,7 +130,7 @@ impl Recogniser {
     /// # Errors
     /// [`ModelError::Body`] if it cannot be encoded.
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
-        let saved = |second: &SecondOpinion| -> Result<SavedSecond, ModelError> {
+        let saved = |second: &AuxiliaryModel| -> Result<SavedAuxiliary, ModelError> {
             Ok((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
         };
         let second = self.second.as_ref().map(saved).transpose()?;
@@ -199,7 +199,7 @@ impl Recogniser {
         }
         let wrong = |error: postcard::Error| ModelError::Body(error.to_string());
         let (body, rest) = postcard::take_from_bytes::<Body>(body).map_err(wrong)?;
-        let (labels, second, lengths): (Vec<usize>, Option<SavedSecond>, Vec<Lengths>) = match version {
+        let (labels, second, lengths): (Vec<usize>, Option<SavedAuxiliary>, Vec<Lengths>) = match version {
             UNLABELLED_VERSION => Default::default(),
             SINGLE_VERSION => (postcard::from_bytes(rest).map_err(wrong)?, None, Vec::new()),
             SECOND_VERSION => {
@@ -214,10 +214,10 @@ impl Recogniser {
         };
         let second = match second {
             None => None,
-            Some(_) if !may_have_second => return Err(ModelError::Parts("the second opinion")),
+            Some(_) if !may_have_second => return Err(ModelError::Parts("the auxiliary model")),
             Some((other, profiles, limits)) => {
                 let other = Self::read(&other, false).map_err(|error| ModelError::Second(Box::new(error)))?;
-                Some(SecondOpinion { recogniser: Arc::new(other), profiles, limits })
+                Some(AuxiliaryModel { recogniser: Arc::new(other), profiles, limits })
             }
         };
         let map = match body.map {
@@ -321,7 +321,7 @@ impl Recogniser {
         fits(self.lengths.is_empty() || measured, "how long clips last")?;
         let second = self.second.as_ref();
         let judges = second.is_none_or(|second| second.fits(self.activities.len(), self.uses_boxes()));
-        fits(judges, "the second opinion")?;
+        fits(judges, "the auxiliary model")?;
         Ok(self)
     }
 }
@@ -359,7 +359,7 @@ mod tests {
             body.pattern =
                 SavedPattern::Network(Box::new(OneMember { mean, spread, layers: layers.clone() }));
         }
-        let second = model.second.as_ref().map(|second| -> SavedSecond {
+        let second = model.second.as_ref().map(|second| -> SavedAuxiliary {
             let other = written_before(&second.recogniser, LENGTHLESS_VERSION);
             (other, second.profiles.clone(), second.limits.clone())
         });
@@ -378,7 +378,7 @@ mod tests {
     fn with_second(of: &Recogniser, by: &Recogniser) -> Recogniser {
         let limits = Limits::none(of.activities.len());
         let profiles = Array2::zeros((of.activities.len(), by.activities.len()));
-        let second = SecondOpinion { recogniser: Arc::new(by.clone()), profiles, limits };
+        let second = AuxiliaryModel { recogniser: Arc::new(by.clone()), profiles, limits };
         Recogniser { second: Some(second), ..of.clone() }
     }
 

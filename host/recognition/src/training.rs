@@ -1,7 +1,7 @@
 //! Training a recogniser: settings chosen or given, the classifier trained, and what counts as unknown.
 
 use super::alignment::Alignment;
-use super::auxiliary_model::SecondOpinion;
+use super::auxiliary_model::AuxiliaryModel;
 use super::choice::{Chosen, Views, choose, names};
 use super::classifier::Classifier;
 use super::clip::Clip;
@@ -77,7 +77,7 @@ impl Recogniser {
         lengths.sort_unstable();
         let other = experiment.second.clone();
         let second =
-            other.map(|other| SecondOpinion::learned(other, clips, &labels[..clips.len()], activities.len()));
+            other.map(|other| AuxiliaryModel::learned(other, clips, &labels[..clips.len()], activities.len()));
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
             limits: limits(&all, &labels, activities.len(), clips.len(), &patterns),

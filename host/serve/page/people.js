@@ -67,10 +67,10 @@ export function activity() {
   };
   const tell = (found, of) => {
     const [first] = found.best ?? [];
-    const likely = first?.probability ?? first?.share;
+    const likely = first?.probability;
     if (found.activity || likely == null) answer.replaceChildren(found.activity ?? "unknown", h("small", {}, ` ${number(100 * found.confidence, 0)} % ${of}`));
     else answer.replaceChildren(`probably ${first.activity} (${number(100 * likely, 0)} %), below the threshold`, h("small", {}, ` ${of}`));
-    keep(details, [found.best, found.flags], () => [rows(found.best.map(({ activity: name, probability, share = probability }) => [name, h("meter", { min: 0, max: 1, value: share, "aria-label": name }, `${number(100 * share, 0)} %`)])),
+    keep(details, [found.best, found.flags], () => [rows(found.best.map(({ activity: name, probability }) => [name, h("meter", { min: 0, max: 1, value: probability, "aria-label": name }, `${number(100 * probability, 0)} %`)])),
       found.flags?.length ? h("p", { class: "dim" }, found.flags.join(", ")) : ""]);
   };
   on("person", ({ width, height, answer: found }, pixels) => {

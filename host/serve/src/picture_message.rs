@@ -1,7 +1,7 @@
 //! A picture as it goes over the socket: the length of a JSON header (u32, little-endian), the header, and the pixels.
 
 use axum::body::Bytes;
-use farnear_workflows::activity::running::Moment;
+use farnear_workflows::activity::streaming::Moment;
 use ndarray::{Array2, s};
 use serde::Serialize;
 use serde_json::json;

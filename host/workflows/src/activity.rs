@@ -4,16 +4,16 @@
 
 mod confusion_picture;
 pub mod evaluation;
-pub mod everybody;
-mod film;
+pub mod multi_person;
+mod annotated_video;
 pub mod judging;
 pub mod method;
 pub mod motion;
 pub mod recognition;
-pub mod running;
+pub mod streaming;
 pub mod samples;
 pub mod shipped;
 pub mod training;
-pub mod verdict;
+pub mod answer;
 pub mod views;
-mod watched;
+mod training_progress;

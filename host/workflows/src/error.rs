@@ -273,7 +273,7 @@ pub enum WorkflowError {
     Views(#[from] crate::activity::recognition::ViewsError),
     /// What several people cannot be recognised in.
     #[error(transparent)]
-    Everybody(#[from] crate::activity::everybody::EverybodyError),
+    MultiPerson(#[from] crate::activity::multi_person::MultiPersonError),
     /// An evaluation.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),

@@ -167,7 +167,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
             .expect("a picture");
     }
     let bar = figures(&mut farnear(&["activity", "recognise", &bar, "--model", &model, "--json"]));
-    assert!(bar["activity"].is_null() && number(&bar, "strangeness") > 1.0, "{bar}");
+    assert!(bar["activity"].is_null() && number(&bar, "outlier_score") > 1.0, "{bar}");
 
     // The same person walking in a video: dark before a light wall. (At a dozen pixels across the spade of the digger is
     // cleaned away.)

@@ -192,7 +192,7 @@ fn one_fold(
     let asked: Vec<Views> =
         arrangements.iter().copied().filter(|arrangement| !doubled(arrangement)).collect();
     let chosen = choose(train, classes, experiment, &asked, watch)?;
-    // What a network was taught mirrors for gives a second opinion of every clip.
+    // What a network was taught mirrors for gives an auxiliary model of every clip.
     let mirrors: Vec<Clip> = if experiment.features.is_some() {
         test.iter().map(|clip| clip.mirrored()).collect()
     } else {

@@ -137,12 +137,12 @@ fn a_auxiliary_model_calls_what_nobody_taught_unknown_and_survives_a_file() {
     let mut nested = model.clone();
     nested.second.as_mut().expect("kept").recogniser = Arc::new(model.clone());
     let error = Recogniser::from_bytes(&nested.to_bytes().expect("encoded")).expect_err("nested without end");
-    assert!(error.to_string().contains("second opinion"), "{error}");
+    assert!(error.to_string().contains("auxiliary model"), "{error}");
     let mut cut = model;
     let profiles = &mut cut.second.as_mut().expect("kept").profiles;
     *profiles = profiles.slice(ndarray::s![.., 1..]).to_owned();
     let error = Recogniser::from_bytes(&cut.to_bytes().expect("encoded")).expect_err("too narrow");
-    assert!(error.to_string().contains("second opinion"), "{error}");
+    assert!(error.to_string().contains("auxiliary model"), "{error}");
 }
 
 #[test]

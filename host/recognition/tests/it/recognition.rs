@@ -1,6 +1,6 @@
 //! Recognition through the public face: synthetic people, order, speed, damage, models and live use.
 
-use farnear_recognition::auxiliary_model::SecondOpinion;
+use farnear_recognition::auxiliary_model::AuxiliaryModel;
 use farnear_recognition::choice::names;
 use farnear_recognition::classifier::ClassifierKind;
 use farnear_recognition::clip::Clip;
@@ -176,7 +176,7 @@ fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
 fn crafted_models_with_good_checksums_are_refused_or_answer_but_never_panic() {
     let (people, recogniser) = trained();
     let classes = recogniser.activities.len();
-    let second = SecondOpinion {
+    let second = AuxiliaryModel {
         recogniser: Arc::new(recogniser.clone()),
         profiles: Array2::from_elem((classes, classes), (1.0 / classes as f32).sqrt()),
         limits: Limits::none(classes),

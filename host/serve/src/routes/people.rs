@@ -13,7 +13,7 @@ use farnear_shadow::sun::Model as SunModel;
 use farnear_shadow::{CameraFile, camera};
 use farnear_workflows::{
     Context, WorkflowError,
-    activity::{recognition::Model, running},
+    activity::{recognition::Model, streaming},
     rig::{RigAddress, live::LiveSettings},
     sessions,
     shadow::video::{self, VideoShadowSettings},
@@ -127,7 +127,7 @@ pub fn routes(api: Api) -> Api {
         .post::<RecogniseRequest, Begun, _, _>(
             "/api/people/recognise",
             For::Control,
-            "Recognises what somebody does; the running answer comes by the socket.",
+            "Recognises what somebody does; the streaming answer comes by the socket.",
             recognise,
         )
         .post::<Sunlight, Shadow, _, _>(
@@ -204,7 +204,7 @@ async fn recognise(
         let settings = LiveSettings { rig: RigAddress::Open(connected(&app)?), camera: app.camera() };
         let work = move |app: &App, context: &Context<'_>| {
             let model = Model::read(USUAL_MODEL.as_ref())?;
-            running::camera(&settings, &model, context, |moment| {
+            streaming::camera(&settings, &model, context, |moment| {
                 app.pictures.send_replace(person(moment));
                 Ok(())
             })?;
@@ -216,7 +216,7 @@ async fn recognise(
     let path = video_of(&app, &name)?;
     let work = move |app: &App, context: &Context<'_>| {
         let model = Model::read(USUAL_MODEL.as_ref())?;
-        figures(running::video(&path, &model, context, |moment| {
+        figures(streaming::video(&path, &model, context, |moment| {
             app.pictures.send_replace(person(moment));
             Ok(())
         })?)

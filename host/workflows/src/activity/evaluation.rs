@@ -24,7 +24,7 @@ use super::{
     confusion_picture,
     method::{Adaptation, Method},
     samples::{SCALING, Samples, SamplesError, are_full_frames},
-    watched,
+    training_progress,
 };
 use crate::{
     context::Context,
@@ -133,8 +133,8 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     check_activities(settings, &test, learned)?;
     let Adaptation { align, self_training } = settings.adaptation;
     let experiment = Experiment { align, self_training, ..settings.method.experiment(full_frames)? };
-    let outcome = train_on_others(learned, &test, &experiment, &[views], &watched::Folds::new(context));
-    let outcome = watched::outcome(outcome, context, "evaluating")?;
+    let outcome = train_on_others(learned, &test, &experiment, &[views], &training_progress::Folds::new(context));
+    let outcome = training_progress::outcome(outcome, context, "evaluating")?;
     let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
     let (low, high) = confusion.interval();
     let (right, answers) = confusion.right_of();
@@ -186,8 +186,8 @@ pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Resul
     let samples = Samples::read(samples, context)?;
     let experiment = method.experiment(samples.full_frames)?;
     let found =
-        open_set::open_set(&samples.fused()?, |_| experiment.clone(), SCALING, &watched::Folds::new(context));
-    let mut rows = watched::outcome(found, context, "evaluating")?;
+        open_set::open_set(&samples.fused()?, |_| experiment.clone(), SCALING, &training_progress::Folds::new(context));
+    let mut rows = training_progress::outcome(found, context, "evaluating")?;
     for row in &mut rows {
         for value in [&mut row.unknown_of_known, &mut row.unknown_of_strangers, &mut row.auroc] {
             *value = rounded(*value, 4);

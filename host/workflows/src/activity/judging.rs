@@ -47,7 +47,7 @@ pub struct JudgingFigures {
     pub accuracy_among: f64,
     /// Its 95 % interval.
     pub confidence_interval_among: [f64; 2],
-    /// How far confidences are from shares of right answers (expected calibration error), 0 to 1.
+    /// How far confidences are from the fraction of right answers (expected calibration error), 0 to 1.
     pub calibration_error: f64,
     /// The same among the samples' activities.
     pub calibration_error_among: f64,

@@ -1,4 +1,4 @@
-//! A running answer over masks or video, then windows and the whole.
+//! A streaming answer over masks or video, then windows and the whole.
 
 use std::{
     fs,
@@ -16,10 +16,10 @@ use farnear_silhouettes::mask::{Mask, centre::SIDE_PX, subject::Flag};
 use serde::Serialize;
 
 use super::{
-    film::Film,
+    annotated_video::AnnotatedVideo,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
-    verdict::{Part, Verdict, of_segments, outlier_score, parts, restricted, rounded_share},
+    answer::{Part, AnswerSummary, of_segments, outlier_score, parts, restricted, rounded_probability},
     views::{Frames, Seen, View},
 };
 use crate::{
@@ -128,10 +128,10 @@ pub struct RecognitionSettings {
     pub views: Vec<View>,
     /// The only activities that can be; empty for all that the model knows.
     pub among: Vec<String>,
-    /// Frames of the running answer and of windows over a long recording; without it as many as a training clip had.
+    /// Frames of the streaming answer and of windows over a long recording; without it as many as a training clip had.
     pub window: Option<usize>,
-    /// A new folder for the first view's frames with the running answer drawn on them.
-    pub film: Option<PathBuf>,
+    /// A new folder for the first view's frames with the streaming answer drawn on them.
+    pub annotated_video: Option<PathBuf>,
 }
 
 /// More or other views than the model's.
@@ -158,7 +158,7 @@ pub struct FrameAnswer {
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
     /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
-    pub strangeness: Option<f64>,
+    pub outlier_score: Option<f64>,
     /// What is doubtful about the frame's masks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
@@ -169,7 +169,7 @@ pub struct FrameAnswer {
 pub struct RecognitionFigures {
     /// For all of it.
     #[serde(flatten)]
-    pub verdict: Verdict,
+    pub answer: AnswerSummary,
     /// Frames of a view.
     pub frames: usize,
     /// Masks of all views without anybody.
@@ -182,7 +182,7 @@ pub struct RecognitionFigures {
     pub windows: Vec<Part>,
     /// The recording cut into stretches of one activity each, by a hidden semi-Markov model; not by the windows.
     pub segments: Vec<Part>,
-    /// From a file to its part of a running answer.
+    /// From a file to its part of a streaming answer.
     pub seconds_per_frame: f64,
 }
 
@@ -193,7 +193,7 @@ pub struct Recognition<'m> {
     window: usize,
     live: Live<'m>,
     among: Vec<String>,
-    film: Option<Film>,
+    annotated_video: Option<AnnotatedVideo>,
     /// Everything seen so far: `[view][frame]`.
     tracks: Vec<Vec<Track>>,
     frames: usize,
@@ -223,7 +223,7 @@ impl<'m> Recognition<'m> {
         Ok(Self {
             live: Live::new(model, window, true),
             among: settings.among.clone(),
-            film: settings.film.as_deref().map(Film::begin).transpose()?,
+            annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
             tracks: vec![Vec::new(); views.len()],
             model,
             views,
@@ -258,8 +258,8 @@ impl<'m> Recognition<'m> {
         let answer = self.live.push_described(described).about(|| name.clone())?;
         let answer = restricted(answer, &self.among);
         self.seconds += start.elapsed().as_secs_f64();
-        if let (Some(film), Some(first)) = (&mut self.film, moment.first()) {
-            film.draw(first.picture.as_ref(), &first.mask, &answer)?;
+        if let (Some(annotated_video), Some(first)) = (&mut self.annotated_video, moment.first()) {
+            annotated_video.draw(first.picture.as_ref(), &first.mask, &answer)?;
         }
         let flags: Vec<String> =
             moment.iter().flat_map(|seen| seen.flags.iter().map(Flag::to_string)).collect();
@@ -267,8 +267,8 @@ impl<'m> Recognition<'m> {
         Ok(Some(FrameAnswer {
             frame: self.frames,
             name,
-            confidence: rounded_share(answer.confidence),
-            strangeness: outlier_score(&answer),
+            confidence: rounded_probability(answer.confidence),
+            outlier_score: outlier_score(&answer),
             activity: answer.activity,
             flags,
         }))
@@ -283,8 +283,8 @@ impl<'m> Recognition<'m> {
         let answer = restricted(self.model.recognise(&whole)?, &self.among);
         let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
         stretches.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), &self.among));
-        if let Some(film) = self.film {
-            film.finish()?;
+        if let Some(annotated_video) = self.annotated_video {
+            annotated_video.finish()?;
         }
         let found = segmented(self.model, &whole, &self.among, Worth::default())?;
         // Frames without anybody are not in the tracks.
@@ -296,7 +296,7 @@ impl<'m> Recognition<'m> {
             .collect();
         let windows = stretches.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
         Ok(RecognitionFigures {
-            verdict: Verdict::new(answer, self.frames),
+            answer: AnswerSummary::new(answer, self.frames),
             frames: self.frames,
             empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
             flagged_frames: self.flagged_frames,

@@ -11,7 +11,7 @@ use farnear_recognition::space::SpaceSettings;
 use farnear_recognition::synthetic::everyday;
 use serde::Serialize;
 
-use super::{samples::SCALING, watched};
+use super::{samples::SCALING, training_progress};
 use crate::{context::Context, error::Result, figures::rounded, parameters::within};
 
 /// A recogniser that comes with the program.
@@ -231,9 +231,9 @@ fn one(
     let (reach, keep, shift) = if mode == Mode::Ordered { (REACH, 1.0, SHIFT) } else { (0, KEEP, 0.0) };
     let network =
         NetworkSettings { passes, reach, keep, shift, members: MEMBERS, ..NetworkSettings::default() };
-    let watch = watched::Passes::new(context);
+    let watch = training_progress::Passes::new(context);
     let trained = Recogniser::train_network(people, others, &space, &network, SCALING, &watch);
-    let model = watched::outcome(trained, context, "training")?;
+    let model = training_progress::outcome(trained, context, "training")?;
     let right = others.iter().filter(|clip| {
         model.recognise(&clip.views).is_ok_and(|answer| answer.best() == Some(&clip.activity))
     });

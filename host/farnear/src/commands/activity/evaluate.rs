@@ -30,7 +30,7 @@ use crate::{report, terminal};
 /// --open-set leaves out activities in place of subjects: half of the subjects teach the others, the other half does all.
 ///
 /// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
-/// from shares of right answers, how many known and strange activities it calls unknown.
+/// from the fraction of right answers, how many known and unknown activities it calls unknown.
 #[derive(Args)]
 #[command(
     after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json\n\

@@ -1,11 +1,11 @@
-//! `farnear activity recognise`: a running answer over masks or video, then windows and the whole.
+//! `farnear activity recognise`: a streaming answer over masks or video, then windows and the whole.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use farnear_workflows::activity::{
-    everybody::{Everybody, EverybodySettings},
+    multi_person::{MultiPersonSettings, MultiPersonTracker},
     recognition::{Model, Recognition, RecognitionSettings},
     views::{View, ViewKind},
 };
@@ -15,7 +15,7 @@ use crate::{report, terminal};
 /// Recognises what a person does, frame by frame.
 ///
 /// For every frame one JSON line: the answer for the frames so far (at most `--window` of them), its confidence from 0 to 1, and its
-/// strangeness, the distance from all training data over what is known (above 1 the activity is null: unknown). The last line
+/// outlier_score, the distance from all training data over what is known (above 1 the activity is null: unknown). The last line
 /// answers for the whole, window by window, and for a recording that nobody cut in `segments`: where one activity ends and the next begins.
 /// With `--json` only that object is printed.
 #[derive(Args)]
@@ -34,14 +34,14 @@ pub struct Arguments {
     /// The only activities that can be, separated by commas: whoever knows some of what is not done gets better answers.
     #[arg(long, value_name = "ACTIVITIES", value_delimiter = ',')]
     among: Vec<String>,
-    /// Frames of the running answer and of windows over a long recording [default: as many as a training clip had].
+    /// Frames of the streaming answer and of windows over a long recording [default: as many as a training clip had].
     #[arg(long, value_name = "FRAMES")]
     window: Option<usize>,
     /// Folders of masks of other clips from where these come from, a clip in one view each, which nobody has to name: the model learns on from its
     /// surest answers for them first. Some dozens, of most of the activities.
     #[arg(long, value_name = "MASKS", num_args = 1..)]
     adapt_to: Vec<PathBuf>,
-    /// A new folder for the first view's frames as pictures with the running answer drawn on them (a video: `ffmpeg -i
+    /// A new folder for the first view's frames as pictures with the streaming answer drawn on them (a video: `ffmpeg -i
     /// frame_%06d.png answer.mp4`).
     #[arg(long, value_name = "DIR")]
     video_out: Option<PathBuf>,
@@ -80,11 +80,11 @@ pub fn run(arguments: Arguments) -> Result<()> {
             "--people follows everybody in one view, {} were given: run it for each view",
             views.len()
         );
-        let settings = EverybodySettings {
+        let settings = MultiPersonSettings {
             view: views.swap_remove(0),
             among: arguments.among,
             window: arguments.window,
-            film: arguments.video_out,
+            annotated_video: arguments.video_out,
         };
         return everybody(&model, &settings, arguments.json);
     }
@@ -92,7 +92,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         views,
         among: arguments.among,
         window: arguments.window,
-        film: arguments.video_out,
+        annotated_video: arguments.video_out,
     };
     let context = terminal::context()?;
     let mut work = Recognition::begin(&model, &settings)?;
@@ -105,9 +105,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
 }
 
 /// Everybody in one view, each apart.
-fn everybody(model: &Model, settings: &EverybodySettings, json: bool) -> Result<()> {
+fn everybody(model: &Model, settings: &MultiPersonSettings, json: bool) -> Result<()> {
     let context = terminal::context()?;
-    let mut work = Everybody::begin(model, settings)?;
+    let mut work = MultiPersonTracker::begin(model, settings)?;
     while let Some(people) = work.next(&context)? {
         if !json {
             report::print(&people, true)?;

@@ -70,7 +70,7 @@ fn two_people_side_by_side_get_an_answer_each() {
         let path = written(&folder, &format!("alone{index}"), &frames);
         let recognise = ["activity", "recognise", &path, "--as", "masks", "--model", "everyday", "--json"];
         let alone = figures(farnear(&recognise).args(["--among", "dig,crouch"]));
-        for key in ["shares", "activity", "segments"] {
+        for key in ["probabilities", "activity", "segments"] {
             assert_eq!(person[key], alone[key], "{key}: {person} {alone}");
         }
     }

@@ -25,14 +25,14 @@ fn models_that_come_with_the_program_need_nothing_else() {
         let recognise = ["activity", "recognise", &masks, "--as", "masks", "--model", name, "--json"];
         let found = figures(&mut farnear(&recognise));
         assert_eq!(
-            found["shares"].as_array().map(Vec::len),
+            found["probabilities"].as_array().map(Vec::len),
             listed["model"][0]["activities"].as_array().map(Vec::len)
         );
         // Somebody who walks, however strangely, where nothing else can be but what is least alike.
         let among = figures(farnear(&recognise).args(["--among", "walk,jumping jack"]));
-        assert_eq!(among["shares"].as_array().map(Vec::len), Some(2), "{among}");
-        assert_eq!(among["shares"][1]["activity"], "walk", "{among}");
-        assert!(among["shares"][1]["share"].as_f64() > Some(0.9), "{among}");
+        assert_eq!(among["probabilities"].as_array().map(Vec::len), Some(2), "{among}");
+        assert_eq!(among["probabilities"][1]["activity"], "walk", "{among}");
+        assert!(among["probabilities"][1]["probability"].as_f64() > Some(0.9), "{among}");
     }
     let masks = people.masks("p00-walk", 1);
     let both = [
@@ -137,11 +137,11 @@ fn somebody_walking_before_a_real_camera_is_said_to_walk() {
             // JPEG leaves greys about the edges; they are taken for masks all the same.
             let found =
                 figures(&mut farnear(&["activity", "recognise", &masks, "--model", "everyday", "--json"]));
-            let best = found["shares"]
+            let best = found["probabilities"]
                 .as_array()
-                .expect("shares")
+                .expect("probabilities")
                 .iter()
-                .max_by(|a, b| a["share"].as_f64().partial_cmp(&b["share"].as_f64()).expect("numbers"));
+                .max_by(|a, b| a["probability"].as_f64().partial_cmp(&b["probability"].as_f64()).expect("numbers"));
             walking += u32::from(best.is_some_and(|share| share["activity"] == "walk"));
             passages += 1;
         }
@@ -185,9 +185,9 @@ fn a_shipped_network_and_unlabelled_clips_serve_where_samples_come_from_elsewher
     let mut recognise = farnear(&["activity", "recognise", &masks, "--model", &model, "--json"]);
     recognise.args(["--video-out", &film, "--adapt-to"]).args(&unlabelled);
     let answer = figures(&mut recognise);
-    let shares = answer["shares"].as_array().expect("shares");
-    let dig = shares.iter().find(|share| share["activity"] == "dig").expect("an activity");
-    assert!(number(dig, "share") > 0.4, "{answer}");
+    let probabilities = answer["probabilities"].as_array().expect("probabilities");
+    let dig = probabilities.iter().find(|share| share["activity"] == "dig").expect("an activity");
+    assert!(number(dig, "probability") > 0.4, "{answer}");
     let segments = answer["segments"].as_array().expect("segments");
     assert_eq!(segments[0]["from"], 1);
     assert_eq!(segments.last().expect("one")["to"], answer["frames"]);

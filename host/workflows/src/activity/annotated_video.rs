@@ -1,4 +1,4 @@
-//! A recording with the running answer drawn on it: a folder of pictures, which is a video to this program and to others.
+//! A recording with the streaming answer drawn on it: a folder of pictures, which is a video to this program and to others.
 
 use std::{io::Cursor, path::Path};
 
@@ -22,7 +22,7 @@ const LEAST_HEIGHT_PX: u32 = 240;
 const SHOWN: usize = 3;
 
 /// Pictures under way; dropped before the end they leave nothing behind.
-pub(super) struct Film {
+pub(super) struct AnnotatedVideo {
     out: Staging,
     writer: Writer,
     frames: usize,
@@ -38,7 +38,7 @@ pub(super) struct Shown {
     pub known: bool,
 }
 
-impl Film {
+impl AnnotatedVideo {
     /// Begins a new folder.
     pub fn begin(folder: &Path) -> Result<Self> {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)?, frames: 0 })
@@ -55,15 +55,15 @@ impl Film {
         imageops::overlay(&mut page, &seen, i64::from((width - seen.width()) / 2), 0);
         let mut ranked: Vec<&(String, f32)> = answer.probabilities.iter().collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
-        for (row, (name, share)) in (0_u32..).zip(ranked.into_iter().take(SHOWN)) {
+        for (row, (name, probability)) in (0_u32..).zip(ranked.into_iter().take(SHOWN)) {
             let top = height + GAP_PX + row * (line + GAP_PX);
-            let bar = ((width - 2 * GAP_PX) as f32 * share.clamp(0.0, 1.0)) as u32;
+            let bar = ((width - 2 * GAP_PX) as f32 * probability.clamp(0.0, 1.0)) as u32;
             let colour = if answer.activity.is_some() { KNOWN } else { UNKNOWN };
             for (x, y) in (0..bar).flat_map(|x| (0..line).map(move |y| (x, y))) {
                 page.put_pixel(GAP_PX + x, top + y, colour);
             }
             let unknown = if row == 0 && answer.activity.is_none() { " (unknown)" } else { "" };
-            let text = format!("{name} {:.0} %{unknown}", 100.0 * share);
+            let text = format!("{name} {:.0} %{unknown}", 100.0 * probability);
             self.writer.write(&mut page, 2 * GAP_PX, top, &text, INK);
         }
         self.write(&page)

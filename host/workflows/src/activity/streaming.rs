@@ -1,4 +1,4 @@
-//! A running answer with what it rests on, the picture and the person cut out of it: for a face that shows both while they come, from a
+//! A streaming answer with what it rests on, the picture and the person cut out of it: for a face that shows both while they come, from a
 //! video or from the rig's camera.
 
 use std::{path::Path, time::Instant};
@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::{
     recognition::Model,
-    verdict::{Share, rounded_share, shares},
+    answer::{Probability, rounded_probability, probabilities},
 };
 use crate::{
     context::Context,
@@ -28,7 +28,7 @@ use crate::{
     silhouettes::frame_of,
 };
 
-/// Activities that are named with their shares.
+/// Activities that are named with their probabilities.
 const BEST: usize = 3;
 
 /// The answer for the frames so far, at most a window of them.
@@ -41,7 +41,7 @@ pub struct RunningAnswer {
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
     /// What it is most likely, the likeliest first.
-    pub best: Vec<Share>,
+    pub best: Vec<Probability>,
     /// What is doubtful about the frame's mask.
     pub flags: Vec<String>,
 }
@@ -64,7 +64,7 @@ pub struct RunningFigures {
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
     /// What it is most likely, the likeliest first.
-    pub best: Vec<Share>,
+    pub best: Vec<Probability>,
     /// Frames.
     pub frames: usize,
     /// Frames with nobody.
@@ -74,7 +74,7 @@ pub struct RunningFigures {
 }
 
 /// Recognises frame by frame.
-pub struct Watcher<'m> {
+pub struct StreamingRecogniser<'m> {
     model: &'m Recogniser,
     live: Live<'m>,
     extractor: Option<Extractor>,
@@ -82,7 +82,7 @@ pub struct Watcher<'m> {
     seconds: f64,
 }
 
-impl<'m> Watcher<'m> {
+impl<'m> StreamingRecogniser<'m> {
     /// With nothing seen.
     pub fn new(model: &'m Model) -> Self {
         let model = model.recogniser(true);
@@ -108,7 +108,7 @@ impl<'m> Watcher<'m> {
         self.seconds += start.elapsed().as_secs_f64();
         let told = RunningAnswer {
             frame: self.tracks.len(),
-            confidence: rounded_share(answer.confidence),
+            confidence: rounded_probability(answer.confidence),
             best: best(&answer),
             activity: answer.activity,
             flags: found.flags.iter().map(Flag::to_string).collect(),
@@ -126,7 +126,7 @@ impl<'m> Watcher<'m> {
         let answer = self.model.recognise(&[whole])?;
         let frames = self.tracks.len();
         Ok(RunningFigures {
-            confidence: rounded_share(answer.confidence),
+            confidence: rounded_probability(answer.confidence),
             best: best(&answer),
             activity: answer.activity,
             frames,
@@ -146,7 +146,7 @@ pub fn video(
     context: &Context<'_>,
     mut on_moment: impl FnMut(&Moment<'_>) -> Result<()>,
 ) -> Result<RunningFigures> {
-    let mut watcher = Watcher::new(model);
+    let mut watcher = StreamingRecogniser::new(model);
     for frame in Video::open(path)? {
         context.cancel.check("recognising")?;
         let VideoFrame { name, pixels } = frame?;
@@ -167,7 +167,7 @@ pub fn camera(
     context: &Context<'_>,
     mut on_moment: impl FnMut(&Moment<'_>) -> Result<()>,
 ) -> Result<()> {
-    let mut watcher = Watcher::new(model);
+    let mut watcher = StreamingRecogniser::new(model);
     live::watch(settings, context, |_, image| {
         let pixels = Pixels::Grey(eight_bits(&image));
         let (mask, answer) = watcher.take(&pixels)?;
@@ -192,9 +192,9 @@ fn eight_bits(image: &Image) -> Array2<u8> {
     image.pixels.mapv(|code| (code >> extra).min(255) as u8)
 }
 
-fn best(answer: &Answer) -> Vec<Share> {
-    let mut shares = shares(answer);
-    shares.sort_by(|a, b| b.share.total_cmp(&a.share));
-    shares.truncate(BEST);
-    shares
+fn best(answer: &Answer) -> Vec<Probability> {
+    let mut probabilities = probabilities(answer);
+    probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    probabilities.truncate(BEST);
+    probabilities
 }

@@ -1,4 +1,4 @@
-//! What everybody in a recording does: people followed apart, a running answer for each, then one for all that was seen of each.
+//! What everybody in a recording does: people followed apart, a streaming answer for each, then one for all that was seen of each.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -14,9 +14,9 @@ use farnear_silhouettes::mask::{
 use serde::Serialize;
 
 use super::{
-    film::{Film, Shown},
+    annotated_video::{AnnotatedVideo, Shown},
     recognition::Model,
-    verdict::{Part, Verdict, of_segments, outlier_score, parts, restricted, rounded_share},
+    answer::{Part, AnswerSummary, of_segments, outlier_score, parts, restricted, rounded_probability},
     views::{Frames, View},
 };
 use crate::{
@@ -28,15 +28,15 @@ use crate::{
 
 /// What is recognised.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct EverybodySettings {
+pub struct MultiPersonSettings {
     /// Masks of full frames, or a video.
     pub view: View,
     /// The only activities that can be; empty for all that the model knows.
     pub among: Vec<String>,
-    /// Frames of the running answer; without it as many as a training clip had.
+    /// Frames of the streaming answer; without it as many as a training clip had.
     pub window: Option<usize>,
-    /// A new folder for the frames with everybody's running answer drawn on them.
-    pub film: Option<PathBuf>,
+    /// A new folder for the frames with everybody's streaming answer drawn on them.
+    pub annotated_video: Option<PathBuf>,
 }
 
 /// Everybody in a frame.
@@ -66,7 +66,7 @@ pub struct PersonInFrame {
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
     /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
-    pub strangeness: Option<f64>,
+    pub outlier_score: Option<f64>,
     /// What is doubtful: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
@@ -81,7 +81,7 @@ pub struct EverybodyFigures {
     pub frames: usize,
     /// Frames of a window.
     pub window: usize,
-    /// From a file to everybody's part of a running answer.
+    /// From a file to everybody's part of a streaming answer.
     pub seconds_per_frame: f64,
 }
 
@@ -102,14 +102,14 @@ pub struct PersonFigures {
     pub perhaps_swapped_with: Vec<usize>,
     /// For all that was seen.
     #[serde(flatten)]
-    pub verdict: Verdict,
+    pub answer: AnswerSummary,
     /// Stretches of one activity each, by a hidden semi-Markov model.
     pub segments: Vec<Part>,
 }
 
 /// Silhouettes at 100x100 or several views, where one view of full frames is needed.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum EverybodyError {
+pub enum MultiPersonError {
     /// Cut-out silhouettes hold one person each.
     #[error("{}: these are silhouettes cut out at 100x100, which hold one person each; several are looked for in full frames", path.display())]
     CutOut {
@@ -138,31 +138,31 @@ struct Somebody<'m> {
 }
 
 /// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
-pub struct Everybody<'m> {
+pub struct MultiPersonTracker<'m> {
     model: &'m Recogniser,
     frames: Frames,
     tracker: Option<Tracker>,
     window: usize,
     among: Vec<String>,
     people: Vec<Somebody<'m>>,
-    film: Option<Film>,
+    annotated_video: Option<AnnotatedVideo>,
     count: usize,
     seconds: f64,
 }
 
-impl<'m> Everybody<'m> {
+impl<'m> MultiPersonTracker<'m> {
     /// Opens the view.
     ///
     /// # Errors
-    /// [`EverybodyError`], a view that cannot be opened.
-    pub fn begin(model: &'m Model, settings: &EverybodySettings) -> Result<Self> {
+    /// [`MultiPersonError`], a view that cannot be opened.
+    pub fn begin(model: &'m Model, settings: &MultiPersonSettings) -> Result<Self> {
         model.check_known(&settings.among)?;
         if settings.view.is_cut_out()? {
-            return Err(EverybodyError::CutOut { path: settings.view.path.clone() }.into());
+            return Err(MultiPersonError::CutOut { path: settings.view.path.clone() }.into());
         }
         let recogniser = model.recogniser(true);
         if recogniser.views != 1 {
-            return Err(EverybodyError::Views { model: model.path().into(), views: recogniser.views }.into());
+            return Err(MultiPersonError::Views { model: model.path().into(), views: recogniser.views }.into());
         }
         if let Some(window) = settings.window {
             at_least("window", window, 1, "frames")?;
@@ -173,7 +173,7 @@ impl<'m> Everybody<'m> {
             window: settings.window.unwrap_or(recogniser.typical_frames).max(1),
             among: settings.among.clone(),
             people: Vec::new(),
-            film: settings.film.as_deref().map(Film::begin).transpose()?,
+            annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
             count: 0,
             seconds: 0.0,
             model: recogniser,
@@ -201,11 +201,11 @@ impl<'m> Everybody<'m> {
             .map(|followed| self.answered(followed).about(|| moved.name.clone()))
             .collect::<Result<Vec<PersonInFrame>>>()?;
         self.seconds += start.elapsed().as_secs_f64();
-        if let Some(film) = &mut self.film {
+        if let Some(annotated_video) = &mut self.annotated_video {
             let shown: Vec<Shown> = people.iter().filter_map(shown).collect();
             let nothing = || moved.picture.as_ref().map_or((1, 1), super::views::size);
             let mask = moved.mask.unwrap_or_else(|_| Mask::from_elem(nothing(), false));
-            film.draw_people(moved.picture.as_ref(), &mask, &shown)?;
+            annotated_video.draw_people(moved.picture.as_ref(), &mask, &shown)?;
         }
         Ok(Some(FrameOfPeople {
             frame: self.count,
@@ -215,7 +215,7 @@ impl<'m> Everybody<'m> {
         }))
     }
 
-    /// The running answer for one of them.
+    /// The streaming answer for one of them.
     fn answered(
         &mut self,
         followed: Followed,
@@ -270,8 +270,8 @@ impl<'m> Everybody<'m> {
             person,
             top_left_bottom_right: spans.map(|b| [b.top, b.left, b.bottom, b.right]),
             activity: answer.and_then(|answer| answer.activity.clone()),
-            confidence: answer.map_or(0.0, |answer| rounded_share(answer.confidence)),
-            strangeness: answer.and_then(outlier_score),
+            confidence: answer.map_or(0.0, |answer| rounded_probability(answer.confidence)),
+            outlier_score: answer.and_then(outlier_score),
             flags,
         })
     }
@@ -281,8 +281,8 @@ impl<'m> Everybody<'m> {
     /// # Errors
     /// A model that does not fit.
     pub fn finish(self) -> Result<EverybodyFigures> {
-        if let Some(film) = self.film {
-            film.finish()?;
+        if let Some(annotated_video) = self.annotated_video {
+            annotated_video.finish()?;
         }
         let (model, among) = (self.model, &self.among);
         let people = (1..)
@@ -323,7 +323,7 @@ fn figures(
         silhouettes: numbers.len(),
         crossing_frames: somebody.crossing_frames,
         perhaps_swapped_with: somebody.perhaps_swapped_with.clone(),
-        verdict: Verdict::new(answer, numbers.len()),
+        answer: AnswerSummary::new(answer, numbers.len()),
         segments: parts(of_segments(&found), &numbers, at(numbers.len().saturating_sub(1))),
     })
 }

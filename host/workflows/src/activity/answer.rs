@@ -8,27 +8,27 @@ use crate::figures::rounded;
 
 /// The answer for all that was seen of one person.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Verdict {
+pub struct AnswerSummary {
     /// The activity; `None` is unknown.
     pub activity: Option<String>,
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
     /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
-    pub strangeness: Option<f64>,
+    pub outlier_score: Option<f64>,
     /// Why the activity is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Probability of every activity.
-    pub shares: Vec<Share>,
+    pub probabilities: Vec<Probability>,
 }
 
 /// Probability of an activity.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Share {
+pub struct Probability {
     /// The activity.
     pub activity: String,
     /// 0 to 1; all add up to 1.
-    pub share: f64,
+    pub probability: f64,
 }
 
 /// A stretch of the recording; frames from 1, both ends included.
@@ -44,14 +44,14 @@ pub struct Part {
     pub confidence: f64,
 }
 
-impl Verdict {
+impl AnswerSummary {
     /// Of that many frames.
     pub(super) fn new(answer: Answer, frames: usize) -> Self {
         Self {
-            confidence: rounded_share(answer.confidence),
-            strangeness: outlier_score(&answer),
+            confidence: rounded_probability(answer.confidence),
+            outlier_score: outlier_score(&answer),
             reason: unknown_because(&answer, frames),
-            shares: shares(&answer),
+            probabilities: probabilities(&answer),
             activity: answer.activity,
         }
     }
@@ -68,7 +68,7 @@ pub(super) fn parts<'a>(
         from: numbers.get(from).copied().unwrap_or(1),
         to: to.checked_sub(1).and_then(|last| numbers.get(last)).copied().unwrap_or(frames),
         activity: activity.clone(),
-        confidence: rounded_share(confidence),
+        confidence: rounded_probability(confidence),
     };
     stretches.into_iter().map(part).collect()
 }
@@ -81,12 +81,12 @@ pub(super) fn of_segments(
 }
 
 /// Probability of every activity.
-pub(super) fn shares(answer: &Answer) -> Vec<Share> {
-    let share = |(activity, value): &(String, f32)| Share {
+pub(super) fn probabilities(answer: &Answer) -> Vec<Probability> {
+    let probability = |(activity, value): &(String, f32)| Probability {
         activity: activity.clone(),
-        share: rounded_share(*value),
+        probability: rounded_probability(*value),
     };
-    answer.probabilities.iter().map(share).collect()
+    answer.probabilities.iter().map(probability).collect()
 }
 
 /// The answer if only some activities can be; all can where none is named.
@@ -109,12 +109,12 @@ fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     })
 }
 
-/// A share with four decimals, without the digits that f32 does not have.
-pub(super) fn rounded_share(value: f32) -> f64 {
+/// A probability with four decimals, without the digits that f32 does not have.
+pub(super) fn rounded_probability(value: f32) -> f64 {
     rounded(f64::from(value), 4)
 }
 
 /// JSON has no infinity: nothing was seen.
 pub(super) fn outlier_score(answer: &Answer) -> Option<f64> {
-    answer.outlier_score.is_finite().then(|| rounded_share(answer.outlier_score))
+    answer.outlier_score.is_finite().then(|| rounded_probability(answer.outlier_score))
 }
