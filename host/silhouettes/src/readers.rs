@@ -14,6 +14,7 @@
 //!
 //! Data sets of body joints come as MATLAB files ([`skeletons`]).
 
+mod body;
 pub mod bvh;
 pub mod c3d;
 pub mod csv;
@@ -26,7 +27,7 @@ pub mod skeletons;
 pub mod trc;
 
 use reader::Reader;
-use recording::{Choices, Recording, RecordingError};
+use recording::{Choices, Recording, RecordingError, Source};
 
 /// All formats of motion capture.
 pub const READERS: [Reader; 6] =
@@ -41,7 +42,11 @@ pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));
     let reader = reader.ok_or_else(|| RecordingError::Extension { found: ending, known: extensions() })?;
-    Ok((reader.read)(bytes)?.settled(choices))
+    let recording = (reader.read)(bytes)?.settled(choices);
+    match &recording.unit.source {
+        Source::Unknown { stated } => Err(RecordingError::Unit(stated.clone())),
+        _ => Ok(recording),
+    }
 }
 
 /// The endings of all readers, for messages: `.bvh, .c3d, ...`.

@@ -25,7 +25,7 @@ pub const READER: Reader = Reader {
 /// # Errors
 /// [`RecordingError::Line`]: what stands there and what was expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
-    let motion = parse::parse(text(bytes)?)?;
+    let motion = parse::parse(&text(bytes)?)?;
     let kinematics = Kinematics::new(&motion);
     let frames =
         motion.frames.iter().map(|frame| kinematics.places(frame).into_iter().map(Some).collect()).collect();
@@ -33,6 +33,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     Ok(Found {
         unit: guess::unit(&motion.joints),
         up: guess::up(&motion, &kinematics),
+        remarks: Vec::new(),
         names: motion.joints.iter().map(|joint| joint.name.clone()).collect(),
         rate_hz: if rate_hz.is_finite() { rate_hz } else { 0.0 },
         frames,

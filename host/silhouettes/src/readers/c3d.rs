@@ -78,15 +78,17 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     for index in names.len()..layout.points {
         names.push(format!("*{}", index + 1));
     }
+    let (frames, remarks) = layout.count(&file, &declared_frames(&file, &parameters));
     Ok(Found {
         names,
         rate_hz: if layout.rate_hz.is_finite() { layout.rate_hz } else { 0.0 },
-        frames: layout.frames(&file)?,
+        frames: layout.frames(&file, frames)?,
         unit: match unit.as_str() {
             "" => Known { value: Unit::MM, source: Source::Format },
-            named => Known { value: Unit::named(named)?, source: Source::File },
+            stated => Found::stated_unit(stated),
         },
         up: Known { value: Up::Z, source: Source::Format },
+        remarks,
     })
 }
 
@@ -136,20 +138,51 @@ impl Layout {
         Ok(Self {
             points,
             analogue: usize::from(word(3)?),
-            frames_by_header: usize::from(word(5)?).saturating_sub(usize::from(word(4)?)) + 1,
+            frames_by_header: usize::from(word(5)?.wrapping_sub(word(4)?)) + 1,
             scale: file.real(12, "the header")?,
             data_at: usize::from(word(9)?).max(1) * BLOCK - BLOCK,
             rate_hz: f64::from(file.real(20, "the header")?),
         })
     }
 
-    /// The points of all frames, in the file's unit.
-    fn frames(&self, file: &File) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
+    /// Bytes of a number and of a frame.
+    fn sizes(&self) -> (usize, usize) {
         let size = if self.scale < 0.0 { 4 } else { 2 };
-        let stride = size * (4 * self.points + self.analogue);
+        (size, size * (4 * self.points + self.analogue))
+    }
+
+    /// Frames to read, and what to report about them. The header counts in 16 bits, so that a longer recording wraps round, and some
+    /// programs trim only the header: the parameters say how many frames there are where they declare more, and there is room for them.
+    fn count(&self, file: &File, declared: &[usize]) -> (usize, Vec<String>) {
+        let (_, stride) = self.sizes();
+        let bytes = file.bytes.len().saturating_sub(self.data_at);
+        let room = bytes / stride;
+        let fitting = declared.iter().copied().filter(|&frames| frames <= room).max();
+        let frames = match (self.frames_by_header, fitting) {
+            (65_535.., None) => room,
+            (header, Some(fitting)) if header > room || fitting > header => fitting,
+            (header, None) => header + room.saturating_sub(header) / 65_536 * 65_536,
+            (header, Some(_)) => header,
+        };
+        let mut remarks = Vec::new();
+        if frames != self.frames_by_header {
+            remarks.push(format!(
+                "the header counts {} frames, {frames} are declared elsewhere and read",
+                self.frames_by_header
+            ));
+        }
+        // The last block may be padded.
+        let left = bytes.saturating_sub(frames.saturating_mul(stride));
+        if left >= BLOCK.max(stride) {
+            remarks.push(format!("the file has room for {room} frames, {frames} are declared and read"));
+        }
+        (frames, remarks)
+    }
+
+    /// The points of the first `frames` frames, in the file's unit.
+    fn frames(&self, file: &File, frames: usize) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
+        let (size, stride) = self.sizes();
         let room = file.bytes.len().saturating_sub(self.data_at) / stride;
-        // The 16-bit header cannot count beyond 65535 frames; the file's length then tells.
-        let frames = if self.frames_by_header >= 65_535 { room } else { self.frames_by_header };
         if frames > room {
             return Err(RecordingError::Truncated {
                 kind: "C3D",
@@ -179,6 +212,26 @@ impl Layout {
         let visible = residual >= 0.0 && [x, y, z].iter().all(|v| v.is_finite());
         Ok(visible.then_some([x, y, z]))
     }
+}
+
+/// Numbers of frames that parameters declare: `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words each, the low one first) and
+/// `POINT:FRAMES`.
+fn declared_frames(file: &File, parameters: &HashMap<String, Parameter>) -> Vec<usize> {
+    let word = |at: usize| file.word(at, "a parameter").ok().map(usize::from);
+    let field = |name: &str| -> Option<usize> {
+        let parameter = parameters.get(name).filter(|p| p.element == 2)?;
+        let high = if parameter.dimensions.first() == Some(&2) { word(parameter.at + 2)? } else { 0 };
+        Some(word(parameter.at)? + 65_536 * high)
+    };
+    let trial = field("TRIAL:ACTUAL_END_FIELD")
+        .zip(field("TRIAL:ACTUAL_START_FIELD"))
+        .and_then(|(last, first)| last.checked_sub(first).map(|frames| frames + 1));
+    let points = match parameters.get("POINT:FRAMES") {
+        Some(p) if p.element == 4 => file.real(p.at, "a parameter").ok().map(|value| value as usize),
+        Some(_) => field("POINT:FRAMES"),
+        None => None,
+    };
+    trial.into_iter().chain(points).collect()
 }
 
 /// All parameters by `GROUP:NAME`; stops quietly where the section is damaged (points can be read without names).

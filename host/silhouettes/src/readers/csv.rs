@@ -68,6 +68,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         frames,
         unit: Known { value: Unit::MM, source: Source::Format },
         up: Known { value: Up::Z, source: Source::Format },
+        remarks: Vec::new(),
     })
 }
 

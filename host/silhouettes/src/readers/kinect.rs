@@ -51,7 +51,8 @@ const RATE_HZ: f64 = 30.0;
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let mut frames = Vec::new();
     let mut joints = None;
-    for (line, content) in (1..).zip(text(bytes)?.lines()) {
+    let whole = text(bytes)?;
+    for (line, content) in (1..).zip(whole.lines()) {
         let wrong = |reason: String| RecordingError::Line { line, reason };
         let words = content.split([' ', '\t', ',', ';']).filter(|word| !word.trim().is_empty());
         let numbers: Vec<f64> = words
@@ -100,6 +101,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         frames,
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
         up: Known { value: Up::Y, source: Source::Format },
+        remarks: Vec::new(),
     })
 }
 

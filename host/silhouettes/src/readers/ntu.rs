@@ -2,7 +2,8 @@
 //!
 //! The number of frames; per frame the number of bodies; per body a line about it (its id first), the number of joints and a line per
 //! joint: x, y, z in metres (x across, y up, z away from the sensor), eight further numbers, and last whether the joint was tracked (0: it
-//! was not). Where a file holds several people the one who is there longest is taken, the one who moves more of equals.
+//! was not). Of several bodies that are present for at least half as long as the longest, the one whose joints vary most in position is taken:
+//! the sensor also reports chairs as bodies, and their joints only jitter.
 
 use super::kinect::JOINTS_25;
 use super::reader::Reader;
@@ -14,7 +15,7 @@ use std::collections::BTreeMap;
 pub const READER: Reader = Reader {
     name: "NTU RGB+D",
     extensions: &["skeleton"],
-    about: "25 joints of a Kinect, metres, y up; the person who is there longest",
+    about: "25 joints of a Kinect, metres, y up; the body that moves most",
     read,
 };
 
@@ -28,7 +29,8 @@ type Body = Vec<Option<Point3>>;
 /// # Errors
 /// [`RecordingError::Line`]: what stands there and what was expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
-    let mut lines = Lines { lines: text(bytes)?.lines(), at: 0 };
+    let content = text(bytes)?;
+    let mut lines = Lines { lines: content.lines(), at: 0 };
     let count = lines.count("the number of frames")?;
     let mut bodies: BTreeMap<String, Vec<(usize, Body)>> = BTreeMap::new();
     for frame in 0..count {
@@ -43,8 +45,13 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             bodies.entry(id).or_default().push((frame, body));
         }
     }
-    let chosen =
-        bodies.into_values().max_by(|a, b| a.len().cmp(&b.len()).then_with(|| moved(a).total_cmp(&moved(b))));
+    let mut remarks = Vec::new();
+    if bodies.len() > 1 {
+        remarks.push(format!("{} bodies in the file: the one that moves most is used", bodies.len()));
+    }
+    let longest = bodies.values().map(Vec::len).max().unwrap_or(0);
+    let present = bodies.into_values().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
+    let chosen = present.max_by(|a, b| variance(a).total_cmp(&variance(b)));
     let mut frames = vec![vec![None; JOINTS_25.len()]; count];
     for (frame, body) in chosen.unwrap_or_default() {
         frames[frame] = body;
@@ -55,16 +62,21 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         frames,
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
         up: Known { value: Up::Y, source: Source::Format },
+        remarks,
     })
 }
 
-/// How far the joints of a body have gone, file units.
-fn moved(body: &[(usize, Body)]) -> f64 {
-    body.windows(2)
-        .flat_map(|pair| pair[0].1.iter().zip(&pair[1].1))
-        .filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)))
-        .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt())
-        .sum()
+/// Variance of the joints' positions over time, summed over joints, file units squared.
+fn variance(body: &[(usize, Body)]) -> f64 {
+    let joints = body.first().map_or(0, |(_, joints)| joints.len());
+    let of = |joint: usize, axis: usize| {
+        let values: Vec<f64> =
+            body.iter().filter_map(|(_, joints)| joints.get(joint)?.map(|p| p[axis])).collect();
+        let count = values.len().max(1) as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count
+    };
+    (0..joints).flat_map(|joint| (0..3).map(move |axis| (joint, axis))).map(|(j, k)| of(j, k)).sum()
 }
 
 struct Lines<'a> {
@@ -145,7 +157,25 @@ mod tests {
         let head = settled.by_name(1)["head"];
         assert!(head.iter().zip([600.0, -3000.0, 120.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
         assert!(!settled.by_name(0).contains_key("left hand"));
-        assert!(settled.remarks().is_empty());
+        assert_eq!(settled.remarks(), ["2 bodies in the file: the one that moves most is used"]);
+    }
+
+    #[test]
+    fn a_chair_that_stays_longer_is_not_taken_for_the_actor() {
+        let body = |id: &str, x: f64| {
+            let joints: String =
+                (0..25).map(|j| format!("{x} {} 3 0 0 0 0 0 0 0 0 2\n", j as f64 / 25.0 + 0.01)).collect();
+            format!("{id} 0 1 1 1 1 0 0 0 2\n25\n{joints}")
+        };
+        let mut text = String::from("20\n");
+        for frame in 0..20 {
+            // The chair jitters from frame to frame; the actor walks a metre and is lost for three frames.
+            let chair = body("1", 2.0 + 0.02 * f64::from(frame % 2));
+            text += &if frame < 3 { format!("1\n{chair}") } else { format!("2\n{chair}{}", body("2", 0.05 * f64::from(frame))) };
+        }
+        let found = read(text.as_bytes()).expect("bodies");
+        assert_eq!(found.frames[10][0].map(|p| p[0]), Some(0.5));
+        assert!(found.remarks[0].starts_with("2 bodies"), "{:?}", found.remarks);
     }
 
     #[test]

@@ -3,7 +3,9 @@
 //! A reader gives what the file holds in the file's own unit and axes ([`Found`]), each with where it is known from;
 //! [`Found::settled`] turns that to millimetres and z up, or to whatever the caller knows better.
 
+use super::body;
 use crate::silhouette::capsule::Point3;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
@@ -122,6 +124,11 @@ pub enum Source {
     File,
     /// Files of this format have it so.
     Format,
+    /// The file states something that this program does not know.
+    Unknown {
+        /// The file's words.
+        stated: String,
+    },
     /// Nothing states it: it was guessed.
     Guess {
         /// From what.
@@ -172,18 +179,34 @@ pub struct Found {
     pub unit: Known<Unit>,
     /// The axis that points up.
     pub up: Known<Up>,
+    /// What a user should know about how the file was read, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 impl Found {
-    /// The recording in millimetres with z up. Points that are not finite count as hidden.
-    pub fn settled(self, choices: Choices) -> Recording {
-        let (unit, up) = (self.unit.unless(choices.unit), self.up.unless(choices.up));
+    /// The unit that the file states, which may be one that this program does not know: then the caller has to name it.
+    pub(super) fn stated_unit(stated: &str) -> Known<Unit> {
+        match Unit::named(stated) {
+            Ok(value) => Known { value, source: Source::File },
+            Err(_) => Known { value: Unit::MM, source: Source::Unknown { stated: stated.to_owned() } },
+        }
+    }
+
+    /// The recording in millimetres with z up. Points that are not finite count as hidden, and points at exactly 0, 0, 0, which is how
+    /// many programs export a missing marker.
+    pub fn settled(mut self, choices: Choices) -> Recording {
+        let hidden = body::hide_zeros(&mut self.frames);
+        if hidden > 0 {
+            self.remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
+        }
+        let unit = body::plausible(self.unit.unless(choices.unit), &self.frames);
+        let up = self.up.unless(choices.up);
         let mut frames = self.frames;
         for point in frames.iter_mut().flatten() {
             let settled = point.map(|p| up.value.to_z(p.map(|v| unit.value.mm * v)));
             *point = settled.filter(|p| p.iter().all(|v| v.is_finite()));
         }
-        Recording { names: self.names, rate_hz: self.rate_hz, frames, unit, up }
+        Recording { names: self.names, rate_hz: self.rate_hz, frames, unit, up, remarks: self.remarks }
     }
 }
 
@@ -200,6 +223,8 @@ pub struct Recording {
     pub unit: Known<Unit>,
     /// The file's axis that points up.
     pub up: Known<Up>,
+    /// What the reader reports about the file, one sentence each.
+    remarks: Vec<String>,
 }
 
 impl Recording {
@@ -224,11 +249,11 @@ impl Recording {
             Source::Guess { reason, sure } => {
                 Some(format!("{what}: a{} guess, {reason}", if *sure { "" } else { " doubtful" }))
             }
-            Source::Caller | Source::File | Source::Format => None,
+            Source::Caller | Source::File | Source::Format | Source::Unknown { .. } => None,
         };
         let unit = remark(format!("lengths are taken as {}", self.unit.value), &self.unit.source);
         let up = remark(format!("{} is taken as up", self.up.value), &self.up.source);
-        unit.into_iter().chain(up).collect()
+        unit.into_iter().chain(up).chain(self.remarks.iter().cloned()).collect()
     }
 }
 
@@ -278,13 +303,15 @@ pub enum RecordingError {
     Unit(String),
 }
 
-/// The text of a file; a byte-order mark at its beginning is left out.
+/// The text of a file without a byte-order mark. Bytes that are not UTF-8 are read as Latin-1, which older programs write.
 ///
 /// # Errors
-/// Bytes that are not UTF-8, with the line in which the first of them stands.
-pub(super) fn text(bytes: &[u8]) -> Result<&str, RecordingError> {
+/// Bytes that are neither, with the line of the first of them.
+pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
+    let control = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
     match std::str::from_utf8(bytes) {
-        Ok(text) => Ok(text.trim_start_matches('\u{feff}')),
+        Ok(text) => Ok(text.trim_start_matches('\u{feff}').into()),
+        Err(_) if !bytes.iter().any(control) => Ok(bytes.iter().map(|&byte| char::from(byte)).collect()),
         Err(error) => {
             let at = error.valid_up_to();
             let line = 1 + bytes.iter().take(at).filter(|&&byte| byte == b'\n').count();
@@ -307,6 +334,7 @@ mod tests {
             frames: vec![vec![Some(point)], vec![None], vec![Some([f64::MAX, 0.0, 0.0])]],
             unit: Known { value: Unit { mm: 10.0 }, source: guess },
             up: Known { value: Up::Y, source: Source::Format },
+            remarks: Vec::new(),
         }
     }
 
@@ -348,8 +376,9 @@ mod tests {
 
     #[test]
     fn what_is_not_text_is_named_with_its_line() {
-        assert_eq!(text(b"\xef\xbb\xbfabc"), Ok("abc"));
-        let error = text(b"one\ntwo\n\xff").expect_err("not UTF-8");
+        assert_eq!(text(b"\xef\xbb\xbfabc"), Ok("abc".into()));
+        assert_eq!(text(b"M\xfcller"), Ok("M\u{fc}ller".into()));
+        let error = text(b"one\ntwo\n\xff\x00").expect_err("not text");
         assert!(error.to_string().starts_with("line 3: byte 0xff"), "{error}");
     }
 }

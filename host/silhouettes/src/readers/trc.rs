@@ -1,7 +1,7 @@
 //! TRC files (Motion Analysis, OpenSim): tab-separated marker trajectories.
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
+use super::recording::{Found, Known, RecordingError, Source, Up, text};
 use crate::silhouette::capsule::Point3;
 
 /// The entry of [`super::READERS`].
@@ -40,43 +40,59 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             reason: format!("{key} = `{text}` is not a number"),
         })
     };
-    let unit = Unit::named(value("Units")?)?;
+    let unit = Found::stated_unit(value("Units")?);
     let (rate_hz, count) = (number("DataRate")?, number("NumMarkers")?);
-    let names: Vec<String> = line(3)?
-        .split('\t')
-        .skip(2)
-        .map(str::trim)
-        .filter(|name| !name.is_empty())
-        .map(str::to_owned)
+    // A name stands above the first of its three columns; Cortex leaves the names of unidentified trajectories out.
+    let cells: Vec<&str> = line(3)?.split('\t').skip(2).map(str::trim).collect();
+    let all: Vec<(usize, String)> = (0..)
+        .zip(cells.chunks(3))
+        .filter(|(_, group)| !group[0].is_empty())
+        .map(|(place, group)| (place, group[0].to_owned()))
         .collect();
-    if names.len() as f64 != count {
+    let packed = cells.iter().any(|c| !c.is_empty()) && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
+    let (places, names): (Vec<usize>, Vec<String>) = if packed {
+        cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()
+    } else {
+        all.into_iter().unzip()
+    };
+    let mut remarks = Vec::new();
+    let unnamed = count - names.len() as f64;
+    if unnamed < 0.0 || names.is_empty() {
         return Err(RecordingError::Line {
             line: 4,
             reason: format!("{} marker names, NumMarkers says {count}", names.len()),
         });
     }
-    let frames = rows(&lines, names.len())?;
+    if unnamed > 0.0 {
+        remarks.push(format!("{unnamed} of {count} trajectories have no name and are not read"));
+    }
+    let frames = rows(&lines, &places)?;
     // Files without the number are read as far as they go; one that promises more was cut short.
     if let Ok(promised) = number("NumFrames")
         && promised > frames.len() as f64
     {
+        // Some exporters count one frame too many.
+        if promised - frames.len() as f64 > 1.0 {
         let reason = format!(
             "NumFrames promises {promised} frames, the file ends after {}: it was cut short",
             frames.len()
         );
         return Err(RecordingError::Line { line: 3, reason });
+        }
+        remarks.push(format!("NumFrames promises {promised} frames, the file has {}", frames.len()));
     }
     Ok(Found {
         names,
         rate_hz,
         frames,
-        unit: Known { value: unit, source: Source::File },
+        unit,
         up: Known { value: Up::Y, source: Source::Format },
+        remarks,
     })
 }
 
-/// The frames of the lines after the header: number, time, then x, y and z of every marker; missing cells at the end are hidden.
-fn rows(lines: &[&str], markers: usize) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
+/// The frames of the lines after the header: number, time, then x, y and z of the markers at these places; missing cells at the end are hidden.
+fn rows(lines: &[&str], places: &[usize]) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
     let mut frames = Vec::new();
     for (index, row) in lines.iter().enumerate().skip(5) {
         // Trailing tabs are common; a row that is only white space separates header and data.
@@ -84,12 +100,8 @@ fn rows(lines: &[&str], markers: usize) -> Result<Vec<Vec<Option<Point3>>>, Reco
         if row.trim().is_empty() {
             continue;
         }
-        if cells.len() > 2 + 3 * markers {
-            let reason = format!("{} values, expected {}", cells.len(), 2 + 3 * markers);
-            return Err(RecordingError::Line { line: index + 1, reason });
-        }
-        let mut points = Vec::with_capacity(markers);
-        for m in 0..markers {
+        let mut points = Vec::with_capacity(places.len());
+        for &m in places {
             let cell = |k: usize| cells.get(2 + 3 * m + k).map_or("", |cell| cell.trim());
             points.push(point([cell(0), cell(1), cell(2)], index + 1)?);
         }
@@ -100,7 +112,7 @@ fn rows(lines: &[&str], markers: usize) -> Result<Vec<Vec<Option<Point3>>>, Reco
 
 /// Three cells; one that is empty (or not a number) is a hidden marker.
 pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, RecordingError> {
-    if cells.iter().any(|cell| cell.is_empty() || cell.eq_ignore_ascii_case("nan")) {
+    if cells.iter().any(|cell| cell.is_empty() || ["nan", "na", "n/a", "null", "-"].iter().any(|word| cell.eq_ignore_ascii_case(word))) {
         return Ok(None);
     }
     let mut point = [0.0; 3];

@@ -1,0 +1,130 @@
+//! What recordings of bodies have in common, whatever their format: missing points written as zeros, and a plausible size.
+
+use super::recording::{Known, Source, Unit};
+use crate::silhouette::capsule::Point3;
+
+/// Points of a frame without which it has no size that could be checked.
+const POINTS: usize = 4;
+/// Extents of a body with its props, millimetres: outside of these it is no person, whatever the file states.
+const POSSIBLE_MM: [f64; 2] = [100.0, 20_000.0];
+/// Extents that need no second look, millimetres.
+const USUAL_MM: [f64; 2] = [400.0, 6000.0];
+/// Height of a standing adult, millimetres.
+const ADULT_MM: f64 = 1700.0;
+
+/// Hides points at exactly the origin and counts them. A point that is there in every frame, inside the body, is the origin of
+/// root-relative coordinates and is kept.
+pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
+    let zero = |point: &Option<Point3>| *point == Some([0.0; 3]);
+    let root = |m: usize, frames: &[Vec<Option<Point3>>]| {
+        frames.iter().all(|frame| frame.get(m).is_some_and(zero) && inside(frame))
+    };
+    let markers = frames.first().map_or(0, Vec::len);
+    let roots: Vec<bool> = (0..markers).map(|m| root(m, frames)).collect();
+    let mut hidden = 0;
+    for frame in frames {
+        for (point, root) in frame.iter_mut().zip(&roots) {
+            if !root && zero(point) {
+                *point = None;
+                hidden += 1;
+            }
+        }
+    }
+    hidden
+}
+
+/// Whether the origin lies strictly inside the box about the other points of a frame.
+fn inside(frame: &[Option<Point3>]) -> bool {
+    (0..3).all(|k| {
+        let values = || frame.iter().flatten().map(|p| p[k]);
+        values().any(|v| v < 0.0) && values().any(|v| v > 0.0)
+    })
+}
+
+/// The unit, or another where a body would have no human size in it: the one of mm, cm and m that fits an adult best. What the caller names is kept.
+pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
+    let limits = match unit.source {
+        Source::Format => USUAL_MM,
+        Source::File => POSSIBLE_MM,
+        Source::Caller | Source::Unknown { .. } | Source::Guess { .. } => return unit,
+    };
+    let Some(extent) = median_extent(frames) else { return unit };
+    let stated_mm = extent * unit.value.mm;
+    if (limits[0]..=limits[1]).contains(&stated_mm) {
+        return unit;
+    }
+    let off = |mm: f64| (extent * mm / ADULT_MM).ln().abs();
+    let Some(best) = [1.0, 10.0, 1000.0].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b))) else { return unit };
+    if off(best) > 1.5 || (best - unit.value.mm).abs() < 1e-9 {
+        return unit;
+    }
+    let stated = if unit.source == Source::File { " as the file states" } else { "" };
+    let reason = format!("in {}{stated} the body would be {stated_mm:.3} mm long", unit.value);
+    Known { value: Unit { mm: best }, source: Source::Guess { reason, sure: off(best) < 0.7 } }
+}
+
+/// The median over frames of the largest extent along an axis, file units; `None` where no frame has enough points.
+fn median_extent(frames: &[Vec<Option<Point3>>]) -> Option<f64> {
+    let extent = |frame: &Vec<Option<Point3>>| -> Option<f64> {
+        let points: Vec<Point3> = frame.iter().flatten().copied().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+        let along = |k: usize| {
+            let values = || points.iter().map(|p| p[k]);
+            values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+        };
+        (points.len() >= POINTS).then(|| (0..3).map(along).fold(0.0, f64::max))
+    };
+    let mut extents: Vec<f64> = frames.iter().filter_map(extent).filter(|extent| *extent > 0.0).collect();
+    extents.sort_by(f64::total_cmp);
+    extents.get(extents.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{read, recording::Choices};
+
+    fn csv(rows: &[[f64; 12]]) -> String {
+        let mut text = String::from("A_x,A_y,A_z,B_x,B_y,B_z,C_x,C_y,C_z,D_x,D_y,D_z\n");
+        for row in rows {
+            text += &(row.map(|v| v.to_string()).join(",") + "\n");
+        }
+        text
+    }
+
+    #[test]
+    fn a_missing_marker_at_zero_is_hidden_and_reported() {
+        let row = [500.0, 900.0, 1700.0, 500.0, 900.0, 900.0, 450.0, 900.0, 100.0, 0.0, 0.0, 0.0];
+        let found = read(csv(&[row]).as_bytes(), "csv", Choices::default()).expect("a table");
+        assert_eq!(found.frames[0][3], None);
+        assert_eq!(found.remarks(), ["1 points at exactly 0, 0, 0 are treated as missing markers"]);
+    }
+
+    #[test]
+    fn the_root_of_root_relative_joints_is_kept() {
+        let row = [-50.0, -40.0, 700.0, 60.0, 50.0, -800.0, 10.0, 0.0, 300.0, 0.0, 0.0, 0.0];
+        let found = read(csv(&[row, row]).as_bytes(), "csv", Choices::default()).expect("a table");
+        assert_eq!(found.frames[1][3], Some([0.0; 3]));
+        assert!(found.remarks().is_empty());
+    }
+
+    #[test]
+    fn a_body_of_two_millimetres_is_read_in_metres_unless_the_caller_names_the_unit() {
+        let row = [0.5, 0.9, 1.7, 0.5, 0.9, 0.9, 0.45, 0.9, 0.1, 0.4, 0.9, 0.1];
+        let found = read(csv(&[row]).as_bytes(), "csv", Choices::default()).expect("a table");
+        assert_eq!(found.unit.value.mm, 1000.0);
+        assert!(found.remarks()[0].contains("1.600 mm long"), "{:?}", found.remarks());
+        let named = Choices { unit: Some(super::Unit { mm: 10.0 }), up: None };
+        assert_eq!(read(csv(&[row]).as_bytes(), "csv", named).expect("a table").unit.value.mm, 10.0);
+    }
+
+    #[test]
+    fn trc_files_as_cortex_and_rokoko_write_them_are_read() {
+        let text = b"PathFileType\t4\t(X/Y/Z)\tM\xfcller.trc\nDataRate\tNumFrames\tNumMarkers\tUnits\n100\t3\t3\tmete\nFrame#\tTime\tA\t\t\t\t\t\tC\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n\n1\t0.0\t1\t2\t3\t4\t5\t6\t7\t8\t9\n2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9\n";
+        let error = read(text, "trc", Choices::default()).expect_err("an unknown unit");
+        assert!(error.to_string().contains("mete"), "{error}");
+        let named = Choices { unit: Some(super::Unit::MM), up: None };
+        let found = read(text, "trc", named).expect("a recording");
+        assert_eq!((found.names.as_slice(), found.frames.len()), (["A".to_owned(), "C".to_owned()].as_slice(), 2));
+        assert_eq!(found.frames[0][1], Some([7.0, -9.0, 8.0]));
+        assert_eq!(found.remarks().len(), 2, "{:?}", found.remarks());
+    }
+}
