@@ -1,5 +1,7 @@
 //! What is said of a recording or of one of the people in it, in the form in which all faces give it.
 
+use std::ops::Range;
+
 use farnear_recognition::live::Segment;
 use farnear_recognition::model::Answer;
 use serde::Serialize;
@@ -73,6 +75,21 @@ pub(super) fn parts<'a>(
     stretches.into_iter().map(part).collect()
 }
 
+/// Frames without anybody after which what follows is a part of its own: somebody may have left and another have come.
+const GAP_FRAMES: usize = 15;
+
+/// Ranges of a recording's frames with somebody in them, without gaps of more than [`GAP_FRAMES`]. `seen` is true where anybody is.
+pub(super) fn passages(seen: &[bool]) -> Vec<Range<usize>> {
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for (frame, _) in (0..).zip(seen).filter(|(_, seen)| **seen) {
+        match found.last_mut() {
+            Some(last) if frame - last.end <= GAP_FRAMES => last.end = frame + 1,
+            _ => found.push(frame..frame + 1),
+        }
+    }
+    found
+}
+
 /// The segments as [`parts`] takes them.
 pub(super) fn of_segments(
     segments: &[Segment],
@@ -117,4 +134,19 @@ pub(super) fn rounded_probability(value: f32) -> f64 {
 /// JSON has no infinity: nothing was seen.
 pub(super) fn outlier_score(answer: &Answer) -> Option<f64> {
     answer.outlier_score.is_finite().then(|| rounded_probability(answer.outlier_score))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_is_cut_where_nobody_is_there_for_a_while() {
+        let mut seen = vec![false; 400];
+        seen[3..40].fill(true);
+        seen[20..25].fill(false);
+        seen[340..390].fill(true);
+        assert_eq!(passages(&seen), [3..40, 340..390]);
+        assert!(passages(&[false; 50]).is_empty());
+    }
 }

@@ -19,7 +19,7 @@ use super::{
     annotated_video::AnnotatedVideo,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
-    answer::{Part, AnswerSummary, of_segments, outlier_score, parts, restricted, rounded_probability},
+    answer::{Part, AnswerSummary, of_segments, outlier_score, parts, passages, restricted, rounded_probability},
     views::{Frames, Seen, View},
 };
 use crate::{
@@ -281,28 +281,40 @@ impl<'m> Recognition<'m> {
     pub fn finish(self) -> Result<RecognitionFigures> {
         let whole: Vec<Track> = self.tracks.iter().map(|parts| joined(parts.iter())).collect();
         let answer = restricted(self.model.recognise(&whole)?, &self.among);
-        let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
-        stretches.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), &self.among));
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
         }
-        let found = segmented(self.model, &whole, &self.among, Worth::default())?;
-        // Frames without anybody are not in the tracks.
-        let seen = self.tracks.iter().find(|frames| frames.iter().any(|track| track.frames() > 0));
-        let numbers: Vec<usize> = seen
-            .into_iter()
-            .flat_map(|frames| (0..).zip(frames).filter(|(_, track)| track.frames() > 0))
-            .map(|(number, _)| number + 1)
+        let seen: Vec<bool> = (0..self.frames)
+            .map(|frame| self.tracks.iter().any(|view| view.get(frame).is_some_and(|track| track.frames() > 0)))
             .collect();
-        let windows = stretches.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
+        let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());
+        for passage in passages(&seen) {
+            let frames = |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
+            let views: Vec<Vec<Track>> = self.tracks.iter().map(frames).collect();
+            let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
+            let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
+            stretches.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), &self.among));
+            let found = segmented(self.model, &whole, &self.among, Worth::default())?;
+            // Frames without anybody are not in the tracks.
+            let numbers: Vec<usize> = views
+                .iter()
+                .find(|view| view.iter().any(|track| track.frames() > 0))
+                .into_iter()
+                .flat_map(|view| (passage.start..).zip(view).filter(|(_, track)| track.frames() > 0))
+                .map(|(frame, _)| frame + 1)
+                .collect();
+            let answers = stretches.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
+            in_windows.extend(parts(answers, &numbers, passage.end));
+            in_segments.extend(parts(of_segments(&found), &numbers, passage.end));
+        }
         Ok(RecognitionFigures {
             answer: AnswerSummary::new(answer, self.frames),
             frames: self.frames,
             empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
             flagged_frames: self.flagged_frames,
             window: self.window,
-            windows: parts(windows, &numbers, self.frames),
-            segments: parts(of_segments(&found), &numbers, self.frames),
+            windows: in_windows,
+            segments: in_segments,
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
         })
     }
