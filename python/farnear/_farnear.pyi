@@ -26,7 +26,7 @@ class ShadowReport(TypedDict):
 class Recognition(TypedDict):
     activity: Optional[str]
     confidence: float
-    strangeness: float
+    outlier_score: float
     probabilities: dict[str, float]
 
 class FarnearError(ValueError):
