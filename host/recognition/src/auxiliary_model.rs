@@ -65,7 +65,8 @@ impl AuxiliaryModel {
 
     /// How strange what the other says of a clip is for the activity answered: above 1 is unknown.
     pub(super) fn outlier_score(&self, said: &Answer, answer: &Answer) -> f32 {
-        let probabilities: Vec<f32> = answer.probabilities.iter().map(|(_, probability)| *probability).collect();
+        let probabilities: Vec<f32> =
+            answer.probabilities.iter().map(|(_, probability)| *probability).collect();
         let (class, _) = largest(&probabilities);
         self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
     }
@@ -106,7 +107,9 @@ mod tests {
 
     #[test]
     fn distances_are_bhattacharyyas() {
-        let of = |probabilities: [f32; 3]| -> Array1<f32> { probabilities.iter().map(|probability| probability.sqrt()).collect() };
+        let of = |probabilities: [f32; 3]| -> Array1<f32> {
+            probabilities.iter().map(|probability| probability.sqrt()).collect()
+        };
         let same = distance(of([0.5, 0.3, 0.2]).view(), of([0.5, 0.3, 0.2]).view());
         assert!(same.abs() < 1e-6, "{same}"); // rounding
         // By hand: -ln(sqrt(0.5 * 0.2) + sqrt(0.3 * 0.3) + sqrt(0.2 * 0.5)) = 0.06993.

@@ -76,8 +76,8 @@ impl Recogniser {
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
         let other = experiment.second.clone();
-        let second =
-            other.map(|other| AuxiliaryModel::learned(other, clips, &labels[..clips.len()], activities.len()));
+        let second = other
+            .map(|other| AuxiliaryModel::learned(other, clips, &labels[..clips.len()], activities.len()));
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
             limits: limits(&all, &labels, activities.len(), clips.len(), &patterns),

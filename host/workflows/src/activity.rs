@@ -2,18 +2,18 @@
 //! pictures, [`everybody`] in a picture by themselves), evaluating
 //! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
+mod annotated_video;
+pub mod answer;
 mod confusion_picture;
 pub mod evaluation;
-pub mod multi_person;
-mod annotated_video;
 pub mod judging;
 pub mod method;
 pub mod motion;
+pub mod multi_person;
 pub mod recognition;
-pub mod streaming;
 pub mod samples;
 pub mod shipped;
+pub mod streaming;
 pub mod training;
-pub mod answer;
-pub mod views;
 mod training_progress;
+pub mod views;

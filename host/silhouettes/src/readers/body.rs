@@ -54,7 +54,9 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
         return unit;
     }
     let off = |mm: f64| (extent * mm / ADULT_MM).ln().abs();
-    let Some(best) = [1.0, 10.0, 1000.0].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b))) else { return unit };
+    let Some(best) = [1.0, 10.0, 1000.0].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b))) else {
+        return unit;
+    };
     if off(best) > 1.5 || (best - unit.value.mm).abs() < 1e-9 {
         return unit;
     }
@@ -66,7 +68,8 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
 /// The median over frames of the largest extent along an axis, file units; `None` where no frame has enough points.
 fn median_extent(frames: &[Vec<Option<Point3>>]) -> Option<f64> {
     let extent = |frame: &Vec<Option<Point3>>| -> Option<f64> {
-        let points: Vec<Point3> = frame.iter().flatten().copied().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+        let points: Vec<Point3> =
+            frame.iter().flatten().copied().filter(|p| p.iter().all(|v| v.is_finite())).collect();
         let along = |k: usize| {
             let values = || points.iter().map(|p| p[k]);
             values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
@@ -123,7 +126,10 @@ mod tests {
         assert!(error.to_string().contains("mete"), "{error}");
         let named = Choices { unit: Some(super::Unit::MM), up: None };
         let found = read(text, "trc", named).expect("a recording");
-        assert_eq!((found.names.as_slice(), found.frames.len()), (["A".to_owned(), "C".to_owned()].as_slice(), 2));
+        assert_eq!(
+            (found.names.as_slice(), found.frames.len()),
+            (["A".to_owned(), "C".to_owned()].as_slice(), 2)
+        );
         assert_eq!(found.frames[0][1], Some([7.0, -9.0, 8.0]));
         assert_eq!(found.remarks().len(), 2, "{:?}", found.remarks());
     }

@@ -50,7 +50,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         remarks.push(format!("{} bodies in the file: the one that moves most is used", bodies.len()));
     }
     let longest = bodies.values().map(Vec::len).max().unwrap_or(0);
-    let present = bodies.into_values().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
+    let present =
+        bodies.into_values().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
     let chosen = present.max_by(|a, b| variance(a).total_cmp(&variance(b)));
     let mut frames = vec![vec![None; JOINTS_25.len()]; count];
     for (frame, body) in chosen.unwrap_or_default() {
@@ -171,7 +172,11 @@ mod tests {
         for frame in 0..20 {
             // The chair jitters from frame to frame; the actor walks a metre and is lost for three frames.
             let chair = body("1", 2.0 + 0.02 * f64::from(frame % 2));
-            text += &if frame < 3 { format!("1\n{chair}") } else { format!("2\n{chair}{}", body("2", 0.05 * f64::from(frame))) };
+            text += &if frame < 3 {
+                format!("1\n{chair}")
+            } else {
+                format!("2\n{chair}{}", body("2", 0.05 * f64::from(frame)))
+            };
         }
         let found = read(text.as_bytes()).expect("bodies");
         assert_eq!(found.frames[10][0].map(|p| p[0]), Some(0.5));

@@ -49,7 +49,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .filter(|(_, group)| !group[0].is_empty())
         .map(|(place, group)| (place, group[0].to_owned()))
         .collect();
-    let packed = cells.iter().any(|c| !c.is_empty()) && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
+    let packed = cells.iter().any(|c| !c.is_empty())
+        && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
     let (places, names): (Vec<usize>, Vec<String>) = if packed {
         cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()
     } else {
@@ -73,22 +74,15 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     {
         // Some exporters count one frame too many.
         if promised - frames.len() as f64 > 1.0 {
-        let reason = format!(
-            "NumFrames promises {promised} frames, the file ends after {}: it was cut short",
-            frames.len()
-        );
-        return Err(RecordingError::Line { line: 3, reason });
+            let reason = format!(
+                "NumFrames promises {promised} frames, the file ends after {}: it was cut short",
+                frames.len()
+            );
+            return Err(RecordingError::Line { line: 3, reason });
         }
         remarks.push(format!("NumFrames promises {promised} frames, the file has {}", frames.len()));
     }
-    Ok(Found {
-        names,
-        rate_hz,
-        frames,
-        unit,
-        up: Known { value: Up::Y, source: Source::Format },
-        remarks,
-    })
+    Ok(Found { names, rate_hz, frames, unit, up: Known { value: Up::Y, source: Source::Format }, remarks })
 }
 
 /// The frames of the lines after the header: number, time, then x, y and z of the markers at these places; missing cells at the end are hidden.
@@ -112,7 +106,10 @@ fn rows(lines: &[&str], places: &[usize]) -> Result<Vec<Vec<Option<Point3>>>, Re
 
 /// Three cells; one that is empty (or not a number) is a hidden marker.
 pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, RecordingError> {
-    if cells.iter().any(|cell| cell.is_empty() || ["nan", "na", "n/a", "null", "-"].iter().any(|word| cell.eq_ignore_ascii_case(word))) {
+    if cells.iter().any(|cell| {
+        cell.is_empty()
+            || ["nan", "na", "n/a", "null", "-"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+    }) {
         return Ok(None);
     }
     let mut point = [0.0; 3];

@@ -133,7 +133,8 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     check_activities(settings, &test, learned)?;
     let Adaptation { align, self_training } = settings.adaptation;
     let experiment = Experiment { align, self_training, ..settings.method.experiment(full_frames)? };
-    let outcome = train_on_others(learned, &test, &experiment, &[views], &training_progress::Folds::new(context));
+    let outcome =
+        train_on_others(learned, &test, &experiment, &[views], &training_progress::Folds::new(context));
     let outcome = training_progress::outcome(outcome, context, "evaluating")?;
     let confusion = if views == Views::Each { &outcome.each } else { &outcome.fused };
     let (low, high) = confusion.interval();
@@ -185,8 +186,12 @@ pub struct OpenSetFigures {
 pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Result<OpenSetFigures> {
     let samples = Samples::read(samples, context)?;
     let experiment = method.experiment(samples.full_frames)?;
-    let found =
-        open_set::open_set(&samples.fused()?, |_| experiment.clone(), SCALING, &training_progress::Folds::new(context));
+    let found = open_set::open_set(
+        &samples.fused()?,
+        |_| experiment.clone(),
+        SCALING,
+        &training_progress::Folds::new(context),
+    );
     let mut rows = training_progress::outcome(found, context, "evaluating")?;
     for row in &mut rows {
         for value in [&mut row.unknown_of_known, &mut row.unknown_of_strangers, &mut row.auroc] {

@@ -15,8 +15,8 @@ use serde::Serialize;
 
 use super::{
     annotated_video::{AnnotatedVideo, Shown},
+    answer::{AnswerSummary, Part, of_segments, outlier_score, parts, restricted, rounded_probability},
     recognition::Model,
-    answer::{Part, AnswerSummary, of_segments, outlier_score, parts, restricted, rounded_probability},
     views::{Frames, View},
 };
 use crate::{
@@ -162,7 +162,9 @@ impl<'m> MultiPersonTracker<'m> {
         }
         let recogniser = model.recogniser(true);
         if recogniser.views != 1 {
-            return Err(MultiPersonError::Views { model: model.path().into(), views: recogniser.views }.into());
+            return Err(
+                MultiPersonError::Views { model: model.path().into(), views: recogniser.views }.into()
+            );
         }
         if let Some(window) = settings.window {
             at_least("window", window, 1, "frames")?;

@@ -17,9 +17,11 @@ use serde::Serialize;
 
 use super::{
     annotated_video::AnnotatedVideo,
+    answer::{
+        AnswerSummary, Part, of_segments, outlier_score, parts, passages, restricted, rounded_probability,
+    },
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
-    answer::{Part, AnswerSummary, of_segments, outlier_score, parts, passages, restricted, rounded_probability},
     views::{Frames, Seen, View},
 };
 use crate::{
@@ -285,11 +287,14 @@ impl<'m> Recognition<'m> {
             annotated_video.finish()?;
         }
         let seen: Vec<bool> = (0..self.frames)
-            .map(|frame| self.tracks.iter().any(|view| view.get(frame).is_some_and(|track| track.frames() > 0)))
+            .map(|frame| {
+                self.tracks.iter().any(|view| view.get(frame).is_some_and(|track| track.frames() > 0))
+            })
             .collect();
         let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());
         for passage in passages(&seen) {
-            let frames = |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
+            let frames =
+                |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
             let views: Vec<Vec<Track>> = self.tracks.iter().map(frames).collect();
             let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
             let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;

@@ -17,8 +17,8 @@ use ndarray::{Array2, Axis};
 use serde::Serialize;
 
 use super::{
+    answer::{Probability, probabilities, rounded_probability},
     recognition::Model,
-    answer::{Probability, rounded_probability, probabilities},
 };
 use crate::{
     context::Context,

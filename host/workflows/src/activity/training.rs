@@ -91,7 +91,8 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
         None => clips,
     };
     let experiment = settings.method.experiment(full_frames)?;
-    let trained = Recogniser::train_searched(&clips, &experiment, SCALING, &training_progress::Training::new(context));
+    let trained =
+        Recogniser::train_searched(&clips, &experiment, SCALING, &training_progress::Training::new(context));
     let (model, inner_accuracy) = training_progress::outcome(trained, context, "training").about(|| what)?;
     staging::write_file(&settings.out, &model.to_bytes()?)?;
     context.info(&format!("wrote {}", settings.out.display()));

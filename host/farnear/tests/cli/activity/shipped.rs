@@ -137,11 +137,9 @@ fn somebody_walking_before_a_real_camera_is_said_to_walk() {
             // JPEG leaves greys about the edges; they are taken for masks all the same.
             let found =
                 figures(&mut farnear(&["activity", "recognise", &masks, "--model", "everyday", "--json"]));
-            let best = found["probabilities"]
-                .as_array()
-                .expect("probabilities")
-                .iter()
-                .max_by(|a, b| a["probability"].as_f64().partial_cmp(&b["probability"].as_f64()).expect("numbers"));
+            let best = found["probabilities"].as_array().expect("probabilities").iter().max_by(|a, b| {
+                a["probability"].as_f64().partial_cmp(&b["probability"].as_f64()).expect("numbers")
+            });
             walking += u32::from(best.is_some_and(|share| share["activity"] == "walk"));
             passages += 1;
         }

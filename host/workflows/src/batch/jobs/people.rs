@@ -175,8 +175,12 @@ fn recognised(settings: &Recognising, out: &Path, context: &Context<'_>) -> Resu
         Ok(View { path: path.clone(), kind })
     };
     let views = settings.views.iter().map(view).collect::<Result<Vec<View>>>()?;
-    let settings =
-        RecognitionSettings { views, among: settings.among.clone(), window: settings.window, annotated_video: None };
+    let settings = RecognitionSettings {
+        views,
+        among: settings.among.clone(),
+        window: settings.window,
+        annotated_video: None,
+    };
     let mut work = Recognition::begin(&model, &settings)?;
     let mut answers = String::new();
     while let Some(answer) = work.next(context)? {
