@@ -13,6 +13,8 @@ pub struct DepthMap {
     pub depth_mm: Array2<f32>,
     /// Confidence, 0 (none) to 1; 0 exactly where the depth is NaN.
     pub confidence: Array2<f32>,
+    /// Pixels whose depth was interpolated from their surroundings; `None` if there are none.
+    pub filled: Option<Array2<bool>>,
     /// Part of the pixels whose texture energy is below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median.
     pub low_texture_fraction: f64,
     /// What a user should know before trusting the map.
@@ -47,13 +49,7 @@ pub enum Warning {
 /// What speaks for a swapped pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SwapEvidence {
-    /// Much of the scene would lie before the near focus and almost nothing beyond the far focus; backgrounds do the
-    /// opposite.
-    BeyondNear {
-        /// Part of the confident pixels before the near focus.
-        fraction: f64,
-    },
-    /// The lower third of the image would lie farther away than the upper third; grounds and tables do the opposite.
+    /// Depth rises from the upper through the middle to the lower third of the image; grounds and tables do the opposite.
     LowerPartFarther {
         /// Difference of the median depths, mm.
         difference_mm: f64,
@@ -80,9 +76,6 @@ impl fmt::Display for Warning {
             Self::LooksSwapped(evidence) => {
                 write!(f, "the pair looks swapped: ")?;
                 match evidence {
-                    SwapEvidence::BeyondNear { fraction } => {
-                        write!(f, "{:.0} % of the scene would lie before the near focus", 100.0 * fraction)?;
-                    }
                     SwapEvidence::LowerPartFarther { difference_mm } => write!(
                         f,
                         "the lower part of the scene would lie {difference_mm:.0} mm farther away than the upper part"

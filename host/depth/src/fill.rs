@@ -138,8 +138,17 @@ pub fn fill_low_texture(map: &mut DepthMap, texture: ArrayView2<f32>, reach_px: 
 /// Fills anew what was filled in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
 /// last.
 pub fn refill_as_thesis(map: &mut DepthMap) -> Filled {
-    let filled = map.confidence.mapv(|confidence| confidence == FILLED_CONFIDENCE);
-    fill_as_thesis(map, filled)
+    match map.filled.take() {
+        Some(filled) => fill_as_thesis(map, filled),
+        None => Filled::default(),
+    }
+}
+
+/// Records that a pixel was filled.
+fn mark(map: &mut DepthMap, at: (usize, usize)) {
+    map.confidence[at] = FILLED_CONFIDENCE;
+    let size = map.depth_mm.dim();
+    map.filled.get_or_insert_with(|| Array2::from_elem(size, false))[at] = true;
 }
 
 fn fill_as_thesis(map: &mut DepthMap, low: Array2<bool>) -> Filled {
@@ -151,7 +160,7 @@ fn fill_as_thesis(map: &mut DepthMap, low: Array2<bool>) -> Filled {
         if thesis::fill_region(&mut map.depth_mm, region) {
             filled.regions += 1;
             filled.pixels += region.len();
-            region.iter().for_each(|at| map.confidence[*at] = FILLED_CONFIDENCE);
+            region.iter().for_each(|at| mark(map, *at));
         } else {
             filled.left_empty += region.len();
         }
@@ -193,7 +202,7 @@ fn fill_by_surfaces(
     // Written at the end, so that no region is fitted to another one's filling.
     for (at, depth_mm) in results {
         map.depth_mm[at] = depth_mm;
-        map.confidence[at] = FILLED_CONFIDENCE;
+        mark(map, at);
     }
     filled
 }
@@ -222,6 +231,7 @@ mod tests {
         DepthMap {
             depth_mm: Array2::from_shape_fn(size, |(y, x)| depth(y as f32, x as f32)),
             confidence: Array2::from_elem(size, 0.9),
+            filled: None,
             low_texture_fraction: 0.0,
             warnings: Vec::new(),
         }

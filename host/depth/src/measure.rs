@@ -17,8 +17,10 @@ use crate::pipeline::{RunError, Settings, depth_from_pair, fill_border, warnings
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
 use crate::reason::Reason;
-use crate::validity::{Lost, Validity, ValiditySettings, assess};
+use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 
+/// Where a pixel is put whose measured alpha lies outside the range before blur scaling is undone.
+const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 /// Part of the pixels without depth for one reason from which it is said.
 const WORTH_SAYING: f64 = 0.002;
 /// What the model leaves of the texture, mean squares, from which point spread function or blur are doubted.
@@ -286,6 +288,10 @@ fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Opt
     }
     // (1 - r) alpha^2 + 2 (1 + r) alpha + (1 - r) - 4 found = 0, on the branch that stays finite for r = 1.
     let alpha_of = |found: f64| {
+        if found.abs() >= LARGEST_ALPHA {
+            // Clamped or saturated: no statement beyond "outside the range", which the range test must still see.
+            return found.signum() * OUT_OF_RANGE_ALPHA;
+        }
         let (b, c) = (1.0 + r, (1.0 - r) - 4.0 * found);
         let root = (b * b - (1.0 - r) * c).max(0.0).sqrt();
         -c / (b + root)
@@ -313,7 +319,7 @@ fn of_estimate(
     let mut confidence: Array2<f32> = deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
     let evidence = settings.run.fill.then(|| confidence.clone());
     confidence.mapv_inplace(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
-    let mut map = DepthMap { depth_mm, confidence, low_texture_fraction: 0.0, warnings: Vec::new() };
+    let mut map = DepthMap { depth_mm, confidence, filled: None, low_texture_fraction: 0.0, warnings: Vec::new() };
     fill_border(&mut map, bank.reach_px() + 1);
     if let Some(evidence) = evidence {
         let pair = [prepared.far.view(), prepared.near.view()];
@@ -338,7 +344,7 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
     }
     if let Some(aligned) = report.aligned.filter(|aligned| aligned.standard_error_px.is_some()) {
         let shrunk = aligned.magnification.recip();
-        if optics.telecentric() != Some(true) && (shrunk - of_optics).abs() < 0.25 * (of_optics - 1.0) {
+        if optics.telecentric() == Some(false) && (shrunk - of_optics).abs() < 0.25 * (of_optics - 1.0) {
             findings.push(Finding::SwappedByMagnification { magnification: aligned.magnification });
         }
     }

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::adaptive_window::Estimate;
 use crate::depth_map::DepthMap;
-use crate::fill::FILLED_CONFIDENCE;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::prepare::Prepared;
@@ -20,6 +19,12 @@ use crate::reason::Reason;
 pub const LARGEST_ALPHA: f64 = 1.1;
 /// Standard deviation of alpha from which noise alone may have made a depth.
 const LARGEST_DEVIATION: f32 = 0.12;
+/// Systematic error of alpha per root of the texture's part that the model leaves unexplained: a residual that is all depth has 1.
+const MODEL_ERROR: f32 = 1.0;
+/// Mean square that right models leave (`Estimate::left_over`).
+const USUAL_LEFT_OVER: f32 = 3e-4;
+/// Standard deviation of alpha of a filled pixel: more than of any that is measured.
+const FILLED_DEVIATION: f32 = 0.25;
 /// Mean square of what the model leaves, relative to the noise, from which it does not hold.
 const LARGEST_MISFIT: f32 = 60.0;
 /// How far around a hole the reason for it is looked for, px.
@@ -69,20 +74,23 @@ pub fn assess(
 ) -> Validity {
     let size = map.depth_mm.dim();
     let mut reasons = prepared.reasons.clone();
-    let Estimate { mut deviation_mm, misfit, .. } = estimate;
+    let Estimate { mut deviation_mm, misfit, left_over, .. } = estimate;
     let range = Range::new(optics);
-    Zip::from(&mut reasons)
+    let of_model = (MODEL_ERROR * range.slope_mm).powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0);
+    let filled = map.filled.take().filter(|_| settings.filled);
+    let is_filled = |at: (usize, usize)| filled.as_ref().is_some_and(|filled| filled[at]);
+    Zip::indexed(&mut reasons)
         .and(&mut map.depth_mm)
         .and(&mut map.confidence)
         .and(&mut deviation_mm)
         .and(&misfit)
-        .par_for_each(|reason, depth, confidence, deviation, misfit| {
-            if settings.filled && *confidence == FILLED_CONFIDENCE && depth.is_finite() {
-                (*reason, *deviation) = (0, f32::NAN);
+        .par_for_each(|at, reason, depth, confidence, deviation, misfit| {
+            if is_filled(at) && depth.is_finite() {
+                (*reason, *deviation) = (0, FILLED_DEVIATION * range.slope_mm);
                 return;
             }
             let noise = *deviation;
-            *deviation *= misfit.max(1.0).sqrt();
+            *deviation = (*deviation * *deviation * misfit.max(1.0) + of_model).sqrt();
             let verdict = if *reason != 0 || !depth.is_finite() {
                 None
             } else {
@@ -97,6 +105,7 @@ pub fn assess(
                 (*depth, *confidence, *deviation) = (f32::NAN, 0.0, f32::NAN);
             }
         });
+    map.filled = filled;
     drop(misfit); // a map is large, and what follows needs one more
     explain_holes(&mut reasons, map);
     let lost = lost_pixels(&reasons);

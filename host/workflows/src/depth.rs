@@ -430,6 +430,9 @@ impl Inputs {
         if let Some(cut) = &self.cut {
             [&mut map.depth_mm, &mut map.confidence, &mut image].into_iter().for_each(|map| cut.wanted(map));
             cut.wanted(&mut reasons);
+            if let Some(filled) = &mut map.filled {
+                cut.wanted(filled);
+            }
             if let Some((deviation, _)) = &mut deviation {
                 cut.wanted(deviation);
             }

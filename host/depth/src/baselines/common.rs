@@ -8,7 +8,7 @@ use crate::fill;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::pipeline::{
-    Backend, DepthMap, MAX_ALPHA, RunError, Settings, SwapEvidence, Warning, check, check_windows,
+    Backend, DepthMap, MAX_ALPHA, RunError, Settings, Warning, check, check_windows,
     warnings_after,
 };
 
@@ -97,18 +97,14 @@ impl Pair {
             *depth = if *value > 0.0 { optics.depth_mm(f64::from(alpha)) as f32 } else { f32::NAN };
         });
         let warnings = self.warnings.clone();
-        let mut map = DepthMap { depth_mm, confidence: values, low_texture_fraction, warnings };
+        let mut map = DepthMap { depth_mm, confidence: values, filled: None, low_texture_fraction, warnings };
         if let Some(energy) = energy {
             // The mean back on: ratios are of light.
             let pair = [&self.far, &self.near].map(|image| image.mapv(|value| 1.0 + value));
             let pair = pair.each_ref().map(|image| image.view());
             fill::fill(&mut map, energy.view(), pair, reach_px, settings.filling());
         }
-        // A baseline's own bias may carry much of a scene beyond the near focus.
-        let beyond =
-            |warning: &Warning| matches!(warning, Warning::LooksSwapped(SwapEvidence::BeyondNear { .. }));
-        let swapped = warnings_after(&map, optics).filter(|warning| !beyond(warning));
-        map.warnings.extend(swapped);
+        map.warnings.extend(warnings_after(&map, optics));
         map
     }
 }

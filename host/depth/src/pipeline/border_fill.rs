@@ -73,6 +73,7 @@ mod tests {
         DepthMap {
             depth_mm: Array2::from_shape_fn((height, width), |(y, x)| (100 * y + x) as f32),
             confidence: Array2::from_elem((height, width), 0.8),
+            filled: None,
             low_texture_fraction: 0.0,
             warnings: Vec::new(),
         }

@@ -234,39 +234,33 @@ pub(crate) fn reach_px(operators: &Operators, settings: &Settings) -> usize {
 /// Confidence from which a pixel has a say in whether the pair looks swapped.
 const CONFIDENT: f32 = 0.7;
 
-/// Part of the working range by which the lower third must lie farther away to draw a warning.
-const TILT: f64 = 0.15;
+/// Part of the working range by which each third must lie farther away than the one above it to draw a warning. Of a ground
+/// that fills the image this is usual; scenes without a ground rarely rise twice in the same direction.
+const TILT: f64 = 0.12;
 
 /// Warnings about the result, from a thinned sample of its pixels.
 pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
-    let [mut total, mut beyond_near, mut beyond_far] = [0_usize; 3];
     let mut thirds: [Vec<f32>; 3] = Default::default();
     let sample = confidence::sample(map.depth_mm.dim());
     let [depths, confidences] = [map.depth_mm.slice(sample), map.confidence.slice(sample)];
     let height = depths.nrows();
     for (y, (depths, confidences)) in depths.rows().into_iter().zip(confidences.rows()).enumerate() {
-        for (depth, _) in depths.iter().zip(confidences).filter(|(_, c)| **c > CONFIDENT) {
-            total += 1;
-            beyond_near += usize::from(*depth < near_mm);
-            beyond_far += usize::from(*depth > far_mm);
-            thirds[3 * y / height].push(*depth);
-        }
+        let trusted = depths.iter().zip(confidences).filter(|(_, c)| **c > CONFIDENT).map(|(depth, _)| *depth);
+        // Outside the working range depth saturates, and its order says nothing.
+        thirds[3 * y / height].extend(trusted.filter(|depth| (near_mm..=far_mm).contains(depth)));
     }
-    let part = |n: usize| n as f64 / total.max(1) as f64;
-    if part(beyond_near) > 0.3 && beyond_near > 4 * beyond_far {
-        return Some(Warning::LooksSwapped(SwapEvidence::BeyondNear { fraction: part(beyond_near) }));
-    }
-    // Each third must have its say.
-    if thirds.iter().any(|third| third.len() < total / 10 + 10) {
+    let total: usize = thirds.iter().map(Vec::len).sum();
+    // Each third needs enough pixels for its median.
+    if thirds.iter().any(|third| third.len() < total / 6 + 10) {
         return None;
     }
-    let [upper, _, lower] = thirds.map(|mut third| {
-        let middle = third.len() / 2;
-        f64::from(*third.select_nth_unstable_by(middle, f32::total_cmp).1)
+    let [upper, middle, lower] = thirds.map(|mut third| {
+        let half = third.len() / 2;
+        f64::from(*third.select_nth_unstable_by(half, f32::total_cmp).1)
     });
     let range = optics.working_range();
-    let difference_mm = lower - upper;
-    (difference_mm > TILT * (range.far_mm - range.near_mm))
-        .then_some(Warning::LooksSwapped(SwapEvidence::LowerPartFarther { difference_mm }))
+    let least = TILT * (range.far_mm - range.near_mm);
+    (middle - upper > least && lower - middle > least)
+        .then_some(Warning::LooksSwapped(SwapEvidence::LowerPartFarther { difference_mm: lower - upper }))
 }

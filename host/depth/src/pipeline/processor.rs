@@ -45,6 +45,7 @@ impl Processor {
             map: DepthMap {
                 depth_mm: empty(),
                 confidence: empty(),
+                filled: None,
                 low_texture_fraction: 0.0,
                 warnings: Vec::new(),
             },

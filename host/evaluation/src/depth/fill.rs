@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use farnear_depth::{
-    fill::{FILLED_CONFIDENCE, FillBy, LowTexture},
+    fill::{FillBy, LowTexture},
     metrics::{CompareSettings, compare},
     operators::Operators,
     pipeline::{Settings, depth_from_pair},
@@ -119,7 +119,7 @@ fn one(
     let judged = |fill: bool, low_texture: LowTexture, fill_by: FillBy| -> Result<(f64, f64)> {
         let settings = Settings { fill, low_texture, fill_by, ..Settings::default() };
         let map = depth_from_pair(pair.far.view(), pair.near.view(), &operators, &optics, &settings)?;
-        let filled = map.confidence.iter().filter(|confidence| **confidence == FILLED_CONFIDENCE).count();
+        let filled = map.filled.iter().flatten().filter(|filled| **filled).count();
         let settings = CompareSettings::default();
         let error = compare(map.depth_mm.view(), pair.truth.view(), Some(disc.view()), &settings);
         // Nothing inside has a depth: there is no error to state.

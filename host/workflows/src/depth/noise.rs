@@ -4,7 +4,6 @@ use std::{fmt, str::FromStr};
 
 use farnear_depth::{
     corrections::Correction,
-    fill::FILLED_CONFIDENCE,
     operators::Operators,
     optics::Optics,
     pipeline::{DepthMap, Settings},
@@ -155,8 +154,7 @@ pub struct Source<'a> {
     pub judged: &'a Array2<f32>,
 }
 
-/// Standard deviation of `raw` (before `correction`), mm; NaN where there is no depth and where it was filled in from
-/// elsewhere.
+/// Standard deviation of `raw` (before `correction`), mm; NaN where there is no depth.
 ///
 /// # Errors
 /// [`crate::WorkflowError::Depth`], [`crate::WorkflowError::Correction`].
@@ -177,11 +175,13 @@ pub fn deviation(
         )?,
         None => source.judged.clone(),
     };
-    let filled = |confidence: f32| source.settings.fill && confidence == FILLED_CONFIDENCE;
-    Zip::from(&mut deviation).and(&raw.depth_mm).and(&raw.confidence).for_each(
-        |deviation, depth_mm, confidence| {
-            if depth_mm.is_nan() || filled(*confidence) {
+    let filled = |at| raw.filled.as_ref().is_some_and(|filled| filled[at]);
+    Zip::indexed(&mut deviation).and(&raw.depth_mm).and(source.judged).for_each(
+        |at, deviation, depth_mm, judged| {
+            if depth_mm.is_nan() {
                 *deviation = f32::NAN;
+            } else if filled(at) || !deviation.is_finite() {
+                *deviation = *judged;
             }
         },
     );

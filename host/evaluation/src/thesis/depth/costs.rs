@@ -96,6 +96,7 @@ fn filling(map: &Array2<f32>) -> f64 {
         let mut map = DepthMap {
             depth_mm: map.clone(),
             confidence: Array2::from_elem(map.dim(), 0.9),
+            filled: None,
             low_texture_fraction: 0.0,
             warnings: Vec::new(),
         };
