@@ -77,6 +77,7 @@ impl Optics {
             focus: FocusSection { far_mm, max_blur_px, near_mm },
             psf: psf_of(psf)?,
             distortion: None,
+            stage: None,
         };
         file.check().map(Self).map_err(wrong)
     }

@@ -32,6 +32,7 @@ fn optics() -> Optics {
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: "gaussian:k=0.4578".parse().unwrap(),
         distortion: None,
+        stage: None,
     }
     .check()
     .unwrap()

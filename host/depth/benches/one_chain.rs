@@ -33,6 +33,7 @@ fn main() {
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: "pillbox".parse().unwrap(),
         distortion: None,
+        stage: None,
     }
     .check()
     .unwrap();

@@ -35,6 +35,7 @@ fn optics(psf: &str) -> Optics {
         focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
         psf: psf.parse().unwrap(),
         distortion: None,
+        stage: None,
     }
     .check()
     .unwrap()

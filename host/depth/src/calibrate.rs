@@ -18,6 +18,7 @@ mod ready;
 mod search;
 mod spectra;
 mod spread;
+pub mod stack;
 
 use std::fmt;
 use std::str::FromStr;

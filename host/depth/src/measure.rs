@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Zip};
 use serde::{Deserialize, Serialize};
 
 use crate::adaptive_window::{
@@ -12,7 +12,7 @@ use crate::baselines::{self, BaselineError};
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
 use crate::operators::{DesignError, Operators};
-use crate::optics::Optics;
+use crate::optics::{Optics, Stage};
 use crate::pipeline::{RunError, Settings, depth_from_pair, fill_border, warnings_after};
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
@@ -204,7 +204,17 @@ pub fn measure_pair(
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
     check_pair(images[0].view(), images[1].view())?;
-    let prepared = prepare_owned(images, optics, camera, &settings.prepare)?;
+    let mut prepare = settings.prepare;
+    let images = match optics.stage() {
+        Some(stage) => {
+            // The residual of a learned response is compared with the usual one instead.
+            prepare.trust = true;
+            images.map(|image| binned(image, stage.bin))
+        }
+        None => images,
+    };
+    check_pair(images[0].view(), images[1].view())?;
+    let prepared = prepare_owned(images, optics, camera, &prepare)?;
     let (mut map, estimate) = measure(&prepared, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
     let (left_over, excess) = (estimate.left_over, estimate.excess);
@@ -276,7 +286,41 @@ fn measure(
     if let Some(aligned) = prepared.report.aligned {
         undo_scaled_blur(&mut map.depth_mm, aligned.magnification, optics);
     }
+    let mut estimate = estimate;
+    if let (DepthMethod::Whitened, Some(stage)) = (method, optics.stage()) {
+        respond(&mut map.depth_mm, &mut estimate.deviation_mm, stage, optics);
+    }
     Ok((map, estimate))
+}
+
+/// Puts each depth where the stage's response says, and scales its deviation; depths outside the learned range are put
+/// outside the working range, where validity drops them.
+fn respond(depth_mm: &mut Array2<f32>, deviation_mm: &mut Array2<f32>, stage: &Stage, optics: &Optics) {
+    Zip::from(depth_mm).and(deviation_mm).par_for_each(|depth, deviation| {
+        let measured = optics.alpha(f64::from(*depth));
+        match stage.respond(measured) {
+            Some([alpha, slope]) => {
+                *depth = optics.depth_mm(alpha) as f32;
+                *deviation *= slope as f32;
+            }
+            None if measured.is_finite() => {
+                *depth = optics.depth_mm(OUT_OF_RANGE_ALPHA.copysign(measured)) as f32;
+            }
+            None => {}
+        }
+    });
+}
+
+/// The image with `bin` x `bin` pixels averaged into one; what is left over at the right and lower border is dropped.
+pub fn binned(image: Array2<f32>, bin: usize) -> Array2<f32> {
+    if bin <= 1 {
+        return image;
+    }
+    let (height, width) = image.dim();
+    let area = (bin * bin) as f32;
+    Array2::from_shape_fn((height / bin, width / bin), |(y, x)| {
+        image.slice(ndarray::s![y * bin..(y + 1) * bin, x * bin..(x + 1) * bin]).sum() / area
+    })
 }
 
 /// Bringing the near image to the far one's size scales its blur circle too, by `1 / m`. Depth follows from the difference of the
@@ -382,6 +426,7 @@ mod tests {
             focus: FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
             psf: Psf::PillBox,
             distortion: None,
+            stage: None,
         }
         .check()
         .unwrap();

@@ -12,6 +12,7 @@ mod distortion;
 mod doubt;
 mod error;
 mod file;
+mod stage;
 
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,7 @@ use crate::psf::Psf;
 pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
+pub use stage::{RESPONSE_POINTS, Stage};
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
 
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.
@@ -39,6 +41,7 @@ pub struct Optics {
     psf: Psf,
     telecentric: Option<bool>,
     distortion: Option<Distortion>,
+    stage: Option<Stage>,
 }
 
 /// The distances between which a pair measures depth, and where the sensor stands for them.
@@ -97,6 +100,16 @@ impl Optics {
     /// Distortion of the lens, where the optics file names one.
     pub fn distortion(&self) -> Option<Distortion> {
         self.distortion
+    }
+
+    /// What a z-stack taught, where the optics come from one.
+    pub fn stage(&self) -> Option<&Stage> {
+        self.stage.as_ref()
+    }
+
+    /// The same optics with another response.
+    pub fn with_stage(self, stage: Stage) -> Self {
+        Self { stage: Some(stage), ..self }
     }
 
     /// By how much a lens that is not telecentric magnifies the near-focused image more than the far-focused one: the

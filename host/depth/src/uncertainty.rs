@@ -299,6 +299,7 @@ mod tests {
             focus: crate::optics::FocusSection { far_mm: 933.0, max_blur_px: Some(2.703), near_mm: None },
             psf: "pillbox".parse().unwrap(),
             distortion: None,
+            stage: None,
         };
         let operators = Operators::for_optics(&optics.check().unwrap()).unwrap();
         let image = Array2::from_shape_fn((12, 19), |(y, x)| ((37 * y + 11 * x) % 17) as f32 - 8.0);

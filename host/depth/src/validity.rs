@@ -76,7 +76,11 @@ pub fn assess(
     let mut reasons = prepared.reasons.clone();
     let Estimate { mut deviation_mm, misfit, left_over, .. } = estimate;
     let range = Range::new(optics);
-    let of_model = (MODEL_ERROR * range.slope_mm).powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0);
+    let of_model = match optics.stage() {
+        Some(stage) => stage.residual.powi(2) as f32,
+        None => MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0),
+    } * range.slope_mm.powi(2);
+    let usual = optics.stage().map_or(1.0, |stage| stage.usual_misfit.max(1.0) as f32);
     let filled = map.filled.take().filter(|_| settings.filled);
     let is_filled = |at: (usize, usize)| filled.as_ref().is_some_and(|filled| filled[at]);
     Zip::indexed(&mut reasons)
@@ -90,6 +94,7 @@ pub fn assess(
                 return;
             }
             let noise = *deviation;
+            let misfit = &(misfit / usual);
             *deviation = (*deviation * *deviation * misfit.max(1.0) + of_model).sqrt();
             let verdict = if *reason != 0 || !depth.is_finite() {
                 None

@@ -64,6 +64,7 @@ mod tests {
                 focus: FocusSection { far_mm: far, max_blur_px: Some(blur), near_mm: None },
                 psf: Default::default(),
                 distortion: None,
+                stage: None,
             }
             .check()
             .unwrap()

@@ -8,6 +8,9 @@ const DISTORTION_NAMES: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "
 /// What is wrong with a set of optics.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OpticsError {
+    /// The section that a z-stack taught.
+    #[error("[stage]: {0}; calibrate the stack again")]
+    Stage(&'static str),
     /// A number that must be positive and finite is not.
     #[error("[{section}] {name} = {value}: must be a positive, finite number{unit}")]
     NotPositive {

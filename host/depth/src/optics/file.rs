@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DistortionSection, Optics, OpticsError, image_mm};
+use super::{DistortionSection, Stage, Optics, OpticsError, image_mm};
 use crate::psf::Psf;
 
 /// The largest relative difference between a given blur radius and the one that `near_mm` leads to.
@@ -68,6 +68,9 @@ pub struct OpticsFile {
     /// Distortion of the lens; none where the file names none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionSection>,
+    /// What a z-stack of a flat target taught.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<Stage>,
 }
 
 impl OpticsFile {
@@ -84,6 +87,9 @@ impl OpticsFile {
         let psf = self.psf.checked()?;
         let telecentric = self.lens.telecentric;
         let distortion = self.distortion.as_ref().map(DistortionSection::check).transpose()?;
+        if let Some(problem) = self.stage.as_ref().and_then(Stage::problem) {
+            return Err(OpticsError::Stage(problem));
+        }
         let of_blur = |max_blur_px| Optics {
             focal_length_mm,
             f_number,
@@ -93,6 +99,7 @@ impl OpticsFile {
             psf,
             telecentric,
             distortion,
+            stage: self.stage,
         };
         let of_near = |near_mm: f64| -> Result<Optics, OpticsError> {
             beyond_focal_length("near_mm", near_mm, focal_length_mm)?;
@@ -197,6 +204,7 @@ impl From<Optics> for OpticsFile {
             },
             psf: optics.psf,
             distortion: optics.distortion.map(DistortionSection::from),
+            stage: optics.stage,
         }
     }
 }

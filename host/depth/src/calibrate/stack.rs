@@ -1,0 +1,207 @@
+//! A depth camera from one z-stack of a flat, textured target.
+//!
+//! 1. [`focus_plane`]: depth from focus per block gives the slice in focus at each pixel, a plane.
+//! 2. [`blur`]: spectra of each slice against the sharpest give blur over distance, on both sides of focus.
+//! 3. Pair separation and binning for a largest blur of 2 to 3 px.
+//! 4. Every pair (i, i + d) is measured with several PSFs and blur radii; the response from measured to true normalised depth is
+//!    a polynomial fitted on one half of a checkerboard of blocks. The other half chooses among them and gives the error that is
+//!    left, which becomes a part of every later standard deviation.
+//!
+//! Distances are relative: the far plane lies at [`StackSettings::far_mm`], and depth falls by one step of the stage per slice.
+
+pub mod blur;
+pub mod focus_plane;
+mod response;
+
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use crate::measure::binned;
+use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
+use crate::psf::Psf;
+use blur::BlurCurve;
+use focus_plane::FocusPlane;
+
+pub use response::Trial;
+
+/// Blur radius, px, of the far plane in the near image that is aimed at.
+const AIM_PX: f64 = 2.5;
+/// Blur radii that are usable.
+const USABLE_PX: [f64; 2] = [1.6, 3.4];
+/// Binnings that are tried.
+const BINS: [usize; 4] = [1, 2, 4, 8];
+/// Fewest slices.
+pub const FEWEST: usize = 5;
+
+/// How a stack is calibrated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StackSettings {
+    /// Distance between neighbouring slices.
+    pub step_mm: f64,
+    /// Pixel pitch of the camera.
+    pub pixel_um: f64,
+    /// Distance of the far plane; `None` is 200 times the range of a pair, where only relative depth is known.
+    pub far_mm: Option<f64>,
+    /// Slices between the images of a pair; `None` chooses.
+    pub pair_step: Option<usize>,
+    /// Binning; `None` chooses.
+    pub bin: Option<usize>,
+}
+
+/// Why a stack gives no lens.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StackError {
+    /// Too few slices.
+    #[error("{0} slices: at least {FEWEST} are needed, from in front of the focus to behind it")]
+    TooFew(usize),
+    /// Slices of different size.
+    #[error("slice {index} has another size than the first one")]
+    Size {
+        /// From 1.
+        index: usize,
+    },
+    /// A number that makes no sense.
+    #[error("{name} = {value}: expected a positive number")]
+    NotPositive {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// No plane in focus.
+    #[error("{0}")]
+    NoFocus(String),
+    /// No separation gives a usable blur.
+    #[error(
+        "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice; use a {hint} step",
+        low = USABLE_PX[0],
+        high = USABLE_PX[1]
+    )]
+    NoSeparation {
+        /// Blur radius per slice, px.
+        per_slice: f64,
+        /// finer or coarser.
+        hint: &'static str,
+    },
+    /// Nothing could be measured.
+    #[error("no pair of slices {0} apart has its target within the range: take more slices around the focus")]
+    NoPair(usize),
+    /// The optics that result.
+    #[error(transparent)]
+    Optics(#[from] crate::optics::OpticsError),
+}
+
+/// What was learned.
+#[derive(Debug, Clone)]
+pub struct StackLens {
+    /// For measuring pairs by operators with a white residual.
+    pub optics: Optics,
+    /// Where the target is in focus.
+    pub plane: FocusPlane,
+    /// Blur over distance, in unbinned px.
+    pub blur: BlurCurve,
+    /// How well held-out parts are measured.
+    pub held_out: HeldOut,
+    /// All that was tried, the best first.
+    pub trials: Vec<Trial>,
+}
+
+/// Errors on blocks that the response was not learned from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// `1.4826 x` median of |error|, mm.
+    pub robust_mm: f64,
+    /// Root mean square error, mm.
+    pub rms_mm: f64,
+    /// Mean error, mm.
+    pub bias_mm: f64,
+    /// Slope of measured over true depth.
+    pub slope: f64,
+    /// Part of the pixels that have a depth.
+    pub fill: f64,
+    /// Part of the errors within three predicted standard deviations.
+    pub within_three: f64,
+    /// Number of pairs.
+    pub pairs: usize,
+}
+
+/// Calibrates from `slices`, the far-focused first, (height, width).
+///
+/// # Errors
+/// [`StackError`].
+pub fn calibrate_stack(slices: &[Array2<f32>], settings: &StackSettings) -> Result<StackLens, StackError> {
+    check(slices, settings)?;
+    let plane = FocusPlane::of(slices).map_err(StackError::NoFocus)?;
+    let blur = BlurCurve::of(slices, &plane);
+    let (bin, pair_step) = separation(&blur, slices.len(), settings)?;
+    let small: Vec<Array2<f32>> = slices.iter().map(|slice| binned(slice.clone(), bin)).collect();
+    let plane_of_bins = plane.binned(bin);
+    let radius = (blur.px_per_slice() * pair_step as f64 / bin as f64).clamp(1.0, 4.0);
+    let optics_of = |psf: Psf, max_blur_px: f64| optics(psf, max_blur_px, bin, pair_step, settings);
+    let (optics, held_out, trials) =
+        response::learn(&small, &plane_of_bins, pair_step, bin, radius, settings.step_mm, &optics_of)?;
+    Ok(StackLens { optics, plane, blur, held_out, trials })
+}
+
+fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackError> {
+    if slices.len() < FEWEST {
+        return Err(StackError::TooFew(slices.len()));
+    }
+    if let Some(index) = slices.iter().position(|slice| slice.dim() != slices[0].dim()) {
+        return Err(StackError::Size { index: index + 1 });
+    }
+    let numbers = [("step_mm", Some(settings.step_mm)), ("pixel_um", Some(settings.pixel_um)), ("far_mm", settings.far_mm)];
+    for (name, value) in numbers {
+        if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+            return Err(StackError::NotPositive { name, value });
+        }
+    }
+    Ok(())
+}
+
+/// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first.
+fn separation(blur: &BlurCurve, slices: usize, settings: &StackSettings) -> Result<(usize, usize), StackError> {
+    let per_slice = blur.px_per_slice();
+    let bins = settings.bin.map_or(BINS.to_vec(), |bin| vec![bin.max(1)]);
+    let most = (slices - 1) / 2;
+    let steps = settings.pair_step.map_or((1..=most.max(1)).collect(), |step| vec![step.clamp(1, slices - 1)]);
+    let forced = settings.bin.is_some() && settings.pair_step.is_some();
+    bins.iter()
+        .flat_map(|bin| steps.iter().map(move |step| (*bin, *step)))
+        .map(|(bin, step)| (bin, step, per_slice * step as f64 / bin as f64))
+        .filter(|(_, _, radius)| forced || (USABLE_PX[0]..=USABLE_PX[1]).contains(radius))
+        .min_by(|a, b| {
+            let cost = |(bin, _, radius): &(usize, usize, f64)| {
+                (radius - AIM_PX).abs() + 0.3 * (*bin as f64).log2()
+            };
+            cost(a).total_cmp(&cost(b))
+        })
+        .map(|(bin, step, _)| (bin, step))
+        .ok_or(StackError::NoSeparation { per_slice, hint: if per_slice > 1.0 { "finer" } else { "coarser" } })
+}
+
+/// A thin lens whose pair spans `pair_step` slices: only the range and its place count, depth is nearly linear in alpha.
+fn optics(
+    psf: Psf,
+    max_blur_px: f64,
+    bin: usize,
+    pair_step: usize,
+    settings: &StackSettings,
+) -> Result<Optics, StackError> {
+    let span_mm = settings.step_mm * pair_step as f64;
+    let far_mm = settings.far_mm.unwrap_or(200.0 * span_mm);
+    let near_mm = far_mm - span_mm;
+    let pixel_um = settings.pixel_um * bin as f64;
+    let focal_length_mm = 0.3 * far_mm;
+    let image = |u: f64| focal_length_mm + focal_length_mm * focal_length_mm / (u - focal_length_mm);
+    let f_number = (image(near_mm) - image(far_mm)) / (2.0 * max_blur_px * pixel_um * 1e-3);
+    let file = OpticsFile {
+        lens: LensSection { focal_length_mm, aperture_mm: None, f_number: Some(f_number), telecentric: Some(true) },
+        sensor: SensorSection { pixel_um },
+        focus: FocusSection { far_mm, max_blur_px: Some(max_blur_px), near_mm: None },
+        psf,
+        distortion: None,
+        stage: None,
+    };
+    Ok(file.check()?)
+}

@@ -1,0 +1,84 @@
+//! What a z-stack of a flat target adds to the optics: binning, the response from measured to true normalised depth, and the
+//! error that the model leaves.
+
+use serde::{Deserialize, Serialize};
+
+/// Points of the response, evenly spaced over the measured range.
+pub const RESPONSE_POINTS: usize = 17;
+
+/// `[stage]` of an optics file, written by `farnear calibrate stack`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stage {
+    /// Pixels per side of the camera's image that are averaged into one; `pixel_um` and `max_blur_px` are those of the result.
+    pub bin: usize,
+    /// Slices from the far to the near image of the pairs that were learned from.
+    pub pair_step: usize,
+    /// Least and largest measured normalised depth that was learned.
+    pub measured: [f64; 2],
+    /// True normalised depth at evenly spaced measured ones, rising.
+    pub response: [f64; RESPONSE_POINTS],
+    /// Standard deviation of the normalised depth beyond what noise explains, on held-out parts of the target.
+    pub residual: f64,
+    /// Median of what the model leaves relative to the noise.
+    pub usual_misfit: f64,
+}
+
+impl Stage {
+    /// A stage that changes nothing, to learn from.
+    pub fn identity(bin: usize, pair_step: usize) -> Self {
+        let measured = [-1.19, 1.19];
+        let response = std::array::from_fn(|i| {
+            measured[0] + (measured[1] - measured[0]) * i as f64 / (RESPONSE_POINTS - 1) as f64
+        });
+        Self { bin, pair_step, measured, response, residual: 0.0, usual_misfit: 1e6 }
+    }
+
+    /// True normalised depth and slope at a measured one; `None` outside the learned range.
+    pub fn respond(&self, measured: f64) -> Option<[f64; 2]> {
+        let [low, high] = self.measured;
+        if !(low..=high).contains(&measured) {
+            return None;
+        }
+        let unit = (high - low) / (RESPONSE_POINTS - 1) as f64;
+        let place = (measured - low) / unit;
+        let index = (place as usize).min(RESPONSE_POINTS - 2);
+        let [a, b] = [self.response[index], self.response[index + 1]];
+        Some([a + (b - a) * (place - index as f64), (b - a) / unit])
+    }
+
+    /// Why the section cannot be used, if it cannot.
+    pub(super) fn problem(&self) -> Option<&'static str> {
+        let finite = self.response.iter().chain(&self.measured).all(|v| v.is_finite() && v.abs() < 2.0);
+        if !(1..=64).contains(&self.bin) {
+            return Some("bin must be 1 to 64");
+        }
+        if !finite || self.measured[0] >= self.measured[1] {
+            return Some("measured and response must be finite and measured must rise");
+        }
+        if self.response.windows(2).any(|pair| pair[1] < pair[0]) {
+            return Some("response must rise");
+        }
+        let positive = self.residual >= 0.0 && self.residual < 2.0 && self.usual_misfit > 0.0;
+        (!positive).then_some("residual must be 0 to 2 and usual_misfit above 0")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identity_changes_nothing_and_ends_at_its_range() {
+        let stage = Stage::identity(2, 3);
+        for alpha in [-1.19, -0.4, 0.0, 0.77, 1.18] {
+            let [value, slope] = stage.respond(alpha).unwrap();
+            assert!((value - alpha).abs() < 1e-12 && (slope - 1.0).abs() < 1e-9);
+        }
+        assert!(stage.respond(1.3).is_none() && stage.respond(f64::NAN).is_none());
+        assert_eq!(stage.problem(), None);
+        let mut falling = stage;
+        falling.response[4] = -1.1;
+        assert_eq!(falling.problem(), Some("response must rise"));
+    }
+}
