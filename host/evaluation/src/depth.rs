@@ -7,6 +7,7 @@ mod designs;
 mod fill;
 mod focus;
 mod kernels;
+mod lens_stacks;
 mod methods;
 mod mismatch;
 mod planes;

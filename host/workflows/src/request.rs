@@ -172,6 +172,7 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::target::TargetRequest>(),
     Task::of::<crate::calibrate::psf::CalibratePsfRequest>(),
     Task::of::<crate::calibrate::correction::CalibrateCorrectionRequest>(),
+    Task::of::<crate::calibrate::stack::CalibrateStackRequest>(),
 ];
 
 /// A task by its name, for callers that know it at run time only.

@@ -28,6 +28,7 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     if breakfast.is_dir() {
         measure_breakfast(page, &breakfast)?;
     }
+    super::lens_stacks::measure(page, data)?;
     super::stacks::measure(page, data)?;
     Ok(())
 }

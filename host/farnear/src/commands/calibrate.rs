@@ -4,11 +4,13 @@ mod camera;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use farnear_workflows::calibrate::{correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest};
+use farnear_workflows::calibrate::{
+    correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest, stack::CalibrateStackRequest,
+};
 
 use crate::run::Run;
 
-/// Learn the point spread function, a correction of the lens's distortion, or the camera's own frames.
+/// Learn the point spread function, a correction of the lens's distortion, the camera's own frames, or a whole lens from a z-stack.
 #[derive(Args)]
 #[command(
     after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian"
@@ -22,6 +24,7 @@ pub struct Arguments {
 enum What {
     Psf(Run<CalibratePsfRequest>),
     Correction(Run<CalibrateCorrectionRequest>),
+    Stack(Run<CalibrateStackRequest>),
     Camera(camera::Arguments),
 }
 
@@ -30,6 +33,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     match arguments.what {
         What::Psf(task) => task.run(),
         What::Correction(task) => task.run(),
+        What::Stack(task) => task.run(),
         What::Camera(arguments) => camera::run(arguments),
     }
 }

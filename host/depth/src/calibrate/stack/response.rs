@@ -46,7 +46,6 @@ struct Sample {
     truth: f64,
     /// Standard deviation of `measured` by noise.
     noise: f64,
-    pair: usize,
     even: bool,
 }
 
@@ -136,7 +135,6 @@ fn measure(
                             measured,
                             truth,
                             noise: f64::from(found.validity.deviation_mm[(y, x)]) / slope,
-                            pair: i,
                             even: (y / BLOCK_PX + x / BLOCK_PX) % 2 == 0,
                         });
                     }
