@@ -83,6 +83,9 @@ pub enum MeasureError {
     /// A method to compare with.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
+    /// A lens learned from a z-stack, measured by other operators than those it was learned with.
+    #[error("the optics were learned by calibrate stack for method whitened: use --method whitened")]
+    LearnedForWhitened,
     /// No operators for these optics.
     #[error(transparent)]
     Design(#[from] DesignError),
@@ -204,6 +207,9 @@ pub fn measure_pair(
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
     check_pair(images[0].view(), images[1].view())?;
+    if optics.stage().is_some() && !matches!(method, DepthMethod::Whitened) {
+        return Err(MeasureError::LearnedForWhitened);
+    }
     let mut prepare = settings.prepare;
     let images = match optics.stage() {
         Some(stage) => {
