@@ -369,7 +369,8 @@ fn of_estimate(
     let mut confidence: Array2<f32> = deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
     let evidence = settings.run.fill.then(|| confidence.clone());
     confidence.mapv_inplace(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
-    let mut map = DepthMap { depth_mm, confidence, filled: None, low_texture_fraction: 0.0, warnings: Vec::new() };
+    let mut map =
+        DepthMap { depth_mm, confidence, filled: None, low_texture_fraction: 0.0, warnings: Vec::new() };
     fill_border(&mut map, bank.reach_px() + 1);
     if let Some(evidence) = evidence {
         let pair = [prepared.far.view(), prepared.near.view()];

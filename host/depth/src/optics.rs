@@ -21,8 +21,8 @@ use crate::psf::Psf;
 pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
-pub use stage::{RESPONSE_POINTS, Stage};
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
+pub use stage::{RESPONSE_POINTS, Stage};
 
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.
 fn image_mm(focal_length_mm: f64, object_mm: f64) -> f64 {

@@ -8,8 +8,7 @@ use crate::fill;
 use crate::metrics::dilate_square;
 use crate::optics::Optics;
 use crate::pipeline::{
-    Backend, DepthMap, MAX_ALPHA, RunError, Settings, Warning, check, check_windows,
-    warnings_after,
+    Backend, DepthMap, MAX_ALPHA, RunError, Settings, Warning, check, check_windows, warnings_after,
 };
 
 /// A checked pair, each image divided by its mean; pixels without a value hold the mean.

@@ -150,7 +150,11 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     if let Some(index) = slices.iter().position(|slice| slice.dim() != slices[0].dim()) {
         return Err(StackError::Size { index: index + 1 });
     }
-    let numbers = [("step_mm", Some(settings.step_mm)), ("pixel_um", Some(settings.pixel_um)), ("far_mm", settings.far_mm)];
+    let numbers = [
+        ("step_mm", Some(settings.step_mm)),
+        ("pixel_um", Some(settings.pixel_um)),
+        ("far_mm", settings.far_mm),
+    ];
     for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
             return Err(StackError::NotPositive { name, value });
@@ -160,24 +164,31 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
 }
 
 /// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first.
-fn separation(blur: &BlurCurve, slices: usize, settings: &StackSettings) -> Result<(usize, usize), StackError> {
+fn separation(
+    blur: &BlurCurve,
+    slices: usize,
+    settings: &StackSettings,
+) -> Result<(usize, usize), StackError> {
     let per_slice = blur.px_per_slice();
     let bins = settings.bin.map_or(BINS.to_vec(), |bin| vec![bin.max(1)]);
     let most = (slices - 1) / 2;
-    let steps = settings.pair_step.map_or((1..=most.max(1)).collect(), |step| vec![step.clamp(1, slices - 1)]);
+    let steps =
+        settings.pair_step.map_or((1..=most.max(1)).collect(), |step| vec![step.clamp(1, slices - 1)]);
     let forced = settings.bin.is_some() && settings.pair_step.is_some();
     bins.iter()
         .flat_map(|bin| steps.iter().map(move |step| (*bin, *step)))
         .map(|(bin, step)| (bin, step, per_slice * step as f64 / bin as f64))
         .filter(|(_, _, radius)| forced || (USABLE_PX[0]..=USABLE_PX[1]).contains(radius))
         .min_by(|a, b| {
-            let cost = |(bin, _, radius): &(usize, usize, f64)| {
-                (radius - AIM_PX).abs() + 0.3 * (*bin as f64).log2()
-            };
+            let cost =
+                |(bin, _, radius): &(usize, usize, f64)| (radius - AIM_PX).abs() + 0.3 * (*bin as f64).log2();
             cost(a).total_cmp(&cost(b))
         })
         .map(|(bin, step, _)| (bin, step))
-        .ok_or(StackError::NoSeparation { per_slice, hint: if per_slice > 1.0 { "finer" } else { "coarser" } })
+        .ok_or(StackError::NoSeparation {
+            per_slice,
+            hint: if per_slice > 1.0 { "finer" } else { "coarser" },
+        })
 }
 
 /// A thin lens whose pair spans `pair_step` slices: only the range and its place count, depth is nearly linear in alpha.
@@ -196,7 +207,12 @@ fn optics(
     let image = |u: f64| focal_length_mm + focal_length_mm * focal_length_mm / (u - focal_length_mm);
     let f_number = (image(near_mm) - image(far_mm)) / (2.0 * max_blur_px * pixel_um * 1e-3);
     let file = OpticsFile {
-        lens: LensSection { focal_length_mm, aperture_mm: None, f_number: Some(f_number), telecentric: Some(true) },
+        lens: LensSection {
+            focal_length_mm,
+            aperture_mm: None,
+            f_number: Some(f_number),
+            telecentric: Some(true),
+        },
         sensor: SensorSection { pixel_um },
         focus: FocusSection { far_mm, max_blur_px: Some(max_blur_px), near_mm: None },
         psf,

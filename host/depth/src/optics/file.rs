@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DistortionSection, Stage, Optics, OpticsError, image_mm};
+use super::{DistortionSection, Optics, OpticsError, Stage, image_mm};
 use crate::psf::Psf;
 
 /// The largest relative difference between a given blur radius and the one that `near_mm` leads to.

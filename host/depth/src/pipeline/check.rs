@@ -246,7 +246,8 @@ pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [depths, confidences] = [map.depth_mm.slice(sample), map.confidence.slice(sample)];
     let height = depths.nrows();
     for (y, (depths, confidences)) in depths.rows().into_iter().zip(confidences.rows()).enumerate() {
-        let trusted = depths.iter().zip(confidences).filter(|(_, c)| **c > CONFIDENT).map(|(depth, _)| *depth);
+        let trusted =
+            depths.iter().zip(confidences).filter(|(_, c)| **c > CONFIDENT).map(|(depth, _)| *depth);
         // Outside the working range depth saturates, and its order says nothing.
         thirds[3 * y / height].extend(trusted.filter(|depth| (near_mm..=far_mm).contains(depth)));
     }

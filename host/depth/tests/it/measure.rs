@@ -194,7 +194,11 @@ fn a_lens_that_is_not_telecentric_is_noticed() {
     let mut file = farnear_depth::optics::OpticsFile::from(rig(PSF));
     file.lens.telecentric = Some(false);
     let found = measure_with(&swapped, &file.check().unwrap(), Window::Fixed(7)).unwrap();
-    assert!(found.findings.iter().any(|f| matches!(f, Finding::SwappedByMagnification { .. })), "{:?}", found.findings);
+    assert!(
+        found.findings.iter().any(|f| matches!(f, Finding::SwappedByMagnification { .. })),
+        "{:?}",
+        found.findings
+    );
 }
 
 #[test]
@@ -314,16 +318,23 @@ fn beyond_three(found: &Measurement, pair: &Pair) -> [f64; 3] {
         let off = f64::from(depth - pair.truth[at]);
         valid += 1.0;
         squares += off * off;
-        wrong += f64::from(u8::from(off.abs() > 3.0 * f64::from(found.validity.deviation_mm[at]) && off.abs() > 0.05));
+        wrong += f64::from(u8::from(
+            off.abs() > 3.0 * f64::from(found.validity.deviation_mm[at]) && off.abs() > 0.05,
+        ));
     }
     [wrong / f64::max(valid, 1.0), valid / pair.truth.len() as f64, (squares / f64::max(valid, 1.0)).sqrt()]
 }
 
 #[test]
 fn a_shrunken_near_image_makes_no_confident_plateau_outside_the_range() {
-    for (seed, depth, magnification) in
-        [(70, 945.0, 0.97), (71, 945.0, 0.95), (72, 960.0, 0.93), (73, 872.0, 1.05), (74, 872.0, 0.95), (75, 1000.0, 1.03)]
-    {
+    for (seed, depth, magnification) in [
+        (70, 945.0, 0.97),
+        (71, 945.0, 0.95),
+        (72, 960.0, 0.93),
+        (73, 872.0, 1.05),
+        (74, 872.0, 0.95),
+        (75, 1000.0, 1.03),
+    ] {
         let view = View { magnification, ..View::default() };
         let pair = pair(&format!("plane:{depth}"), PSF, Noise::EightBit, &lens(), view, seed);
         for window in [Window::Fixed(7), Window::Adaptive] {

@@ -52,7 +52,10 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
          Truth is the plane of depth from focus over all slices (spread of its blocks 0.005 mm). The peer is a look-up curve: the log ratio of Laplacian energies in windows of 15 px, a cubic learned \
          on the left half, the best of three scales on the right half.",
     );
-    let truth = Truth { step_mm: 0.1, plane_slice: Plane { a_x_px: 9.5452e-05, a_y_px: 0.000_522_74, c: 8.317_557_807_999_998 } };
+    let truth = Truth {
+        step_mm: 0.1,
+        plane_slice: Plane { a_x_px: 9.5452e-05, a_y_px: 0.000_522_74, c: 8.317_557_807_999_998 },
+    };
     let slices = (1..=16)
         .map(|i| Ok(read_grey(&folder.join(format!("{i:02}.png")))?.pixels))
         .collect::<Result<Vec<Array2<f32>>>>()?;
@@ -82,7 +85,8 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
             format!("{:.1} %", 100.0 * found.within_three),
         ]);
     }
-    let head = ["binning, step", "peer", "robust error", "of the peer's", "RMSE", "slope", "fill", "within 3 SD"];
+    let head =
+        ["binning, step", "peer", "robust error", "of the peer's", "RMSE", "slope", "fill", "within 3 SD"];
     page.table(1, &head, &rows);
     Ok(())
 }

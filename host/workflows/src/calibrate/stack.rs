@@ -144,9 +144,8 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
         pair_step: request.pair_step,
         bin: request.bin,
     };
-    let found = calibrate_stack(&slices, &settings).map_err(|error| {
-        WorkflowError::parameter("folder", request.folder.display(), error.to_string())
-    })?;
+    let found = calibrate_stack(&slices, &settings)
+        .map_err(|error| WorkflowError::parameter("folder", request.folder.display(), error.to_string()))?;
     context.cancel.check("calibrating the lens")?;
     staging::write_file(&request.out, toml::to_string(&found.optics)?.as_bytes())?;
     context.say(&format!("wrote {}", request.out.display()));

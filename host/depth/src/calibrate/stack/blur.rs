@@ -56,7 +56,8 @@ impl BlurCurve {
                     warp::Warp::IDENTITY,
                 ) {
                     Some(found) if index != sharpest && found.correlation > 0.3 => {
-                        warp::resample(slice.view(), &found.warp).mapv(|v| if v.is_finite() { v } else { f32::NAN })
+                        warp::resample(slice.view(), &found.warp)
+                            .mapv(|v| if v.is_finite() { v } else { f32::NAN })
                     }
                     _ => slice,
                 };

@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, s};
 use serde::{Deserialize, Serialize};
 
-
 /// Side of a block in parts of the shorter side.
 const BLOCKS: usize = 24;
 /// Least ratio of a block's largest energy to its least one for a peak.
@@ -127,10 +126,14 @@ fn laplacian_energy(image: &Array2<f32>, side: usize) -> Array2<f64> {
     let taps = [1.0_f32, 4.0, 6.0, 4.0, 1.0].map(|tap| tap / 16.0);
     let smooth = |image: &Array2<f32>| {
         let rows = Array2::from_shape_fn((height, width), |(y, x)| {
-            (0..5).map(|i| taps[i] * image[(y, crate::border::reflect(x as isize + i as isize - 2, width))]).sum::<f32>()
+            (0..5)
+                .map(|i| taps[i] * image[(y, crate::border::reflect(x as isize + i as isize - 2, width))])
+                .sum::<f32>()
         });
         Array2::from_shape_fn((height, width), |(y, x)| {
-            (0..5).map(|i| taps[i] * rows[(crate::border::reflect(y as isize + i as isize - 2, height), x)]).sum::<f32>()
+            (0..5)
+                .map(|i| taps[i] * rows[(crate::border::reflect(y as isize + i as isize - 2, height), x)])
+                .sum::<f32>()
         })
     };
     let image = smooth(image);

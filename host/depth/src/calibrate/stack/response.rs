@@ -109,7 +109,8 @@ fn measure(
         run: Settings { median_px: 3, ..Settings::default() },
         ..MeasureSettings::default()
     };
-    let alpha = |i: usize, y: usize, x: usize| -1.0 + 2.0 * (plane.at(y as f64, x as f64) - i as f64) / step as f64;
+    let alpha =
+        |i: usize, y: usize, x: usize| -1.0 + 2.0 * (plane.at(y as f64, x as f64) - i as f64) / step as f64;
     let usable: Vec<usize> = (0..slices.len().saturating_sub(step))
         .filter(|i| alpha(*i, height / 2, width / 2).abs() < 1.0 + 0.3)
         .collect();
@@ -221,7 +222,8 @@ fn finish(samples: &Samples, degree: usize, bin: usize, step: usize, half_mm: f6
     for i in (0..middle).rev() {
         response[i] = response[i].min(response[i + 1] - 1e-6);
     }
-    let mut stage = Stage { bin, pair_step: step, measured: range, response, residual: 0.0, usual_misfit: 1e6 };
+    let mut stage =
+        Stage { bin, pair_step: step, measured: range, response, residual: 0.0, usual_misfit: 1e6 };
     let errors = held_out_errors(samples, degree).unwrap_or_default();
     let noise: Vec<f64> = [true, false]
         .iter()
@@ -245,9 +247,10 @@ fn finish(samples: &Samples, degree: usize, bin: usize, step: usize, half_mm: f6
         .map(|s| s.truth)
         .collect();
     let mean = truths.iter().sum::<f64>() / count;
-    let [cross, square] = truths.iter().zip(&errors).fold([0.0; 2], |[a, b], (t, e)| {
-        [a + (t - mean) * (t + e), b + (t - mean) * (t - mean)]
-    });
+    let [cross, square] = truths
+        .iter()
+        .zip(&errors)
+        .fold([0.0; 2], |[a, b], (t, e)| [a + (t - mean) * (t + e), b + (t - mean) * (t - mean)]);
     let held_out = HeldOut {
         robust_mm: robust(&errors) * half_mm,
         rms_mm: (errors.iter().map(|e| e * e).sum::<f64>() / count).sqrt() * half_mm,
