@@ -302,6 +302,9 @@ impl From<MeasureError> for WorkflowError {
             MeasureError::Prepare(error) => error.into(),
             MeasureError::Baseline(error) => Self::Baseline(error),
             MeasureError::Design(error) => Self::Design(error),
+            MeasureError::LearnedForWhitened => {
+                Self::parameter("method", "ro or another", "the optics were learned by calibrate stack: use --method whitened")
+            }
         }
     }
 }

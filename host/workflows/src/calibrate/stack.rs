@@ -148,7 +148,7 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
         .map_err(|error| WorkflowError::parameter("folder", request.folder.display(), error.to_string()))?;
     context.cancel.check("calibrating the lens")?;
     staging::write_file(&request.out, toml::to_string(&found.optics)?.as_bytes())?;
-    context.say(&format!("wrote {}", request.out.display()));
+    context.info(&format!("wrote {}", request.out.display()));
     Ok(figures(&found, slices.len(), request))
 }
 
