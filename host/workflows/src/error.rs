@@ -302,9 +302,11 @@ impl From<MeasureError> for WorkflowError {
             MeasureError::Prepare(error) => error.into(),
             MeasureError::Baseline(error) => Self::Baseline(error),
             MeasureError::Design(error) => Self::Design(error),
-            MeasureError::LearnedForWhitened => {
-                Self::parameter("method", "ro or another", "the optics were learned by calibrate stack: use --method whitened")
-            }
+            MeasureError::LearnedForWhitened => Self::parameter(
+                "method",
+                "ro or another",
+                "the optics were learned by calibrate stack: use --method whitened",
+            ),
         }
     }
 }
