@@ -2,13 +2,18 @@
 import assert from "node:assert/strict";
 import { cpSync, readdirSync } from "node:fs";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { after, afterEach, before, test } from "node:test";
 import { browser as launch, open, serve } from "./server.mjs";
 
 let browser, server;
 before(async () => {
   browser = await launch();
   server = await serve();
+});
+afterEach(async () => {
+  for (const context of browser.contexts()) await context.close();
+  // Control is reserved for the last page; the next test's page gets it after that.
+  while ((await server.ask("/api/state")).control.holder !== null) await new Promise((done) => setTimeout(done, 200));
 });
 after(async () => {
   await browser?.close();
@@ -57,6 +62,7 @@ test("a reload keeps control and the job while another browser watches", async (
   assert.equal(now.id, job.id);
   assert.notEqual(now.phase, "stopped", now.error);
   assert.match(await second.locator("#who").textContent(), /another browser has control/);
+  while ((await server.ask("/api/state")).job.phase === "running") await second.waitForTimeout(200);
   await first.context().close();
   await second.context().close();
 });
@@ -126,7 +132,7 @@ test("captures: newest first, names with blanks and &, rename, delete, filter; B
   await page.locator("dialog").getByRole("button", { name: "Delete" }).click();
   await renamed.waitFor({ state: "detached" });
   assert.ok(!readdirSync(server.session).includes("plane"));
-  await page.getByLabel("Show").selectOption("sequence");
+  await page.getByLabel("Show", { exact: true }).selectOption("sequence");
   await page.waitForFunction(() => [...document.querySelectorAll(".capture-card h3")].every((title) => title.textContent.startsWith("stack")));
   assert.deepEqual(page.complaints, []);
   await page.context().close();
