@@ -81,6 +81,7 @@ fn ten_thousand_malformed_messages_change_nothing() {
     assert!(state["job"].is_null(), "{state:#}");
     assert_eq!(state["rig"]["phase"], "ready");
     let holder = Socket::open(&served);
+    served.state_when(|state| state["control"]["holder"] == holder.client);
     let targets = r#"{"targets":[{"axis":"fine","to_um":20}]}"#;
     let begun = served.post("/api/rig/move", &holder.secret, targets).json();
     assert_eq!(served.ended("job", &begun["job"])["phase"], "done");
