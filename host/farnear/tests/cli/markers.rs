@@ -10,16 +10,16 @@ use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 const TEMPLATE: &str = "name = 'boxes'\n[[part]]\nname = 'body'\nmarkers = ['B1', 'B2', 'B3', 'B4', 'B5', 'B6', 'B7', 'B8']\n\
                         [[part]]\nname = 'head'\nmarkers = ['H1', 'H2', 'H3']\n";
 
-/// Three frames in which the figure steps 0.5 m along x; in the last the head is hidden.
+/// Three frames in which the figure, away from the origin (zeros are missing markers), steps 0.5 m along x; in the last the head is hidden.
 fn recording() -> String {
     let mut points: Vec<(String, [f64; 3])> = (0..8)
         .map(|i| {
             let corner = [i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from);
-            (format!("B{}", i + 1), [400.0 * corner[0], 200.0 * corner[1], 1000.0 * corner[2]])
+            (format!("B{}", i + 1), [400.0 * corner[0], 100.0 + 200.0 * corner[1], 1000.0 * corner[2]])
         })
         .collect();
     for (i, x) in [100.0, 300.0, 200.0].into_iter().enumerate() {
-        points.push((format!("H{}", i + 1), [x, 100.0, if i == 2 { 1300.0 } else { 1000.0 }]));
+        points.push((format!("H{}", i + 1), [x, 200.0, if i == 2 { 1300.0 } else { 1000.0 }]));
     }
     let columns: Vec<String> = points.iter().map(|(n, _)| format!("{n}_x,{n}_y,{n}_z")).collect();
     let mut text = format!("frame,{}\n", columns.join(","));
