@@ -78,13 +78,12 @@ fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     rig
 }
 
-/// Counts cycles, which the control loop wants to know.
+/// Counts cycles: the measure of waits and of the control loop.
 fn count_cycles() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
     }
-    Interrupt::TIM5.set_priority(Priority::P3);
 }
 
 /// Says why the boot before this ended itself.
@@ -102,17 +101,17 @@ fn tell_of(last: Option<Last>) {
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
-    let brown_out_reset = option_bytes::demand_brown_out_reset();
     let reset_cause = registers::take_reset_cause();
     let (boot, last) = retained::take();
-    let (peripherals, own_clock) = clock::start(last == Some(Last::ClockLost));
     count_cycles();
+    let (peripherals, own_clock) = clock::start(last == Some(Last::ClockLost));
+    Interrupt::TIM5.set_priority(Priority::P3);
     tell_of(last);
     if own_clock {
         error!("there is no clock from outside: the chip's own is used");
     }
-    if !brown_out_reset {
-        error!("the option bytes cannot be written: there is no brown-out reset");
+    if !option_bytes::has_brown_out_reset() {
+        error!("the brown-out reset is off or below level 2: set BOR_LEV with the probe (docs/rig.md)");
     }
     let Parts { mut board, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,

@@ -1,30 +1,18 @@
 //! The option bytes: the brown-out reset, which a chip from the factory has off.
 //!
-//! Without it the chip runs out of its specification between 2.7 V and 1.7 V, with the memory still enabled. With level 3
-//! it is held in reset below 2.83 V (DS9405, table 22, typical; the supply's detector speaks up at 2.93 V before that).
+//! Without it the chip runs out of its specification below 2.4 V, with the memory still enabled. Level 2 holds it in reset below
+//! 2.50 V (DS9405, table 22, typical): 0.5 V below the supply's detector, which leaves time to store an alarm.
+//!
+//! The firmware reads the option bytes and never programs them. Programming erases their sector first; a supply that fails in
+//! that moment leaves read protection and PCROP on. Right after power-on, while a plug still bounces, is the worst moment for it.
+//! `docs/rig.md` has the step with the debug probe.
 
-use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
 
-/// Level 3 of BOR_LEV (RM0090, section 3.9.10).
-const LEVEL: u8 = 0;
-/// Unlocks the option bytes (section 3.7.2).
-const KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
+/// The lowest level that is enough: BOR_LEV is 0 for level 3 and 1 for level 2 (RM0090, section 3.9.10).
+const LEVEL_2: u8 = 1;
 
-/// Sees to it that the brown-out reset is on; gives whether it is. Where it was not, it is programmed, and the chip reset, for
-/// the option bytes count from a reset on: call before anything else is done. Not again after a reset by the program
-/// itself: bytes that cannot be written must not keep the board from starting.
-pub fn demand_brown_out_reset() -> bool {
-    let flash = pac::FLASH;
-    if flash.optcr().read().bor_lev() == LEVEL {
-        return true;
-    }
-    if pac::RCC.csr().read().sftrstf() {
-        return false;
-    }
-    KEYS.into_iter().for_each(|key| flash.optkeyr().write_value(key));
-    flash.optcr().modify(|options| options.set_bor_lev(LEVEL));
-    flash.optcr().modify(|options| options.set_optstrt(true));
-    while flash.sr().read().bsy() {}
-    SCB::sys_reset()
+/// Whether the brown-out reset is on, at level 2 or 3.
+pub fn has_brown_out_reset() -> bool {
+    pac::FLASH.optcr().read().bor_lev() <= LEVEL_2
 }

@@ -3,8 +3,8 @@
 //! - DAC: TI DAC8830 (SLAS449): 16 bit, +-1 LSB, SPI mode 0 up to 50 MHz, 16-bit frame, takes the value when
 //!   its select rises; starts at code 0, which leaves the piezo relaxed. Select PD0.
 //! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise) in its three-wire CS mode with busy
-//!   indicator: the rising edge of CNV (PD1) samples; CNV is low again before the shortest conversion (0.5 us)
-//!   ends, which no interrupt may delay. When the longest (3.7 us at a supply of 3.3 V) has ended, the output, released and
+//!   indicator: the rising edge of CNV (PD1) samples; CNV stays high for at least 50 ns (10 ns are the minimum of the
+//!   AD7685, a part of the same family) and is low again before the shortest conversion (0.5 us) ends, which no interrupt may delay. When the longest (3.7 us at a supply of 3.3 V) has ended, the output, released and
 //!   pulled up till then, is low; each clock then gives a bit of the result, two's complement, most significant first, in SPI
 //!   mode 0; after the last one the output is released again, and what is read there is as good as the pull-up is fast: it
 //!   says nothing. The leading 0 tells a converter from a broken wire, as do codes at either end, which the rig refuses.
@@ -24,11 +24,15 @@ use embassy_stm32::{
 };
 use farnear_rig::io::GAUGE_CODE_MAX;
 
+use crate::clock;
+
 /// APB1 / 4; the slowest part stands twice this.
 const SPI_HZ: Hertz = Hertz(10_500_000);
 /// Longest conversion of the AD7691 at VDD = 2.3 to 4.5 V, 3.7 us (2.2 us at 5 V), of the 168 MHz clock.
 const CONVERSION_CYCLES: u32 = 622;
-/// Half of a word's 256 cycles: the loop that waits may take twice as long as it is told.
+/// CNV is high for this long: 60 ns, between the 50 ns that are wanted and the 500 ns of the shortest conversion.
+const PULSE_CYCLES: u32 = 10;
+/// Half of a word's 256 cycles.
 const HALF_A_WORD_CYCLES: u32 = 128;
 /// From one look for the word's end to the next.
 const LOOK_CYCLES: u32 = 12;
@@ -65,7 +69,7 @@ impl Piezo {
         convert: Peri<'static, PD1>,
     ) -> Self {
         let dac_select = Output::new(dac_select, Level::High, Speed::Medium);
-        let convert = Output::new(convert, Level::Low, Speed::Medium);
+        let convert = Output::new(convert, Level::Low, Speed::VeryHigh);
         let mut config = spi::Config::default();
         config.mode = MODE_0;
         config.frequency = SPI_HZ;
@@ -79,9 +83,9 @@ impl Piezo {
     /// Sends a word and gives the one that comes meanwhile.
     fn exchange(&mut self, word: u16) -> u16 {
         pac::SPI3.dr().write(|w| w.set_dr(word));
-        cortex_m::asm::delay(HALF_A_WORD_CYCLES);
+        clock::wait_cycles(HALF_A_WORD_CYCLES);
         while !pac::SPI3.sr().read().rxne() {
-            cortex_m::asm::delay(LOOK_CYCLES);
+            clock::wait_cycles(LOOK_CYCLES);
         }
         pac::SPI3.dr().read().dr()
     }
@@ -91,6 +95,7 @@ impl Piezo {
         // An interrupt between the two would make the pulse longer than a conversion, and the result without its indicator.
         critical_section::with(|_| {
             self.convert.set_high();
+            clock::wait_cycles(PULSE_CYCLES);
             self.convert.set_low();
         });
         self.sampled = DWT::cycle_count();
@@ -98,8 +103,7 @@ impl Piezo {
 
     /// Reads the last sample when it is converted: 0 to [`GAUGE_CODE_MAX`], `None` where no converter answers. Takes 3.8 us.
     pub fn gauge(&mut self) -> Option<u32> {
-        let passed = DWT::cycle_count().wrapping_sub(self.sampled);
-        cortex_m::asm::delay(CONVERSION_CYCLES.saturating_sub(passed));
+        clock::wait_cycles_since(self.sampled, CONVERSION_CYCLES);
         let word = u32::from(self.exchange(0)) << 16 | u32::from(self.exchange(0));
         let code = (word >> TRAILING_BITS) & GAUGE_CODE_MAX;
         (word & BUSY_BIT == 0).then_some(code ^ SIGN_BIT)

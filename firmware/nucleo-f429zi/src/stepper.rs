@@ -291,7 +291,11 @@ impl<T: StepInstance> Stepper<T> {
                     queue.underrun = true;
                 }
             }
-            if queue.running.is_none() && !queue.underrun {
+            // Behind a break nothing starts until the loop has read it: `emergency_stop` clears the flag, and the rig aborts then.
+            if queue.broken {
+                queue.waiting.clear();
+            }
+            if queue.running.is_none() && !queue.underrun && !queue.broken {
                 timer.start_next(queue);
             }
         });

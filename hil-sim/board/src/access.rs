@@ -81,9 +81,11 @@ impl RigAccess<'_, '_> {
         self.chip().disconnect(chip, cut);
     }
 
-    /// Sets the supply, millivolts. The emulator's chip knows its detector but no brown-out: for that, see
-    /// [`RigAccess::brown_out`].
+    /// Sets the supply, millivolts. Below the level of the option bytes the chip resets.
     pub fn set_supply_mv(&mut self, millivolts: u32) {
+        if self.chip().dips(millivolts) {
+            self.press_reset();
+        }
         self.chip().part().set_supply(millivolts);
     }
 
@@ -129,6 +131,11 @@ impl RigAccess<'_, '_> {
     /// Conversions of the gauge that were read without a busy indicator.
     pub fn conversions_without_indicator(&mut self) -> u64 {
         self.chip().gauge_converter().map_or(0, |converter| converter.without_indicator())
+    }
+
+    /// Pulses of CNV that were too short for the gauge's converter.
+    pub fn short_conversion_pulses(&mut self) -> u64 {
+        self.chip().gauge_converter().map_or(0, |converter| converter.short_pulses())
     }
 
     /// Lets the power fail when the firmware has written this many more bytes to its memory.

@@ -79,6 +79,7 @@ pub struct GaugeConverter {
     /// What is shifted out, most significant bit first, and ones after it; `None` until it is read.
     shift: Option<u64>,
     without_indicator: u64,
+    short_pulses: u64,
     cut: bool,
 }
 
@@ -93,6 +94,7 @@ impl GaugeConverter {
             result: 0,
             shift: None,
             without_indicator: 0,
+            short_pulses: 0,
             cut: false,
         }
     }
@@ -100,6 +102,11 @@ impl GaugeConverter {
     /// Conversions that were read without a busy indicator, because CNV was high for too long.
     pub fn without_indicator(&self) -> u64 {
         self.without_indicator
+    }
+
+    /// Pulses of CNV that were shorter than the converter needs.
+    pub fn short_pulses(&self) -> u64 {
+        self.short_pulses
     }
 
     /// Cuts its data line, which the pull-up then holds high, or mends it.
@@ -139,6 +146,8 @@ impl Peer for GaugeConverter {
     /// CNV falls.
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
         self.low_ns = context.now().0;
+        let high_ns = self.low_ns.saturating_sub(self.sampled_ns);
+        self.short_pulses += u64::from(self.sampled_ns > 0 && high_ns < self.parts.pulse_min_ns);
     }
 
     /// CNV rises: sample.

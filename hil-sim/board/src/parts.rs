@@ -126,6 +126,8 @@ pub struct ProcessorParts {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConverterParts {
+    /// CNV is high for at least this, or the converter may not sample.
+    pub pulse_min_ns: u64,
     /// Shortest conversion: CNV is low again before that, or there is no busy indicator.
     pub conversion_min_ns: u64,
     /// Longest conversion: before that nothing can be read.

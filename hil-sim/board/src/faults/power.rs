@@ -3,7 +3,7 @@
 use super::{Kind, Takes};
 use crate::board::SUPPLY_MV;
 
-/// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 2.93 V).
+/// A supply at which the chip still runs but its detector speaks up (the firmware sets it to 3.03 V) and above the brown-out reset of level 2.
 const LOW_SUPPLY_MV: u32 = 2800;
 /// TIM5, which keeps the firmware's time.
 const TIM5_CR1: u64 = 0x4000_0c00;
