@@ -62,7 +62,7 @@ impl FromStr for Paper {
     fn from_str(text: &str) -> Result<Self, String> {
         let named = PAPERS.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)).map(|(_, size)| *size);
         let written = || {
-            let (width, height) = text.split_once('x')?;
+            let (width, height) = text.trim_end_matches("mm").split_once('x')?;
             Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
         };
         match named.or_else(written) {
