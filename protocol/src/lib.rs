@@ -8,6 +8,7 @@
 //! - [`settle`]: when a position counts as reached.
 //! - [`camera`]: the length-prefixed frames of the simulator's camera endpoint (TCP, not the serial link).
 #![no_std]
+#![deny(missing_docs)]
 
 pub mod camera;
 pub mod frame;

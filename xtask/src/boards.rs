@@ -9,7 +9,6 @@ use crate::run::ROOT;
 pub struct Board {
     /// Its name, as hello tells it.
     pub name: &'static str,
-    /// Most bytes of flash.
     pub flash_budget: u64,
     /// Most bytes of variables; the stack has what is left of the RAM.
     pub ram_budget: u64,

@@ -15,14 +15,10 @@ use crate::{
 /// Where a Chromium may lie beside the one that `CHROMIUM` names.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
-/// How the tests ended.
 #[derive(Default)]
 pub struct Counts {
-    /// Passed.
     pub passed: u32,
-    /// Failed.
     pub failed: u32,
-    /// Not run.
     pub skipped: u32,
     /// Whether the runner ended well.
     pub ended_well: bool,
@@ -56,7 +52,6 @@ pub fn run() -> Result<Counts> {
     })
 }
 
-/// What there is not.
 fn missing(folder: &Path) -> Option<&'static str> {
     let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
     let browser = BROWSERS.into_iter().map(PathBuf::from).chain(named).any(|path| path.is_file());

@@ -48,7 +48,6 @@ pub struct Arguments {
     power_cuts: u64,
 }
 
-/// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = firmware::build()?;
     // Where both go wrong the scenarios' table is seen all the same.

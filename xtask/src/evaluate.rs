@@ -21,7 +21,6 @@ pub struct Arguments {
     page: Vec<String>,
 }
 
-/// Runs the evaluation.
 pub fn run(arguments: &Arguments) -> Result<()> {
     step("render, measure, write docs/accuracy.md and the pages beside it");
     let mut command = cargo(["run", "--release", "--locked", "--package", "farnear-evaluation", "--"]);

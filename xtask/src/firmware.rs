@@ -26,7 +26,6 @@ fn built(board: &Board, program: &str) -> Result<PathBuf> {
 /// What of a board's workspace is built.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Selection {
-    /// All programs.
     All,
     /// The firmware alone, which is quicker.
     Firmware,

@@ -25,7 +25,6 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// What a program printed, and how it ended.
 pub struct Said {
-    /// Its standard output.
     pub text: String,
     /// Whether it ended by itself, with success.
     pub well: bool,

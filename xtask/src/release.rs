@@ -121,7 +121,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 /// What goes beside the programs, whatever they run on.
 struct Extras {
-    /// Manual pages.
     man: PathBuf,
     /// `farnear.bash`, `farnear.zsh`, `farnear.fish`.
     completions: PathBuf,

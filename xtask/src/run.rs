@@ -98,7 +98,6 @@ pub fn has_target(triple: &str) -> bool {
     })
 }
 
-/// The words of a call.
 pub fn describe(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")

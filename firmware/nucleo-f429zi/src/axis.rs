@@ -20,7 +20,6 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// Sets the pins up.
     pub fn new(home: Peri<'static, impl Pin>, far: Peri<'static, impl Pin>) -> Self {
         Self { home: Input::new(home, Pull::Up), far: Input::new(far, Pull::Up) }
     }
@@ -28,11 +27,9 @@ impl Switches {
 
 /// The hardware of a stage.
 pub struct Axis<S: StepInstance, E: GeneralInstance4Channel> {
-    /// Motor.
     pub stepper: Stepper<S>,
     /// Encoder on its shaft.
     pub encoder: Encoder<E>,
-    /// Both ends.
     pub switches: Switches,
 }
 

@@ -45,7 +45,6 @@ pub struct Nucleo {
 
 /// The board and what does not belong to the control loop.
 pub struct Parts {
-    /// The board.
     pub board: Nucleo,
     /// The LED that shows that the loop runs.
     pub led: Peri<'static, PB0>,

@@ -49,12 +49,14 @@ struct Exposure {
 /// What the strobe input is for.
 #[derive(Clone, Copy)]
 enum Strobe {
-    /// Nothing.
     Ignored,
     /// The exposure that was triggered.
     Triggered(Exposure),
     /// Exposures that come by themselves: the start of the one under way, and the last whole one.
-    Listening { start: Option<u32>, ended: Option<(u32, u32)> },
+    Listening {
+        start: Option<u32>,
+        ended: Option<(u32, u32)>,
+    },
 }
 
 impl Strobe {

@@ -7,7 +7,6 @@ use farnear_protocol::BoardMicros;
 
 use crate::{clock_tree, registers};
 
-/// Clock of the core.
 pub const SYSCLK_HZ: u32 = 168_000_000;
 /// Clock of the timers on APB1 (TIM2 to TIM7).
 pub const APB1_TIMER_HZ: u32 = 84_000_000;

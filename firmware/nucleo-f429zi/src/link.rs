@@ -26,7 +26,6 @@ use farnear_protocol::{frame::FRAME_MAX, message::LinkRate};
 
 use crate::clock::APB1_TIMER_HZ;
 
-/// What drives USART3.
 const APB1_HZ: u32 = APB1_TIMER_HZ / 2;
 /// 5 ms of bytes, 25 control ticks.
 const RECEIVE_RING: usize = 1024;

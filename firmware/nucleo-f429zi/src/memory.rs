@@ -17,7 +17,6 @@ use farnear_rig::io::{MEMORY_BYTES, MemoryWrite};
 
 /// APB2 / 4; the chip stands 40 MHz.
 const SPI_HZ: Hertz = Hertz(21_000_000);
-/// Opcodes (table 1).
 const WRITE_ENABLE: u8 = 0x06;
 const WRITE: u8 = 0x02;
 const READ: u8 = 0x03;
@@ -30,7 +29,6 @@ const ATTEMPTS: usize = 4;
 /// What is read at once.
 const PIECE: usize = 256;
 
-/// The chip.
 pub struct Memory {
     spi: Spi<'static, Blocking, Master>,
     select: Output<'static>,

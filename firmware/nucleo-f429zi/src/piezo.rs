@@ -90,7 +90,6 @@ impl Piezo {
         pac::SPI3.dr().read().dr()
     }
 
-    /// Samples the gauge.
     pub fn sample(&mut self) {
         // An interrupt between the two would make the pulse longer than a conversion, and the result without its indicator.
         critical_section::with(|_| {

@@ -202,19 +202,14 @@ where
     G: PeripheralType + 'static,
     B: PeripheralType + 'static,
 {
-    /// STEP.
     pub step: Peri<'static, S>,
-    /// DIR.
     pub direction: Peri<'static, D>,
-    /// EN.
     pub enable: Peri<'static, E>,
-    /// DIAG.
     pub diagnosis: Peri<'static, G>,
     /// Break input: the emergency stop.
     pub stop: Peri<'static, B>,
 }
 
-/// One axis' motor.
 pub struct Stepper<T: StepInstance> {
     direction: Output<'static>,
     enable: Output<'static>,

@@ -6,7 +6,6 @@ use embassy_stm32::pac;
 /// follows at 2.50 V; `docs/rig.md` has the capacitor that makes the time between them long enough for a record.
 const LEVEL: u8 = 7;
 
-/// The detector.
 pub struct Supply(());
 
 impl Supply {

@@ -7,10 +7,8 @@
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Alarm, AlarmRecord, Axis, Failure, RequestError};
 
-/// Alarms kept.
 pub(crate) const RETAINED: usize = 8;
 
-/// All alarms.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Alarms {
     /// The number of the last.

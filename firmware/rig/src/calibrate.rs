@@ -31,13 +31,10 @@ pub(crate) enum Calibrating {
 /// What a tick of a routine brought.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
-    /// It goes on.
     On,
     /// It goes on with this setting.
     Set(SettingKey, i32),
-    /// It is over.
     Done(Calibration),
-    /// It cannot be done.
     Failed(Axis, Failure),
 }
 
@@ -53,7 +50,6 @@ impl Calibrating {
         }
     }
 
-    /// The axes that move.
     pub(crate) const fn axes(&self) -> &'static [Axis] {
         match self {
             Self::Travel(travel) => only(travel.axis()),
@@ -63,7 +59,6 @@ impl Calibrating {
         }
     }
 
-    /// Goes on.
     pub(crate) fn tick(&mut self, stage: &mut Stage, settings: &Settings) -> Step {
         match self {
             Self::Travel(travel) => travel.tick(stage, settings),

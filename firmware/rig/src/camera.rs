@@ -53,7 +53,6 @@ impl Camera {
         Self { settings, ready_at: BoardMicros(0), triggers: 0, pending: None, order: None, edges: None }
     }
 
-    /// Takes other numbers.
     pub(crate) const fn apply(&mut self, settings: CameraSettings) {
         self.settings = settings;
     }

@@ -92,7 +92,6 @@ pub trait Board {
     /// Keeps the watchdog from resetting the board.
     fn feed_watchdog(&mut self);
 
-    /// Resets the board.
     fn reset(&mut self);
 }
 

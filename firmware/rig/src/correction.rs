@@ -14,7 +14,6 @@ use farnear_protocol::message::{
     CODES_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,
 };
 
-/// Widest row.
 pub const ROW_PIXELS_MAX: u16 = 1024;
 /// Coefficients of the largest form.
 pub(crate) const COEFFICIENTS: usize = REGIONS * REGIONS * REGION_TERMS;
@@ -34,7 +33,6 @@ impl StoredCorrection {
         Some(Self { info, bits })
     }
 
-    /// What it is for.
     pub(crate) const fn info(&self) -> &CorrectionInfo {
         &self.info
     }
@@ -146,7 +144,6 @@ impl Correction {
         Ok(())
     }
 
-    /// Sets coefficients.
     pub(crate) fn put(&mut self, first: u8, bits: &CoefficientBits) -> Result<(), CorrectionFault> {
         let open = self.open.as_mut().ok_or(CorrectionFault::None)?;
         let places = open.places(first, bits.len())?;
@@ -158,7 +155,6 @@ impl Correction {
         Ok(())
     }
 
-    /// Reads coefficients.
     pub(crate) fn get(&self, first: u8, count: u8) -> Result<CoefficientBits, CorrectionFault> {
         let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
         let places = open.places(first, usize::from(count))?;

@@ -6,10 +6,8 @@
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Event, EventKind};
 
-/// Events kept.
 pub const RETAINED: u32 = 16;
 
-/// The numbered events.
 #[derive(Clone, Debug)]
 pub(crate) struct Events {
     ring: [Option<Event>; RETAINED as usize],

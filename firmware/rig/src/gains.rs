@@ -25,7 +25,6 @@ pub(crate) const GAIN_BITS: u32 = 24;
 pub struct PiezoModel {
     /// First resonance with the sensor board mounted.
     pub resonance_hz: f64,
-    /// Its damping ratio.
     pub damping: f64,
     /// Control period in seconds.
     pub tick_s: f64,
@@ -70,9 +69,7 @@ pub struct ShaperGains {
 /// A pair of poles: natural frequency in Hz and damping ratio.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Poles {
-    /// Natural frequency.
     pub hz: f64,
-    /// Damping ratio.
     pub damping: f64,
 }
 

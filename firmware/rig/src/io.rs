@@ -87,7 +87,6 @@ pub struct ExposureEdges {
     pub trigger: BoardMicros,
     /// Rising edge of the camera's exposure-active signal.
     pub strobe_start: BoardMicros,
-    /// Its falling edge.
     pub strobe_end: BoardMicros,
 }
 
@@ -96,7 +95,6 @@ pub struct ExposureEdges {
 pub struct StrobeEdges {
     /// Rising edge of the camera's exposure-active signal.
     pub start: BoardMicros,
-    /// Its falling edge.
     pub end: BoardMicros,
 }
 
@@ -112,7 +110,6 @@ pub struct MotorInputs {
     pub far_switch: bool,
     /// The driver pulls its DIAG line.
     pub driver_fault: bool,
-    /// The step timer.
     pub stepper: StepperState,
 }
 
@@ -211,7 +208,6 @@ pub struct MemoryWrite {
 pub struct Trigger {
     /// Its rising edge, to the microsecond, at most a few ticks ahead; as soon as possible where that is over.
     pub at: BoardMicros,
-    /// Its length.
     pub length: Micros,
 }
 

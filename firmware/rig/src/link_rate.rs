@@ -14,15 +14,20 @@ const ANSWER_LEAVES: Micros = Micros(20_000);
 
 #[derive(Clone, Copy, Debug)]
 enum Change {
-    /// None is under way.
     None,
     /// Asked for; the answer is to leave first.
-    Asked { to: LinkRate, at: BoardMicros },
+    Asked {
+        to: LinkRate,
+        at: BoardMicros,
+    },
     /// On trial since then; so many good requests had come before.
-    Trial { back: LinkRate, at: BoardMicros, requests: u32 },
+    Trial {
+        back: LinkRate,
+        at: BoardMicros,
+        requests: u32,
+    },
 }
 
-/// See the module.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinkSpeed {
     now: LinkRate,
@@ -30,7 +35,6 @@ pub(crate) struct LinkSpeed {
 }
 
 impl LinkSpeed {
-    /// As after a reset.
     pub(crate) const fn new() -> Self {
         Self { now: LinkRate::START, change: Change::None }
     }

@@ -6,7 +6,6 @@
 /// A square matrix, rows first.
 pub(crate) type Matrix<const N: usize> = [[f64; N]; N];
 
-/// The unit matrix.
 pub(crate) const fn identity<const N: usize>() -> Matrix<N> {
     let mut unit = [[0.0; N]; N];
     let mut i = 0;
@@ -17,7 +16,6 @@ pub(crate) const fn identity<const N: usize>() -> Matrix<N> {
     unit
 }
 
-/// `a + factor * b`.
 pub(crate) const fn add_scaled<const N: usize>(a: &Matrix<N>, b: &Matrix<N>, factor: f64) -> Matrix<N> {
     let mut sum = *a;
     let mut i = 0;
@@ -28,7 +26,6 @@ pub(crate) const fn add_scaled<const N: usize>(a: &Matrix<N>, b: &Matrix<N>, fac
     sum
 }
 
-/// `a * b`.
 pub(crate) const fn product<const N: usize>(a: &Matrix<N>, b: &Matrix<N>) -> Matrix<N> {
     let mut out = [[0.0; N]; N];
     let mut i = 0;
@@ -43,7 +40,6 @@ pub(crate) const fn product<const N: usize>(a: &Matrix<N>, b: &Matrix<N>) -> Mat
     out
 }
 
-/// `a * v`.
 pub(crate) const fn apply<const N: usize>(a: &Matrix<N>, v: &[f64; N]) -> [f64; N] {
     let mut out = [0.0; N];
     let mut i = 0;

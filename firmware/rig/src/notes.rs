@@ -66,7 +66,6 @@ impl Notes {
         Self { waiting: Deque::new(), states }
     }
 
-    /// Notes something.
     pub(crate) fn add(&mut self, note: Note) {
         let _ = self.waiting.push_back(note); // without room it is left out
     }
@@ -82,7 +81,6 @@ impl Notes {
         }
     }
 
-    /// The next one.
     pub(crate) fn take(&mut self) -> Option<Note> {
         self.waiting.pop_front()
     }

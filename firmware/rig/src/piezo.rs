@@ -64,7 +64,6 @@ pub(crate) const BITS: u32 = 10;
 /// Position, scaled velocity, disturbance and its drift per tick, each nm in 2^-10.
 type State = [i32; 4];
 
-/// The closed loop.
 #[derive(Clone, Debug)]
 struct Loop {
     shaper: Shaper,
@@ -105,7 +104,6 @@ enum Start {
     Over,
 }
 
-/// The fine axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Piezo {
     settings: FineSettings,

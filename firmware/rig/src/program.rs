@@ -109,7 +109,6 @@ pub(crate) struct Run {
     shot: Shot,
     repeat: u16,
     exposures: u16,
-    /// Of a continuous run.
     pace: Option<Pace>,
     positioning: Positioning,
     /// From the start of the move until it was first settled.
@@ -123,20 +122,34 @@ pub(crate) struct Run {
 /// What a tick of a program brought.
 #[derive(Debug)]
 pub(crate) enum Progress {
-    /// Nothing to tell.
     On,
     /// The shot is settled and the host triggers the camera: number of the exposure.
-    Ready { number: u32 },
-    /// It stands.
+    Ready {
+        number: u32,
+    },
     Paused,
     /// An exposure was taken; with the number of exposures, if it was the last.
-    Taken { shot: ShotRecord, end: Option<u16> },
+    Taken {
+        shot: ShotRecord,
+        end: Option<u16>,
+    },
     /// An exposure of a continuous run was taken; with all exposures and dropped frames, if it was the last.
-    Frame { frame: u32, deviation: Nanometres, shot: ShotRecord, end: Option<(u32, u32)> },
+    Frame {
+        frame: u32,
+        deviation: Nanometres,
+        shot: ShotRecord,
+        end: Option<(u32, u32)>,
+    },
     /// A moment of a continuous run's pace passed without an exposure.
-    Dropped { frame: u32, reason: DropReason },
+    Dropped {
+        frame: u32,
+        reason: DropReason,
+    },
     /// It cannot go on; whether that is the axis' fault.
-    Failed { axis: Option<Axis>, reason: Failure },
+    Failed {
+        axis: Option<Axis>,
+        reason: Failure,
+    },
 }
 
 impl Run {
@@ -205,7 +218,6 @@ impl Run {
         }
     }
 
-    /// Goes on.
     pub(crate) fn tick(
         &mut self,
         shots: &Shots,

@@ -212,7 +212,6 @@ impl Rig {
         }
     }
 
-    /// Who it is.
     pub const fn identity(&self) -> &Identity {
         &self.identity
     }

@@ -39,9 +39,7 @@ pub struct Settings {
 /// Stepper, screw, encoder and switches.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StepperSettings {
-    /// Smallest position.
     pub min: Nanometres,
-    /// Largest position.
     pub max: Nanometres,
     /// Speed of a move, STEP pulses per second.
     pub speed: u32,
@@ -123,9 +121,7 @@ pub struct FineSettings {
 /// Timing of the camera.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CameraSettings {
-    /// Shortest exposure.
     pub exposure_min: Micros,
-    /// Longest exposure.
     pub exposure_max: Micros,
     /// From the end of an exposure until the camera may be triggered again.
     pub readout: Micros,
@@ -135,7 +131,6 @@ pub struct CameraSettings {
     pub patience: Micros,
 }
 
-/// Timing of the link.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LinkSettings {
     /// From the last answer handed to the UART until the reset.

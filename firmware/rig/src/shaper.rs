@@ -36,7 +36,6 @@ impl Stage {
     }
 }
 
-/// The two stages.
 #[derive(Clone, Debug)]
 pub(crate) struct Shaper {
     first: Stage,

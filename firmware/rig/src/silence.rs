@@ -17,7 +17,6 @@ pub(crate) struct Silence {
 /// What is to be done about it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Verdict {
-    /// Nothing.
     Fine,
     /// Say [`farnear_protocol::EventKind::StillThere`] with this request.
     Remind(u32),

@@ -20,7 +20,6 @@ pub(crate) struct Active<W> {
     pub(crate) work: W,
 }
 
-/// Work on one axis.
 #[derive(Clone, Debug)]
 pub(crate) enum AxisWork {
     Home(Homing),
@@ -32,7 +31,6 @@ pub(crate) enum AxisWork {
     Ending(Failure),
 }
 
-/// Work on all axes.
 #[derive(Clone, Debug)]
 pub(crate) enum WholeWork {
     Program(Run),

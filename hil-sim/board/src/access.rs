@@ -42,12 +42,10 @@ pub struct RigAccess<'a, 'h> {
 }
 
 impl RigAccess<'_, '_> {
-    /// Virtual time, in ns.
     pub fn now_ns(&self) -> u64 {
         self.stop.at.0
     }
 
-    /// Works on the plant.
     pub fn plant<T>(&mut self, work: impl FnOnce(&mut Plant) -> T) -> T {
         with_plant(self.plant, work)
     }

@@ -1,6 +1,5 @@
 //! The host's adapter: it keeps what the board says for its latency, from the first byte on.
 
-/// See the module.
 #[derive(Debug, Default)]
 pub struct Adapter {
     kept: Vec<u8>,

@@ -61,13 +61,10 @@ const SPI4: usize = 3;
 const USART3: usize = 2;
 /// TIM2 in the part's table of general timers.
 pub const TIM2: usize = 0;
-/// TIM3 likewise.
 pub const TIM3: usize = 1;
-/// TIM4 likewise.
 pub const TIM4: usize = 2;
 /// TIM1 in the table of advanced timers.
 pub const TIM1: usize = 0;
-/// TIM8 likewise.
 pub const TIM8: usize = 1;
 
 /// The volatile memory of the chip: where it begins and how long it is. SRAM1 to 3, and the core's own.
@@ -84,7 +81,6 @@ pub enum SpiChip {
     Dac,
     /// The gauge's converter.
     Gauge,
-    /// The FRAM.
     Memory,
 }
 
@@ -93,7 +89,6 @@ pub enum SpiChip {
 pub struct PinName {
     /// Port, A = 0.
     pub port: usize,
-    /// Pin, 0 to 15.
     pub pin: u8,
 }
 
@@ -116,15 +111,12 @@ pub struct StagePins {
     pub step: (PinName, usize, u8),
     /// DIR, high = sensor and lens away from each other.
     pub direction: PinName,
-    /// EN, low = on.
     pub enable: PinName,
-    /// DIAG, high = fault.
     pub diagnosis: PinName,
     /// Encoder A and B, and the general timer that counts them (alternate function 2).
     pub encoder: ([PinName; 2], usize),
     /// Home switch, high = open = actuated.
     pub home: PinName,
-    /// Far switch likewise.
     pub far: PinName,
     /// Break input, which the emergency stop's circuit reaches; the STEP timer's, with its alternate function.
     pub stop: (PinName, u8),
@@ -161,9 +153,7 @@ pub const fn pins(stage: StageName) -> &'static StagePins {
     }
 }
 
-/// Camera trigger.
 pub const TRIGGER: PinName = PinName::new(b'B', 10);
-/// Camera strobe.
 pub const STROBE: PinName = PinName::new(b'B', 11);
 /// Strap that tells the firmware that it is emulated.
 const STRAP: PinName = PinName::new(b'D', 15);
@@ -184,7 +174,6 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// The part itself.
     pub fn part(&mut self) -> &mut Stm32f427 {
         &mut self.part
     }
@@ -300,7 +289,6 @@ impl Chip {
         self.part.spi[SPI3].chip_mut::<GaugeConverter>(1)
     }
 
-    /// The FRAM.
     pub fn memory(&mut self) -> Option<&mut MemoryChip> {
         self.part.spi[SPI4].chip_mut::<MemoryChip>(0)
     }
@@ -379,7 +367,6 @@ impl Mcu for Chip {
 /// The NUCLEO-F429ZI with the rig's chips.
 #[derive(Debug)]
 pub struct RigBoard {
-    /// The chip.
     pub chip: Chip,
     unique_id: [u8; 12],
     costs: Costs,

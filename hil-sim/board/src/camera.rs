@@ -14,7 +14,6 @@ use crate::plant::Noise;
 const LATENCY_NS: f64 = 20_000.0;
 /// Standard deviation of the latency.
 const JITTER_NS: f64 = 2_000.0;
-/// Read-out of a frame.
 const READOUT_NS: u64 = 10_000_000;
 /// From a command of the host to the exposure: USB and the camera's own program.
 const COMMAND_NS: u64 = 1_000_000;
@@ -24,7 +23,6 @@ const COMMAND_NS: u64 = 1_000_000;
 pub enum Edge {
     /// It begins to collect light for the image of this name.
     Begin(u32),
-    /// It stops.
     End,
 }
 
@@ -35,7 +33,6 @@ struct FreeRun {
     exposure_ns: u64,
 }
 
-/// The camera.
 #[derive(Debug)]
 pub struct Camera {
     jitter: Noise,

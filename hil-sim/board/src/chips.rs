@@ -143,14 +143,12 @@ impl Peer for GaugeConverter {
         (shift >> (64 - u32::from(bits))) as u32
     }
 
-    /// CNV falls.
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
         self.low_ns = context.now().0;
         let high_ns = self.low_ns.saturating_sub(self.sampled_ns);
         self.short_pulses += u64::from(self.sampled_ns > 0 && high_ns < self.parts.pulse_min_ns);
     }
 
-    /// CNV rises: sample.
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
         self.sampled_ns = context.now().0;
         self.shift = None;

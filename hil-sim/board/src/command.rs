@@ -10,9 +10,7 @@ pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
 /// What the camera's host can ask of the camera.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CameraOrder {
-    /// Expose once.
     Expose {
-        /// For so long.
         exposure_us: u64,
         /// The image's name.
         id: u32,
@@ -21,13 +19,11 @@ pub enum CameraOrder {
     FreeRun {
         /// From one exposure to the next.
         period_us: u64,
-        /// For so long.
         exposure_us: u64,
     },
 }
 
 impl CameraOrder {
-    /// Gives the order.
     pub fn give(self, rig: &mut RigAccess<'_, '_>) {
         match self {
             Self::Expose { exposure_us, id } => rig.expose(exposure_us, id),
@@ -44,14 +40,12 @@ pub enum Command {
     HostRate(u32),
     /// Let this much time pass.
     Advance {
-        /// How much.
         nanos: u64,
         /// Told when it has passed.
         done: Sender<Report>,
     },
     /// Let time pass until the board owes nothing.
     Settle {
-        /// Told then.
         done: Sender<Report>,
     },
     /// Do something with the rig between two instructions.
@@ -62,10 +56,8 @@ pub enum Command {
     Heal,
     /// Give what was seen since the last time.
     Sights {
-        /// Told.
         done: Sender<Vec<Sight>>,
     },
-    /// End.
     End,
 }
 

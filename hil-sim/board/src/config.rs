@@ -29,7 +29,6 @@ pub struct RigConfig {
     pub costs_by_kind: bool,
     /// What happens to it. Its seed, its parts and its host's steps are the caller's business ([`RigConfig::of`]).
     pub scenario: Scenario,
-    /// How time passes.
     pub pace: Pace,
     /// What the board's memory holds at power-on, and where it is kept when the rig ends; a new one is made where there is
     /// none. `None`: a blank memory, which is forgotten.

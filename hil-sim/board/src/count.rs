@@ -38,7 +38,6 @@ const LOOK_NS: u64 = 1_000_000;
 /// What a routine takes.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Count {
-    /// What it does.
     pub routine: String,
     /// What it does that to.
     pub unit: String,

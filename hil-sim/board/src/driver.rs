@@ -51,13 +51,11 @@ const PICTURE: Duration = Duration::from_millis(2);
 struct Last {
     /// STEP edges of both motors, and when one of them was seen.
     step_edges: [(u64, u64); 2],
-    /// Exposures begun.
     exposures: u64,
     /// Bytes written to the memory, and when.
     memory: (u64, u64),
 }
 
-/// See the module.
 pub struct Driver {
     commands: Receiver<Command>,
     outlets: Outlets,

@@ -9,21 +9,13 @@ use thiserror::Error;
 pub enum SimError {
     /// The memory's file is not one.
     #[error("{} has {length} bytes, the board's memory {expected}: name a file that an earlier run wrote, or a new one", path.display())]
-    Memory {
-        /// The file.
-        path: PathBuf,
-        /// Its length.
-        length: usize,
-        /// What it should be.
-        expected: usize,
-    },
+    Memory { path: PathBuf, length: usize, expected: usize },
     /// No firmware where it was looked for.
     #[error("no firmware at {}: run `cargo xtask firmware` to build it, or name an ELF with --firmware", .0.display())]
     NoFirmware(PathBuf),
     /// The firmware file is there but cannot be used.
     #[error("the firmware {} cannot be loaded: {reason}", path.display())]
     Firmware {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
@@ -34,7 +26,6 @@ pub enum SimError {
         path.display()
     )]
     NotStarted {
-        /// The file.
         path: PathBuf,
         /// How long it was given.
         millis: u64,
@@ -42,7 +33,6 @@ pub enum SimError {
     /// The scenario's file is wrong.
     #[error("scenario {}: {reason}", path.display())]
     Scenario {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
@@ -50,19 +40,13 @@ pub enum SimError {
     /// The file of the parts is wrong.
     #[error("parts file {}: {reason}", path.display())]
     Parts {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
     },
     /// A trace cannot be replayed.
     #[error("{}: {reason}", path.display())]
-    Replay {
-        /// The trace.
-        path: PathBuf,
-        /// Why not.
-        reason: String,
-    },
+    Replay { path: PathBuf, reason: String },
     /// The emulator's description of the chip, or the emulation itself, failed.
     #[error("the emulator stopped: {0}")]
     Emulator(String),
@@ -72,7 +56,6 @@ pub enum SimError {
     /// A file, the pty or the camera endpoint.
     #[error("{what}: {source}")]
     Io {
-        /// What was being done.
         what: String,
         /// What the system said.
         source: std::io::Error,

@@ -31,17 +31,14 @@ pub type Deed = fn(&mut RigAccess<'_, '_>, &Happening);
 /// A kind of thing that may happen to a rig.
 #[derive(Clone, Copy)]
 pub struct Kind {
-    /// Its name in files.
     pub name: &'static str,
     /// Which fields it has beside the moment.
     pub takes: Takes,
-    /// Lets it happen.
     pub happen: Deed,
     /// Takes it back; `None` where nothing can be.
     pub mend: Option<Deed>,
 }
 
-/// All kinds.
 pub const KINDS: [Kind; 41] = [
     motion::EMERGENCY_STOP,
     motion::EMERGENCY_STOP_RELEASED,

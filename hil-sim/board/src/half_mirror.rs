@@ -13,7 +13,6 @@ const FURTHER_MAX_UM: f64 = 10_000.0;
 pub enum Further {
     /// As far as near focus lies behind far focus.
     Near,
-    /// So many micrometres.
     Micrometres(f64),
 }
 

@@ -22,7 +22,6 @@ use crate::{error::SimError, parts::HalfMirrorParts, pictures::Pictures, wiring:
 pub struct Picture {
     /// Start of the exposure, virtual nanoseconds.
     pub begin_ns: u64,
-    /// What it is.
     pub header: FrameHeader,
     /// As the endpoint sends it.
     frame: Vec<u8>,
@@ -48,7 +47,6 @@ impl Picture {
 /// Sets the second camera's noise apart from the first's, and from that of the rigs of the seeds beside.
 const OF_THE_SECOND: u64 = 0x5ec0_0d00_0000_0000;
 
-/// Renders exposures.
 pub struct Imager {
     renderer: Renderer,
     camera: Camera,
@@ -58,7 +56,6 @@ pub struct Imager {
     speed_px_per_s: [f64; 2],
     /// How much further from the lens the sensor stands than the stage says.
     further_mm: f64,
-    /// Left is right.
     mirrored: bool,
     exposures: u32,
 }
@@ -98,9 +95,6 @@ impl Imager {
     }
 
     /// One exposure as the endpoint sends it: length, header, pixels.
-    ///
-    /// # Errors
-    /// [`SimError::Scene`].
     pub fn frame(&mut self, shot: &Shot) -> Result<Vec<u8>, SimError> {
         Ok(self.picture(shot)?.frame)
     }

@@ -13,7 +13,6 @@ const APB1_HZ: u32 = 42_000_000;
 /// A receiver bears a twentieth of a bit per bit at most; beyond that it reads something else.
 const TOLERANCE: u32 = 20;
 
-/// See the module.
 #[derive(Debug)]
 pub struct LinkRates {
     board: LinkRate,
@@ -45,7 +44,6 @@ impl LinkRates {
         self.board = self.next.take().unwrap_or(self.board);
     }
 
-    /// The board was reset.
     pub fn reset(&mut self) {
         (self.board, self.next) = (LinkRate::START, None);
     }

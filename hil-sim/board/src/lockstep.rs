@@ -28,7 +28,6 @@ pub const BOOT_NS: u64 = 2_000_000_000;
 /// Ended requests that are remembered, more than the board remembers answers.
 const ENDED: usize = 256;
 
-/// What the board owes.
 #[derive(Debug, Default)]
 pub struct Lockstep {
     to_board: Decoder,

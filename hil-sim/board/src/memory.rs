@@ -15,7 +15,6 @@ use crate::parts::MemoryMake;
 
 /// Opcode of a write; two bytes of address follow it.
 const WRITE: u32 = 0x02;
-/// Opcode of a read.
 const READ: u32 = 0x03;
 /// Opcode of the question for its name.
 const READ_ID: u32 = 0x9f;
@@ -59,7 +58,6 @@ impl MemoryChip {
         self.spoilt = (names, reads);
     }
 
-    /// What it holds.
     pub fn contents(&self) -> &[u8] {
         self.chip.stored()
     }

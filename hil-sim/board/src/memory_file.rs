@@ -26,9 +26,6 @@ pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
 }
 
 /// Keeps what the memory holds: written aside first, so that a file is whole or the old one.
-///
-/// # Errors
-/// [`SimError::Io`].
 pub fn write(path: &Path, contents: &[u8]) -> Result<(), SimError> {
     let aside = path.with_added_extension(format!("partial-{}", std::process::id()));
     let written = fs::write(&aside, contents).and_then(|()| fs::rename(&aside, path));

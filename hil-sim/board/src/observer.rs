@@ -27,7 +27,6 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// As it is now.
     pub fn of(plant: &Plant) -> Self {
         let (sensor, lens) = (plant.stage(StageName::Sensor), plant.stage(StageName::Lens));
         Self {
@@ -44,7 +43,6 @@ impl Truth {
 pub enum Seen {
     /// A good frame with a request goes on the line to the board.
     Asked {
-        /// Its id.
         id: u32,
         /// The boot that it is for.
         boot: u32,
@@ -53,22 +51,16 @@ pub enum Seen {
     },
     /// The board has given an answer.
     Answered {
-        /// To which id.
         id: u32,
-        /// In which boot.
         boot: u32,
-        /// The answer.
         answer: Box<Result<Response, RequestError>>,
         /// Where everything was then.
         truth: Truth,
     },
     /// The board has told of an event.
     Told {
-        /// Its number.
         number: u32,
-        /// In which boot.
         boot: u32,
-        /// The event.
         event: Box<Event>,
         /// Where everything was then.
         truth: Truth,
@@ -77,15 +69,12 @@ pub enum Seen {
     Stepped(Burst),
     /// The camera has taken a picture.
     Exposed(Shot),
-    /// The chip was reset.
     Reset,
     /// Its power went, or came back.
     Powered(bool),
     /// Something happened to the rig, or was taken back.
     Happened {
-        /// Its kind.
         what: &'static str,
-        /// Taken back.
         mends: bool,
     },
     /// Everything is mended; what comes now has to work.
@@ -97,11 +86,9 @@ pub enum Seen {
 pub struct Sight {
     /// Virtual time, nanoseconds.
     pub at_ns: u64,
-    /// What.
     pub seen: Seen,
 }
 
-/// See the module.
 #[derive(Default)]
 pub struct Observer {
     keeps: bool,
@@ -116,7 +103,6 @@ impl Observer {
         Self { keeps, ..Self::default() }
     }
 
-    /// Notes something.
     pub fn note(&mut self, at_ns: u64, seen: Seen) {
         if self.keeps {
             self.sights.push(Sight { at_ns, seen });

@@ -19,10 +19,8 @@ const AWAKE: Duration = Duration::from_millis(200);
 /// A machine that is this far behind follows the wall clock from where it is.
 const BEHIND: Duration = Duration::from_millis(100);
 
-/// See the module.
 pub struct Pacing {
     pace: Pace,
-    /// What the board owes.
     pub lockstep: Lockstep,
     /// Until when time passes because somebody said so.
     told_ns: u64,

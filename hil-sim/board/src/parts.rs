@@ -13,7 +13,6 @@ use crate::error::SimError;
 /// The rig that tests and the program have where nobody says otherwise.
 const STANDARD: &str = include_str!("../parts.toml");
 
-/// All parts.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parts {
@@ -25,11 +24,9 @@ pub struct Parts {
     pub gauge: GaugeParts,
     /// The piezo with its flexure.
     pub piezo: PiezoParts,
-    /// The FRAM.
     pub memory: MemoryParts,
     /// The chip's own supervision of its supply.
     pub supply: SupplyParts,
-    /// End switches.
     pub switches: SwitchParts,
     /// The motors' driver chips.
     pub driver: DriverParts,
@@ -156,28 +153,23 @@ pub struct GaugeParts {
     pub gain: f64,
     /// What it says where the piezo is relaxed.
     pub offset_um: f64,
-    /// Its noise, RMS.
     pub noise_um: f64,
 }
 
-/// The FRAM.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MemoryParts {
-    /// Which one it is.
     pub make: MemoryMake,
 }
 
 /// A make of FRAM.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum MemoryMake {
-    /// Cypress FM25V02.
     #[serde(rename = "FM25V02")]
     Fm25v02,
     /// Its successor, with another revision in its name.
     #[serde(rename = "FM25V02A")]
     Fm25v02a,
-    /// None is fitted.
     #[serde(rename = "none")]
     None,
 }
@@ -214,10 +206,8 @@ pub enum BrownOut {
     /// The lowest threshold.
     #[serde(rename = "level-1")]
     Level1,
-    /// The middle one.
     #[serde(rename = "level-2")]
     Level2,
-    /// The highest.
     #[serde(rename = "level-3")]
     Level3,
 }
@@ -252,13 +242,11 @@ impl SupplyParts {
 pub struct PiezoParts {
     /// Frequency of the flexure's second mode.
     pub second_mode_hz: f64,
-    /// Its damping ratio.
     pub second_mode_damping: f64,
     /// Its share of what a slow drive moves; 0 = there is none.
     pub second_mode_share: f64,
 }
 
-/// End switches.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SwitchParts {

@@ -55,7 +55,6 @@ impl Pictures {
     }
 }
 
-/// See the module.
 pub struct Patience {
     pictures: Option<Arc<Pictures>>,
     last: usize,

@@ -187,7 +187,6 @@ impl Plant {
         })
     }
 
-    /// One of the stages.
     pub fn stage(&self, name: StageName) -> &Stage {
         match name {
             StageName::Sensor => &self.sensor_stage,
@@ -203,7 +202,6 @@ impl Plant {
         }
     }
 
-    /// The piezo.
     pub fn piezo(&self) -> &Piezo {
         &self.piezo
     }

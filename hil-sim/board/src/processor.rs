@@ -47,7 +47,6 @@ const FLASH_BYTES: u64 = 2 << 20;
 /// How an instruction's cycles are found.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Costs {
-    /// By the average.
     Average(ProcessorParts),
     /// By kind, for the program with these bytes at the beginning of the flash.
     ByKind(Vec<u8>),
@@ -170,7 +169,6 @@ impl Metered {
         Ok(Self { inner, meter, model, clock })
     }
 
-    /// Goes step by step.
     fn step_by_step(&mut self, budget: u32, bus: &mut dyn CoreBus) -> Exit {
         let end = self.retired() + u64::from(budget);
         loop {

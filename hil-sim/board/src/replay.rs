@@ -30,14 +30,11 @@ pub enum Entry {
     },
 }
 
-/// Where two runs part.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Departure {
-    /// Virtual nanoseconds.
     pub at_ns: u64,
     /// Line of the trace, from 1.
     pub line: usize,
-    /// The signal.
     pub signal: &'static str,
     /// What the trace has; `None` behind its end.
     pub recorded: Option<String>,
@@ -67,7 +64,6 @@ impl Comparer {
         }
     }
 
-    /// The run has ended.
     pub fn end(&mut self) {
         if let Some(recorded) = self.lines.pop_front() {
             self.line += 1;
@@ -99,7 +95,6 @@ pub struct Script {
     pub firmware: u64,
     /// What the memory held at power-on.
     pub memory: Option<Box<[u8; SIZE]>>,
-    /// What came of it.
     pub comparer: Comparer,
     entries: VecDeque<(u64, Entry)>,
     end_ns: u64,

@@ -1,6 +1,5 @@
 //! How a rig is at a moment: what a test may compare with what the firmware says.
 
-/// How a stage is.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StageReport {
     /// Where it really is, micrometres from its true home edge.
@@ -17,7 +16,6 @@ pub struct StageReport {
     pub driver_violations: u64,
 }
 
-/// How the rig is.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
     /// Virtual time since power-on, nanoseconds.
@@ -30,7 +28,6 @@ pub struct Report {
     pub powered: bool,
     /// The sensor's stage.
     pub coarse: StageReport,
-    /// The lens' stage.
     pub lens: StageReport,
     /// Where the piezo really is, micrometres.
     pub piezo_um: f64,

@@ -63,17 +63,11 @@ impl EmulatedRig {
     }
 
     /// Puts bytes on the line to the board; they travel when time passes.
-    ///
-    /// # Errors
-    /// [`SimError::Stopped`].
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), SimError> {
         self.commands.send(Command::Bytes(bytes.to_vec())).map_err(|_| SimError::Stopped)
     }
 
     /// Gives the host's end of the line a rate, in baud; bytes pass only where the board has the same.
-    ///
-    /// # Errors
-    /// [`SimError::Stopped`].
     pub fn set_host_rate(&mut self, baud: u32) -> Result<(), SimError> {
         self.commands.send(Command::HostRate(baud)).map_err(|_| SimError::Stopped)
     }
@@ -87,25 +81,16 @@ impl EmulatedRig {
     }
 
     /// Lets time pass until the board owes nothing more: no answer, no terminal event.
-    ///
-    /// # Errors
-    /// As [`EmulatedRig::advance_us`].
     pub fn settle(&mut self) -> Result<Report, SimError> {
         self.ask(|done| Command::Settle { done })
     }
 
     /// Takes back what the scenario did to the rig, and lets nothing more of it happen.
-    ///
-    /// # Errors
-    /// [`SimError::Stopped`].
     pub fn heal(&mut self) -> Result<(), SimError> {
         self.commands.send(Command::Heal).map_err(|_| SimError::Stopped)
     }
 
     /// What was seen since the last call, where the rig was asked to keep it ([`RigConfig::observe`]).
-    ///
-    /// # Errors
-    /// [`SimError::Stopped`].
     pub fn take_sights(&mut self) -> Result<Vec<Sight>, SimError> {
         let (done, wait) = mpsc::channel();
         self.commands.send(Command::Sights { done }).map_err(|_| SimError::Stopped)?;
@@ -113,17 +98,11 @@ impl EmulatedRig {
     }
 
     /// The plant and the wires as they are now.
-    ///
-    /// # Errors
-    /// As [`EmulatedRig::advance_us`].
     pub fn report(&mut self) -> Result<Report, SimError> {
         self.advance_us(0)
     }
 
     /// Does something with the rig between two instructions: breaks something, presses the reset button.
-    ///
-    /// # Errors
-    /// [`SimError::Stopped`].
     pub fn access(
         &mut self,
         work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
@@ -180,9 +159,6 @@ impl Drop for EmulatedRig {
 type Launched = (Sender<Command>, JoinHandle<Result<(), SimError>>);
 
 /// Starts the rig's thread, with the board started to its first idle moment. With a `script` it does what that says, to its end.
-///
-/// # Errors
-/// As [`EmulatedRig::new`].
 pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> Result<Launched, SimError> {
     let script_given = script.is_some();
     let path = firmware::find(config.firmware.as_deref())?;

@@ -29,7 +29,6 @@ const ANSWER: Duration = Duration::from_secs(2);
 
 /// A rig that clients can open.
 pub struct ServedRig {
-    /// Name of the pty.
     pub port: String,
     /// Address of the camera endpoint.
     pub camera: SocketAddr,
@@ -46,9 +45,6 @@ impl ServedRig {
     /// camera has another one.
     ///
     /// `renamed` hears the new name of a pty that a scenario gives another one.
-    ///
-    /// # Errors
-    /// [`SimError`].
     pub fn start(
         config: &RigConfig,
         first: Imager,

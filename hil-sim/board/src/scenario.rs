@@ -39,7 +39,6 @@ use crate::{
     plant::{StageName, TRAVEL_UM},
 };
 
-/// See the module.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
@@ -113,7 +112,6 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// Its text.
     pub fn text(&self) -> String {
         // All of it are tables, numbers and strings.
         toml::to_string(self).unwrap_or_else(|error| unreachable!("a scenario that is no TOML: {error}"))

@@ -24,9 +24,6 @@ pub enum Trace {
 
 impl Trace {
     /// Opens the file and writes its heading.
-    ///
-    /// # Errors
-    /// [`SimError::Io`].
     pub fn create(path: &Path, config: &RigConfig, firmware: u64) -> Result<Self, SimError> {
         let vcd = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("vcd"));
         if vcd {

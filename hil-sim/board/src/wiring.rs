@@ -48,13 +48,9 @@ pub struct Shot {
 /// STEP pulses of one motor, one behind the other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Burst {
-    /// Whose.
     pub stage: StageName,
-    /// When the first came.
     pub first_ns: u64,
-    /// When the last came.
     pub last_ns: u64,
-    /// How many.
     pub steps: u64,
 }
 
@@ -430,12 +426,10 @@ impl Wiring {
         &mut self.camera
     }
 
-    /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The board was reset.
     pub fn board_reset(&mut self, at: VirtualNanos) {
         for stage in &mut self.stages {
             // A resistor holds EN while the chip's pins float.

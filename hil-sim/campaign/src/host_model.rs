@@ -28,7 +28,6 @@ const SILENCE: Micros = Micros(2_000_000);
 /// What came of a scenario.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Outcome {
-    /// What did not hold.
     pub broken: Vec<Broken>,
     /// Virtual time of it, nanoseconds.
     pub board_ns: u64,
@@ -36,13 +35,10 @@ pub struct Outcome {
     pub answered: u64,
     /// Long work that came to its end, and that did not.
     pub done: u32,
-    /// Likewise.
     pub failed: u32,
-    /// Alarms that came up.
     pub alarms: u32,
     /// Exposures that were taken.
     pub exposures: u32,
-    /// Resets of the chip.
     pub resets: usize,
 }
 

@@ -28,7 +28,6 @@ use farnear_sim::{
 /// A property that did not hold.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Broken {
-    /// Its name.
     pub property: &'static str,
     /// When, virtual nanoseconds.
     pub at_ns: u64,
@@ -39,11 +38,8 @@ pub struct Broken {
 /// A run, and what is known of the rig.
 #[derive(Clone, Copy, Debug)]
 pub struct Case<'a> {
-    /// What was done to it.
     pub scenario: &'a Scenario,
-    /// What it is made of.
     pub parts: &'a Parts,
-    /// What was seen.
     pub sights: &'a [Sight],
 }
 

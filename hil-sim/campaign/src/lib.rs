@@ -33,9 +33,7 @@ use invariants::Broken;
 /// A part of a campaign's seeds: the `index`th of `count` parts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shard {
-    /// From 1.
     pub index: u64,
-    /// Of so many.
     pub count: u64,
 }
 
@@ -58,7 +56,6 @@ impl FromStr for Shard {
 pub struct Campaign {
     /// Seeds: the first, and the one behind the last.
     pub seeds: std::ops::Range<u64>,
-    /// Which part of them.
     pub shard: Shard,
     /// How many rigs run at a time.
     pub jobs: usize,
@@ -71,11 +68,9 @@ pub struct Campaign {
 /// What came of a campaign.
 #[derive(Clone, Default, Debug)]
 pub struct Summary {
-    /// Scenarios played.
     pub played: u64,
     /// Those of them that broke a property: seed, first broken property, file.
     pub broken: Vec<(u64, Broken, PathBuf)>,
-    /// Board time, seconds.
     pub board_s: f64,
     /// Requests answered, long work done and failed, alarms, exposures, resets.
     pub counts: [u64; 6],

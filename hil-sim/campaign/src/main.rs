@@ -119,7 +119,6 @@ fn play_seeds(seeds: &Seeds) -> Result<()> {
     Ok(())
 }
 
-/// Plays one scenario.
 fn play_file(file: &Path, firmware: Option<&Path>, trace: Option<PathBuf>) -> Result<()> {
     let scenario = Scenario::read(file)?;
     anyhow::ensure!(

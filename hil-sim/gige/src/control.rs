@@ -25,20 +25,15 @@ const WRITE_MEMORY: u16 = 0x0086;
 /// What a client asks for.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Ask {
-    /// Who is there?
     Discovery,
     /// Packets of a frame again.
     Resend {
         /// The frame's short number.
         frame: u16,
-        /// First packet.
         first: u32,
-        /// Last packet.
         last: u32,
     },
-    /// Registers.
     Registers(Vec<u32>),
-    /// Writes to registers.
     Write(Vec<(u32, u32)>),
     /// Bytes from an address on.
     Memory(u32, usize),

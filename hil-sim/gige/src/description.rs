@@ -6,7 +6,6 @@ use crate::features::{CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, Value};
 pub const FILE: &str = "farnear-emulated.xml";
 /// Of the model, as it stands in the registers, too.
 pub const MODEL: &str = "emulated";
-/// Of the maker.
 pub const VENDOR: &str = "farnear";
 /// Chunks by their numbers in the frame: time and number of the frame.
 pub const CHUNKS: [(&str, u32); 2] = [("Timestamp", 0xFA00_0001), ("FrameID", 0xFA00_0002)];

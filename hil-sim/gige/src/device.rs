@@ -44,7 +44,6 @@ const SOFTWARE_SHOTS: u32 = 0x4000_0000;
 /// What a packet of the control channel led to.
 #[derive(Default)]
 pub struct Done {
-    /// What to answer.
     pub answer: Option<Vec<u8>>,
     /// What the rig is asked for.
     pub asks: Vec<Control>,
@@ -54,7 +53,6 @@ pub struct Done {
 
 /// Packets for the stream.
 pub struct Sending {
-    /// Where they go.
     pub to: SocketAddr,
     /// The packets, in order.
     pub packets: Vec<Vec<u8>>,
@@ -62,7 +60,6 @@ pub struct Sending {
     pub gap: Duration,
 }
 
-/// The camera.
 pub struct Device {
     registers: Registers,
     bits: u8,
@@ -79,7 +76,6 @@ pub struct Device {
 }
 
 impl Device {
-    /// At power-on.
     pub fn new(config: &GigeConfig) -> Self {
         Self {
             registers: Registers::new(config),

@@ -4,27 +4,20 @@
 /// What kind of value a feature has. Each lies in a register of 32 bits.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Value {
-    /// Only to be read.
     Constant,
     /// A whole number.
     Integer {
-        /// Smallest.
         min: u32,
-        /// Largest.
         max: u32,
     },
     /// A number that the register holds in parts.
     Number {
-        /// Smallest, in parts.
         min: u32,
-        /// Largest, in parts.
         max: u32,
-        /// Parts of 1.
         parts: u32,
         /// Unit of the number; empty for a factor.
         unit: &'static str,
     },
-    /// One of these.
     Choice(Vec<(&'static str, u32)>),
     /// Something that is done when this is written.
     Command(u32),
@@ -33,13 +26,9 @@ pub enum Value {
 /// A feature.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Feature {
-    /// By SFNC.
     pub name: &'static str,
-    /// Where SFNC has it.
     pub category: &'static str,
-    /// Its register.
     pub register: u32,
-    /// What it may be.
     pub value: Value,
     /// The register at power-on.
     pub initial: u32,
@@ -47,7 +36,6 @@ pub struct Feature {
 
 /// Columns of the sensor.
 pub const SENSOR_WIDTH: u32 = 0xA000;
-/// Rows of the sensor.
 pub const SENSOR_HEIGHT: u32 = 0xA004;
 /// First column of the region.
 pub const OFFSET_X: u32 = 0xA008;
@@ -55,7 +43,6 @@ pub const OFFSET_X: u32 = 0xA008;
 pub const OFFSET_Y: u32 = 0xA00C;
 /// Columns of the region.
 pub const WIDTH: u32 = 0xA010;
-/// Rows of the region.
 pub const HEIGHT: u32 = 0xA014;
 /// [`MONO_8`] and so on.
 pub const PIXEL_FORMAT: u32 = 0xA018;
@@ -69,19 +56,16 @@ pub const ACQUISITION: u32 = 0xA024;
 pub const FRAME_RATE: u32 = 0xA028;
 /// FrameStart, and nothing else.
 pub const TRIGGER_SELECTOR: u32 = 0xA02C;
-/// 0: off, 1: on.
 pub const TRIGGER_MODE: u32 = 0xA030;
 /// [`LINE_1`] or [`SOFTWARE`].
 pub const TRIGGER_SOURCE: u32 = 0xA034;
 /// Rising edge, and nothing else.
 pub const TRIGGER_ACTIVATION: u32 = 0xA038;
-/// Triggers once.
 pub const TRIGGER_SOFTWARE: u32 = 0xA03C;
 /// Exposure of software triggers and of a camera that runs freely, in us; a hardware trigger's pulse is its own measure.
 pub const EXPOSURE_US: u32 = 0xA040;
 /// Factor, in hundredths.
 pub const GAIN: u32 = 0xA044;
-/// Added to each pixel.
 pub const BLACK_LEVEL: u32 = 0xA048;
 /// Whether frames have chunks.
 pub const CHUNK_MODE: u32 = 0xA04C;
@@ -91,7 +75,6 @@ pub const CHUNK_SELECTOR: u32 = 0xA050;
 pub const CHUNK_ENABLE: u32 = 0xA054;
 /// What begins an acquisition.
 pub const START: u32 = 1;
-/// What ends it.
 pub const STOP: u32 = 2;
 /// The board's trigger line.
 pub const LINE_1: u32 = 1;
@@ -101,7 +84,6 @@ pub const SOFTWARE: u32 = 7;
 pub const MONO_8: u32 = 0x0108_0001;
 /// PFNC: 12 bits in two bytes.
 pub const MONO_12: u32 = 0x0110_0005;
-/// PFNC: 16 bits.
 pub const MONO_16: u32 = 0x0110_0007;
 
 /// Pixel formats of a sensor with a converter of so many bits, its own first.

@@ -79,7 +79,6 @@ pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
 pub struct Picture {
     /// Start of the exposure, virtual nanoseconds.
     pub begin_ns: u64,
-    /// Name, size and bits.
     pub header: FrameHeader,
     /// Row by row, 16 bits each, the lower byte first.
     pub pixels: Vec<u8>,
@@ -89,7 +88,6 @@ pub struct Picture {
 #[derive(Debug, Error)]
 #[error("{what}: {source}")]
 pub struct OpenError {
-    /// What was being done.
     pub what: String,
     /// The system's error.
     pub source: std::io::Error,

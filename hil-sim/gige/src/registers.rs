@@ -56,15 +56,11 @@ const WRITABLE: [(u32, u32, u32); 9] = [
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u16)]
 pub enum Refusal {
-    /// No such command.
     NotImplemented = 0x8001,
     /// A value out of range, or a packet that is none.
     InvalidParameter = 0x8002,
-    /// Nothing lies there.
     InvalidAddress = 0x8003,
-    /// To be read only.
     WriteProtect = 0x8004,
-    /// Not a multiple of 4.
     BadAlignment = 0x8005,
     /// Somebody else has the camera.
     AccessDenied = 0x8006,

@@ -29,7 +29,6 @@ pub struct Frame {
     pub time_ns: u64,
     /// PFNC's number.
     pub pixel_format: u32,
-    /// Width and height.
     pub size_px: (u32, u32),
     /// First column and row.
     pub offset_px: (u32, u32),

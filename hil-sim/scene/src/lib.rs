@@ -14,6 +14,8 @@
 //! [`render()`] makes one exposure; [`Renderer`] keeps the texture for many. Everything is a function of its
 //! arguments and the seed: no clock, no thread count, no CPU feature enters.
 
+#![deny(missing_docs)]
+
 pub mod blur;
 pub mod camera;
 mod composite;

@@ -25,7 +25,6 @@ pub enum BoardCorrectionError {
     /// The rows are longer than the board's buffer.
     #[error("the depth map is {width} px wide, the board's row buffer holds {max}")]
     TooWide {
-        /// Width of the map.
         width: usize,
         /// What the board holds.
         max: u16,
@@ -35,9 +34,7 @@ pub enum BoardCorrectionError {
         "the depth map has {width}x{height} px, the correction is for {made_for_width}x{made_for_height}"
     )]
     Size {
-        /// Width of the map.
         width: usize,
-        /// Height of the map.
         height: usize,
         /// Width of the correction.
         made_for_width: u16,
@@ -89,9 +86,6 @@ pub fn decode(codes: ArrayView2<i16>, scale: DepthScale) -> Array2<f32> {
 
 impl Client {
     /// Sends a correction, which becomes the board's open one.
-    ///
-    /// # Errors
-    /// [`BoardCorrectionError`].
     pub fn send_correction(&self, correction: &BoardCorrection) -> Result<(), BoardCorrectionError> {
         let BoardCorrection { method, frame, scale, coefficients, .. } = correction;
         let during = "sending a depth correction";
@@ -106,9 +100,6 @@ impl Client {
     }
 
     /// Coefficients of the board's open correction, in the order of [`BoardCorrection::coefficients`].
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn read_coefficients(&self, form: CorrectionForm) -> Result<Vec<i32>, ClientError> {
         let during = "reading the depth correction";
         let mut coefficients = Vec::new();
@@ -126,17 +117,11 @@ impl Client {
     }
 
     /// Keeps the board's open correction without power.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn store_correction(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::StoreCorrection, "storing the depth correction")
     }
 
     /// Lets the board correct a depth map's codes, with the correction that was sent. `progress` is told of each row.
-    ///
-    /// # Errors
-    /// [`BoardCorrectionError`].
     pub fn correct_codes(
         &self,
         codes: ArrayView2<i16>,
@@ -171,9 +156,6 @@ impl Client {
 
     /// Lets the board fit a correction to flat targets, every `step`th pixel of every `step`th row. It becomes the
     /// board's open correction; its coefficients are given. `progress` is told of each row of each target.
-    ///
-    /// # Errors
-    /// [`BoardCorrectionError`].
     pub fn fit_correction(
         &self,
         method: Method,

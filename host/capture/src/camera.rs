@@ -76,7 +76,6 @@ impl Image {
 /// A picture as it came, to look at.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
-    /// The picture.
     pub image: Image,
     /// What the camera says of it.
     pub stamp: Stamp,
@@ -142,7 +141,6 @@ pub enum CameraError {
     /// No camera answers at the address.
     #[error("no camera at {address}: {reason}; does a simulator run, and is this its camera's address?")]
     Connect {
-        /// The address.
         address: String,
         /// What the system says.
         reason: String,
@@ -150,25 +148,16 @@ pub enum CameraError {
     /// The connection broke off.
     #[error("the camera at {address} went away: {reason}")]
     Gone {
-        /// The address.
         address: String,
         /// What the system says.
         reason: String,
     },
     /// Another program has the camera.
     #[error("the camera at {address} is in use by another program; end that program first")]
-    InUse {
-        /// The address.
-        address: String,
-    },
+    InUse { address: String },
     /// What came is no image.
     #[error("the camera at {address} sends no images: {reason}")]
-    Nonsense {
-        /// The address.
-        address: String,
-        /// What is wrong.
-        reason: String,
-    },
+    Nonsense { address: String, reason: String },
     /// The camera knows no such trigger.
     #[error("a camera of the kind `{camera}` cannot be triggered by {mode}; use hardware triggers")]
     Trigger {
@@ -179,49 +168,33 @@ pub enum CameraError {
     },
     /// Nothing came in time.
     #[error("the camera gave no image of exposure {trigger_number} within {waited:?} ({camera})")]
-    Late {
-        /// The camera.
-        camera: String,
-        /// Which exposure.
-        trigger_number: u32,
-        /// How long was waited.
-        waited: Duration,
-    },
+    Late { camera: String, trigger_number: u32, waited: Duration },
     /// The image of this exposure was passed over.
     #[error("the camera skipped exposure {wanted}: it sent the image of exposure {came}")]
     Skipped {
         /// Which exposure was due.
         wanted: u32,
-        /// Which one came.
         came: u32,
     },
     /// The folder cannot be looked into.
     #[error("cannot look into the camera's folder {}: {source}", folder.display())]
     Folder {
-        /// The folder.
         folder: PathBuf,
         /// What the system says.
         source: std::io::Error,
     },
     /// An image file that appeared cannot be used.
     #[error("{} cannot be used: {reason}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
+    File { path: PathBuf, reason: String },
     /// What a frame says of itself contradicts what the board says of the exposure.
     #[error(
         "the picture for exposure {wanted} cannot be told from others ({camera}): {reason}; does the camera take one picture \
          for each trigger, and is its strobe wired to the board?"
     )]
     Mispaired {
-        /// The camera.
         camera: String,
         /// Which exposure was due.
         wanted: u32,
-        /// What does not agree.
         reason: String,
     },
     /// More pictures than triggers.
@@ -230,10 +203,7 @@ pub enum CameraError {
          must take one picture for each trigger and not run freely{}",
         ffmpeg_hint(camera)
     )]
-    Surplus {
-        /// The camera.
-        camera: String,
-    },
+    Surplus { camera: String },
     /// A picture that arrived before its exposure can have begun.
     #[error(
         "the next picture arrived {} ms before exposure {wanted} began ({camera}), so it belongs to an earlier one: the camera gave \
@@ -242,7 +212,6 @@ pub enum CameraError {
         ffmpeg_hint(camera)
     )]
     Stale {
-        /// The camera.
         camera: String,
         /// Exposure that was due.
         wanted: u32,
@@ -256,7 +225,6 @@ pub enum CameraError {
         ffmpeg_hint(camera)
     )]
     Doubled {
-        /// The camera.
         camera: String,
         /// Exposure that has the same picture.
         earlier: u32,
@@ -269,27 +237,19 @@ pub enum CameraError {
          let them be transferred one after the other",
         path.display()
     )]
-    Reordered {
-        /// The file.
-        path: PathBuf,
-    },
+    Reordered { path: PathBuf },
     /// A picture file that was written again.
     #[error(
         "{} was overwritten: each picture needs a file name of its own (gphoto2: --filename 'image-%n.jpg')",
         path.display()
     )]
-    Overwritten {
-        /// The file.
-        path: PathBuf,
-    },
+    Overwritten { path: PathBuf },
     /// A frame that did not come whole.
     #[error("frame {frame} of {camera} came incomplete: {reason}")]
     Incomplete {
-        /// The camera.
         camera: String,
         /// Its number, as the camera counts.
         frame: u64,
-        /// What is missing.
         reason: String,
     },
     /// A device or program that cannot be used.
@@ -297,19 +257,11 @@ pub enum CameraError {
     Unusable {
         /// The device, or the program.
         camera: String,
-        /// Why, and what to do.
         reason: String,
     },
     /// A value that cannot be set.
     #[error("{name} {value}: {expected}")]
-    Setting {
-        /// What was to be set.
-        name: &'static str,
-        /// To what.
-        value: String,
-        /// What was expected.
-        expected: String,
-    },
+    Setting { name: &'static str, value: String, expected: String },
 }
 
 /// ffmpeg repeats frames by default to keep a constant rate.

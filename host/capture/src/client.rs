@@ -69,9 +69,6 @@ impl Client {
     /// Opens a serial port and says hello. Once the board was there, the port is opened again whenever it comes back. A rate
     /// behind its name, `/dev/ttyACM0@921600`, is asked of the board; where it is not heard at it, the link goes on at the rate
     /// it had, see [`Client::link_note`].
-    ///
-    /// # Errors
-    /// As [`Client::connect`].
     pub fn open(port: &str) -> Result<Self, ClientError> {
         let (port, wanted) = with_rate(port)?;
         Self::start(serial(port), port, false, wanted)
@@ -79,9 +76,6 @@ impl Client {
 
     /// As [`Client::open`], where the board is known to be emulated: hello is asked as patiently as all else, so
     /// that a slow computer does not ask it twice, which would make the run another one.
-    ///
-    /// # Errors
-    /// As [`Client::connect`].
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
         Self::start(serial(port), port, true, None)
     }
@@ -95,9 +89,6 @@ impl Client {
     }
 
     /// As [`Client::connect`], at this rate of the link, where both ends can have it.
-    ///
-    /// # Errors
-    /// As [`Client::connect`].
     pub fn connect_at(connect: Connect, port: &str, rate: LinkRate) -> Result<Self, ClientError> {
         Self::start(connect, port, false, Some(rate))
     }
@@ -163,7 +154,6 @@ impl Client {
         self.port.paces.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Who the board is.
     pub fn hello(&self) -> &Hello {
         &self.session.hello
     }
@@ -236,9 +226,6 @@ impl Client {
 
     /// Sends a request until its answer comes. `during` says what for, e.g. "homing". Gives the request's id,
     /// which events will name.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn request(&self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
         self.ask(request, during, None)
     }
@@ -288,9 +275,6 @@ impl Client {
     }
 
     /// How the board is.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn status(&self) -> Result<Status, ClientError> {
         let during = "reading the status";
         match self.request(&Request::Status, during)? {

@@ -45,20 +45,17 @@ pub struct Frame {
     pub deviation: Nanometres,
     /// What the board measured.
     pub record: ShotRecord,
-    /// The picture.
     pub image: Image,
 }
 
 /// Why there is no exposure, or no image of it.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Loss {
-    /// The board took none.
     Board(DropReason),
     /// The event that tells of it was lost, and the board no longer remembers it.
     EventLost,
     /// The image of this exposure did not come; with the camera's word for it.
     Image {
-        /// Which exposure.
         trigger_number: u32,
         /// What the camera says.
         reason: String,
@@ -70,11 +67,9 @@ pub enum Loss {
 pub enum Outcome {
     /// It was exposed, and its image is here.
     Taken(Box<Frame>),
-    /// There is no image.
     Dropped {
         /// Which moment of the pace, from 0.
         number: u32,
-        /// Why.
         loss: Loss,
     },
 }
@@ -103,9 +98,6 @@ pub struct Continuous<'c> {
 
 impl<'c> Continuous<'c> {
     /// Arms camera and board with a cycle of shots and begins. Waits for each image at most `image_wait`.
-    ///
-    /// # Errors
-    /// [`CaptureError`].
     pub fn start(
         client: &Client,
         camera: &'c mut dyn Camera,
@@ -123,9 +115,6 @@ impl<'c> Continuous<'c> {
     }
 
     /// Frames that the board has reported of and nobody has asked for yet: whoever falls behind may want to leave some out.
-    ///
-    /// # Errors
-    /// As [`Self::outcome`].
     pub fn waiting(&mut self) -> Result<usize, CaptureError> {
         while let Some(work) = &mut self.work
             && let Some(step) = work.step_within(Duration::ZERO)?
@@ -279,9 +268,6 @@ impl Client {
     /// Runs the armed program again and again, a trigger each period (0: as fast as position and camera allow), until it has
     /// taken so many exposures (0: until the work is dropped). Its events are [`EventKind::FrameTaken`] and
     /// [`EventKind::FrameDropped`]; of those that are lost nothing is reported, their numbers are missing.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn start_continuous(
         &self,
         shots: &[Shot],

@@ -16,7 +16,6 @@ pub fn um(position: Nanometres) -> f64 {
     f64::from(position.0) / 1000.0
 }
 
-/// Name of an axis.
 pub fn axis_name(axis: Axis) -> &'static str {
     match axis {
         Axis::SensorCoarse => "sensor's coarse axis",

@@ -15,7 +15,6 @@ pub enum PortError {
     /// There is no such port.
     #[error("there is no port {port}; {}", present_ports(present))]
     Absent {
-        /// What was asked for.
         port: String,
         /// What the system lists.
         present: Vec<String>,
@@ -40,44 +39,25 @@ pub enum PortError {
     },
     /// No port was named, and more than one belongs to a board.
     #[error("several boards are plugged in: {}", ports.join(", "))]
-    SeveralBoards {
-        /// Theirs.
-        ports: Vec<String>,
-    },
+    SeveralBoards { ports: Vec<String> },
     /// The link does not have the rate that was asked for.
     #[error("{port} is asked for {rate} baud, but the link has {} baud", rates())]
-    Rate {
-        /// The port.
-        port: String,
-        /// What was asked for.
-        rate: String,
-    },
+    Rate { port: String, rate: String },
     /// The path leads to something else.
     #[error("{port} is not a serial port")]
-    NoPort {
-        /// What was asked for.
-        port: String,
-    },
+    NoPort { port: String },
     /// Another program holds it.
     #[error(
         "port {port} is busy: another program holds it; end that program (a terminal, another farnear) first"
     )]
-    Busy {
-        /// What was asked for.
-        port: String,
-    },
+    Busy { port: String },
     /// The user may not open it.
     #[error(
         "no permission to open {port}; on Linux, add yourself to its group (often `dialout`) and log in again"
     )]
-    Denied {
-        /// What was asked for.
-        port: String,
-    },
-    /// Anything else.
+    Denied { port: String },
     #[error("cannot open port {port}: {reason}")]
     Open {
-        /// What was asked for.
         port: String,
         /// What the system says.
         reason: String,
@@ -111,9 +91,7 @@ pub enum ClientError {
          stopped by the board's keep-alive timeout"
     )]
     Gone {
-        /// The port.
         port: String,
-        /// What was being done.
         during: String,
         /// What the system says.
         source: Arc<std::io::Error>,
@@ -123,12 +101,7 @@ pub enum ClientError {
         "another program has taken the board on {port} over while {during}; what was moving has stopped; end that program, or \
          connect again"
     )]
-    TakenOver {
-        /// The port.
-        port: String,
-        /// What was being done.
-        during: String,
-    },
+    TakenOver { port: String, during: String },
     /// The line is there again, and another board is at its end.
     #[error(
         "another board is on {port} now (unique id {}) than before ({}): nothing was asked of it; plug the first one in again, or \
@@ -137,7 +110,6 @@ pub enum ClientError {
         unique_id_text(was)
     )]
     OtherBoard {
-        /// The port.
         port: String,
         /// The board that was there.
         was: [u8; 12],
@@ -150,9 +122,7 @@ pub enum ClientError {
         what_came(*bad_frames, *bytes)
     )]
     Silent {
-        /// The port.
         port: String,
-        /// What was being done.
         during: String,
         /// How often it was asked.
         attempts: u32,
@@ -197,16 +167,10 @@ pub enum ClientError {
     },
     /// The answer is none that fits the request.
     #[error("the board's answer while {during} makes no sense: {answer}")]
-    Nonsense {
-        /// What was being done.
-        during: String,
-        /// What came.
-        answer: String,
-    },
+    Nonsense { during: String, answer: String },
     /// The board refused; nothing has changed.
     #[error("the board refused {during}: {}", refusal_text(error))]
     Refused {
-        /// What was being done.
         during: String,
         /// The board's reason.
         error: RequestError,
@@ -218,11 +182,9 @@ pub enum ClientError {
         cause.map(|cause| format!(", cause: {}", cause_name(cause))).unwrap_or_default()
     )]
     Reset {
-        /// What was being done.
         during: String,
         /// Boot number of the session.
         was: u32,
-        /// Boot number now.
         now: u32,
         /// Why, as far as the board said.
         cause: Option<ResetCause>,
@@ -230,9 +192,7 @@ pub enum ClientError {
     /// Long work ended early.
     #[error("{during} failed{}: {}", axis.map(|axis| format!(" on the {}", axis_name(axis))).unwrap_or_default(), failure_text(*reason, alarm.as_ref()))]
     Failed {
-        /// What was being done.
         during: String,
-        /// The axis concerned.
         axis: Option<Axis>,
         /// The board's reason.
         reason: Failure,
@@ -241,32 +201,16 @@ pub enum ClientError {
     },
     /// The work took longer than it possibly should; the board was told to stop.
     #[error("{during} did not end within {allowed:?}; the rig was told to stop")]
-    Overdue {
-        /// What was being done.
-        during: String,
-        /// What was allowed.
-        allowed: Duration,
-    },
+    Overdue { during: String, allowed: Duration },
     /// Events were lost and the board no longer remembers them.
     #[error("events {from} to {to} of the board were lost while {during} and it no longer remembers them")]
-    EventsLost {
-        /// What was being done.
-        during: String,
-        /// First one missing.
-        from: u32,
-        /// Last one missing.
-        to: u32,
-    },
+    EventsLost { during: String, from: u32, to: u32 },
     /// The board says that it is not working on the request, yet no event said how it ended.
     #[error("the board is no longer {during}, but never said how it ended")]
-    NoEnd {
-        /// What was being done.
-        during: String,
-    },
+    NoEnd { during: String },
     /// More shots than the board's program can hold.
     #[error("a program of {shots} shots, the board can hold {max}; use repeats, or run it in parts")]
     TooManyShots {
-        /// How many.
         shots: usize,
         /// What the board can hold.
         max: u8,
@@ -276,10 +220,7 @@ pub enum ClientError {
     NotArmed,
     /// The user interrupted; the board was told to stop.
     #[error("interrupted while {during}; the rig was stopped")]
-    Interrupted {
-        /// What was being done.
-        during: String,
-    },
+    Interrupted { during: String },
 }
 
 fn what_came(bad_frames: u64, bytes: u64) -> String {

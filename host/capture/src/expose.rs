@@ -27,19 +27,11 @@ pub enum CaptureError {
     /// The rig does not reach that far.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// One of several cameras that expose together.
     #[error("camera {number} of {cameras}: {source}")]
-    OneCamera {
-        /// Which, from 1.
-        number: usize,
-        /// How many there are.
-        cameras: usize,
-        /// What it did.
-        source: CameraError,
-    },
+    OneCamera { number: usize, cameras: usize, source: CameraError },
     /// The two images do not belong together.
     #[error(
         "the far image has {far_width}x{far_height} pixels of {far_bits} bits, the near one {near_width}x{near_height} of {near_bits}"
@@ -61,7 +53,6 @@ pub enum CaptureError {
     /// The board ended the program with another number of exposures than asked for.
     #[error("the board told of {told} exposures where {asked} were asked for")]
     Count {
-        /// How many.
         told: usize,
         /// How many there should have been.
         asked: usize,
@@ -73,7 +64,6 @@ pub enum CaptureError {
     MixedTriggers {
         /// The first shot that differs.
         index: usize,
-        /// Its trigger.
         found: &'static str,
         /// The trigger of the first.
         first: &'static str,
@@ -200,17 +190,11 @@ fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), Captur
 }
 
 /// Checks the exposures of a program against the board's limits.
-///
-/// # Errors
-/// [`PlanError::Exposure`].
 pub fn check_exposures(client: &Client, shots: &[Shot]) -> Result<(), PlanError> {
     shots.iter().try_for_each(|shot| check_exposure(client, shot.exposure))
 }
 
 /// Checks the length of an exposure against the board's limits.
-///
-/// # Errors
-/// [`PlanError::Exposure`].
 pub fn check_exposure(client: &Client, asked: Micros) -> Result<(), PlanError> {
     let limits = &client.hello().limits;
     let (min, max) = (limits.exposure_min, limits.exposure_max);

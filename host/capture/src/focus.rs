@@ -43,10 +43,8 @@ const FINE_STEP_NM: i32 = 14_000;
 /// The fine sweep may run out of the peak so often.
 const SWEEPS_MAX: usize = 3;
 
-/// How focus is sought.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FocusSettings {
-    /// What is maximised.
     pub measure: FocusMeasure,
     /// How far the focus may be from where the sensor stands, mm.
     pub range_mm: f64,
@@ -70,7 +68,6 @@ impl Default for FocusSettings {
     }
 }
 
-/// The best focus.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Focus {
     /// Sensor distance of the best focus, mm: m1, where the sensor stands now.
@@ -89,13 +86,10 @@ pub struct Focus {
     pub sweep: Vec<(f64, f64)>,
 }
 
-/// Focus was not found.
 #[derive(Debug, thiserror::Error)]
 pub enum FocusSearchError {
-    /// Taking the images.
     #[error(transparent)]
     Capture(#[from] CaptureError),
-    /// Judging them.
     #[error(transparent)]
     Measure(#[from] FocusError),
     /// The region is not inside the image.
@@ -103,17 +97,12 @@ pub enum FocusSearchError {
         "the region {column},{row},{region_width},{region_height} does not lie in an image of {width}x{height} px"
     )]
     Region {
-        /// First column.
         column: usize,
-        /// First row.
         row: usize,
-        /// Width of the region.
         region_width: usize,
         /// Height of the region.
         region_height: usize,
-        /// Width of the image.
         width: usize,
-        /// Height of the image.
         height: usize,
     },
     /// The search left the range, or did not settle.
@@ -139,9 +128,6 @@ impl From<ClientError> for FocusSearchError {
 
 /// Finds the best focus near where the sensor stands, and leaves the sensor there. Both of stage A's axes must be homed.
 /// `say` is told in words what is being done.
-///
-/// # Errors
-/// [`FocusSearchError`].
 pub fn find_focus(
     client: &Client,
     camera: &mut dyn Camera,

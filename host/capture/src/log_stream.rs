@@ -32,9 +32,6 @@ impl LogStream {
     }
 
     /// The next piece, waiting at most `wait`; `Ok(None)` where none came.
-    ///
-    /// # Errors
-    /// [`LogEnded`].
     pub fn next_within(&self, wait: Duration) -> Result<Option<LogPart>, LogEnded> {
         match self.parts.recv_timeout(wait) {
             Ok(part) => Ok(Some(part)),
@@ -44,7 +41,6 @@ impl LogStream {
     }
 }
 
-/// Nothing more comes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("the log has ended: its port was closed, or this reader was too far behind")]
 pub struct LogEnded;

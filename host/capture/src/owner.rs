@@ -83,7 +83,6 @@ pub(crate) type Answered = Result<(u32, Response), ClientError>;
 pub(crate) enum Command {
     Ask {
         session: u32,
-        /// Sent together.
         questions: Vec<Question>,
         answers: SyncSender<Vec<Answered>>,
     },

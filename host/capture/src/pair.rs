@@ -24,7 +24,6 @@ pub use crate::expose::CaptureError;
 /// How the exposures are taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Exposures {
-    /// Length of each.
     pub exposure: Micros,
     /// When the piezo counts as settled, before the trigger.
     pub settle: Settle,
@@ -48,7 +47,6 @@ impl Default for Exposures {
 /// One image and how it was taken.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Taken {
-    /// The picture.
     pub image: Image,
     /// Sensor distance that the optics ask for, in mm.
     pub sensor_asked_mm: f64,
@@ -86,7 +84,6 @@ impl Pair {
 /// A rig that stands where its piezo reaches both places of a pair.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reach {
-    /// The coarse stage.
     pub coarse: Moved,
     /// The far and the near shot.
     pub shots: [Shot; 2],
@@ -156,9 +153,6 @@ pub fn capture_pair(
 }
 
 /// A pair of a far and a near exposure.
-///
-/// # Errors
-/// [`CaptureError::Unlike`].
 pub fn pair_of(
     [far, near]: [(ShotRecord, Image); 2],
     sensor: &SensorPair,

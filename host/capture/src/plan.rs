@@ -25,7 +25,6 @@ pub enum PlanError {
     /// An exposure that the board refuses.
     #[error("an exposure of {} us is outside the board's limits, {} to {} us", asked.0, min.0, max.0)]
     Exposure {
-        /// Asked for.
         asked: Micros,
         /// The board's shortest.
         min: Micros,
@@ -37,25 +36,13 @@ pub enum PlanError {
         "the optics ask for {travel_um:.2} um between the two images, the piezo has {piezo_um:.2} um; \
          a smaller max_blur_px or f-number needs less"
     )]
-    Travel {
-        /// Asked for.
-        travel_um: f64,
-        /// What the piezo has.
-        piezo_um: f64,
-    },
+    Travel { travel_um: f64, piezo_um: f64 },
     /// The stage does not go there.
     #[error(
         "the optics ask for a sensor distance of {sensor_mm:.4} mm, the stage reaches {min_mm:.4} to {max_mm:.4} mm; \
          check focal length, focus distances and where the lens stage stands"
     )]
-    Reach {
-        /// Asked for.
-        sensor_mm: f64,
-        /// Smallest distance.
-        min_mm: f64,
-        /// Largest distance.
-        max_mm: f64,
-    },
+    Reach { sensor_mm: f64, min_mm: f64, max_mm: f64 },
     /// The coarse stage stands too far off for the piezo to make up for it.
     #[error(
         "with the coarse stage at {coarse_um:.3} um the piezo would have to go to {fine_um:.3} um, outside {min_um:.3} to {max_um:.3} um"

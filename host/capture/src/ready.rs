@@ -17,9 +17,6 @@ pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {
 }
 
 /// Homes what is not homed, all at the same time.
-///
-/// # Errors
-/// [`ClientError`].
 pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), ClientError> {
     let status = client.status()?;
     let mut axes = steppers(&client.hello().capabilities);

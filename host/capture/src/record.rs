@@ -41,12 +41,10 @@ pub struct CaptureRecord {
     pub stage: StageRecord,
     /// The exposures; of a pair far first.
     pub exposure: Vec<ExposureRecord>,
-    /// The camera.
     pub camera: CameraRecord,
     /// The second camera, where both images are of one exposure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_mirror: Option<HalfMirrorRecord>,
-    /// The board.
     pub board: BoardRecord,
     /// What was simulated, if it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,7 +75,6 @@ pub struct StageRecord {
 /// One exposure. Times are the board's, since its reset.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct ExposureRecord {
-    /// The image file.
     pub image: String,
     /// Sensor distance the optics ask for, in a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -87,7 +84,6 @@ pub struct ExposureRecord {
     /// The axis that was moved, in a sequence: `coarse`, `fine` or `lens`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<String>,
-    /// Where it was sent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked_um: Option<f64>,
     /// Where the piezo was sent, in a pair.
@@ -109,22 +105,17 @@ pub struct ExposureRecord {
     pub exposure_us: u32,
     /// Running number of the trigger.
     pub trigger_number: u32,
-    /// The trigger.
     pub trigger_us: u64,
     /// Start of the exposure, as the camera reported it.
     pub strobe_start_us: u64,
-    /// Its end.
     pub strobe_end_us: u64,
 }
 
 /// The camera and its images.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct CameraRecord {
-    /// `sim`, `folder`, ...
     pub kind: String,
-    /// Pixels per row.
     pub width: usize,
-    /// Rows.
     pub height: usize,
     /// Bits of the camera; 9 to 15 are shifted up to 16 in the files.
     pub bits: u8,
@@ -142,7 +133,6 @@ pub struct CameraRecord {
 /// The second camera behind a half mirror, which took the near image.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct HalfMirrorRecord {
-    /// Its kind.
     pub second_camera: String,
     /// How much further from the lens its sensor stands than the first one's, as it was said.
     pub second_further_um: f64,
@@ -151,10 +141,8 @@ pub struct HalfMirrorRecord {
     pub second_mirrored: bool,
 }
 
-/// The board.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct BoardRecord {
-    /// Its name.
     pub name: String,
     /// Its firmware's version.
     pub firmware: String,
@@ -164,7 +152,6 @@ pub struct BoardRecord {
     pub schema_key: String,
     /// The chip's unique id.
     pub unique_id: String,
-    /// Number of the boot.
     pub boot: u32,
     /// Why it was reset last.
     pub reset_cause: String,
@@ -175,13 +162,10 @@ pub struct BoardRecord {
 /// What `farnear-sim` was told.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct SimulationRecord {
-    /// The scene.
     pub scene: String,
     /// The point spread function.
     pub psf: String,
-    /// The noise.
     pub noise: String,
-    /// The seed.
     pub seed: u64,
 }
 
@@ -194,7 +178,6 @@ pub struct Circumstances {
     pub time: Option<String>,
     /// [`crate::camera::Camera::kind`].
     pub camera: &'static str,
-    /// What was simulated.
     pub simulation: Option<SimulationRecord>,
     /// The optics file; empty where none was given.
     pub optics: toml::Table,
@@ -206,7 +189,6 @@ pub enum RecordError {
     /// The folder or a file in it.
     #[error(transparent)]
     Staging(#[from] StagingError),
-    /// An image.
     #[error(transparent)]
     Image(#[from] EncodeError),
     /// The record cannot be put into TOML.
@@ -214,12 +196,7 @@ pub enum RecordError {
     Toml(#[from] toml::ser::Error),
     /// The record is not readable.
     #[error("{path}: {reason}")]
-    Read {
-        /// The file.
-        path: String,
-        /// What is wrong.
-        reason: String,
-    },
+    Read { path: String, reason: String },
 }
 
 /// The record of a pair.

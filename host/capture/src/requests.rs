@@ -18,9 +18,6 @@ const LOOK: Duration = Duration::from_millis(10);
 
 impl Client {
     /// Stops all motion along the ramps and ends a running program; positions stay known.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn stop(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Stop, "stopping")
     }
@@ -46,9 +43,6 @@ impl Client {
 
     /// Emergency stop: the last step comes within a millisecond, what moved has lost its position, and the alarm has to
     /// be cleared.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn halt(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Halt, "halting")
     }
@@ -90,9 +84,6 @@ impl Client {
     }
 
     /// The alarms that the board keeps, the last one first.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn alarms(&self) -> Result<Vec<AlarmRecord>, ClientError> {
         let mut alarms = Vec::new();
         let mut number = 0;
@@ -122,9 +113,6 @@ impl Client {
     }
 
     /// A setting and what it may be.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn setting(&self, key: SettingKey) -> Result<Setting, ClientError> {
         self.setting_by(&Request::ReadSetting { key }, &format!("reading {}", key.name()))
     }
@@ -148,9 +136,6 @@ impl Client {
     }
 
     /// What the board has counted in its life.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn counters(&self) -> Result<Counters, ClientError> {
         let during = "reading the counters";
         match self.request(&Request::ReadCounters, during)? {

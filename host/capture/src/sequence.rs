@@ -87,17 +87,11 @@ pub enum ProgramError {
     /// It is no TOML of this kind.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
-    /// It has no shots.
     #[error("it has no [[shot]]")]
     Empty,
     /// A position that the wire cannot carry.
     #[error("shot {index}: {to_um} um is no position: expected a number between -2147483 and 2147483 um")]
-    Position {
-        /// Which shot, from 0.
-        index: usize,
-        /// What it says.
-        to_um: f64,
-    },
+    Position { index: usize, to_um: f64 },
 }
 
 // The options stand in both, because serde cannot refuse unknown keys beside a flattened struct.
@@ -174,9 +168,6 @@ pub fn nanometres(position_um: f64) -> Option<Nanometres> {
 }
 
 /// The shots of a program file; the board checks them when it is armed.
-///
-/// # Errors
-/// [`ProgramError`].
 pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
     let ProgramFile { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger, shot } =
         toml::from_str(text)?;
@@ -198,13 +189,11 @@ pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
 /// One exposure of a sequence.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SequenceShot {
-    /// Name of its file.
     pub name: String,
     /// What the board measured.
     pub record: ShotRecord,
     /// How it was triggered.
     pub mode: TriggerMode,
-    /// The picture.
     pub image: Image,
 }
 

@@ -47,7 +47,6 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// For a real board.
     pub const REAL: Self = Self {
         reply: Duration::from_millis(50),
         retries: 3,

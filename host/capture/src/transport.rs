@@ -3,7 +3,7 @@
 //! Every operation takes the longest time it may wait; none blocks for ever.
 
 use std::{
-    io::{self, Read, Write},
+    io,
     time::{Duration, Instant},
 };
 

@@ -38,7 +38,6 @@ struct Plan {
     during: String,
 }
 
-/// How a move ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Moved {
     /// Where the axis was sent.
@@ -57,7 +56,6 @@ pub struct Work {
     /// What the owner of the port holds weakly.
     _held: Arc<()>,
     allowed: Duration,
-    /// What is left of it.
     left: Duration,
     /// A program that stands still takes no time.
     paused: bool,
@@ -66,12 +64,10 @@ pub struct Work {
     received: Instant,
 }
 
-/// What work says.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Step {
     /// Something on the way, such as an exposure that was taken.
     Event(EventKind),
-    /// Its end.
     Done(EventKind),
 }
 
@@ -132,9 +128,6 @@ impl Work {
     }
 
     /// Waits for the end.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn wait(mut self) -> Result<EventKind, ClientError> {
         loop {
             if let Step::Done(kind) = self.step()? {
@@ -144,9 +137,6 @@ impl Work {
     }
 
     /// Waits for the end of a move.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn moved(self) -> Result<Moved, ClientError> {
         let during = self.during.clone();
         match self.wait()? {
@@ -156,9 +146,6 @@ impl Work {
     }
 
     /// Waits for the end of a homing. Gives how far the encoder's old zero was from the new one.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn homed(self) -> Result<Nanometres, ClientError> {
         let during = self.during.clone();
         match self.wait()? {
@@ -331,9 +318,6 @@ impl Client {
     }
 
     /// Begins to home axes, all at the same time.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn start_homing(&self, axes: &[Axis]) -> Result<Vec<Work>, ClientError> {
         let plan = |axis: &Axis| {
             Ok(Plan {
@@ -346,25 +330,16 @@ impl Client {
     }
 
     /// Begins to home an axis.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
         only(self.start_homing(&[axis])?, "homing")
     }
 
     /// Homes an axis. Gives how far the encoder's old zero was from the new one.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn home(&self, axis: Axis) -> Result<Nanometres, ClientError> {
         self.start_home(axis)?.homed()
     }
 
     /// Begins to move axes to absolute positions, all at the same time.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn start_moves(&self, targets: &[(Axis, Nanometres)]) -> Result<Vec<Work>, ClientError> {
         let status = self.status()?;
         let plan = |&(axis, target): &(Axis, Nanometres)| {
@@ -378,25 +353,16 @@ impl Client {
     }
 
     /// Begins to move an axis to an absolute position.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
         only(self.start_moves(&[(axis, target)])?, "moving")
     }
 
     /// Moves an axis to an absolute position.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn move_to(&self, axis: Axis, target: Nanometres) -> Result<Moved, ClientError> {
         self.start_move(axis, target)?.moved()
     }
 
     /// Lets the board measure its own mechanics.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn calibrate(&self, routine: Routine) -> Result<Calibration, ClientError> {
         let during = format!("measuring the {}", routine_name(routine));
         let axis = match routine {
@@ -430,9 +396,6 @@ impl Client {
     }
 
     /// Runs the armed program, whose shots tell how long it may take.
-    ///
-    /// # Errors
-    /// [`ClientError`].
     pub fn start_program(&self, shots: &[Shot]) -> Result<Work, ClientError> {
         let work = self.program_time(shots)?;
         let during = "running the exposure program".to_string();

@@ -44,12 +44,10 @@ pub fn register_font() -> Result<()> {
         .map_err(|_| anyhow!("the built-in font is damaged"))
 }
 
-/// One curve.
 #[derive(Clone)]
 pub struct Curve {
     /// Its name in the legend.
     pub name: String,
-    /// Its points.
     pub points: Vec<(f64, f64)>,
 }
 

@@ -13,13 +13,11 @@ const TITLE: usize = 26;
 const LEVELS: usize = 40;
 const NO_VALUE: [u8; 3] = [150, 150, 152];
 
-/// One map.
 pub struct Panel<'a> {
     /// What stands above it.
     pub title: String,
     /// The map, (height, width).
     pub map: ArrayView2<'a, f32>,
-    /// What it means.
     pub scale: Scale,
 }
 

@@ -45,7 +45,6 @@ impl Exposure {
     /// All of them in the order of the tables.
     pub const ALL: [Self; 3] = [Self::Clean, Self::EightBit, Self::TwelveBit];
 
-    /// As tables call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Clean => "clean",
@@ -65,9 +64,7 @@ impl Exposure {
 
 /// A rendered pair and the depth it was rendered from.
 pub struct Pair {
-    /// Far-focused image.
     pub far: Array2<f32>,
-    /// Near-focused image.
     pub near: Array2<f32>,
     /// True depth in mm.
     pub truth: Array2<f32>,

@@ -32,7 +32,6 @@ pub fn planes(psf: &str, count: usize, seed: u64, by: &[(Operators, Optics)]) ->
     Ok(found)
 }
 
-/// "clean / 8-bit".
 pub fn cell([clean, noisy]: [f64; 2]) -> String {
     format!("{} / {}", mm(clean), mm(noisy))
 }

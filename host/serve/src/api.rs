@@ -27,7 +27,6 @@ pub struct Api {
     generator: SchemaGenerator,
 }
 
-/// Who may use a route.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum For {
     /// Every client that the guard admits.

@@ -57,9 +57,7 @@ pub struct App {
     /// The connection, while there is one.
     rig: Mutex<Option<OpenRig>>,
     camera: Mutex<CameraSettings>,
-    /// Jobs on the rig.
     pub rig_jobs: JobQueue,
-    /// Computations.
     pub computing: JobQueue,
     control: Mutex<ControlLock>,
     state: Mutex<State>,
@@ -84,7 +82,6 @@ pub struct App {
 /// What is to be seen live.
 #[derive(Clone, Debug)]
 pub struct Live {
-    /// What.
     pub mode: LiveMode,
     /// Length of an exposure.
     pub exposure: Micros,

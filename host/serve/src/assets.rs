@@ -41,7 +41,6 @@ const ASSETS: &[Asset] = assets![
     TEXT "vendor/LICENSES.txt",
 ];
 
-/// The page.
 pub async fn page() -> Response {
     of("index.html", StatusCode::OK)
 }

@@ -132,7 +132,6 @@ pub struct LimitedListener {
     listener: TcpListener,
     app: Arc<App>,
     limits: Limits,
-    /// The oldest first.
     open: Arc<Mutex<VecDeque<Arc<Connection>>>>,
     closed: usize,
     logged: Option<Instant>,

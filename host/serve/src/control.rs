@@ -25,7 +25,6 @@ pub struct ControlLock {
 /// A connected browser.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Client {
-    /// Its number; public.
     pub id: u32,
     /// Authenticates its requests.
     pub secret: String,

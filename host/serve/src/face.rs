@@ -22,7 +22,6 @@ const COUNT: Duration = Duration::from_millis(100);
 
 /// The face of one queue's job.
 pub struct Face<'a> {
-    /// Where the state is.
     pub app: &'a App,
     /// Where the job stands in it.
     pub place: Place,

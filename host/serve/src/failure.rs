@@ -30,7 +30,6 @@ impl Failure {
         Self { error: error.into(), hint: None, status }
     }
 
-    /// With what to do.
     pub fn with_hint(self, hint: impl Into<String>) -> Self {
         Self { hint: Some(hint.into()), ..self }
     }

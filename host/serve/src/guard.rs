@@ -19,24 +19,17 @@ use crate::app::lock;
 
 /// Shortest token: 16 characters of hexadecimal are 64 bits.
 const SHORTEST: usize = 16;
-/// Longest token.
 const LONGEST: usize = 256;
 /// Delay after a wrong token.
 const GUESS: Duration = Duration::from_secs(1);
 /// The cookie that carries the token.
 const COOKIE: &str = "farnear-token";
 
-/// Where to listen.
 #[derive(Debug)]
 pub enum Listen {
     /// This computer only; port 0 = any that is free.
-    Loopback {
-        /// The port.
-        port: u16,
-    },
-    /// The network too.
+    Loopback { port: u16 },
     Network {
-        /// The address.
         address: SocketAddr,
         /// What everybody has to know.
         token: Token,
@@ -67,10 +60,8 @@ impl fmt::Debug for Token {
 /// A file that holds no token.
 #[derive(Debug, thiserror::Error)]
 pub enum TokenError {
-    /// It cannot be read.
     #[error("cannot read the token file {}: {source}", path.display())]
     Read {
-        /// The file.
         path: PathBuf,
         /// What the system says.
         source: std::io::Error,
@@ -80,17 +71,11 @@ pub enum TokenError {
         "{} holds no token: expected one line of {SHORTEST} to {LONGEST} letters and digits, e.g. from `openssl rand -hex 16`",
         path.display()
     )]
-    Content {
-        /// The file.
-        path: PathBuf,
-    },
+    Content { path: PathBuf },
 }
 
 impl Token {
     /// Reads a token.
-    ///
-    /// # Errors
-    /// [`TokenError`].
     pub fn read(path: &Path) -> Result<Self, TokenError> {
         let text =
             fs::read_to_string(path).map_err(|source| TokenError::Read { path: path.into(), source })?;
@@ -167,9 +152,6 @@ impl Guard {
     }
 
     /// Checks the token, where there is one: in a cookie or as a bearer's.
-    ///
-    /// # Errors
-    /// [`Refused::Token`].
     pub fn check_token(&self, headers: &HeaderMap) -> Result<(), Refused> {
         let Some(token) = &self.token else { return Ok(()) };
         let text = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());

@@ -31,13 +31,10 @@ pub type Work = Box<dyn FnOnce(&App, &Context<'_>) -> Result<Value, WorkflowErro
 pub struct Task {
     /// What kind: `home`, `move`, `pair`, ...
     pub kind: &'static str,
-    /// In words.
     pub title: String,
-    /// What is done.
     pub work: Work,
 }
 
-/// One job at a time.
 #[derive(Default)]
 pub struct JobQueue {
     inner: Mutex<Inner>,

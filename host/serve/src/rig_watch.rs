@@ -17,7 +17,6 @@ use crate::{app::App, view::Phase};
 
 /// From one question to the next while somebody looks.
 const OFTEN: Duration = Duration::from_millis(100);
-/// While nobody does.
 const SELDOM: Duration = Duration::from_secs(1);
 /// From one look at the end of the program to the next.
 const LOOK: Duration = Duration::from_millis(50);

@@ -24,13 +24,11 @@ const FAREWELL: Duration = Duration::from_secs(2);
 pub struct ServeSettings {
     /// The rig; without one the page shows captures.
     pub rig: Option<RigAddress>,
-    /// Its camera.
     pub camera: CameraSettings,
     /// The folder of captures; made where it is missing.
     pub session: PathBuf,
     /// The optics to begin with; without it those of the session, or of the 50 mm lens.
     pub optics: Option<PathBuf>,
-    /// Where to listen.
     pub listen: Listen,
     /// Time-outs and limits.
     pub limits: Limits,
@@ -42,7 +40,6 @@ pub enum ServeError {
     /// The address is taken or not this computer's.
     #[error("cannot listen at {address}: {source}")]
     Listen {
-        /// The address.
         address: SocketAddr,
         /// What the system says.
         source: std::io::Error,

@@ -33,20 +33,17 @@ const MESSAGE_MAX: usize = 4096;
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
 enum Said {
-    /// Stops the rig.
     Stop,
     /// A picture was taken in: the next one may come.
     Seen,
 }
 
-/// Query of a socket.
 #[derive(Deserialize)]
 pub struct Resume {
     /// Secret of the same page before it was reloaded.
     resume: Option<String>,
 }
 
-/// Opens a socket.
 pub async fn open(
     State(app): Shared,
     Query(Resume { resume }): Query<Resume>,

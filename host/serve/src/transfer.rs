@@ -22,7 +22,6 @@ use zip::{
 
 use crate::{app::lock, failure::Failure};
 
-/// Bytes of a piece.
 const PIECE: usize = 64 * 1024;
 
 /// An open file as the body of an answer.
@@ -82,7 +81,6 @@ pub fn zip_body(folder: PathBuf, name: String, mut files: Vec<String>) -> Body {
 struct ZipStream {
     folder: PathBuf,
     name: String,
-    /// The next one last.
     files: Vec<String>,
     current: Option<File>,
     archive: Option<ZipWriter<StreamWriter<Unsent>>>,

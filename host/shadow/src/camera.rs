@@ -50,7 +50,6 @@ pub struct Camera {
     /// Columns of the image.
     #[serde(default = "default_width")]
     pub width_px: usize,
-    /// Rows of the image.
     #[serde(default = "default_height")]
     pub height_px: usize,
     /// Where the optical axis meets the image; the middle unless given.
@@ -69,7 +68,6 @@ fn default_height() -> usize {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SubjectPrior {
-    /// Mean stature H.
     pub height_m: f64,
     /// Mean width of a head w.
     pub head_width_m: f64,
@@ -90,13 +88,9 @@ impl Default for SubjectPrior {
 pub struct StandardDeviations {
     /// Day of the year, days.
     pub day: f64,
-    /// Time of day, hours.
     pub time_h: f64,
-    /// Latitude, degrees.
     pub latitude_deg: f64,
-    /// Longitude, degrees.
     pub longitude_deg: f64,
-    /// Stature, metres.
     pub subject_height_m: f64,
     /// Camera height, metres.
     pub camera_height_m: f64,
@@ -150,7 +144,6 @@ pub enum CameraError {
     /// A number outside its range.
     #[error("camera file: {name} = {value} is not {expected}")]
     Range {
-        /// The key in the file.
         name: &'static str,
         /// The value that stands there.
         value: f64,

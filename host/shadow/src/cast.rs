@@ -109,9 +109,7 @@ type Run = (usize, usize);
 /// A row of the upright plane in which a body stands.
 #[derive(Clone, Copy)]
 struct Row {
-    /// Above the ground.
     up_m: f64,
-    /// Width of a pixel.
     pixel_m: f64,
     /// The column straight ahead of the camera.
     ahead_px: f64,

@@ -187,7 +187,6 @@ fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subjec
     Subject { distance_m, offset_m: slope * distance_m, height_m: file.subject.height_m }
 }
 
-/// The printed method.
 fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, sd_rad: f64) -> Edge {
     /// The largest step over beta's range (10 degrees).
     const STEP_RAD: f64 = 10.0 * PI / 180.0;

@@ -67,7 +67,6 @@ pub enum Detector {
     Chromaticity(chromaticity::Settings),
     /// See [`physical`]; learns from frame to frame.
     Physical(physical::Physical),
-    /// See [`geometry`].
     Geometry(geometry::Settings),
     /// See [`small_region`].
     SmallRegionTexture(small_region::Settings),

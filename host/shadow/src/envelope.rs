@@ -87,7 +87,6 @@ impl Outline {
 pub struct LowerEdge {
     /// Lowest y' (y down) per column.
     pub edge: Vec<f32>,
-    /// x' of column 0.
     pub origin: f32,
 }
 

@@ -10,7 +10,6 @@ use crate::sun::SunPosition;
 /// What throws the shadow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// The sun.
     Sun(SunPosition),
     /// A lamp, small beside its distance, in the camera's frame on the ground below the lens.
     Lamp(Lamp),
@@ -21,7 +20,6 @@ pub enum Light {
     },
 }
 
-/// Where a lamp is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
     /// To the camera's right, metres.

@@ -28,7 +28,6 @@ pub enum ShadowError {
         "the lamp hangs {up_m} m above the ground: no usable shadow below {least_m:.2} m, a tenth above the subject's head"
     )]
     LampTooLow {
-        /// Its height, metres.
         up_m: f64,
         /// The least that would do, metres.
         least_m: f64,
@@ -41,9 +40,7 @@ pub enum ShadowError {
         "the mask has {mask_height} x {mask_width} pixels, the camera file {camera_height} x {camera_width}"
     )]
     Shape {
-        /// Rows of the mask.
         mask_height: usize,
-        /// Columns of the mask.
         mask_width: usize,
         /// Rows by the camera file.
         camera_height: usize,

@@ -20,7 +20,6 @@ pub enum Truth {
     Background,
     /// Shadow cast by the subject.
     Shadow,
-    /// The subject.
     Subject,
     /// Not judged: outside the region of interest, or too blurred to tell.
     Ignored,

@@ -40,7 +40,6 @@ pub enum UncertaintyError {
     /// The sun's position.
     #[error(transparent)]
     Sun(#[from] SunError),
-    /// The shadow.
     #[error(transparent)]
     Shadow(#[from] ShadowError),
 }

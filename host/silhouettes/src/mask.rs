@@ -22,9 +22,7 @@ pub type Mask = Array2<bool>;
 /// The smallest upright rectangle that holds some pixels; half open, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoundingBox {
-    /// First row.
     pub top: usize,
-    /// First column.
     pub left: usize,
     /// One past the last row.
     pub bottom: usize,
@@ -57,13 +55,11 @@ impl BoundingBox {
         }
     }
 
-    /// Height in pixels.
     #[must_use]
     pub fn height(self) -> usize {
         self.bottom - self.top
     }
 
-    /// Width in pixels.
     #[must_use]
     pub fn width(self) -> usize {
         self.right - self.left

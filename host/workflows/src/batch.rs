@@ -122,7 +122,6 @@ pub enum State {
     Already,
     /// It would be made: a dry run.
     Todo,
-    /// It has none.
     Failed,
 }
 
@@ -133,23 +132,18 @@ pub struct JobReport {
     pub job: usize,
     /// The line of the manifest that it begins on.
     pub line: usize,
-    /// What it does.
     #[serde(rename = "do")]
     pub kind: String,
     /// Where its result is, as the manifest says it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub out: Option<String>,
-    /// What became of it.
     pub state: State,
-    /// How long it took.
     pub seconds: f64,
     /// What the command of the same name prints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub figures: Option<Value>,
-    /// What it warned of.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
-    /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
 }
@@ -157,18 +151,13 @@ pub struct JobReport {
 /// How many jobs were what.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct BatchFigures {
-    /// Jobs of the shard.
     pub jobs: usize,
-    /// Made now.
     pub done: usize,
-    /// Made before.
     pub already: usize,
     /// To be made, in a dry run.
     #[serde(skip_serializing_if = "is_zero")]
     pub todo: usize,
-    /// Without a result.
     pub failed: usize,
-    /// For all.
     pub seconds: f64,
 }
 
@@ -246,7 +235,6 @@ fn failures_file(settings: &BatchSettings) -> PathBuf {
 /// What the threads share.
 struct Work<'a> {
     settings: &'a BatchSettings,
-    /// When the run began.
     begun: SystemTime,
     base: PathBuf,
     manifest: Mutex<Manifest>,

@@ -70,7 +70,6 @@ impl Cache {
         }
     }
 
-    /// As [`Model::read`].
     pub(crate) fn model(&self, path: &Path) -> Result<Arc<Model>> {
         let version = Model::file(path).map(|path| FileVersion::of("the model", path)).transpose()?;
         self.models.get((path.into(), version), || Model::read(path))

@@ -18,17 +18,14 @@ use crate::{
 /// A kind of camera.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Kind {
-    /// Its name.
     pub kind: &'static str,
     /// How one of it is named.
     pub address: &'static str,
-    /// What it is.
     pub about: &'static str,
     /// Whether this program was built with it.
     pub built_in: bool,
 }
 
-/// All kinds.
 pub const KINDS: [Kind; 5] = [
     Kind {
         kind: "sim",
@@ -67,7 +64,6 @@ pub const KINDS: [Kind; 5] = [
 pub struct Found {
     /// By which it is named.
     pub address: String,
-    /// What it says it is.
     pub about: String,
 }
 
@@ -108,7 +104,6 @@ fn genicam() -> Vec<Found> {
 /// A camera, and what is set before it is used.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CameraChoice {
-    /// Which.
     pub address: CameraAddress,
     /// What is set, in this order.
     pub settings: Vec<Setting>,
@@ -132,12 +127,9 @@ impl CameraChoice {
     }
 }
 
-/// What can be set.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ControlFigures {
-    /// Its name.
     pub name: String,
-    /// Its value now.
     pub value: String,
     /// What it may be; `fixed` where it can only be read.
     pub range: String,
@@ -146,16 +138,12 @@ pub struct ControlFigures {
 /// A camera's controls.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ShowFigures {
-    /// Its kind.
     pub kind: &'static str,
     /// What can be set or read; nothing for kinds that leave it to others.
     pub controls: Vec<ControlFigures>,
 }
 
 /// Shows a camera's controls, after what is to be set has been set.
-///
-/// # Errors
-/// As [`CameraChoice::open`].
 pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
     let mut camera = choice.open()?;
     Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })

@@ -33,7 +33,6 @@ pub trait Progress: Sync {
     fn advance(&self, _unit: &'static str, _done: usize, _total: Option<usize>) {}
 }
 
-/// Prompts a person.
 pub trait Questions: Sync {
     /// Shows the question and returns the typed answer; it is empty if the person only confirmed.
     ///
@@ -75,11 +74,8 @@ impl Cancel {
 /// What a workflow needs in addition to its settings.
 #[derive(Clone)]
 pub struct Context<'a> {
-    /// Receives progress.
     pub progress: &'a dyn Progress,
-    /// Prompts a person.
     pub questions: &'a dyn Questions,
-    /// Cancellation.
     pub cancel: Cancel,
     /// Operators, corrections and models that tasks share.
     pub cache: Arc<Cache>,
@@ -91,7 +87,6 @@ impl<'a> Context<'a> {
         Self { progress, questions, cancel, cache: Arc::default() }
     }
 
-    /// Reports a step.
     pub fn info(&self, what: &str) {
         self.progress.info(what);
     }

@@ -23,26 +23,20 @@ pub struct DoctorSettings {
     pub folders: Vec<PathBuf>,
 }
 
-/// How it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Health {
-    /// There, and well.
     Ok,
     /// Not there, and only some need it.
     Optional,
-    /// Something will fail.
     Missing,
 }
 
 /// One thing that was looked at.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Finding {
-    /// What.
     pub what: String,
-    /// How it is.
     pub health: Health,
-    /// What was found.
     pub found: String,
     /// What to do; empty where nothing is to be done.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -67,7 +61,6 @@ impl Finding {
 /// All that was looked at.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct DoctorFigures {
-    /// One after the other.
     pub findings: Vec<Finding>,
 }
 

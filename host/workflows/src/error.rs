@@ -45,9 +45,7 @@ pub enum WorkflowError {
     Parameter {
         /// The parameter, as the field's users call it; faces translate it to their own word.
         name: &'static str,
-        /// The offending value.
         value: String,
-        /// What was expected.
         expected: String,
     },
     /// A field of a request.
@@ -56,11 +54,9 @@ pub enum WorkflowError {
     /// A file that does not hold what it should.
     #[error("{} does not hold {expected}: {reason}", path.display())]
     File {
-        /// The file.
         path: PathBuf,
         /// What was expected in it.
         expected: &'static str,
-        /// What is wrong.
         reason: String,
     },
     /// A file that cannot be read at all.
@@ -68,17 +64,13 @@ pub enum WorkflowError {
     Read {
         /// What it would have been: "the optics file".
         what: &'static str,
-        /// The file.
         path: PathBuf,
         /// What the system says.
         source: std::io::Error,
     },
     /// The user, or whoever speaks for them, gave the work up; a rig has been stopped.
     #[error("interrupted while {during}")]
-    Cancelled {
-        /// What was under way.
-        during: String,
-    },
+    Cancelled { during: String },
     /// The sharpest image would lie where no lens puts one.
     #[error(
         "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: is the \
@@ -96,7 +88,6 @@ pub enum WorkflowError {
     /// The bring-up checklist found something.
     #[error("{failed} of the steps failed; put that right before anything moves further (docs/rig.md)")]
     StepsFailed {
-        /// How many steps.
         failed: usize,
         /// Number of the alarm that is latched.
         alarm: Option<u32>,
@@ -110,17 +101,13 @@ pub enum WorkflowError {
     /// A folder that cannot be made.
     #[error("cannot make the folder {}: {source}", folder.display())]
     Folder {
-        /// The folder.
         folder: PathBuf,
         /// What the system says.
         source: std::io::Error,
     },
     /// A question that nobody answered.
     #[error("nobody answers, the input has ended: {question}")]
-    Unanswered {
-        /// The question.
-        question: String,
-    },
+    Unanswered { question: String },
     /// Nothing says what optics a pair was taken with.
     #[error("no optics: none were named, and neither capture.toml nor optics.toml lies beside {}", far.display())]
     NoOptics {
@@ -134,7 +121,6 @@ pub enum WorkflowError {
         far: PathBuf,
         /// The image that was given as near-focused.
         near: PathBuf,
-        /// What is wrong.
         reason: String,
     },
     /// The same, about something.
@@ -142,7 +128,6 @@ pub enum WorkflowError {
     About {
         /// What it is about: a pair, a file, a step.
         about: String,
-        /// What went wrong.
         source: Box<Self>,
     },
     /// Values that make no optics.
@@ -178,16 +163,13 @@ pub enum WorkflowError {
     /// A text that is not TOML of the expected kind.
     #[error(transparent)]
     Parse(#[from] toml::de::Error),
-    /// The emulated rig.
     #[error(transparent)]
     Simulator(#[from] crate::simulator::SimulatorError),
     /// The board, or the way to it.
     #[error(transparent)]
     Client(#[from] ClientError),
-    /// Exposures.
     #[error(transparent)]
     Capture(#[from] CaptureError),
-    /// The camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// Where the stages would have to go.
@@ -196,7 +178,6 @@ pub enum WorkflowError {
     /// The search for the focus.
     #[error(transparent)]
     Focus(#[from] FocusSearchError),
-    /// An exposure program.
     #[error(transparent)]
     Program(#[from] ProgramError),
     /// The board's log.
@@ -208,19 +189,15 @@ pub enum WorkflowError {
     /// Correction by the board.
     #[error(transparent)]
     BoardCorrection(#[from] BoardCorrectionError),
-    /// An image file.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// A map of numbers.
     #[error(transparent)]
     Map(#[from] MapError),
-    /// Masks.
     #[error(transparent)]
     Masks(#[from] MaskError),
-    /// Video.
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// An encoder.
     #[error(transparent)]
     Encode(#[from] EncodeError),
     /// Results that cannot be put in place.
@@ -235,7 +212,6 @@ pub enum WorkflowError {
     /// Where the sun stands.
     #[error(transparent)]
     Sun(#[from] SunError),
-    /// Silhouettes.
     #[error(transparent)]
     Silhouettes(#[from] crate::silhouettes::SilhouettesError),
     /// What moves in a video.
@@ -244,7 +220,6 @@ pub enum WorkflowError {
     /// Pictures that a shadow detector cannot take.
     #[error(transparent)]
     ShadowImages(#[from] ImagesError),
-    /// How a camera stands.
     #[error(transparent)]
     CameraFile(#[from] CameraFileError),
     /// Where a shadow falls.
@@ -274,10 +249,8 @@ pub enum WorkflowError {
     /// What several people cannot be recognised in.
     #[error(transparent)]
     MultiPerson(#[from] crate::activity::multi_person::MultiPersonError),
-    /// An evaluation.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),
-    /// Many jobs.
     #[error(transparent)]
     Batch(#[from] crate::batch::BatchError),
     /// A record that cannot be put into TOML.

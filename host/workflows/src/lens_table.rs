@@ -29,7 +29,6 @@ pub struct Readings {
 /// A reading as the thimble shows it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Reading {
-    /// All of it.
     pub mm: f64,
     /// Whole half-millimetres on the sleeve.
     pub major_mm: f64,
@@ -40,7 +39,6 @@ pub struct Reading {
 /// Blur of an object at a distance.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Blur {
-    /// Object distance.
     pub depth_mm: f64,
     /// Blur radius in the far-focused image, px.
     pub far_px: f64,
@@ -53,11 +51,9 @@ pub struct Blur {
 pub struct LensFigures {
     /// Object and sensor distances.
     pub range: WorkingRange,
-    /// f-number.
     pub f_number: f64,
     /// Diameter of the aperture.
     pub aperture_mm: f64,
-    /// Largest blur radius.
     pub max_blur_px: f64,
     /// From the near to the far end of the range.
     pub depth_range_mm: f64,

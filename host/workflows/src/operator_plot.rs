@@ -24,12 +24,9 @@ const COLOURS: [RGBColor; 5] = [
     RGBColor(230, 159, 0),
 ];
 
-/// How a plot is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Format {
-    /// Curves.
     Svg,
-    /// Pixels.
     Png,
 }
 
@@ -48,9 +45,6 @@ impl Format {
 }
 
 /// The plot of `operators` as the bytes of a file.
-///
-/// # Errors
-/// [`WorkflowError::Encode`].
 pub fn plot(operators: &Operators, format: Format) -> Result<Vec<u8>> {
     register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular())
         .map_err(|_| EncodeError::of("a plot")("the built-in font is damaged"))?;

@@ -16,7 +16,6 @@ use crate::error::{About, Result, WorkflowError};
 /// Optics and the file they come from.
 #[derive(Clone, Debug)]
 pub struct GivenOptics {
-    /// The file.
     pub path: PathBuf,
     /// What it says, checked.
     pub optics: Optics,
@@ -56,9 +55,6 @@ impl GivenOptics {
 }
 
 /// Reads and checks an optics file.
-///
-/// # Errors
-/// As [`GivenOptics::read`].
 pub fn read(path: &Path) -> Result<Optics> {
     GivenOptics::read(path).map(|given| given.optics)
 }

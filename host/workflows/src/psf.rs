@@ -13,7 +13,6 @@ use crate::{
 /// Part of an image's energy that is not round from which it is said.
 const NOT_ROUND: f64 = 0.1;
 
-/// What is asked for.
 #[derive(Clone, PartialEq, Debug)]
 pub enum PsfSource {
     /// A model with its parameters.

@@ -30,9 +30,6 @@ pub trait Request:
     type Figures: Serialize;
 
     /// Finds contradictions between fields without reading or moving anything.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`].
     fn check(&self) -> Result<()> {
         Ok(())
     }
@@ -86,26 +83,13 @@ pub enum Paths<'a> {
 pub enum RequestError {
     /// The task has no such field.
     #[error("{task} has no field `{name}`; expected some of {}", known.join(", "))]
-    UnknownField {
-        /// The task.
-        task: &'static str,
-        /// The field.
-        name: String,
-        /// Fields of the task.
-        known: Vec<String>,
-    },
+    UnknownField { task: &'static str, name: String, known: Vec<String> },
     /// A required field is missing.
     #[error("{task} needs the field `{name}`")]
-    MissingField {
-        /// The task.
-        task: &'static str,
-        /// The field.
-        name: &'static str,
-    },
+    MissingField { task: &'static str, name: &'static str },
     /// The value does not fit.
     #[error("{field}: {reason}")]
     Value {
-        /// The field.
         field: String,
         /// The value and what was expected.
         reason: String,

@@ -46,7 +46,6 @@ use crate::{
 };
 use open::OpenRig;
 
-/// Where a rig is.
 #[derive(Clone, PartialEq, Debug)]
 pub enum RigAddress {
     /// Behind a serial port, e.g. `/dev/ttyACM0`.

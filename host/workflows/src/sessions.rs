@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{About, Result, WorkflowError};
 
-/// The file of a note.
 const NOTE_FILE: &str = "note.toml";
 /// Longest note, bytes: a note, not a file store.
 const NOTE_MAX: usize = 64 * 1024;
@@ -32,17 +31,14 @@ const RESERVED: &[&str] = &[
     "aux",
     "prn",
 ];
-/// Best rating.
 const BEST: u8 = 5;
 
 /// What a person noted about a capture.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Note {
-    /// 0 (not rated) to 5.
     #[serde(default)]
     pub rating: u8,
-    /// Anything.
     #[serde(default)]
     pub text: String,
 }
@@ -56,7 +52,6 @@ pub struct Capture {
     pub kind: &'static str,
     /// Its images, in the order of the exposures.
     pub images: Vec<String>,
-    /// All files.
     pub files: Vec<String>,
     /// Other maps of the same pair: folders in the capture's with a `depth.npy`.
     pub variants: Vec<String>,
@@ -65,11 +60,8 @@ pub struct Capture {
     /// When it was taken; only of real hardware.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
-    /// Bits of the camera.
     pub bits: u8,
     /// Length of an exposure.
     pub exposure_us: u32,
@@ -80,7 +72,6 @@ pub struct Capture {
     pub optics: toml::Table,
     /// Whether a depth map lies there.
     pub has_depth: bool,
-    /// What a person noted.
     pub note: Note,
     /// Why the folder cannot be read, though it is there.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -170,9 +161,6 @@ pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
 }
 
 /// The first free names `KIND-001`, `KIND-002` and so on. A name is free until something has it.
-///
-/// # Errors
-/// As [`folder_of`].
 pub fn free_names(session: &Path, kind: &str, count: usize) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let mut number = 1;

@@ -30,61 +30,36 @@ pub(crate) const MM_PER_PX: RangeInclusive<f64> = 0.1..=1000.0;
 pub enum SilhouettesError {
     /// A recording that cannot be read.
     #[error("{}: {source}", path.display())]
-    Recording {
-        /// The file.
-        path: PathBuf,
-        /// Where and why.
-        source: RecordingError,
-    },
+    Recording { path: PathBuf, source: RecordingError },
     /// Joints that cannot be read.
     #[error("{}: {source}", path.display())]
-    Skeletons {
-        /// The file.
-        path: PathBuf,
-        /// Where and why.
-        source: SkeletonError,
-    },
+    Skeletons { path: PathBuf, source: SkeletonError },
     /// A template that cannot be read.
     #[error("the template {name}: {source}")]
-    Template {
-        /// Its name or file.
-        name: String,
-        /// What is wrong.
-        source: TemplateError,
-    },
+    Template { name: String, source: TemplateError },
     /// A template with other names than the recording's.
     #[error("{}: {source}{}", path.display(), fitting(*.fits))]
     Unfit {
-        /// The recording.
         path: PathBuf,
-        /// What does not fit.
         source: TemplateError,
         /// A built-in template that does.
         fits: Option<&'static str>,
     },
     /// A recording without a frame.
     #[error("{}: the recording holds no frame", path.display())]
-    NoFrames {
-        /// The file.
-        path: PathBuf,
-    },
+    NoFrames { path: PathBuf },
     /// A recording in which everything is hidden.
     #[error("{}: no frame has a visible marker, so there is nothing to draw", path.display())]
-    NothingVisible {
-        /// The file.
-        path: PathBuf,
-    },
+    NothingVisible { path: PathBuf },
     /// Points too far apart for a picture.
     #[error(
         "{what} reaches from {low_mm:.0} to {high_mm:.0} mm, which is not a picture at {mm_per_px} mm per pixel; the \
          unit may be wrong"
     )]
     TooLarge {
-        /// Whose points.
         what: String,
         /// The least of their coordinates in the picture.
         low_mm: f64,
-        /// The greatest.
         high_mm: f64,
         /// Millimetres per pixel asked for.
         mm_per_px: f64,
@@ -92,7 +67,6 @@ pub enum SilhouettesError {
     /// Nobody stays in the picture for long enough.
     #[error("{}: nobody is seen in {least} frames in a row", path.display())]
     NoPassage {
-        /// The folder.
         path: PathBuf,
         /// Frames that a passage has at least.
         least: usize,
@@ -102,10 +76,7 @@ pub enum SilhouettesError {
     NoPerformance,
     /// A detector that compares colours.
     #[error("the shadow detector {} compares colours, but the video is grey", method.name())]
-    NeedsColour {
-        /// The detector.
-        method: Method,
-    },
+    NeedsColour { method: Method },
 }
 
 fn fitting(template: Option<&str>) -> String {

@@ -20,7 +20,6 @@ use crate::{
     error::Result,
 };
 
-/// Name of the program.
 const PROGRAM: &str = "farnear-sim";
 /// Name of the firmware beside it.
 pub(crate) const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
@@ -67,28 +66,19 @@ pub struct Scenery {
 pub enum SimulatorError {
     /// There is no such program.
     #[error("{program} is neither next to this program nor on the PATH")]
-    Missing {
-        /// The program.
-        program: &'static str,
-    },
-    /// The system refuses.
+    Missing { program: &'static str },
     #[error("cannot start {}: {source}", program.display())]
     Start {
-        /// The program.
         program: PathBuf,
         /// What the system says.
         source: std::io::Error,
     },
     /// It ended without a word on its standard output.
     #[error("{PROGRAM} ended at once ({status}); its message stands above")]
-    Ended {
-        /// How.
-        status: String,
-    },
+    Ended { status: String },
     /// It printed something else than where it listens.
     #[error("{PROGRAM} printed no address but {line:?}: {reason}")]
     Address {
-        /// What it printed.
         line: String,
         /// What is wrong with it.
         reason: String,
@@ -254,9 +244,6 @@ pub(crate) fn find() -> Result<PathBuf, SimulatorError> {
 }
 
 /// A program of the emulated board, next to this one or on the PATH.
-///
-/// # Errors
-/// [`SimulatorError::Missing`].
 pub(crate) fn find_program(program: &'static str) -> Result<PathBuf, SimulatorError> {
     let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(&name)));

@@ -12,9 +12,7 @@ use crate::{error::Result, figures::rounded};
 /// A place and a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// The place.
     pub place: Place,
-    /// The time.
     pub time: DateTime<Utc>,
 }
 
@@ -34,7 +32,6 @@ impl Moment {
     }
 }
 
-/// Who computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Formula {
     /// The host, in double precision.
@@ -62,7 +59,6 @@ impl FromStr for Formula {
 /// Where the sun stands, without refraction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SunFigures {
-    /// Above the horizon.
     pub elevation_deg: f64,
     /// Clockwise from north.
     pub azimuth_deg: f64,

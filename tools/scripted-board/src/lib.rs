@@ -64,7 +64,6 @@ pub struct Faults {
     pub forgetful: bool,
     /// The board works, ends, and says nothing.
     pub end_unsaid: bool,
-    /// Work ends with this.
     pub fails_with: Option<Failure>,
     /// Work ends with this alarm.
     pub alarm_at_work: Option<Alarm>,
@@ -112,7 +111,6 @@ pub struct Board {
     pub events: Vec<Event>,
     /// Exposures that were triggered.
     pub triggers: u32,
-    /// Alarms that came up.
     pub alarms: Vec<AlarmRecord>,
     /// Whether the last of them is latched.
     pub latched: bool,
@@ -124,7 +122,6 @@ pub struct Board {
     pub lens_switches: [bool; 2],
     /// Whether the emergency stop is pressed.
     pub emergency_stop: bool,
-    /// What it has counted.
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
     pub still_there: u32,

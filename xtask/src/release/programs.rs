@@ -9,7 +9,6 @@ use crate::run::{ROOT, cargo, finish, has, has_target, step, target_folder};
 
 /// What programs are built for.
 pub struct Target {
-    /// As Rust names it.
     pub triple: &'static str,
     /// The processor, as archives name it.
     pub processor: &'static str,

@@ -10,7 +10,6 @@ use crate::{
     run::{ROOT, finish, step, target_folder},
 };
 
-/// What builds it.
 const NEEDS: [&str; 1] = ["maturin>=1.9,<2"];
 
 /// Builds the wheel; gives its path, or what is missing.

@@ -31,7 +31,6 @@ pub enum Last {
     Panic {
         /// The source file, where it is known.
         file: Option<&'static str>,
-        /// The line.
         line: u32,
     },
     /// The processor refused an instruction, or an access.
@@ -41,7 +40,6 @@ pub enum Last {
         /// The configurable fault status register (ARMv7-M, B3.2.15).
         status: u32,
     },
-    /// The stack was full.
     StackOverflow,
     /// The clock from outside stopped.
     ClockLost,

@@ -32,14 +32,12 @@ enum Phase {
     Pass {
         closed: Nanometres,
     },
-    /// Up until it opens.
     Open {
         closed: Nanometres,
     },
     HomeAgain(Homing),
 }
 
-/// The routine.
 #[derive(Clone, Debug)]
 pub(crate) struct Backlash {
     axis: Axis,
@@ -122,7 +120,6 @@ impl Backlash {
     }
 }
 
-/// The leg of a phase.
 fn set_off(phase: &Phase, stepper: &mut Stepper, settings: &StepperSettings) -> Leg {
     let (leave_speed, approach_speed) = (settings.home_leave_speed, settings.home_approach_speed);
     let (way, until) = match phase {

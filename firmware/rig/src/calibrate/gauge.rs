@@ -57,7 +57,6 @@ enum Phase {
     HomeAgain(Homing),
 }
 
-/// The routine.
 #[derive(Clone, Debug)]
 pub(crate) struct GaugeScale {
     phase: Phase,
@@ -200,7 +199,6 @@ impl GaugeScale {
     }
 }
 
-/// The leg of a phase.
 fn set_off(phase: &Phase, stepper: &mut Stepper, numbers: &StepperSettings, piezo: Nanometres) -> Leg {
     let (way, until) = match phase {
         Phase::Lift => {

@@ -21,9 +21,7 @@ const STEP: u32 = TICK_HZ / 20;
 const EARLY: u32 = TICK_HZ * 15 / 100;
 const LATE: u32 = TICK_HZ * 15 / 10;
 const MEAN: u32 = 50;
-/// Places on each way.
 const PLACES: usize = 16;
-/// Code of the step.
 const HALF: u16 = DAC_CODE_MAX / 2;
 
 /// Where the routine is; counts ticks.
@@ -43,7 +41,6 @@ enum Phase {
     Tell(u8),
 }
 
-/// The routine.
 #[derive(Clone, Debug)]
 pub(crate) struct Sweep {
     phase: Option<Phase>,

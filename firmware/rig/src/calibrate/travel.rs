@@ -23,7 +23,6 @@ enum Phase {
     Return { length: Nanometres },
 }
 
-/// The routine.
 #[derive(Clone, Debug)]
 pub(crate) struct Travel {
     axis: Axis,
@@ -70,7 +69,6 @@ impl Travel {
     }
 }
 
-/// The leg of a phase.
 fn set_off(phase: &Phase, stepper: &mut Stepper, settings: &StepperSettings) -> Leg {
     let leave_speed = settings.home_leave_speed;
     let (way, until) = match phase {

@@ -23,7 +23,6 @@ use crate::io::MEMORY_BYTES;
 use crate::program::SHOTS_MAX;
 use crate::settings::KEYS;
 
-/// Bytes of a block.
 pub(crate) const BLOCK: usize = 32;
 /// Numbers of 32 bits in a block.
 pub(crate) const VALUES: usize = BLOCK / 4;
@@ -141,11 +140,8 @@ pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
 /// What lies in the place of a copy.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Copy {
-    /// Never written.
     Blank,
-    Good {
-        sequence: u32,
-    },
+    Good { sequence: u32 },
     Bad,
 }
 
@@ -155,8 +151,11 @@ pub(crate) enum Found {
     /// Never written: defaults, and nothing is wrong.
     Blank,
     /// A good copy, the newer of two, and whether the other was bad.
-    Good { copy: usize, sequence: u32, repaired: bool },
-    /// No copy is good.
+    Good {
+        copy: usize,
+        sequence: u32,
+        repaired: bool,
+    },
     Lost,
 }
 

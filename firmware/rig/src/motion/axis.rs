@@ -40,7 +40,6 @@ pub(crate) enum Purpose {
     SeekFar,
 }
 
-/// Where a motion is.
 #[derive(Clone, Debug)]
 enum Motion {
     Still,

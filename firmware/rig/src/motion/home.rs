@@ -21,7 +21,6 @@ use crate::motion::leg::{Leg, Until};
 use crate::motion::steps;
 use crate::settings::StepperSettings;
 
-/// Where homing is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
     Begin,
@@ -122,7 +121,6 @@ impl Homing {
     }
 }
 
-/// The leg of a phase.
 fn set_off(phase: Phase, axis: &mut Stepper, settings: &StepperSettings) -> Leg {
     let leave_speed = settings.home_leave_speed;
     let (way, until) = match phase {

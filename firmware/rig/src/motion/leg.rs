@@ -9,7 +9,6 @@ use crate::motion::switch::Place;
 /// What ends a leg before its way is over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Until {
-    /// Nothing.
     Arrival,
     /// The home switch closes (`true`) or opens.
     Home(bool),

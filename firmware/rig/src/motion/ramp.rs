@@ -29,7 +29,6 @@ pub(crate) struct RampLimits {
     pub(crate) speed: u32,
     /// Acceleration and deceleration, pulses/s2.
     pub(crate) acceleration: u32,
-    /// Jerk, pulses/s3.
     pub(crate) jerk: u32,
 }
 

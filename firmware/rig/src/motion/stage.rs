@@ -9,7 +9,6 @@ use crate::motion::since;
 use crate::piezo::Piezo;
 use crate::settings::{Settings, StepperSettings};
 
-/// All axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Stage {
     pub(crate) coarse: Stepper,
@@ -52,7 +51,6 @@ impl Stage {
         }
     }
 
-    /// Orders the board.
     pub(crate) fn act(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
         self.coarse.act(&inputs.coarse.stepper, &mut outputs.coarse);
         self.lens.act(&inputs.lens.stepper, &mut outputs.lens);

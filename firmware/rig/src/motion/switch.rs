@@ -8,7 +8,6 @@ use farnear_protocol::Nanometres;
 /// Equal samples in a row that are believed: 0.6 ms, in which a stage at full speed goes 4 um.
 pub(crate) const SAMPLES: u8 = 3;
 
-/// Where an axis was.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Place {
     /// In pulses of the present count.

@@ -30,7 +30,6 @@ const LAG_BITS: u32 = 16;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct GaugeScale {
     offset: i32,
-    /// Times 2^24.
     gain: i64,
 }
 
@@ -114,7 +113,6 @@ impl Lag {
         Self { play_weight, creep_weight, ..*self }
     }
 
-    /// What it is now.
     pub(crate) const fn offset(&self) -> i32 {
         self.offset
     }

@@ -13,7 +13,6 @@ const AHEAD_US: u64 = 2 * TICK_US as u64;
 /// Triggers in a row that the camera did not answer, after which it is taken for dead.
 const UNANSWERED_MAX: u8 = 3;
 
-/// See the module.
 #[derive(Clone, Debug)]
 pub(crate) struct Pace {
     /// 0 = as fast as position and camera allow.

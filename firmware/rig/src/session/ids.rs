@@ -9,7 +9,6 @@ use farnear_protocol::message::ID_STEP_MAX;
 /// Ids of which it is known whether they were used.
 pub(super) const IDS: u32 = u64::BITS;
 
-/// The ids of a boot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ids {
     last: u32,

@@ -49,7 +49,6 @@ pub type Answer = Result<Response, RequestError>;
 pub struct Bench {
     pub rig: Rig,
     pub hardware: Hardware,
-    /// The FRAM.
     pub memory: Box<[u8; MEMORY_BYTES]>,
     boot: u32,
     /// The next write to the FRAM ends after this many bytes; whether one has.
@@ -169,7 +168,6 @@ impl Bench {
         self.accepted(&Request::ClearAlarm { number });
     }
 
-    /// One control tick.
     pub fn tick(&mut self) -> Outputs {
         let inputs = self.hardware.inputs(BoardMicros(self.now));
         let outputs = self.rig.tick(&inputs);
@@ -200,7 +198,6 @@ impl Bench {
         self.now += ticks * u64::from(TICK_US);
     }
 
-    /// Many control ticks.
     pub fn run_ms(&mut self, ms: u64) {
         for _ in 0..ms * 1_000 / u64::from(TICK_US) {
             self.tick();
@@ -253,7 +250,6 @@ impl Bench {
         (id, self.ask_as(id, self.boot, request))
     }
 
-    /// Asks under an id.
     pub fn ask_as(&mut self, id: u32, boot: u32, request: &Request) -> Answer {
         let before = self.answers.len();
         self.send_as(id, boot, request);
@@ -270,7 +266,6 @@ impl Bench {
         id
     }
 
-    /// The status.
     pub fn status(&mut self) -> Status {
         match self.ask(&Request::Status).1 {
             Ok(Response::Status(status)) => status,
@@ -278,7 +273,6 @@ impl Bench {
         }
     }
 
-    /// Who the board is.
     pub fn hello(&mut self) -> Hello {
         match self.ask(&Request::Hello).1 {
             Ok(Response::Hello(hello)) => hello,

@@ -15,9 +15,7 @@ pub enum When {
     },
     /// When something else has happened so many times.
     On {
-        /// What.
         moment: Moment,
-        /// Which time, from 1.
         nth: u32,
         /// How long after it, milliseconds.
         delay_ms: f64,
@@ -33,7 +31,6 @@ pub enum When {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Row", into = "Row")]
 pub struct Happening {
-    /// When.
     pub when: When,
     /// The kind of thing that happens.
     pub what: Kind,
@@ -194,29 +191,22 @@ impl From<Happening> for Row {
 /// Which fields beside the moment a kind has.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Takes {
-    /// `stage`.
     pub stage: bool,
-    /// `amount`.
     pub amount: Option<Amount>,
-    /// `address` and `bit`.
     pub place: bool,
 }
 
 /// What `amount` may be.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Amount {
-    /// Smallest.
     pub min: f64,
-    /// Largest.
     pub max: f64,
     /// Where nothing is said.
     pub usual: f64,
 }
 
 impl Takes {
-    /// Nothing more.
     pub const NOTHING: Self = Self { stage: false, amount: None, place: false };
-    /// The stage.
     pub const STAGE: Self = Self { stage: true, ..Self::NOTHING };
     /// An address and a bit of the memory.
     pub const PLACE: Self = Self { place: true, ..Self::NOTHING };

@@ -11,7 +11,6 @@ pub struct Rates {
     pub lost: f64,
     /// Probability of a byte to come out of nothing in front of each byte.
     pub inserted: f64,
-    /// Nothing passes.
     pub cut: bool,
 }
 
@@ -122,13 +121,11 @@ impl NoisyLine {
         }
     }
 
-    /// Bits flipped so far.
     pub fn flipped(&self) -> u64 {
         self.flipped
     }
 }
 
-/// Both directions.
 #[derive(Clone, Debug)]
 pub struct Lines {
     /// From the host to the board.

@@ -29,7 +29,6 @@ pub enum Moment {
 }
 
 impl Moment {
-    /// All, in order.
     pub const ALL: [Self; 10] = [
         Self::MotionBegins,
         Self::ExposureBegins,

@@ -6,7 +6,6 @@ use crate::plant::Noise;
 /// Something that is due.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Due {
-    /// What.
     pub happening: Happening,
     /// It is taken back, and does not begin.
     pub mends: bool,
@@ -33,7 +32,6 @@ impl Entry {
     }
 }
 
-/// See the module.
 #[derive(Debug)]
 pub struct Schedule {
     entries: Vec<Entry>,

@@ -22,7 +22,6 @@ const DAMPING: f64 = 185.0;
 /// Speed at which the torque has fallen to a half, microsteps/s.
 const HALF_TORQUE_SPEED: f64 = 60_000.0;
 
-/// See the module.
 #[derive(Debug)]
 pub struct Motor {
     now_ns: u64,

@@ -35,7 +35,6 @@ impl Noise {
         radius * libm::cos(core::f64::consts::TAU * self.uniform())
     }
 
-    /// 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }

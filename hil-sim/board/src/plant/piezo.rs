@@ -26,7 +26,6 @@ const PLAYS: usize = 10;
 const CREEP: f64 = 0.015;
 const CREEP_S: [f64; 4] = [0.3, 3.0, 30.0, 300.0];
 
-/// The fine stage.
 #[derive(Debug)]
 pub struct Piezo {
     code: u16,

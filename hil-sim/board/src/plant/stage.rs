@@ -55,7 +55,6 @@ impl HomeSwitch {
     }
 }
 
-/// See the module.
 #[derive(Debug)]
 pub struct Stage {
     motor: Motor,

@@ -8,7 +8,6 @@
 const LINE: u64 = 16;
 const INSTRUCTION_LINES: usize = 64;
 const DATA_LINES: usize = 8;
-/// Bits of FLASH_ACR.
 const PREFETCH: u64 = 1 << 8;
 const INSTRUCTION_CACHE: u64 = 1 << 9;
 const DATA_CACHE: u64 = 1 << 10;

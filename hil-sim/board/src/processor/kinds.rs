@@ -10,7 +10,6 @@ const REFILL: u64 = 2;
 pub(super) const EXCEPTION_ENTRY: u64 = 12;
 pub(super) const EXCEPTION_RETURN: u64 = 10;
 
-/// An instruction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Instruction {
     first: u16,

@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Deed {
     /// Homes an axis, or both steppers at once.
     Home(Option<Axis>),
-    /// Moves an axis.
     Move {
-        /// Which.
         axis: Axis,
         /// Where to, micrometres.
         to_um: f64,
@@ -19,35 +17,27 @@ pub enum Deed {
     Expose(Program),
     /// The same again and again.
     Continuous {
-        /// The shots.
         program: Program,
         /// From one trigger to the next; 0: as fast as it goes.
         period_us: u32,
-        /// How many exposures.
         exposures: u32,
     },
     /// Measures the backlash of an axis.
     Calibrate(Axis),
-    /// Changes a setting.
     Set {
-        /// Which.
         key: SettingKey,
-        /// Its new value.
         value: i32,
     },
     /// Stops along the ramps.
     Stop,
     /// Stops at once, with an alarm.
     Halt,
-    /// Resets the board.
     Reboot,
     /// Lets the program stand after the exposure that is under way.
     Pause,
-    /// Lets it go on.
     Resume,
     /// Clears what is latched.
     Clear,
-    /// Says nothing.
     Silent {
         /// So long, milliseconds.
         ms: f64,
@@ -62,7 +52,6 @@ pub enum Deed {
 /// Exposures on the piezo.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Program {
-    /// Where, micrometres.
     pub at_um: Vec<f64>,
     /// How long each exposure is.
     pub exposure_us: u32,
@@ -74,7 +63,6 @@ pub struct Program {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Row", into = "Row")]
 pub struct Step {
-    /// What it asks for.
     pub deed: Deed,
     /// It goes on after so long, milliseconds, whether or not that has come to its end; `None`: it waits for the end.
     pub goes_on_after_ms: Option<f64>,

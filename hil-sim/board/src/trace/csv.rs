@@ -28,9 +28,6 @@ pub struct Csv {
 
 impl Csv {
     /// Opens the file and writes the heading.
-    ///
-    /// # Errors
-    /// [`SimError::Io`].
     pub fn create(path: &Path) -> Result<Self, SimError> {
         let wrong =
             |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };

@@ -51,14 +51,12 @@ pub fn name_of(letter: char) -> &'static str {
     all.copied().find(|signal| signal.2 == letter).map_or("?", |signal| signal.3)
 }
 
-/// Where the lines go.
 enum Sink {
     File(BufWriter<File>),
     /// Held against those of another run.
     Compare(Comparer),
 }
 
-/// See the module.
 pub struct Vcd {
     sink: Sink,
     /// Changes since the last stop: when, and the line.
@@ -80,7 +78,6 @@ pub fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// And back.
 pub fn unhex(text: &str) -> Option<Vec<u8>> {
     if !text.is_ascii() || text.len() % 2 == 1 {
         return None;
@@ -128,9 +125,6 @@ impl Vcd {
     }
 
     /// Opens the file and writes its heading.
-    ///
-    /// # Errors
-    /// [`SimError::Io`].
     pub fn create(path: &Path, config: &RigConfig, firmware: u64) -> Result<Self, SimError> {
         let wrong =
             |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };

@@ -233,7 +233,6 @@ impl Bench {
     }
 }
 
-/// The request to move.
 pub fn go(axis: Axis, target_nm: i32) -> Request {
     Request::Move { axis, target: Nanometres(target_nm), silence: SILENCE }
 }

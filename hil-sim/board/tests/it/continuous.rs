@@ -17,7 +17,6 @@ const PERIOD_US: u64 = 25_000;
 /// Board time of each run.
 const SECONDS: u64 = 2;
 
-/// What a run gave.
 struct Ran {
     frames: Vec<(u32, Nanometres, ShotRecord)>,
     dropped: Vec<DropReason>,

@@ -33,7 +33,6 @@ struct Client {
     given: u16,
 }
 
-/// Packets of a frame.
 #[derive(Default)]
 struct Packets {
     packets: BTreeMap<u32, Vec<u8>>,
@@ -45,7 +44,6 @@ impl Packets {
         self.last.is_some_and(|last| self.packets.len() as u32 == last + 1)
     }
 
-    /// The first gap.
     fn missing(&self) -> (u32, u32) {
         // The end is not known where the trailer was lost, too.
         let end = self.last.unwrap_or_else(|| self.packets.keys().next_back().map_or(0, |last| last + 1000));
@@ -103,7 +101,6 @@ impl Client {
         (u16::from_be_bytes([answer[0], answer[1]]), answer[8..length].to_vec())
     }
 
-    /// Status of a write.
     fn write(&mut self, register: u32, value: u32) -> u16 {
         self.ask(0x0082, &[register.to_be_bytes(), value.to_be_bytes()].concat()).0
     }

@@ -24,7 +24,6 @@ pub type Answer = Result<Response, RequestError>;
 /// How work came to its end.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Ended {
-    /// Well.
     Done,
     /// The board said why not.
     Failed(Failure),

@@ -21,7 +21,6 @@ fn broken(at_ns: u64, what: String) -> Broken {
     Broken { property: "exposure", at_ns, what }
 }
 
-/// Property `exposure`.
 pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
     let mut found = Vec::new();
     // The exposures since the last reset, and whether they were told.

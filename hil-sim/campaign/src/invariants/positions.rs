@@ -39,7 +39,6 @@ fn truly_um(truth: &Truth, axis: Axis) -> f64 {
     }
 }
 
-/// Property `position`.
 pub fn position(case: &Case<'_>) -> Vec<Broken> {
     let mut homed: BTreeSet<(u32, &str)> = BTreeSet::new();
     let mut broken = Vec::new();

@@ -27,7 +27,6 @@ struct Known {
     since: Vec<(u64, i32)>,
 }
 
-/// Property `records`.
 pub fn records(case: &Case<'_>) -> Vec<Broken> {
     // Without a memory nothing is kept, and the board says so; and bits that flip in both copies are told as such.
     let lossy = case.has(&["memory-dead", "memory-misread"]);

@@ -23,7 +23,6 @@ pub enum Setting {
 const NAMES: [&str; 6] = ["exposure_us", "gain", "black_level", "pixel_format", "region", "trigger_source"];
 
 impl Setting {
-    /// What is set.
     pub fn name(&self) -> &'static str {
         match self {
             Self::ExposureUs(_) => NAMES[0],
@@ -80,27 +79,21 @@ impl FromStr for Setting {
 pub struct Control {
     /// As [`Setting::name`], or the camera's own name of what can only be read.
     pub name: String,
-    /// Its value now.
     pub value: String,
-    /// What it may be.
     pub range: Range,
 }
 
 /// What a control may be.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Range {
-    /// It is what it is.
     Fixed,
     /// A number between two others, both included.
     Number {
-        /// Smallest.
         min: f64,
-        /// Largest.
         max: f64,
         /// Its unit; empty for the camera's own steps.
         unit: &'static str,
     },
-    /// One of these names.
     Choice(Vec<String>),
 }
 

@@ -40,7 +40,6 @@ pub struct Stamp {
 /// What is known of a picture.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Evidence {
-    /// By the camera.
     pub stamp: Stamp,
     /// When it arrived, by this computer's clock; only if that is known to a few milliseconds.
     pub arrived: Option<Instant>,

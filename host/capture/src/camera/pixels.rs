@@ -19,10 +19,7 @@ pub enum Layout {
         colour_twelfths: u8,
     },
     /// Two bytes per pixel, the lower first, of which so many bits carry the picture: Y10, Y12, Y16, gray12le, Mono12.
-    Grey16 {
-        /// Bits, 9 to 16.
-        bits: u8,
-    },
+    Grey16 { bits: u8 },
     /// Ten bits per pixel in a stream of bits, the lowest first: Mono10p.
     Packed10,
     /// Twelve bits per pixel in a stream of bits, the lowest first: Mono12p.

@@ -31,7 +31,6 @@ const SCHEDULING: Duration = Duration::from_secs(15);
 /// There is one port for cameras on one address, so there is one at a time.
 pub static ALONE: Mutex<()> = Mutex::new(());
 
-/// The fake camera.
 struct Fake {
     child: Child,
     _alone: MutexGuard<'static, ()>,

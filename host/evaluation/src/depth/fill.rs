@@ -28,7 +28,6 @@ const COLUMNS: usize = 5;
 /// A threshold of the variance of the ratio that lies between that of the disc and of the texture, and the thesis' own.
 const SUITED: f32 = 1e-4;
 const OF_THESIS: f32 = 0.0144;
-/// Textures and noises.
 const REPEATS: u64 = 3;
 
 pub fn measure(page: &mut Page) -> Result<()> {

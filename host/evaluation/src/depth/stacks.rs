@@ -155,11 +155,9 @@ fn measure_phone(page: &mut Page, folder: &Path) -> Result<()> {
 
 /// How a pair's depth agrees with a given one.
 struct Judged {
-    /// Rank correlation.
     rank: f64,
     /// Part of the pixels that was judged.
     part: f64,
-    /// Which ones.
     confident: Array2<bool>,
 }
 

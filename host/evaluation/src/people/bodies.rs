@@ -18,7 +18,6 @@ use crate::{
     panels::{self, Panel, Scale},
 };
 
-/// Sides of fig. 7.10.
 const VIEWS: usize = 8;
 /// A recording of CMU's 41 markers.
 const RECORDING: &str = "mocap/cmu_02_05.c3d";

@@ -20,16 +20,13 @@ use crate::{
 const VIEWS: usize = 8;
 /// Members per dimension of the spatial objects.
 const MEMBERS: usize = 20;
-/// The thesis' six.
 const SHOWN: [&str; 6] = ["walk", "drop", "crouch", "bag", "shoot", "dig"];
-/// Grey levels.
 const BLACK: f32 = 0.0;
 const GREY: f32 = 0.72;
 const WHITE: f32 = 1.0;
 
 /// All silhouettes in the first two dimensions of the embedding.
 struct Embedded {
-    /// Silhouettes x 2.
     points: Array2<f32>,
     /// Which activity each is of.
     activities: Vec<usize>,

@@ -17,15 +17,10 @@ pub const RATE_HZ: f64 = 8.0;
 /// Views of sets that are drawn from bodies.
 pub const VIEWS: usize = 4;
 
-/// Clips under a name.
 pub struct Set {
-    /// For headings.
     pub name: &'static str,
-    /// For file names.
     pub short: &'static str,
-    /// What it is.
     pub about: &'static str,
-    /// The clips.
     pub clips: Vec<Clip>,
     /// Whether mirrors of training clips train too; a set that holds its mirrors needs none.
     pub mirror: bool,

@@ -28,7 +28,6 @@ const THESIS_SHADOWS: [(&str, [f64; 6], [f64; 6]); 6] = [
     ("large-region-texture", [0.7, 78.5, 64.9, 79.4, 73.2, 59.3], [0.8, 47.2, 45.5, 36.6, 51.7, 36.4]),
     ("thesis", [68.6, 63.8, 48.1, 88.1, 85.9, 70.9], [0.7, 1.9, 3.2, 2.7, 4.1, 2.5]),
 ];
-/// Scenes of ours.
 const SCENES: u64 = 5;
 /// Li 2014, diagonals of tables 9.1 to 9.3, in the activities' own order there.
 const TABLE_9_1: [(&str, f64); 10] = [

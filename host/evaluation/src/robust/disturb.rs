@@ -129,7 +129,6 @@ pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed
     Ok(Taken { far, near, truth: truth(scene, &lens, &camera), response })
 }
 
-/// Gain and vignetting.
 fn shade(image: &mut Array2<f32>, disturbance: &Disturbance) {
     let (height, width) = image.dim();
     let (middle_y, middle_x) = (0.5 * height as f64, 0.5 * width as f64);
@@ -161,13 +160,11 @@ fn jpeg(image: &Array2<f32>, quality: u8) -> Result<Array2<f32>> {
 pub const WAYS: [(&str, Window); 2] =
     [("ro, window 7", Window::Fixed(7)), ("whitened, adaptive", Window::Adaptive)];
 
-/// What a way comes to.
 pub struct Outcome {
     /// Root mean square error over the pixels that have a depth, mm.
     pub error_mm: f64,
     /// Part of the pixels that have one.
     pub valid: f64,
-    /// What was said.
     pub said: Vec<String>,
     /// Depth and what is known of it, if there is any.
     pub found: Option<Measurement>,

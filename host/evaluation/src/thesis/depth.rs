@@ -18,7 +18,6 @@ use bench::Bench;
 /// The lens' own point spread function: what the thesis measured on its rig (section 5.4).
 const LENS_PSF: &str = "generalised:p=1.8,k=0.4802";
 
-/// Writes the section.
 pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("Chapters 4 to 6: depth from defocus");
     page.paragraph(
@@ -76,7 +75,6 @@ fn rig_of_chapter_4(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Fig. 5.2.
 fn normalised_ratio(page: &mut Page) -> Result<()> {
     use farnear_depth::normalised_ratio::{first_non_monotonic, normalised_ratio as ratio};
     use farnear_depth::psf::Psf;
@@ -120,7 +118,6 @@ fn normalised_ratio(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// "1.92 (4.17)".
 fn beside(here: f64, li: Option<f64>) -> String {
     li.map_or_else(|| mm(here), |li| format!("{here:.2} ({li:.2})"))
 }

@@ -41,7 +41,6 @@ use crate::{
 pub const CORRECTION: &str = "correction.toml";
 /// The series of flat targets in it.
 const SERIES: &str = "flat-series";
-/// Its list.
 const LIST: &str = "PATTERNS.toml";
 
 /// A capture of a flat target.
@@ -97,7 +96,6 @@ pub struct Taught {
     pub methods: Vec<String>,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Taught, _, _>("/api/calibrate", "What this session has been taught.", taught)
         .post::<PsfRequest, Begun, _, _>(

@@ -35,7 +35,6 @@ pub struct CameraRequest {
     pub set: Vec<String>,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.post::<CameraRequest, Begun, _, _>(
         "/api/camera",

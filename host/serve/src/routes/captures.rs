@@ -119,7 +119,6 @@ pub struct RenameRequest {
     pub name: String,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Captures, _, _>("/api/captures", "The captures of the session, by name.", list)
         .query("/api/captures", "search", "Words that record, optics or note hold.")

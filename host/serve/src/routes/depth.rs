@@ -97,7 +97,6 @@ pub struct Figures {
     pub figures: Value,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.post::<CaptureDepthRequest, Begun, _, _>(
         "/api/captures/{capture}/depth",

@@ -19,7 +19,6 @@ use crate::{
 /// What a report may load: what stands in it.
 const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get_bytes(
         "/api/captures/{capture}/files/{file}",

@@ -53,7 +53,6 @@ pub struct Login {
     pub token: String,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<view::State, _, _>("/api/state", "Everything that changes, as it is now.", state)
         .get::<Log, _, _>("/api/log", "What was said, the oldest line first.", log)

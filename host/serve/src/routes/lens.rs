@@ -49,7 +49,6 @@ pub struct Calculated {
     pub figures: Value,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Optics, _, _>("/api/optics", "The optics that captures are taken with.", read)
         .put::<Optics, Done, _, _>(

@@ -120,7 +120,6 @@ pub struct Removing {
     pub shadow: String,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<People, _, _>("/api/people", "Videos that were sent, activities that are known.", people)
         .put_bytes::<Done, _, _>("/api/people/videos/{video}", "Uploads a video.", receive)

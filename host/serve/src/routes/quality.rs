@@ -43,7 +43,6 @@ pub struct Records {
     pub records: Vec<Value>,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Records, _, _>("/api/quality", "The measurements of depth quality so far.", list)
         .post::<QualityRequest, Begun, _, _>(

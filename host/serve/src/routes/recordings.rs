@@ -24,7 +24,6 @@ use crate::{
 
 /// The folder of recordings in the session's.
 const FOLDER: &str = "recordings";
-/// How their names end.
 const ENDING: &str = ".pairs";
 
 /// Whether live depth is recorded.
@@ -62,7 +61,6 @@ pub struct Recordings {
     pub recordings: Vec<OneRecording>,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.get::<Recordings, _, _>("/api/recordings", "Recordings of live depth.", list)
         .post::<RecordRequest, Done, _, _>(

@@ -130,7 +130,6 @@ pub struct Alarms {
     pub figures: Value,
 }
 
-/// Adds the routes.
 pub fn routes(api: Api) -> Api {
     api.post::<Nothing, Done, _, _>("/api/rig/connect", For::Control, "Connects to the rig again.", connect)
         .post::<Home, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)

@@ -43,7 +43,6 @@ impl Served {
         Self::start(Some(RigAddress::Port(port)), Some(Box::new(board)), |_| Listen::Loopback { port: 0 })
     }
 
-    /// Without a rig.
     pub fn captures_only() -> Self {
         Self::start(None, None, |_| Listen::Loopback { port: 0 })
     }
@@ -160,7 +159,6 @@ impl Drop for Served {
     }
 }
 
-/// What came back.
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,

@@ -9,7 +9,6 @@ use ndarray::Array2;
 use super::images::{Images, hsv, hue_difference, rgb, window_means};
 use farnear_silhouettes::mask::Mask;
 
-/// Limits of the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Least value in proportion to the background's.

@@ -11,7 +11,6 @@ pub enum SunError {
     /// Longitude outside -180 to 360 degrees or not a number.
     #[error("longitude {0} deg is outside -180 to 360 deg (east is positive)")]
     Longitude(f64),
-    /// No such model.
     #[error("unknown sun model `{0}`: expected psa, almanac, thesis or spa")]
     UnknownModel(String),
     /// The text is not an RFC 3339 time.

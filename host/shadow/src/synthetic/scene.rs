@@ -39,9 +39,7 @@ pub struct Scene {
     pub shadow: Mask,
     /// Both: what a background model would find.
     pub silhouette: Mask,
-    /// The camera.
     pub camera: CameraFile,
-    /// The sun.
     pub sun: SunPosition,
     /// Where the person truly stands, [offset to the right, distance], metres.
     pub stands_at_m: [f64; 2],

@@ -17,7 +17,6 @@ use ndarray::{Array2, ArrayView2, ArrayView3};
 /// A frame of the sequence.
 struct Shot {
     picture: DynamicImage,
-    /// From frame 470 on.
     truth: Option<GrayImage>,
 }
 

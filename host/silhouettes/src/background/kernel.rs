@@ -67,7 +67,6 @@ pub struct Update<'a, const CHANNELS: usize> {
     pub used: &'a mut [u8],
     /// Interleaved samples, row by row.
     pub pixels: &'a [u8],
-    /// One code per pixel.
     pub labels: &'a mut [u8],
 }
 

@@ -18,7 +18,6 @@ pub enum Frame<'a> {
 }
 
 impl Frame<'_> {
-    /// Its (height, width).
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
         match self {
@@ -55,12 +54,7 @@ pub enum BackgroundError {
     Settings(#[from] SettingsError),
     /// A frame without pixels.
     #[error("background model: a frame of {width}x{height} pixels has nothing in it")]
-    Empty {
-        /// Height in pixels.
-        height: usize,
-        /// Width in pixels.
-        width: usize,
-    },
+    Empty { height: usize, width: usize },
     /// Neither grey nor RGB.
     #[error("background model: {channels} channels per pixel; give 1 (grey) or 3 (red, green, blue)")]
     Channels {
@@ -144,9 +138,6 @@ impl BackgroundModel {
     }
 
     /// A model for frames like this one, which is not taken in yet.
-    ///
-    /// # Errors
-    /// As [`BackgroundModel::new`].
     pub fn like(frame: Frame<'_>, settings: Settings) -> Result<Self, BackgroundError> {
         Self::new(frame.size(), frame.channels(), settings)
     }
@@ -166,9 +157,6 @@ impl BackgroundModel {
 
     /// As [`BackgroundModel::apply`] with a learning rate of one's own, clamped to 0 (labels only; unexplained
     /// samples still leave a component of no weight) to 1 (forgets everything).
-    ///
-    /// # Errors
-    /// As [`BackgroundModel::apply`].
     pub fn apply_at(&mut self, frame: Frame<'_>, rate: f32) -> Result<Array2<Label>, BackgroundError> {
         if frame.size() != self.size || frame.channels() != self.channels {
             return Err(BackgroundError::Changed {

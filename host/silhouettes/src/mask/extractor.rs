@@ -46,7 +46,6 @@ impl ExtractorSettings {
     }
 }
 
-/// What a frame gave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extracted {
     /// The subject's mask, its bounds and what is doubtful about them.
@@ -108,9 +107,6 @@ impl Extractor {
     }
 
     /// As [`Self::extract`], for whoever wants all that moves and not one subject.
-    ///
-    /// # Errors
-    /// As [`Self::extract`].
     pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
         let labels = self.model.apply(frame)?;
         let moving = labels.mapv(|label| label == Label::Foreground);

@@ -13,7 +13,6 @@ use super::{
 pub struct Person {
     /// The connected regions.
     pub fragments: Vec<Region>,
-    /// Their pixels.
     pub area: usize,
     /// The smallest box that holds them.
     pub bounds: BoundingBox,

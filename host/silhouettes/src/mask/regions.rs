@@ -20,9 +20,7 @@ pub enum Connectivity {
 /// Neighbouring set pixels of one row; half open columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// Row of the run.
     pub row: usize,
-    /// First column.
     pub start: usize,
     /// One past the last column.
     pub end: usize,
@@ -33,7 +31,6 @@ pub struct Run {
 pub struct Region {
     /// Its pixels, row by row.
     pub runs: Vec<Run>,
-    /// How many they are.
     pub area: usize,
     /// The smallest box that holds them.
     pub bounds: BoundingBox,

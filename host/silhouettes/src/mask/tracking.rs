@@ -44,7 +44,6 @@ pub enum Sight {
     Alone {
         /// Its pixels in the full frame.
         mask: Mask,
-        /// What it spans.
         bounds: BoundingBox,
         /// Part of it may be outside.
         cut_by_edge: bool,
@@ -52,22 +51,15 @@ pub enum Sight {
         before: Vec<Mask>,
     },
     /// In one blob with these people.
-    Crossing {
-        /// Their numbers.
-        with: Vec<usize>,
-        /// What the blob spans.
-        bounds: BoundingBox,
-    },
+    Crossing { with: Vec<usize>, bounds: BoundingBox },
     /// Nowhere, for the moment.
     Missed,
 }
 
-/// Somebody in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Followed {
     /// The person's number, from 1 in the order of coming.
     pub person: usize,
-    /// What is seen.
     pub sight: Sight,
     /// Crossings that have just ended.
     pub parted: Vec<Parting>,
@@ -76,7 +68,6 @@ pub struct Followed {
 /// The end of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parting {
-    /// The other one.
     pub from: usize,
     /// Whether the two might as well be each other.
     pub ambiguous: bool,

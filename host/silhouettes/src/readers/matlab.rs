@@ -30,13 +30,11 @@ pub enum Array {
 /// What is wrong with a MAT-file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MatlabError {
-    /// Not a MATLAB 5 file.
     #[error("not a MATLAB 5 MAT-file: {0}")]
     Header(&'static str),
     /// The file ends within an element.
     #[error("the file ends within {what} at byte {at}")]
     Truncated {
-        /// What was being read.
         what: &'static str,
         /// Offset in the (decompressed) element.
         at: usize,
@@ -44,7 +42,6 @@ pub enum MatlabError {
     /// Something that cannot be.
     #[error("{what} at byte {at} is {value}, which is not valid")]
     Invalid {
-        /// What was being read.
         what: &'static str,
         /// The value that stands there.
         value: u64,
@@ -59,7 +56,6 @@ pub enum MatlabError {
 /// Data types of elements.
 const MI_MATRIX: u32 = 14;
 const MI_COMPRESSED: u32 = 15;
-/// Array classes.
 const CELL_CLASS: u8 = 1;
 const NUMERIC_CLASSES: std::ops::RangeInclusive<u8> = 6..=15;
 /// Cells within cells are read no deeper than this.

@@ -5,7 +5,6 @@ use super::recording::{Found, RecordingError};
 /// A kind of file and how it is read.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader {
-    /// Name of the format.
     pub name: &'static str,
     /// Endings of its files, lower case, without the dot.
     pub extensions: &'static [&'static str],

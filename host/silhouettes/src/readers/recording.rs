@@ -73,11 +73,8 @@ impl FromStr for Unit {
 /// The axis of a file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Up {
-    /// The first.
     X,
-    /// The second.
     Y,
-    /// The third.
     Z,
 }
 
@@ -118,9 +115,7 @@ impl FromStr for Up {
 /// Where something about a recording is known from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The caller named it.
     Caller,
-    /// The file states it.
     File,
     /// Files of this format have it so.
     Format,
@@ -131,7 +126,6 @@ pub enum Source {
     },
     /// Nothing states it: it was guessed.
     Guess {
-        /// From what.
         reason: String,
         /// Whether the guess stands clear of the other possibilities.
         sure: bool,
@@ -141,7 +135,6 @@ pub enum Source {
 /// Something about a recording, and where it is known from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known<T> {
-    /// The value.
     pub value: T,
     /// Where it is known from.
     pub source: Source,
@@ -160,7 +153,6 @@ impl<T> Known<T> {
 /// What the caller knows better than the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Choices {
-    /// The unit of length.
     pub unit: Option<Unit>,
     /// The axis that points up.
     pub up: Option<Up>,
@@ -169,13 +161,11 @@ pub struct Choices {
 /// What a file holds, in its own unit and axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// Names in file order.
     pub names: Vec<String>,
     /// Frames per second, 0 if the file does not say.
     pub rate_hz: f64,
     /// `frames[f][m]`: point m in frame f.
     pub frames: Vec<Vec<Option<Point3>>>,
-    /// The unit of length.
     pub unit: Known<Unit>,
     /// The axis that points up.
     pub up: Known<Up>,
@@ -213,7 +203,6 @@ impl Found {
 /// Named points (markers or joints) over time, `None` where one was hidden: millimetres, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Names in file order.
     pub names: Vec<String>,
     /// Frames per second, 0 if the file does not say.
     pub rate_hz: f64,
@@ -263,7 +252,6 @@ pub enum RecordingError {
     /// No reader knows files with this ending.
     #[error("no reader of motion capture knows files that end in `.{found}`: expected {known}")]
     Extension {
-        /// The ending.
         found: String,
         /// The endings that are known.
         known: String,
@@ -276,27 +264,21 @@ pub enum RecordingError {
         /// What the file has in place of what such a file has.
         reason: String,
     },
-    /// The file ends early.
     #[error("the {kind} file ends within {what}: {needed} bytes are needed, {found} are there")]
     Truncated {
-        /// Kind of file.
         kind: &'static str,
-        /// What was being read.
         what: &'static str,
         /// Bytes up to the end of what was being read.
         needed: usize,
-        /// Bytes of the file.
         found: usize,
     },
     /// A line that cannot be read.
     #[error("line {line}: {reason}")]
     Line {
-        /// Line number from 1.
         line: usize,
         /// What stands there and what was expected.
         reason: String,
     },
-    /// An unknown unit.
     #[error(
         "unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres"
     )]

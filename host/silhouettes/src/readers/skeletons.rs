@@ -128,7 +128,6 @@ pub struct SkeletonClip {
 /// Why a skeleton file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SkeletonError {
-    /// The file itself.
     #[error(transparent)]
     Matlab(#[from] MatlabError),
     /// No cell array of the expected form.

@@ -6,7 +6,6 @@ pub type Point3 = [f64; 3];
 /// All points nearer than `radius_mm` to the segment from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    /// One end of the axis.
     pub from: Point3,
     /// The other end; equal to `from` it makes a sphere.
     pub to: Point3,

@@ -17,7 +17,6 @@ use std::collections::HashMap;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fill {
-    /// The convex hull.
     #[default]
     Hull,
     /// All triplets, as printed.
@@ -27,7 +26,6 @@ pub enum Fill {
 /// A drawn frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartsSilhouette {
-    /// All parts together.
     pub mask: Mask,
     /// Parts without a single visible marker: the picture lacks them.
     pub missing_parts: Vec<String>,

@@ -18,7 +18,6 @@ use serde::{Deserialize, Serialize};
 pub struct Part {
     /// Its name, by which flags and errors call it.
     pub name: String,
-    /// Markers on it.
     pub markers: Vec<String>,
     /// Grown by so many millimetres all round.
     #[serde(default)]
@@ -48,7 +47,6 @@ pub enum TemplateError {
     /// A part that cannot be drawn.
     #[error("template: part `{part}` {reason}")]
     Part {
-        /// Name of the part.
         part: String,
         /// What keeps it from being drawn.
         reason: String,
@@ -122,9 +120,6 @@ impl Template {
     }
 
     /// Checks that a recording's markers fit: at least half of the template's must be there by name (a suit may lack a few).
-    ///
-    /// # Errors
-    /// [`TemplateError::UnknownMarkers`].
     pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
         let (missing, of) = self.missing(names);
         if 2 * missing.len() > of {

@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 pub struct View {
     /// About x: positive looks down on the subject.
     pub alpha_deg: f64,
-    /// About y: roll.
     pub beta_deg: f64,
     /// About z: round the subject.
     pub gamma_deg: f64,
@@ -57,9 +56,7 @@ pub(super) fn project(matrix: &[[f64; 3]; 3], p: Point3) -> Point {
 /// The picture that a view is drawn into: its size, scale, and which point of the view lies in its middle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Canvas {
-    /// Height in pixels.
     pub height_px: usize,
-    /// Width in pixels.
     pub width_px: usize,
     /// Millimetres per pixel: D in (7.2).
     pub mm_per_px: f64,

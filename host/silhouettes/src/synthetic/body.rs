@@ -5,7 +5,6 @@
 
 use crate::silhouette::capsule::{Capsule, Point3};
 
-/// Build of one person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
     /// Stature in millimetres.
@@ -29,9 +28,7 @@ impl Default for Build {
 pub struct Leg {
     /// Thigh forward of the vertical.
     pub hip_deg: f64,
-    /// Knee bend.
     pub knee_deg: f64,
-    /// Thigh outwards.
     pub spread_deg: f64,
 }
 
@@ -40,7 +37,6 @@ pub struct Leg {
 pub struct Arm {
     /// Upper arm forward of the trunk's axis (hanging = 0, straight ahead = 90, up = 180).
     pub shoulder_deg: f64,
-    /// Upper arm outwards.
     pub spread_deg: f64,
     /// Elbow bend, forearm forwards.
     pub elbow_deg: f64,
@@ -53,34 +49,23 @@ pub struct Pose {
     pub lean_deg: f64,
     /// Head forward of the trunk.
     pub nod_deg: f64,
-    /// Legs.
     pub legs: [Leg; 2],
-    /// Arms.
     pub arms: [Arm; 2],
 }
 
 /// Joint positions of a posed person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joints {
-    /// Middle of the hips.
     pub pelvis: Point3,
-    /// Base of the neck.
     pub neck: Point3,
-    /// Centre of the head.
     pub head: Point3,
     /// Hips, left and right, as all pairs below.
     pub hips: [Point3; 2],
-    /// Knees.
     pub knees: [Point3; 2],
-    /// Ankles.
     pub ankles: [Point3; 2],
-    /// Toes.
     pub toes: [Point3; 2],
-    /// Shoulders.
     pub shoulders: [Point3; 2],
-    /// Elbows.
     pub elbows: [Point3; 2],
-    /// Hands.
     pub hands: [Point3; 2],
 }
 
@@ -139,7 +124,6 @@ pub fn joints(build: &Build, pose: &Pose) -> Joints {
 }
 
 impl Joints {
-    /// Changes every joint.
     pub fn each(&mut self, mut change: impl FnMut(&mut Point3)) {
         change(&mut self.pelvis);
         change(&mut self.neck);

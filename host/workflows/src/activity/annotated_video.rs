@@ -39,7 +39,6 @@ pub(super) struct Shown {
 }
 
 impl AnnotatedVideo {
-    /// Begins a new folder.
     pub fn begin(folder: &Path) -> Result<Self> {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)?, frames: 0 })
     }

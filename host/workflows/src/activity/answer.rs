@@ -27,7 +27,6 @@ pub struct AnswerSummary {
 /// Probability of an activity.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Probability {
-    /// The activity.
     pub activity: String,
     /// 0 to 1; all add up to 1.
     pub probability: f64,
@@ -36,9 +35,7 @@ pub struct Probability {
 /// A stretch of the recording; frames from 1, both ends included.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Part {
-    /// First frame.
     pub from: usize,
-    /// Last frame.
     pub to: usize,
     /// The activity; `None` is unknown.
     pub activity: Option<String>,
@@ -47,7 +44,6 @@ pub struct Part {
 }
 
 impl AnswerSummary {
-    /// Of that many frames.
     pub(super) fn new(answer: Answer, frames: usize) -> Self {
         Self {
             confidence: rounded_probability(answer.confidence),

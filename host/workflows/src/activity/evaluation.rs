@@ -79,13 +79,9 @@ pub struct EvaluationFigures {
     pub accuracy: f64,
     /// Its 95 % interval (Wilson).
     pub confidence_interval: [f64; 2],
-    /// Right answers.
     pub right: u32,
-    /// Answers.
     pub answers: u32,
-    /// Clips.
     pub clips: usize,
-    /// People.
     pub subjects: usize,
     /// Which views were recognised together.
     pub views: Views,
@@ -93,13 +89,11 @@ pub struct EvaluationFigures {
     pub mode: &'static str,
     /// Whether masks are full frames, so that the box's motion counts.
     pub full_frames: bool,
-    /// Masks.
     pub frames: usize,
     /// Masks without anybody.
     pub empty_frames: usize,
     /// From a mask in memory to its part of an answer, one thread.
     pub seconds_per_frame: f64,
-    /// Time for all.
     pub seconds: f64,
     /// `counts[truth][answer]`.
     pub confusion: Confusion,

@@ -22,7 +22,6 @@ use crate::{context::Context, counter::Counter, error::Result, figures::rounded}
 /// What is judged by what.
 #[derive(Clone, PartialEq, Debug)]
 pub struct JudgingSettings {
-    /// The samples, TOML.
     pub samples: PathBuf,
     /// Names of activities in the samples and in the model where they differ.
     pub same: Vec<(String, String)>,
@@ -45,7 +44,6 @@ pub struct JudgingFigures {
     pub confidence_interval: [f64; 2],
     /// Share that is right if only activities of the samples can be.
     pub accuracy_among: f64,
-    /// Its 95 % interval.
     pub confidence_interval_among: [f64; 2],
     /// How far confidences are from the fraction of right answers (expected calibration error), 0 to 1.
     pub calibration_error: f64,
@@ -65,7 +63,6 @@ pub struct JudgingFigures {
     pub confusion: Confusion,
 }
 
-/// One answer.
 struct Judged<'a> {
     clip: &'a Clip,
     view: usize,

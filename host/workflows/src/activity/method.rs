@@ -20,7 +20,6 @@ pub struct Adaptation {
     pub self_training: usize,
 }
 
-/// The method.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Method {
     /// What clips are turned into.
@@ -52,9 +51,6 @@ pub enum Pattern {
 
 impl Method {
     /// What is tried and chosen from, for full frames or cut-out silhouettes.
-    ///
-    /// # Errors
-    /// As [`Shipped::recognisers`].
     pub fn experiment(&self, full_frames: bool) -> Result<Experiment> {
         let experiment = match (self.pattern, self.search) {
             (Pattern::Features { model, classifier }, _) => {

@@ -38,7 +38,6 @@ pub struct MotionFile {
     pub activity: Option<String>,
     /// Who does it; `None` for the file's name, or what a set says.
     pub subject: Option<String>,
-    /// The file.
     pub path: PathBuf,
 }
 
@@ -66,7 +65,6 @@ impl FromStr for MotionFile {
 /// Which motion files are learned from, and how they are seen.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MotionSettings {
-    /// The files.
     pub files: Vec<MotionFile>,
     /// What makes bodies of points: a built-in template's name, or a TOML file; without it the built-in one that fits best.
     pub template: Option<String>,
@@ -81,22 +79,13 @@ pub struct MotionSettings {
 pub enum MotionError {
     /// Nothing says what is done in it.
     #[error("{}: nothing says what is done in it; name it ACTIVITY=FILE", path.display())]
-    Activity {
-        /// The file.
-        path: PathBuf,
-    },
+    Activity { path: PathBuf },
     /// A set has its own names.
     #[error("{}: a set of joints says itself who does what; give the file alone", path.display())]
-    Named {
-        /// The file.
-        path: PathBuf,
-    },
+    Named { path: PathBuf },
     /// No camera sees anybody.
     #[error("{}: nobody is seen; the unit or the upward axis may be wrong", path.display())]
-    NobodySeen {
-        /// The file.
-        path: PathBuf,
-    },
+    NobodySeen { path: PathBuf },
 }
 
 /// One recorded performance.
@@ -158,7 +147,6 @@ fn seen(recorded: &Recorded, cameras: usize, seed: u64) -> Vec<Clip> {
     tracks.into_iter().map(clip).collect()
 }
 
-/// What a file holds.
 fn recorded(file: &MotionFile, settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Recorded>> {
     let path = &file.path;
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();

@@ -26,7 +26,6 @@ use crate::{
     parameters::at_least,
 };
 
-/// What is recognised.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MultiPersonSettings {
     /// Masks of full frames, or a video.
@@ -44,7 +43,6 @@ pub struct MultiPersonSettings {
 pub struct FrameOfPeople {
     /// Number of the frame, from 1.
     pub frame: usize,
-    /// Its name.
     pub name: String,
     /// Those who are followed, by their numbers.
     pub people: Vec<PersonInFrame>,
@@ -53,7 +51,6 @@ pub struct FrameOfPeople {
     pub flags: Vec<String>,
 }
 
-/// One of them.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PersonInFrame {
     /// The number, from 1 in the order of coming.
@@ -75,11 +72,8 @@ pub struct PersonInFrame {
 /// Everybody in the recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct EverybodyFigures {
-    /// By their numbers.
     pub people: Vec<PersonFigures>,
-    /// Frames.
     pub frames: usize,
-    /// Frames of a window.
     pub window: usize,
     /// From a file to everybody's part of a streaming answer.
     pub seconds_per_frame: f64,
@@ -88,7 +82,6 @@ pub struct EverybodyFigures {
 /// What one of them did.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PersonFigures {
-    /// The number.
     pub person: usize,
     /// First frame with a silhouette.
     pub from: usize,
@@ -112,21 +105,12 @@ pub struct PersonFigures {
 pub enum MultiPersonError {
     /// Cut-out silhouettes hold one person each.
     #[error("{}: these are silhouettes cut out at 100x100, which hold one person each; several are looked for in full frames", path.display())]
-    CutOut {
-        /// The masks.
-        path: PathBuf,
-    },
+    CutOut { path: PathBuf },
     /// A model that fuses views.
     #[error("{}: the model fuses {views} views; several people are recognised by a model of one view", model.display())]
-    Views {
-        /// The model.
-        model: PathBuf,
-        /// Its views.
-        views: usize,
-    },
+    Views { model: PathBuf, views: usize },
 }
 
-/// One who is followed.
 struct Somebody<'m> {
     live: Live<'m>,
     answer: Option<Answer>,

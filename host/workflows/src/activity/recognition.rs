@@ -100,12 +100,10 @@ impl Model {
         self.cut_out.as_ref().filter(|_| !full_frames).unwrap_or(&self.recogniser)
     }
 
-    /// Its file or name.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What it can answer.
     pub fn activities(&self) -> &[String] {
         &self.recogniser.activities
     }
@@ -123,7 +121,6 @@ impl Model {
     }
 }
 
-/// What is recognised.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct RecognitionSettings {
     /// As many views as the model fuses, in its order; any number for a model of one view.
@@ -140,11 +137,8 @@ pub struct RecognitionSettings {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{}: the model fuses {expected} views, {found} were given", model.display())]
 pub struct ViewsError {
-    /// The model.
     pub model: PathBuf,
-    /// Its views.
     pub expected: usize,
-    /// Views given.
     pub found: usize,
 }
 
@@ -169,16 +163,13 @@ pub struct FrameAnswer {
 /// The answer for the whole recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecognitionFigures {
-    /// For all of it.
     #[serde(flatten)]
     pub answer: AnswerSummary,
-    /// Frames of a view.
     pub frames: usize,
     /// Masks of all views without anybody.
     pub empty_frames: usize,
     /// Frames with something doubtful.
     pub flagged_frames: usize,
-    /// Frames of a window.
     pub window: usize,
     /// Answers for windows that overlap by half.
     pub windows: Vec<Part>,

@@ -50,7 +50,6 @@ fn first() -> u32 {
 /// Why samples cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SamplesError {
-    /// Nothing in it.
     #[error("it has no [[sample]] (masks, subject, activity, view)")]
     None,
     /// A sample without a person or without an activity.
@@ -58,12 +57,7 @@ pub enum SamplesError {
     Nameless,
     /// A folder in which nobody is seen.
     #[error("{}: all {count} masks are empty", folder.display())]
-    NobodySeen {
-        /// The folder.
-        folder: PathBuf,
-        /// Its masks.
-        count: usize,
-    },
+    NobodySeen { folder: PathBuf, count: usize },
     /// Full frames beside cut-out silhouettes.
     #[error(
         "the masks of {} are full frames, those of {} cut out at 100x100; samples must be alike", full.display(), cut_out.display()
@@ -79,11 +73,8 @@ pub enum SamplesError {
     Twice {
         /// The clip's name.
         clip: String,
-        /// Who.
         subject: String,
-        /// What.
         activity: String,
-        /// The view.
         view: u32,
     },
     /// Clips with other views, where all views were to be fused.
@@ -93,7 +84,6 @@ pub enum SamplesError {
     Views {
         /// Fewest views of a clip.
         least: usize,
-        /// Most.
         most: usize,
     },
     /// Samples to test with other views than those to learn from.
@@ -110,9 +100,7 @@ pub enum SamplesError {
         samples.display(), found.join(", "), known.join(", ")
     )]
     NothingInCommon {
-        /// The samples.
         samples: PathBuf,
-        /// Their activities.
         found: Vec<String>,
         /// The model's.
         known: Vec<String>,
@@ -122,7 +110,6 @@ pub enum SamplesError {
         "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()
     )]
     SamePerson {
-        /// Who.
         subject: String,
         /// Samples to test with.
         test: PathBuf,
@@ -133,7 +120,6 @@ pub enum SamplesError {
 
 /// What a file of samples holds.
 pub struct Samples {
-    /// The file.
     pub path: PathBuf,
     /// Clips whose views are in the order of their numbers.
     pub clips: Vec<Clip>,
@@ -210,9 +196,6 @@ impl Samples {
     }
 
     /// Whether these and others are both full frames, or both cut out.
-    ///
-    /// # Errors
-    /// [`SamplesError::Kinds`].
     pub fn check_kind(&self, other: &Self) -> Result<(), SamplesError> {
         if self.full_frames == other.full_frames {
             return Ok(());

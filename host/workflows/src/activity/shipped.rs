@@ -21,13 +21,11 @@ pub struct Shipped {
     pub name: &'static str,
     /// What it is, in a line.
     pub about: &'static str,
-    /// Its file.
     bytes: &'static [u8],
     /// Its file for silhouettes that are cut out at 100x100, whose motion through the picture is gone.
     cut_out: &'static [u8],
 }
 
-/// All of them.
 pub const MODELS: &[Shipped] = &[
     Shipped {
         name: "everyday",
@@ -45,9 +43,6 @@ pub const MODELS: &[Shipped] = &[
 
 /// The recogniser that says beside one trained on full frames or cut-out silhouettes what is unknown. It is the one that sees order, whatever
 /// the trained one sees: it knows strangers better.
-///
-/// # Errors
-/// As [`Shipped::recognisers`].
 pub fn auxiliary_model(full_frames: bool) -> Result<Recogniser> {
     let [full, cut_out] = MODELS[0].recognisers()?;
     Ok(if full_frames { full } else { cut_out })
@@ -63,7 +58,6 @@ impl std::fmt::Debug for Shipped {
 }
 
 impl Shipped {
-    /// The one of a name.
     pub fn named(name: &str) -> Option<&'static Self> {
         MODELS.iter().find(|model| model.name == name)
     }
@@ -80,22 +74,16 @@ impl Shipped {
 /// What there is of a shipped model to list.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ModelFigures {
-    /// Its name.
     pub name: &'static str,
-    /// What it is.
     pub about: &'static str,
     /// Its size in the program.
     pub bytes: usize,
     /// Share of what it knows that it calls unknown, as it was made for.
     pub false_alarms: f64,
-    /// What it can answer.
     pub activities: Vec<String>,
 }
 
 /// All shipped models.
-///
-/// # Errors
-/// As [`Shipped::recognisers`].
 pub fn list() -> Result<Vec<ModelFigures>> {
     MODELS
         .iter()
@@ -114,7 +102,6 @@ pub fn list() -> Result<Vec<ModelFigures>> {
 
 /// People and passes that the shipped models were made with.
 pub const PEOPLE: usize = 3000;
-/// See [`PEOPLE`].
 pub const PASSES: usize = 6;
 
 /// How models are made of synthetic people.
@@ -128,18 +115,14 @@ pub struct SyntheticTraining {
     pub out: PathBuf,
 }
 
-/// What was made.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SyntheticTrainingFigures {
     /// Clips learned from; their mirrors come on top.
     pub clips: usize,
     /// Clips of other people by which models were calibrated.
     pub calibration_clips: usize,
-    /// Activities.
     pub activities: usize,
-    /// Time for all.
     pub seconds: f64,
-    /// The models.
     pub model: Vec<MadeModel>,
 }
 
@@ -150,7 +133,6 @@ pub struct MadeModel {
     pub file: String,
     /// Share of right answers for the clips that calibrated it.
     pub accuracy: f64,
-    /// Its size.
     pub bytes: usize,
 }
 

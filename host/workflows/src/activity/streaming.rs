@@ -48,11 +48,8 @@ pub struct RunningAnswer {
 
 /// A frame, its mask and the answer with it.
 pub struct Moment<'a> {
-    /// Grey values.
     pub picture: &'a Array2<u8>,
-    /// The person.
     pub mask: &'a Mask,
-    /// The answer.
     pub answer: &'a RunningAnswer,
 }
 
@@ -65,9 +62,7 @@ pub struct RunningFigures {
     pub confidence: f64,
     /// What it is most likely, the likeliest first.
     pub best: Vec<Probability>,
-    /// Frames.
     pub frames: usize,
-    /// Frames with nobody.
     pub empty_frames: usize,
     /// From a frame to its answer, mean, in s.
     pub seconds_per_frame: f64,
@@ -83,7 +78,6 @@ pub struct StreamingRecogniser<'m> {
 }
 
 impl<'m> StreamingRecogniser<'m> {
-    /// With nothing seen.
     pub fn new(model: &'m Model) -> Self {
         let model = model.recogniser(true);
         let live = Live::new(model, model.typical_frames.max(1), true);

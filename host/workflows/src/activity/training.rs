@@ -28,11 +28,9 @@ const WINDOW_MIN: usize = 5;
 /// What is trained on, how, and where the model goes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TrainingSettings {
-    /// The samples, TOML.
     pub samples: Option<PathBuf>,
     /// Motion files to learn from, too or instead; every view is a clip of its own then.
     pub motion: Option<MotionSettings>,
-    /// The model.
     pub out: PathBuf,
     /// How activities are told apart.
     pub method: Method,
@@ -42,18 +40,13 @@ pub struct TrainingSettings {
     pub any_view: bool,
 }
 
-/// What was trained.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrainingFigures {
-    /// Clips.
     pub clips: usize,
-    /// People.
     pub subjects: usize,
-    /// Activities.
     pub activities: usize,
     /// Views that the model fuses.
     pub views: usize,
-    /// Masks.
     pub frames: usize,
     /// Masks without anybody.
     pub empty_frames: usize,
@@ -71,7 +64,6 @@ pub struct TrainingFigures {
     pub condition_number: Option<f64>,
     /// Over the folds in which the settings were chosen, 0 to 1.
     pub inner_accuracy: Option<f64>,
-    /// Time for all.
     pub seconds: f64,
 }
 
@@ -124,7 +116,6 @@ struct Learned {
     frames: usize,
     empty_frames: usize,
     full_frames: bool,
-    /// For messages.
     what: String,
 }
 

@@ -58,7 +58,6 @@ fn nearly_two_levels(levels: impl ExactSizeIterator<Item = u8>) -> bool {
 pub struct View {
     /// A folder, a picture or a video.
     pub path: PathBuf,
-    /// What it is.
     pub kind: ViewKind,
 }
 
@@ -97,7 +96,6 @@ pub(super) struct Moved {
     pub picture: Option<Pixels>,
 }
 
-/// Height and width.
 pub(super) fn size(picture: &Pixels) -> (usize, usize) {
     match picture {
         Pixels::Grey(grey) => grey.dim(),

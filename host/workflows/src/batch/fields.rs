@@ -54,13 +54,11 @@ impl Fields {
         self
     }
 
-    /// Takes a field away.
     pub fn remove(&mut self, name: &str) {
         self.values.remove(name);
         self.taken.remove(name);
     }
 
-    /// Takes all fields.
     pub fn take_all(&mut self) -> Map<String, Value> {
         let all = std::mem::take(&mut self.values).into_iter();
         all.map(|(name, values)| {

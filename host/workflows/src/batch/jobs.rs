@@ -19,7 +19,6 @@ use crate::{
 
 /// A kind of job.
 pub(super) struct Kind {
-    /// What `do` says.
     pub name: &'static str,
     /// Whether its result is one file and not a folder.
     pub makes_file: bool,

@@ -21,7 +21,6 @@ pub(super) const KIND: &str = "do";
 
 /// A job as it stands in the manifest.
 pub(super) struct Entry {
-    /// From 1.
     pub number: usize,
     /// The line that it begins on.
     pub line: usize,

@@ -91,7 +91,6 @@ impl<'a> Tally<'a> {
         Ok(())
     }
 
-    /// The counts.
     pub fn end(&self) -> BatchFigures {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner).figures.clone()
     }

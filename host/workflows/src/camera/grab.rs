@@ -19,7 +19,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Name of the record.
 pub const GRAB_FILE: &str = "grab.toml";
 /// Longest single wait, so that an interruption is seen soon.
 const SLICE: Duration = Duration::from_millis(200);
@@ -36,26 +35,21 @@ pub enum PictureFormat {
 /// What is grabbed, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct GrabSettings {
-    /// The camera.
     pub camera: CameraChoice,
-    /// How many pictures.
     pub frames: usize,
     /// How they are written.
     pub format: PictureFormat,
     /// Longest wait for one.
     pub wait: Duration,
-    /// The new folder.
     pub out: PathBuf,
 }
 
 /// What there is to say of it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GrabFigures {
-    /// Pictures.
     pub frames: usize,
     /// Pixels across the last one.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
     /// Bits that carry the picture.
     pub bits: u8,

@@ -20,7 +20,6 @@ const SLICE: Duration = Duration::from_millis(100);
 /// What is looked at, and for how long.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveSettings {
-    /// The camera.
     pub camera: CameraChoice,
     /// What is largest when the picture is sharpest.
     pub measure: FocusMeasure,
@@ -42,9 +41,7 @@ pub struct LiveFigures {
     pub mean_percent: f64,
     /// Pixels at full scale, in per cent.
     pub saturated_percent: f64,
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
     /// Bits that carry the picture.
     pub bits: u8,

@@ -12,7 +12,6 @@ use crate::{
 /// How depth is computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
-    /// `ro`.
     #[default]
     RationalOperators,
     /// `whitened`: operators with a white residual.
@@ -25,7 +24,6 @@ pub enum Method {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("expected ro, whitened, subbarao, subbarao-fourier or favaro")]
 pub struct UnknownMethod {
-    /// The name.
     pub name: String,
 }
 
@@ -55,7 +53,6 @@ impl fmt::Display for Method {
 
 /// A method with what it needs.
 pub enum Prepared {
-    /// With its operators.
     RationalOperators(Arc<Operators>),
     /// Designs its kernels for the optics.
     Whitened,
@@ -83,7 +80,6 @@ impl Prepared {
         }
     }
 
-    /// Which method it is.
     pub fn method(&self) -> Method {
         match self {
             Self::RationalOperators(_) => Method::RationalOperators,

@@ -39,7 +39,6 @@ pub enum CameraNoise {
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{reason}")]
 pub struct NoiseError {
-    /// The text.
     pub text: String,
     /// What is wrong with it, and what was expected.
     pub reason: String,
@@ -146,9 +145,7 @@ pub struct Source<'a> {
     pub prepared: &'a Prepared,
     /// The rational operators of one window that the depth was computed with, if it was.
     pub operators: Option<&'a Operators>,
-    /// See there.
     pub optics: &'a Optics,
-    /// See there.
     pub settings: &'a Settings,
     /// What the judge says, for every other method.
     pub judged: &'a Array2<f32>,

@@ -31,7 +31,6 @@ type Sink = BufWriter<File>;
 struct Output {
     /// The names by which it is asked for.
     names: &'static [&'static str],
-    /// The file.
     file: &'static str,
     /// Writes it, piece by piece: with several megapixels a file can be larger than all maps together.
     write: fn(&Results<'_>, &mut Sink) -> io::Result<()>,
@@ -69,7 +68,6 @@ pub struct Outputs(BTreeSet<&'static str>);
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("there is no output \"{name}\"; expected some of {}", Outputs::names().join(","))]
 pub struct UnknownOutput {
-    /// The name.
     pub name: String,
 }
 
@@ -121,7 +119,6 @@ impl fmt::Display for Outputs {
     }
 }
 
-/// All that is written.
 pub(super) struct Results<'a> {
     settings: &'a DepthRequest,
     inputs: &'a Inputs,

@@ -18,11 +18,9 @@ pub(super) const AROUND_PX: usize = 40;
 pub struct Part {
     /// Leftmost column of the map in the images.
     pub x: usize,
-    /// Topmost row.
     pub y: usize,
     /// Columns of the images.
     pub image_width: usize,
-    /// Rows of the images.
     pub image_height: usize,
 }
 
@@ -90,7 +88,6 @@ impl Cut {
         }
     }
 
-    /// For the record.
     pub fn part(&self) -> Part {
         let Rectangle { x, y, .. } = self.wanted;
         Part { x, y, image_width: self.image.1, image_height: self.image.0 }

@@ -11,11 +11,9 @@ use crate::{context::Context, error::Result};
 pub struct AlarmFigures {
     /// Number of the latched alarm; 0 = none.
     pub latched: u32,
-    /// The last one first.
     pub alarms: Vec<AlarmEntry>,
 }
 
-/// An alarm.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AlarmEntry {
     /// Its number, by which it is cleared.

@@ -9,9 +9,7 @@ use crate::{context::Context, error::Result};
 /// What the board has counted in its life.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct CounterFigures {
-    /// Starts.
     pub boots: u32,
-    /// Alarms that came up.
     pub alarms: u32,
     /// Exposures that were triggered.
     pub triggers: u64,
@@ -19,7 +17,6 @@ pub struct CounterFigures {
     pub coarse_steps: u64,
     /// Steps of the lens stage.
     pub lens_steps: u64,
-    /// Homings.
     pub homings: u32,
     /// Records in the memory of which one copy was bad.
     pub repaired_records: u32,

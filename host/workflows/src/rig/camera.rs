@@ -21,7 +21,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Which camera.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub enum CameraAddress {
     /// The emulated rig's own.
@@ -113,7 +112,6 @@ fn not_built(kind: &str, address: impl std::fmt::Display, feature: &str) -> Work
 /// A camera and how it exposes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CameraSettings {
-    /// Which.
     pub address: CameraAddress,
     /// Length of an exposure.
     pub exposure: Micros,
@@ -205,9 +203,6 @@ impl EarlyCamera {
     }
 
     /// The same with a second camera, behind a half mirror; without one of its own, the emulated rig's second.
-    ///
-    /// # Errors
-    /// As [`EarlyCamera::connect`].
     pub(super) fn connect_both(
         self,
         second: Self,
@@ -232,7 +227,6 @@ impl EarlyCamera {
 pub struct EquippedRig {
     /// Where images come from.
     pub camera: Box<dyn Camera>,
-    /// The rig.
     pub rig: Rig,
 }
 

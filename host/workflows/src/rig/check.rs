@@ -71,12 +71,9 @@ const PHASES: [Phase; 3] = [
     },
 ];
 
-/// What is checked.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CheckSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
     /// Only the steps with the motors disconnected: nothing moves.
     pub resting_only: bool,
@@ -84,20 +81,17 @@ pub struct CheckSettings {
     pub actuation: bool,
 }
 
-/// How a step ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// It is as it should be.
     Passed,
-    /// It is not.
     Failed,
     /// It was not looked at; the detail says why.
     PassedOver,
 }
 
 impl Verdict {
-    /// As it is said.
     fn text(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -110,20 +104,15 @@ impl Verdict {
 /// A step that was taken.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Outcome {
-    /// Its name.
     pub step: &'static str,
-    /// How it ended.
     pub verdict: Verdict,
-    /// What was found.
     pub detail: String,
 }
 
 /// The checklist, as far as it went.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Checklist {
-    /// Steps that passed.
     pub passed: usize,
-    /// Steps that failed.
     pub failed: usize,
     /// Steps that were not looked at.
     pub passed_over: usize,

@@ -37,12 +37,9 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=10_000.0;
 pub enum Cycle {
     /// Far and near focus of these optics.
     Pair {
-        /// The optics file.
         optics: PathBuf,
     },
-    /// The shots of a file.
     Program {
-        /// The file.
         path: PathBuf,
     },
 }
@@ -61,15 +58,11 @@ pub enum Enough {
 /// What is captured, how fast, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ContinuousSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
-    /// What is exposed.
     pub cycle: Cycle,
     /// Exposures a second; `None` = as fast as position and camera allow.
     pub rate_hz: Option<f64>,
-    /// When it is enough.
     pub enough: Enough,
     /// The new folder, where images are kept.
     pub out: Option<PathBuf>,
@@ -105,7 +98,6 @@ impl ContinuousSettings {
 /// A rig that is ready to begin.
 struct Ready {
     shots: Vec<Shot>,
-    /// Of a pair.
     pair: Option<(GivenOptics, SensorPair, Reach)>,
 }
 

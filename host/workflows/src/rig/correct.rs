@@ -19,7 +19,6 @@ use crate::{
 /// What is corrected, with what, and where it goes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct BoardCorrectSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// The depth map in mm, `.npy` or float TIFF.
     pub depth: PathBuf,
@@ -34,11 +33,8 @@ pub struct BoardCorrectSettings {
 /// What the correction did.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct BoardCorrectFigures {
-    /// Which correction.
     pub method: String,
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
     /// Mean change, mm; positive = farther.
     pub mean_change_mm: f64,
@@ -54,9 +50,7 @@ pub struct BoardCorrectFigures {
 /// A pixel of which board and computer make different depths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PixelDifference {
-    /// From 0.
     pub row: usize,
-    /// From 0.
     pub column: usize,
     /// The board's depth.
     pub board_mm: f32,

@@ -18,7 +18,6 @@ use crate::{
 /// What is fitted to what.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FitSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// The list of depth maps; see [`correction::read`].
     pub patterns: PathBuf,
@@ -33,9 +32,7 @@ pub struct FitSettings {
 /// What there is to say of a fit.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct FitFigures {
-    /// Which correction.
     pub method: String,
-    /// Flat targets.
     pub targets: usize,
     /// Pixels that were taken of all of them.
     pub samples: usize,

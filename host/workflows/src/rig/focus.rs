@@ -23,12 +23,9 @@ use crate::{
     optics::GivenOptics,
 };
 
-/// How focus is sought.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FocusSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
     /// The optics file; its far focus is where the search begins, unless told otherwise.
     pub optics: PathBuf,
@@ -36,7 +33,6 @@ pub struct FocusSettings {
     pub start_mm: Option<f64>,
     /// How far the focus may be from the start.
     pub range_mm: f64,
-    /// What is maximised.
     pub measure: FocusMeasure,
     /// Part of the image that is looked at: column, row, width, height in pixels. All of it where none.
     pub region: Option<[usize; 4]>,
@@ -55,7 +51,6 @@ pub struct FocusFigures {
     pub near_mm: f64,
     /// Offset of the normalised depth.
     pub alpha0_mm: f64,
-    /// From m1 to m2.
     pub sensor_travel_mm: f64,
     /// Where the sensor's coarse axis stands.
     pub coarse_um: f64,

@@ -22,14 +22,11 @@ pub enum Focus {
     Near,
 }
 
-/// Where to go.
 #[derive(Clone, PartialEq, Debug)]
 pub struct GotoSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// The optics file, whose working range counts.
     pub optics: PathBuf,
-    /// Which focus.
     pub focus: Focus,
 }
 

@@ -59,7 +59,6 @@ pub struct AxisFigures {
     pub asked_um: f64,
     /// Where its encoder or gauge says it is.
     pub measured_um: f64,
-    /// Whether it moves.
     pub moving: bool,
 }
 

@@ -25,12 +25,9 @@ const LOST_MAX: u32 = 8;
 /// Most exposures of a program.
 const REPEATS_MAX: u16 = 100;
 
-/// What is looked at.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
 }
 

@@ -23,11 +23,8 @@ const PASSED_OVER: Duration = Duration::from_millis(100);
 /// What is looked at, and how depth is computed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveDepthSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
-    /// The optics file.
     pub optics: PathBuf,
     /// Windows, filling and threads.
     pub computation: Settings,

@@ -25,7 +25,6 @@ const TEXTS: &str = "the texts of the firmware's log";
 /// Whose log, and for how long.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LogSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// The firmware that runs on the board; without it the log is given as bytes.
     pub elf: Option<PathBuf>,

@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::{Rig, RigAddress};
 use crate::{context::Context, error::Result};
 
-/// What was measured.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum MechanicsFigures {
@@ -15,7 +14,6 @@ pub enum MechanicsFigures {
     Travel {
         /// The axis: coarse, lens.
         axis: &'static str,
-        /// Its travel.
         travel_um: f64,
     },
     /// A screw's backlash.

@@ -20,15 +20,12 @@ pub struct HomeFigures {
     /// Of stage A's stepper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shift_um: Option<f64>,
-    /// Of the lens stage.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens_shift_um: Option<f64>,
 }
 
-/// Where to go.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MoveSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// Each axis with its position in micrometres; they move at the same time.
     pub targets: Vec<(Axis, f64)>,
@@ -41,7 +38,6 @@ pub struct MoveSettings {
 pub struct MovedAxis {
     /// Its name: coarse, fine, lens.
     pub axis: &'static str,
-    /// Where it was sent.
     pub asked_um: f64,
     /// Where its encoder or gauge says it is.
     pub measured_um: f64,
@@ -51,9 +47,7 @@ pub struct MovedAxis {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum MoveFigures {
-    /// One axis was moved.
     One(MovedAxis),
-    /// Several were.
     All {
         /// In the order of the targets.
         moved: Vec<MovedAxis>,

@@ -36,7 +36,6 @@ impl fmt::Debug for OpenRig {
 }
 
 impl PartialEq for OpenRig {
-    /// The same connection.
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -44,9 +43,6 @@ impl PartialEq for OpenRig {
 
 impl OpenRig {
     /// Connects and stays connected. An emulated rig has the lens of `optics`.
-    ///
-    /// # Errors
-    /// As [`Rig::connect`].
     pub fn open(address: &RigAddress, optics: &GivenOptics, context: &Context<'_>) -> Result<Self> {
         if let RigAddress::Open(open) = address {
             return Ok(open.clone());
@@ -59,7 +55,6 @@ impl OpenRig {
         Ok(Self(Arc::new(Held { name, client: Mutex::new(client), emulation })))
     }
 
-    /// As people call it.
     pub fn name(&self) -> &str {
         &self.0.name
     }
@@ -89,18 +84,12 @@ impl OpenRig {
     }
 
     /// Stops all motion along the ramps and ends a running program, now, whatever job is under way.
-    ///
-    /// # Errors
-    /// [`crate::WorkflowError::Client`].
     pub fn stop(&self) -> Result<()> {
         let client = self.client().clone(); // the lock is not held while the board answers
         Ok(client.stop()?)
     }
 
     /// Emergency stop, now: what moved has lost its position, and the alarm has to be cleared.
-    ///
-    /// # Errors
-    /// [`crate::WorkflowError::Client`].
     pub fn halt(&self) -> Result<()> {
         let client = self.client().clone();
         Ok(client.halt()?)

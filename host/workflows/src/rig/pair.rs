@@ -21,11 +21,8 @@ use crate::{camera_frames, context::Context, error::Result, optics::GivenOptics,
 /// What is captured with, and where to.
 #[derive(Clone, Debug)]
 pub struct PairSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
-    /// The optics file.
     pub optics: PathBuf,
     /// Exposures of each image, which are averaged: 1 to [`AVERAGED_MAX`].
     pub averaged: u16,
@@ -51,9 +48,7 @@ pub struct PairFigures {
     pub sensor_far_mm: f64,
     /// The same at the near exposure.
     pub sensor_near_mm: f64,
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
 }
 
@@ -83,9 +78,6 @@ pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFig
 }
 
 /// The same; `on_pair` sees the pair as soon as it is there, before anything is written.
-///
-/// # Errors
-/// As [`capture`].
 pub fn capture_seen(
     settings: &PairSettings,
     context: &Context<'_>,
@@ -126,9 +118,6 @@ fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
 }
 
 /// Captures a pair with what is open already.
-///
-/// # Errors
-/// [`crate::WorkflowError::Capture`].
 pub fn take(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,

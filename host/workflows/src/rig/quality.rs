@@ -31,16 +31,11 @@ const PAIRS: std::ops::RangeInclusive<usize> = 2..=50;
 /// Part of the image that is looked at, along each side: the rim has less light and more distortion.
 const MIDDLE: f64 = 0.8;
 
-/// What is measured.
 #[derive(Clone, PartialEq, Debug)]
 pub struct QualitySettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
-    /// The optics file.
     pub optics: PathBuf,
-    /// Pairs.
     pub pairs: usize,
     /// How far the target is, where that is known.
     pub true_mm: Option<f64>,
@@ -48,17 +43,14 @@ pub struct QualitySettings {
     pub record: PathBuf,
 }
 
-/// How good depth is.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct QualityFigures {
     /// When; only of real hardware.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// Pairs.
     pub pairs: usize,
     /// Part of the pixels with a depth.
     pub fill_rate: f64,
-    /// Mean depth.
     pub mean_mm: f64,
     /// Distance of the depths from the plane through them, root mean square; of the mean over the pairs.
     pub plane_rms_mm: f64,
@@ -76,7 +68,6 @@ pub struct QualityFigures {
 /// The measurements of a rig.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct QualityRecord {
-    /// The oldest first.
     #[serde(default, rename = "measurement")]
     pub measurements: Vec<QualityFigures>,
 }

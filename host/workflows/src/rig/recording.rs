@@ -39,7 +39,6 @@ const MAGIC: &[u8; 8] = b"FNPAIRS1";
 const EXPECTED: &str = "recorded pairs";
 /// Most pairs of a recording: 2.5 GB at 640x480.
 pub const PAIRS_MAX: usize = 2000;
-/// Longest optics.
 const OPTICS_MAX: u32 = 1 << 20;
 /// Most pixels of an image.
 const PIXELS_MAX: usize = 1 << 26;
@@ -48,19 +47,15 @@ const AHEAD: usize = 2;
 /// From one look at the wish to stop to the next.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What was recorded.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecordingFigures {
-    /// Pairs.
     pub pairs: usize,
     /// From the first to the last.
     pub seconds: f64,
 }
 
-/// What was played.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PlayFigures {
-    /// Pairs.
     pub pairs: usize,
     /// Over the time that it took.
     pub maps_per_second: f64,
@@ -175,7 +170,6 @@ impl Drop for Recorder {
 /// A pair of a recording.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RecordedPair {
-    /// Since the first.
     pub at: Duration,
     /// The far-focused image.
     pub far: Image,

@@ -26,20 +26,15 @@ use crate::{
     simulator::USUAL_PSF,
 };
 
-/// Which shots.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Program {
-    /// Those of a file.
     File(PathBuf),
     /// A focus stack.
     Stack {
         /// The axis that goes through it.
         axis: Axis,
-        /// First position.
         from_um: f64,
-        /// Last position.
         to_um: f64,
-        /// Positions.
         steps: usize,
     },
 }
@@ -47,17 +42,14 @@ pub enum Program {
 /// What is exposed, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SequenceSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// Its camera; the exposure is that of a stack, a file has its own.
     pub camera: CameraSettings,
-    /// The shots.
     pub program: Program,
     /// How often the armed program runs; the images of all runs are kept.
     pub runs: usize,
     /// The optics file: for the record, and for what the emulated rig sees.
     pub optics: Option<PathBuf>,
-    /// The new folder.
     pub out: PathBuf,
 }
 
@@ -66,7 +58,6 @@ pub struct SequenceSettings {
 pub struct SequenceFigures {
     /// Shots of the program.
     pub shots: usize,
-    /// Images of all runs.
     pub exposures: usize,
     /// From the first move to the end of the last exposure, by the board's clock.
     pub board_ms: f64,

@@ -22,11 +22,8 @@ const MOST: usize = 1000;
 /// What is captured, and where to.
 #[derive(Clone, Debug)]
 pub struct SeriesSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
-    /// The optics file.
     pub optics: PathBuf,
     /// The new capture folders, one per pair.
     pub out: Vec<PathBuf>,
@@ -35,7 +32,6 @@ pub struct SeriesSettings {
 /// What there is to say of a series.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SeriesFigures {
-    /// Of each pair.
     pub pairs: Vec<PairFigures>,
 }
 

@@ -12,9 +12,7 @@ use crate::{
 /// A setting, in the unit of its name.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct SettingFigures {
-    /// Its name.
     pub key: &'static str,
-    /// What it is.
     pub value: i32,
     /// What it is on a new board.
     pub default: i32,
@@ -31,7 +29,6 @@ impl From<Setting> for SettingFigures {
     }
 }
 
-/// All settings.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct AllSettings {
     /// In the order of their numbers on the wire.

@@ -12,16 +12,13 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// What is asked.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SunSettings {
-    /// The rig.
     pub rig: RigAddress,
     /// Latitude in degrees, north positive.
     pub latitude_deg: f64,
     /// Longitude in degrees, east positive.
     pub longitude_deg: f64,
-    /// The moment.
     pub time: DateTime<Utc>,
     /// The person whose shadow is asked for.
     pub shadow: Option<Person>,
@@ -70,7 +67,6 @@ pub struct BoardSunFigures {
     pub shadow_length_m: Option<f32>,
     /// Whether board and host agree bit for bit.
     pub same_bits: bool,
-    /// What the board said.
     #[serde(skip)]
     pub board: SunAnswer,
     /// What this computer makes of the same question.

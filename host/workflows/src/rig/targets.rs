@@ -34,14 +34,10 @@ const LIST: &str = "PATTERNS.toml";
 /// Targets of a series where none are named.
 const USUAL_TARGETS: usize = 24;
 
-/// The series.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TargetSettings {
-    /// The rig.
     pub rig: RigAddress,
-    /// Its camera.
     pub camera: CameraSettings,
-    /// The optics file.
     pub optics: PathBuf,
     /// Distances of the target from the lens; where there are none, 24 through the working range.
     pub distances_mm: Vec<f64>,
@@ -54,13 +50,11 @@ pub struct TargetSettings {
 /// What there is to say of a series.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TargetFigures {
-    /// Targets in the list.
     pub targets: usize,
     /// Those that were captured now.
     pub captured: usize,
     /// Root mean square of the maps' error before any correction, mm; of those that were captured now.
     pub rmse_mm: f64,
-    /// The list.
     pub patterns: String,
 }
 

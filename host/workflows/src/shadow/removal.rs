@@ -42,7 +42,6 @@ pub struct RemovalSettings {
     pub masks: PathBuf,
     /// How the camera stands, TOML.
     pub camera: PathBuf,
-    /// What throws it.
     pub light: LightSource,
     /// How shadow is cut off.
     pub method: Method,
@@ -55,7 +54,6 @@ pub struct RemovalSettings {
 /// What throws the shadow.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum LightSource {
-    /// The sun.
     Sun {
         /// Where the camera stands, and the first mask's time.
         moment: Moment,
@@ -71,12 +69,9 @@ pub enum LightSource {
     },
 }
 
-/// What was cut.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RemovalFigures {
-    /// Masks.
     pub frames: usize,
-    /// Masks that were cut.
     pub cut: usize,
     /// Masks with something doubtful.
     pub flagged: usize,
@@ -93,13 +88,10 @@ pub struct RemovalFigures {
     pub sun_in_view: Option<bool>,
     /// Mean share of the silhouettes that were cut off, of those that were cut.
     pub removed_percent: Option<f64>,
-    /// Time for one cut.
     pub cut_ms_per_frame: f64,
-    /// Time for all.
     pub seconds: f64,
 }
 
-/// `shadow.toml`.
 #[derive(Serialize)]
 struct Index {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -279,7 +271,6 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Cuts one mask.
     fn frame(&mut self, number: usize, mask: &Mask, file: String) -> Result<(Mask, Entry)> {
         let chooser =
             self.chooser.get_or_insert_with(|| SubjectChooser::new(SubjectSettings::for_size(mask.dim())));

@@ -21,7 +21,6 @@ use crate::{
     figures::rounded,
 };
 
-/// What is scored.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct ScoreSettings {
     /// Masks after the removal: a picture or a folder. Frames of two folders belong together by name, else by the number
@@ -43,7 +42,6 @@ pub struct ScoreFigures {
     pub wrongly_removed_percent: Option<f64>,
     /// Intersection over union of what is left and the person.
     pub iou_percent: Option<f64>,
-    /// Frames.
     pub frames: usize,
     /// Pixels of shadow in the truth.
     pub shadow_pixels: u64,
@@ -61,9 +59,7 @@ pub enum ScoreError {
     Ambiguous {
         /// A mask.
         one: PathBuf,
-        /// Another.
         other: PathBuf,
-        /// The number.
         number: u64,
     },
     /// No mask for a frame of the truth.
@@ -84,7 +80,6 @@ pub enum ScoreError {
     Level {
         /// The truth's frame.
         path: PathBuf,
-        /// The level.
         level: u8,
         /// Its place from the left.
         column: usize,

@@ -53,7 +53,6 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    /// Begins a new folder.
     pub fn begin(folder: &Path) -> Result<Self> {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)? })
     }

@@ -30,7 +30,6 @@ pub const WITHOUT: &str = "without-shadow";
 /// What is cut out and how.
 #[derive(Clone, PartialEq, Debug)]
 pub struct VideoShadowSettings {
-    /// The video.
     pub video: PathBuf,
     /// How the camera stands; the size of its pictures is the video's.
     pub camera: CameraFile,
@@ -38,23 +37,19 @@ pub struct VideoShadowSettings {
     pub moment: Moment,
     /// Frames per second, where the time is to pass.
     pub rate_hz: Option<f64>,
-    /// The new folder.
     pub out: PathBuf,
 }
 
-/// What was cut.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct VideoShadowFigures {
     /// Frames with a usable silhouette.
     pub silhouettes: usize,
     /// Names of some masks with a person, evenly through the video.
     pub samples: Vec<String>,
-    /// What was taken off.
     #[serde(flatten)]
     pub removal: RemovalFigures,
 }
 
-/// Samples to look at.
 const SAMPLES: usize = 6;
 
 /// Makes both folders of masks.

@@ -43,7 +43,6 @@ pub struct MarkersSettings {
     pub choices: Choices,
     /// A built-in template's name, or a TOML file; without it the built-in one that fits best.
     pub template: Option<String>,
-    /// The new folder.
     pub out: PathBuf,
     /// Views at equal steps round the subject, 1 to 72.
     pub views: usize,
@@ -71,9 +70,7 @@ pub struct MarkersSettings {
 /// Who does what in a recording.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Performer {
-    /// The person.
     pub subject: String,
-    /// The activity.
     pub activity: String,
 }
 
@@ -100,10 +97,8 @@ impl MarkersSettings {
     }
 }
 
-/// What was drawn.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MarkersFigures {
-    /// Views.
     pub views: usize,
     /// Frames drawn of each.
     pub frames: usize,
@@ -117,7 +112,6 @@ pub struct MarkersFigures {
     pub markers: usize,
     /// Share of all points in all frames that were hidden.
     pub hidden_markers_percent: f64,
-    /// Time for all.
     pub seconds: f64,
     /// What was guessed about the recording.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -27,18 +27,13 @@ pub struct PassagesSettings {
     pub least_px: usize,
 }
 
-/// What was cut.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PassagesFigures {
-    /// Masks read.
     pub masks: usize,
-    /// Passages written.
     pub passages: usize,
-    /// Masks in them.
     pub frames: usize,
     /// Passages too short to be written.
     pub too_short: usize,
-    /// Time for all.
     pub seconds: f64,
 }
 

@@ -40,28 +40,20 @@ impl Drawing {
     }
 }
 
-/// One performance.
 pub(super) struct Performance {
     pub subject: String,
     pub activity: String,
-    /// One body per frame.
     pub bodies: Vec<Vec<Capsule>>,
 }
 
-/// What was drawn.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PerformancesFigures {
-    /// Performances.
     pub performances: usize,
-    /// People.
     pub subjects: usize,
-    /// Activities.
     pub activities: usize,
     /// Views of each performance.
     pub views: usize,
-    /// Pictures.
     pub masks: usize,
-    /// Time for all.
     pub seconds: f64,
 }
 
@@ -146,7 +138,6 @@ fn draw_view(
     Ok(())
 }
 
-/// `samples.toml`.
 fn samples(performances: &[Performance], names: &[String], views: usize) -> String {
     let mut samples = String::new();
     for (Performance { subject, activity, .. }, name) in performances.iter().zip(names) {

@@ -66,13 +66,11 @@ pub enum ShadowTreatment {
 /// How many frames were what.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct VideoFigures {
-    /// Frames of the video.
     pub frames: usize,
     /// Frames with a usable silhouette.
     pub silhouettes: usize,
     /// Frames that only taught the background.
     pub learning: usize,
-    /// Frames with nobody.
     pub empty: usize,
     /// Frames with several people.
     pub several_people: usize,
@@ -80,7 +78,6 @@ pub struct VideoFigures {
     pub cut_by_edge: usize,
     /// Frames in which most of the picture changed.
     pub scene_changed: usize,
-    /// Time for all.
     pub seconds: f64,
     /// Frames over that time.
     pub frames_per_second: f64,

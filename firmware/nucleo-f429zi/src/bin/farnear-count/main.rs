@@ -48,7 +48,6 @@ mod clock_tree;
 
 const ROUTINES: usize = 21;
 
-/// What is counted.
 // SAFETY: no other symbol has this name.
 #[unsafe(no_mangle)]
 pub static FARNEAR_ROUTINES: [Routine; ROUTINES] = [

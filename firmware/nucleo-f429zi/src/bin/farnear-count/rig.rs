@@ -73,7 +73,6 @@ pub fn tick_at_rest() -> u32 {
     cycles(|| rig.tick(&inputs))
 }
 
-/// What moves.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Work {
     Coarse,

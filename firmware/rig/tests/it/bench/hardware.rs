@@ -18,13 +18,10 @@ pub struct Faults {
     pub no_strobe: bool,
     /// The emergency-stop circuit is open.
     pub emergency_stop: bool,
-    /// The supply is low.
     pub supply_low: bool,
-    /// The link overflows.
     pub link_overflow: bool,
 }
 
-/// The hardware.
 pub struct Hardware {
     pub faults: Faults,
     pub coarse: Motor,

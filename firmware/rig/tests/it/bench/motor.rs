@@ -34,7 +34,6 @@ pub struct MotorFaults {
     pub driver: bool,
 }
 
-/// The axis.
 pub struct Motor {
     pub faults: MotorFaults,
     queue: VecDeque<Segment>,
@@ -80,7 +79,6 @@ impl Motor {
         }
     }
 
-    /// Where the stage is.
     pub fn position_um(&self) -> f64 {
         self.stage as f64 * STEP_UM
     }

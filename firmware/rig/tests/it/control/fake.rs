@@ -10,7 +10,6 @@ use farnear_rig::io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges, TICK_US}
 use crate::bench::hardware::Hardware;
 use crate::bench::{BOOT, SESSION, request_frame};
 
-/// What the loop did.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Call {
     Now,
@@ -31,7 +30,6 @@ pub enum Call {
     Reset,
 }
 
-/// The board.
 pub struct Fake {
     pub hardware: Hardware,
     pub now: u64,

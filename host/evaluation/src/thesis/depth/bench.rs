@@ -34,18 +34,15 @@ pub enum Method {
     Ggro,
     /// The same by this project's linear design.
     GgroLinear,
-    /// S-transform.
     Subbarao,
     /// Null-space projectors.
     Favaro,
 }
 
 impl Method {
-    /// All of them.
     pub const ALL: [Self; 6] =
         [Self::Raj, Self::Gro, Self::Ggro, Self::GgroLinear, Self::Subbarao, Self::Favaro];
 
-    /// As tables call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Raj => "Raj",

@@ -36,7 +36,6 @@ fn patches(map: &Array2<f32>) -> Array2<f32> {
     map.slice(s![14..14 + 7 * SMALL.0 as isize; 7, 14..14 + 7 * SMALL.1 as isize; 7]).to_owned()
 }
 
-/// Writes the table.
 pub fn measure(page: &mut Page, bench: &Bench, planes: &Planes) -> Result<()> {
     page.subheading("Computational cost (section 6.6.4)");
     let large: Vec<(f64, Array2<f32>)> =

@@ -40,13 +40,11 @@ pub struct Planes {
 /// What is taught to a method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Taught {
-    /// Eqs. 5.21 and 5.22.
     TwoStep,
     /// Cancellation by patterns as measured, eqs. 6.2 to 6.10.
     CdcRaw,
     /// The same by smoothed patterns.
     Cdc,
-    /// Eq. 6.11.
     Clsf,
     /// One seamless polynomial with mixed terms.
     ClsfFull,
@@ -179,7 +177,6 @@ fn curve(name: &str, judged: &[(f64, Flat)], of: fn(&Flat) -> f64) -> Curve {
     Curve { name: name.into(), points: judged.iter().map(|(depth, flat)| (*depth, of(flat))).collect() }
 }
 
-/// Fig. 5.4.
 pub fn operators(page: &mut Page, planes: &Planes) -> Result<()> {
     page.subheading("Raj's operators, GRO and GGRO (fig. 5.4)");
     page.paragraph(&format!(
@@ -283,7 +280,6 @@ fn claims_of_5_4(page: &mut Page, all: &[Vec<(f64, Flat)>]) {
     );
 }
 
-/// Fig. 6.1.
 pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
     page.subheading("The distortion depends on depth (fig. 6.1)");
     let index = place(Method::Subbarao);
@@ -348,7 +344,6 @@ pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
     Ok(())
 }
 
-/// Fig. 6.4.
 pub fn corrections(page: &mut Page, planes: &Planes) -> Result<()> {
     page.subheading("CDC and CLSF on four methods (fig. 6.4)");
     let ways: [(&str, Option<Taught>); 3] =

@@ -154,7 +154,6 @@ fn chapter_6(
     Ok(maps)
 }
 
-/// Figs. 6.7 and 6.8.
 pub fn pictures(page: &mut Page, scenes: &[Seen]) -> Result<()> {
     page.subheading("Two scenes before and after correction (figs. 6.7 and 6.8)");
     let range = [880.0, 940.0];

@@ -22,7 +22,6 @@ const PROGRAM: &str = "farnear-campaign";
 /// Name of the figures beside the scenarios that broke something.
 const FIGURES: &str = "campaign.json";
 
-/// Which scenarios.
 struct Seeds {
     program: PathBuf,
     first: u64,

@@ -74,7 +74,6 @@ impl Tally {
         Self { period, windows_nm, counted, first: None, last: None, intervals_us: (u64::MAX, 0) }
     }
 
-    /// Exposures so far.
     pub fn exposures(&self) -> usize {
         self.counted.exposures
     }

@@ -22,7 +22,6 @@ use farnear_files::{
 
 use crate::error::{Result, WorkflowError};
 
-/// The folder.
 pub struct Folder {
     path: PathBuf,
     rows: String,
@@ -87,7 +86,6 @@ impl Folder {
         Ok(())
     }
 
-    /// Writes an image.
     pub fn image(&self, frame: &Frame) -> Result<()> {
         let path = self.path.join(format!("frame-{:06}-shot-{:02}.png", frame.number, frame.record.index));
         let image = encode_png(frame.image.pixels.view(), frame.image.bits)
@@ -95,7 +93,6 @@ impl Folder {
         Ok(write_file(&path, &image)?)
     }
 
-    /// Writes the table.
     pub fn finish(self) -> Result<()> {
         write_file(&self.path.join("frames.csv"), self.rows.as_bytes()).map_err(WorkflowError::from)
     }

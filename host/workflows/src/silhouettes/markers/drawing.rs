@@ -27,14 +27,12 @@ const MARGIN_PX: usize = 2;
 /// Gaps that are closed in the thesis, and where parts have a thickness.
 const CLOSED_MM: f64 = 126.0;
 const CLOSED_BETWEEN_THICK_PARTS_MM: f64 = 40.0;
-/// What is counted.
 const UNIT: &str = "masks";
 /// What is under way where the work is cancelled.
 const DURING: &str = "drawing silhouettes";
 
 /// What all views share.
 pub struct Job<'a> {
-    /// How it is drawn.
     pub settings: &'a MarkersSettings,
     /// The body's parts.
     pub template: &'a Template,
@@ -42,7 +40,6 @@ pub struct Job<'a> {
     pub frames: &'a [HashMap<&'a str, Point3>],
     /// The frames' names, by their numbers in the recording.
     pub names: &'a [String],
-    /// Who watches.
     pub context: &'a Context<'a>,
 }
 
