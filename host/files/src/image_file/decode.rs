@@ -85,26 +85,12 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
         return Err(INCOMPLETE.into());
     }
     let values = decoder.decode().map_err(broken)?;
-    if ends_alike(&values, [width, height, channels]) && needs_more(bytes, &values, options, to) {
+    if needs_more(bytes, &values, options, to) {
         return Err(INCOMPLETE.into());
     }
     let orientation = decoder.exif().and_then(|exif| image::metadata::Orientation::from_exif_chunk(exif));
     let decoded = Decoded { width, height, channels, colours: channels, values: Values::U8(values), white_level: None };
     Ok((decoded, orientation.map_or(1, image::metadata::Orientation::to_exif)))
-}
-
-/// Whether the last two blocks are alike, as the ones are that a decoder makes up after the end of the data (and as some of
-/// even surfaces are).
-fn ends_alike(values: &[u8], [width, height, channels]: [usize; 3]) -> bool {
-    const BLOCK: usize = 8;
-    let last = (width.max(1) - 1) / BLOCK * BLOCK;
-    let from = (height.max(1) - 1) / BLOCK * BLOCK;
-    let Some(before) = last.checked_sub(BLOCK) else { return true };
-    let at = |row: usize, column: usize| values.get((row * width + column) * channels).copied().map_or(0, i16::from);
-    let relative = |row, column, to| at(row, column) - at(from, to);
-    (from..height).all(|row| {
-        (0..width - last).all(|x| (relative(row, last + x, last) - relative(row, before + x, before)).abs() <= 2)
-    })
 }
 
 /// Whether a decoder still reads when the data go on before the end marker: then they ended early.
