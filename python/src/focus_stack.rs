@@ -1,10 +1,10 @@
 //! Depth from a focus stack.
 
 use farnear_depth::{
-    focus_stack::{StackSettings, depth_from_stack},
+    focus_stack::{StackSettings, depth_from_positions},
     prepare::align::Model,
 };
-use farnear_workflows::focus_stack::{aligned_stack, depth_of_places};
+use farnear_workflows::focus_stack::{aligned_stack, depth_of_places, even_positions};
 use ndarray::ArrayView2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
@@ -130,8 +130,9 @@ pub fn focus_stack<'py>(
     let (map, depth, moved_px) = py.detach(|| -> PyResult<_> {
         let moved_px = model.map_or(Ok(0.0), |model| aligned_stack(&mut owned, model)).map_err(wrong)?;
         let views: Vec<ArrayView2<'_, f32>> = owned.iter().map(|image| image.view()).collect();
-        let map = depth_from_stack(&views, &settings).map_err(wrong)?;
-        let depth = depth_of_places(&map.place, focused_at_mm.as_deref());
+        let positions = even_positions(views.len(), focused_at_mm.as_deref());
+        let map = depth_from_positions(&views, &positions, &settings).map_err(wrong)?;
+        let depth = depth_of_places(&map.place, views.len(), focused_at_mm.as_deref());
         Ok((map, depth, moved_px))
     })?;
     Ok(FocusStack {

@@ -274,7 +274,6 @@ impl Client {
         }
     }
 
-    /// How the board is.
     pub fn status(&self) -> Result<Status, ClientError> {
         let during = "reading the status";
         match self.request(&Request::Status, during)? {

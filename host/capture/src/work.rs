@@ -127,7 +127,6 @@ impl Work {
         }
     }
 
-    /// Waits for the end.
     pub fn wait(mut self) -> Result<EventKind, ClientError> {
         loop {
             if let Step::Done(kind) = self.step()? {

@@ -20,7 +20,7 @@ use std::ops::Range;
 use ndarray::{Array2, ArrayView2, Axis, Zip, s};
 use rayon::prelude::*;
 
-use crate::prepare::band::box_mean;
+use crate::{metrics::dilate_square, prepare::band::box_mean};
 use guided::{Guide, mended};
 pub use sharpness::{Sharpness, UnknownSharpness};
 use sharpness::{blur_reach_px, blurred};
@@ -123,6 +123,16 @@ pub enum StackError {
     /// A reach that is none.
     #[error("places are to be mended within {0} px: 0 (not at all) or 1 to {MOST_GUIDED_PX} is possible")]
     Guided(f32),
+    /// Positions that are not one for each image, or do not rise or fall.
+    #[error(
+        "{positions} positions of {images} images: one for each is needed, all different, rising or falling"
+    )]
+    Positions {
+        /// Images.
+        images: usize,
+        /// Positions.
+        positions: usize,
+    },
     /// A pixel without a value.
     #[error("image {number}: the pixel in column {column}, row {row} is not finite")]
     NotFinite {
@@ -155,11 +165,39 @@ pub fn depth_from_stack(
     images: &[ArrayView2<f32>],
     settings: &StackSettings,
 ) -> Result<StackMap, StackError> {
+    for (index, image) in images.iter().enumerate() {
+        if let Some(((row, column), _)) = image.indexed_iter().find(|(_, v)| !v.is_finite()) {
+            return Err(StackError::NotFinite { number: index + 1, column, row });
+        }
+    }
+    let positions: Vec<f64> = (0..images.len()).map(|index| index as f64).collect();
+    depth_from_positions(images, &positions, settings)
+}
+
+/// [`depth_from_stack`] of images at uneven positions along the axis, strictly rising or falling, in any unit: the tip is fitted
+/// over these. Places stay numbers of images. Pixels that are not finite were not seen in that image: places come from the images
+/// that saw a pixel and what the measure takes around it, and have no value where these are fewer than half, or where
+/// the sharpest has no neighbour that saw it.
+///
+/// # Errors
+/// [`StackError`], without [`StackError::NotFinite`].
+pub fn depth_from_positions(
+    images: &[ArrayView2<f32>],
+    positions: &[f64],
+    settings: &StackSettings,
+) -> Result<StackMap, StackError> {
     check(images, settings)?;
+    let signs = || positions.windows(2).map(|two| two[1].total_cmp(&two[0]));
+    let one_way = signs().all(|sign| sign.is_ne()) && signs().zip(signs().skip(1)).all(|(a, b)| a == b);
+    if positions.len() != images.len() || !one_way || !positions.iter().all(|p| p.is_finite()) {
+        return Err(StackError::Positions { images: images.len(), positions: positions.len() });
+    }
     let (height, width) = images[0].dim();
     let tops: Vec<usize> = (0..height).step_by(BAND).collect();
-    let bands: Vec<Vec<Tip>> =
-        tops.into_par_iter().map(|top| band(images, settings, top..(top + BAND).min(height))).collect();
+    let bands: Vec<Vec<Tip>> = tops
+        .into_par_iter()
+        .map(|top| band(images, positions, settings, top..(top + BAND).min(height)))
+        .collect();
     let map = |of: fn(&Tip) -> f32| {
         let values = bands.iter().flatten().map(of).collect();
         Array2::from_shape_vec((height, width), values)
@@ -235,15 +273,17 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
         if height.min(width) < settings.window_px {
             return Err(StackError::TooSmall { width, height, window_px: settings.window_px });
         }
-        if let Some(((row, column), _)) = image.indexed_iter().find(|(_, v)| !v.is_finite()) {
-            return Err(StackError::NotFinite { number, column, row });
-        }
     }
     Ok(())
 }
 
 /// Place and reliability of each pixel of some rows.
-fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>) -> Vec<Tip> {
+fn band(
+    images: &[ArrayView2<f32>],
+    positions: &[f64],
+    settings: &StackSettings,
+    rows: Range<usize>,
+) -> Vec<Tip> {
     let (height, width) = images[0].dim();
     // Rows beyond the band that its values depend on; at the picture's own border there are none.
     let reach = 2 * (settings.window_px / 2) + Sharpness::REACH_PX + blur_reach_px(settings.smoothing_px);
@@ -261,14 +301,32 @@ fn band(images: &[ArrayView2<f32>], settings: &StackSettings, rows: Range<usize>
     pixels
         .map(|(y, x)| {
             curve.iter_mut().zip(&measured).for_each(|(value, map)| *value = map[(y - from, x)]);
-            tip(&curve, settings.fit_points)
+            tip(&curve, positions, settings.fit_points)
         })
         .collect()
 }
 
 /// The focus measure over windows that fade towards their rim: the mean over the window is taken twice, for a window with a hard
-/// rim puts a sharp detail's place on everything within its reach.
+/// rim puts a sharp detail's place on everything within its reach. NaN where a pixel that it depends on was not seen.
 fn measured_over_windows(image: ArrayView2<f32>, settings: &StackSettings) -> Array2<f32> {
+    if image.iter().all(|value| value.is_finite()) {
+        return measured_where_seen(image, settings);
+    }
+    let seen = || image.iter().copied().filter(|value| value.is_finite());
+    let mean = seen().map(f64::from).sum::<f64>() / seen().count().max(1) as f64;
+    let whole = image.mapv(|value| if value.is_finite() { value } else { mean as f32 });
+    let mut measured = measured_where_seen(whole.view(), settings);
+    let reach = 2 * (settings.window_px / 2) + Sharpness::REACH_PX + blur_reach_px(settings.smoothing_px);
+    let unseen = dilate_square(&image.mapv(|value| !value.is_finite()), reach);
+    Zip::from(&mut measured).and(&unseen).for_each(|value, unseen| {
+        if *unseen {
+            *value = f32::NAN;
+        }
+    });
+    measured
+}
+
+fn measured_where_seen(image: ArrayView2<f32>, settings: &StackSettings) -> Array2<f32> {
     let side = settings.window_px;
     let measured = if settings.smoothing_px > 0.0 {
         settings.measure.of(blurred(image, settings.smoothing_px).view(), side)
@@ -285,11 +343,17 @@ fn sharp_everywhere(images: &[ArrayView2<f32>], place: &Array2<f32>) -> Array2<f
     sharp
 }
 
-/// A pixel between two images of the stack.
+/// A pixel between two images of the stack; of images that did not see it the nearest that did.
 fn between(images: &[ArrayView2<f32>], place: f32, at: (usize, usize)) -> f32 {
     let below = (place as usize).min(images.len() - 2);
     let part = place - below as f32;
-    (1.0 - part) * images[below][at] + part * images[below + 1][at]
+    let value = (1.0 - part) * images[below][at] + part * images[below + 1][at];
+    if value.is_finite() {
+        return value;
+    }
+    let distance = |index: &usize| (*index as f32 - place).abs();
+    let seen = (0..images.len()).filter(|index| images[*index][at].is_finite());
+    seen.min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or(0.0, |index| images[index][at])
 }
 
 /// The tip of a curve.
@@ -303,35 +367,56 @@ struct Tip {
     rise: f32,
 }
 
-/// The tip of a curve of sharpness over the stack.
-fn tip(curve: &[f32], fit_points: usize) -> Tip {
-    let largest = (0..curve.len()).max_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
-    let most = curve[largest];
-    let mean = curve.iter().sum::<f32>() / curve.len() as f32;
+/// The tip of a curve of sharpness over the positions of the stack; NaN = not seen.
+fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
+    let seen = || (0..curve.len()).filter(|i| curve[*i].is_finite());
+    let count = seen().count();
+    let largest = seen().max_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
+    let most = if count == 0 { 0.0 } else { curve[largest] };
+    let mean = seen().map(|i| curve[i]).sum::<f32>() / count.max(1) as f32;
     let rise = if most > 0.0 { (1.0 - mean / most).clamp(0.0, 1.0) } else { 0.0 };
     let unreliable = Tip { place: largest as f32, reliability: 0.0, sharpness: most, rise };
+    if 2 * count < curve.len() {
+        // Nor has it a say in its surroundings.
+        return Tip { rise: 0.0, ..unreliable };
+    }
     if largest == 0 || largest + 1 == curve.len() || most <= 0.0 {
         return unreliable;
     }
+    if !(curve[largest - 1].is_finite() && curve[largest + 1].is_finite()) {
+        return Tip { rise: 0.0, ..unreliable };
+    }
     let half = fit_points / 2;
     let window = largest.saturating_sub(half)..(largest + half + 1).min(curve.len());
+    // In units of the spacing around the largest value.
+    let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
     let mut fit = Parabola::default();
-    for i in window.clone() {
+    for i in window.filter(|i| curve[*i].is_finite()) {
         let value = f64::from((curve[i] / most).max(1e-6));
-        fit.add(i as f64 - largest as f64, value.ln(), value * value);
+        fit.add((positions[i] - positions[largest]) / unit, value.ln(), value * value);
     }
-    match fit.tip() {
-        // A tip beyond the neighbours is none of this curve's: of two peaks, or of noise.
-        Some((tip, determination)) if tip.abs() <= 1.5 => {
-            let end = (curve.len() - 1) as f32;
-            Tip {
-                place: (largest as f32 + tip as f32).clamp(0.0, end),
-                reliability: rise * determination.clamp(0.0, 1.0) as f32,
-                sharpness: most,
-                rise,
-            }
+    let Some((tip, determination)) = fit.tip() else { return unreliable };
+    let place = place_of(positions, positions[largest] + tip * unit);
+    // A tip beyond the neighbours is none of this curve's: of two peaks, or of noise.
+    if (place - largest as f64).abs() > 1.5 || tip.abs() > 3.0 {
+        return unreliable;
+    }
+    let reliability = rise * determination.clamp(0.0, 1.0) as f32;
+    Tip { place: place as f32, reliability, sharpness: most, rise }
+}
+
+/// The number of the image, from 0 and between images as a fraction, at a position; the first or last beyond the ends.
+fn place_of(positions: &[f64], position: f64) -> f64 {
+    let falling = positions.len() > 1 && positions[1] < positions[0];
+    let sign = if falling { -1.0 } else { 1.0 };
+    let after = positions.partition_point(|p| sign * p < sign * position);
+    match after {
+        0 => 0.0,
+        after if after == positions.len() => (after - 1) as f64,
+        after => {
+            let [low, high] = [positions[after - 1], positions[after]];
+            (after - 1) as f64 + (position - low) / (high - low)
         }
-        _ => unreliable,
     }
 }
 
@@ -386,19 +471,70 @@ mod tests {
         for (tip_at, width, floor) in [(7.3_f32, 2.0_f32, 0.0_f32), (4.45, 3.0, 0.0), (8.0, 1.2, 0.02)] {
             let curve: Vec<f32> =
                 (0..16).map(|i| floor + 3.0 * (-0.5 * ((i as f32 - tip_at) / width).powi(2)).exp()).collect();
-            let found = tip(&curve, 11);
+            let found = tip(&curve, &even(curve.len()), 11);
             assert!((found.place - tip_at).abs() < 0.02, "{found:?} for {tip_at}");
             assert!(found.reliability > 0.4, "{found:?}");
         }
     }
 
+    fn even(count: usize) -> Vec<f64> {
+        (0..count).map(|index| index as f64).collect()
+    }
+
+    #[test]
+    fn the_tip_is_fitted_over_uneven_positions() {
+        let positions = [0.0, 1.0, 2.0, 4.0, 5.0, 5.5, 6.0, 8.0, 11.0, 12.0];
+        for sign in [1.0, -1.0] {
+            let positions = positions.map(|p| sign * p);
+            for tip_at in [3.1, 4.6, 5.2, 7.3, 9.0] {
+                let value = |p: &f64| (-0.5 * ((p - sign * tip_at) / 2.0).powi(2)).exp() as f32;
+                let curve: Vec<f32> = positions.iter().map(value).collect();
+                let found = tip(&curve, &positions, 11);
+                let place = place_of(&positions, sign * tip_at);
+                assert!((f64::from(found.place) - place).abs() < 0.02, "{found:?} for {tip_at}, {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn images_that_did_not_see_a_pixel_do_not_count() {
+        let unseen = f32::NAN;
+        let curve = [unseen, 0.1, 0.4, 0.9, 0.8, 0.3, 0.1, unseen];
+        let found = tip(&curve, &even(8), 11);
+        assert!((found.place - 3.4).abs() < 0.2 && found.reliability > 0.3, "{found:?}");
+        // The sharpest image's neighbour did not see it; too few did.
+        assert_eq!(tip(&[0.1, 0.2, 0.9, unseen, 0.3, 0.1], &even(6), 11).reliability, 0.0);
+        assert_eq!(tip(&[unseen, unseen, unseen, unseen, 0.3, 0.9, 0.3], &even(7), 11).reliability, 0.0);
+        assert_eq!(tip(&[unseen; 5], &even(5), 11).reliability, 0.0);
+    }
+
+    #[test]
+    fn a_border_that_few_images_saw_has_no_depth() {
+        let image = |number: usize| {
+            Array2::from_shape_fn((40, 60), |(y, x)| {
+                let noise = ((x * 7919 + y * 104_729 + x * y * 13) % 101) as f32 / 101.0;
+                let seen = x >= 5 || number < 2;
+                if seen { 0.4 + 0.3 * noise / (1.0 + (number as f32 - 3.0).powi(2)) } else { f32::NAN }
+            })
+        };
+        let images: Vec<_> = (0..7).map(image).collect();
+        let views: Vec<_> = images.iter().map(|image| image.view()).collect();
+        let map = depth_from_positions(&views, &even(7), &StackSettings::default()).unwrap();
+        assert!(map.place.slice(s![.., ..5]).iter().all(|place| place.is_nan()));
+        assert!(map.place.slice(s![4..36, 45..56]).iter().all(|place| (place - 3.0).abs() < 0.5));
+        assert!(map.all_in_focus.iter().all(|value| value.is_finite()));
+        let wrong =
+            |positions: &[f64]| depth_from_positions(&views, positions, &StackSettings::default()).is_err();
+        assert!(wrong(&[0.0, 1.0, 2.0]) && wrong(&[0.0, 1.0, 2.0, 3.0, 3.0, 4.0, 5.0]));
+    }
+
     #[test]
     fn what_rises_to_an_end_or_nowhere_is_unreliable() {
         let rising: Vec<f32> = (1..12).map(|i| i as f32).collect();
-        let at_the_end = tip(&rising, 11);
+        let at_the_end = tip(&rising, &even(11), 11);
         assert_eq!((at_the_end.place, at_the_end.reliability), (10.0, 0.0));
-        assert_eq!(tip(&[0.0; 9], 11).reliability, 0.0);
-        assert!(tip(&[1.0, 1.01, 0.99, 1.02, 1.0, 1.01, 0.98], 7).reliability < 0.05);
+        assert_eq!(tip(&[0.0; 9], &even(9), 11).reliability, 0.0);
+        assert!(tip(&[1.0, 1.01, 0.99, 1.02, 1.0, 1.01, 0.98], &even(7), 7).reliability < 0.05);
     }
 
     #[test]
@@ -421,7 +557,7 @@ mod tests {
                 images.iter().map(|image| measured_over_windows(image.view(), &settings)).collect();
             for at in [(BAND - 1, 20), (BAND, 20), (2 * BAND, 3), (3 * BAND + 4, 39)] {
                 let curve: Vec<f32> = whole.iter().map(|map| map[at]).collect();
-                let expected = tip(&curve, settings.fit_points).place;
+                let expected = tip(&curve, &even(curve.len()), settings.fit_points).place;
                 assert!((all.place[at] - expected).abs() < 1e-2, "{measure} at {at:?}");
             }
         }

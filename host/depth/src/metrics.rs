@@ -62,6 +62,8 @@ pub struct Comparison {
     pub pixels: usize,
     /// Part of the pixels that counted by border, mask and edges but had no depth.
     pub missing_fraction: f64,
+    /// Pixels that did not count because the truth has a hole there (0, negative or NaN).
+    pub pixels_without_truth: usize,
 }
 
 /// Compares `depth` with `truth`, both (height, width) in mm; `mask`, where given, allows the pixels that are true.
@@ -89,25 +91,38 @@ pub fn compare(
     let near_edge = settings.away_from_edges_px.map(|distance| near_steps(truth, distance));
     let border = settings.border_px;
     let [mut errors, mut relative] = [const { Vec::new() }; 2];
-    let mut asked = 0_usize;
+    let [mut asked, mut without_truth] = [0_usize; 2];
     for ((y, x), &truth_mm) in truth.indexed_iter() {
         let inside = y >= border && x >= border && y + border < height && x + border < width;
         let allowed = mask.is_none_or(|m| m[(y, x)]) && near_edge.as_ref().is_none_or(|e| !e[(y, x)]);
-        if !(inside && allowed && truth_mm.is_finite()) {
+        if !(inside && allowed) {
+            continue;
+        }
+        if !is_depth(truth_mm) {
+            without_truth += 1;
             continue;
         }
         asked += 1;
         let depth_mm = depth[(y, x)];
-        if depth_mm.is_finite() {
+        if is_depth(depth_mm) {
             let error = f64::from(depth_mm) - f64::from(truth_mm);
             errors.push(error);
             relative.push(error / f64::from(truth_mm));
         }
     }
-    summarise(errors, &relative, asked).ok_or(CompareError::NothingToCompare(height * width))
+    summarise(errors, &relative, [asked, without_truth]).ok_or(CompareError::NothingToCompare(height * width))
 }
 
-fn summarise(mut errors: Vec<f64>, relative: &[f64], asked: usize) -> Option<Comparison> {
+/// Whether a value is a depth; 0, negative values, NaN and infinity are holes in depth maps of many sources.
+pub fn is_depth(value_mm: f32) -> bool {
+    value_mm.is_finite() && value_mm > 0.0
+}
+
+fn summarise(
+    mut errors: Vec<f64>,
+    relative: &[f64],
+    [asked, without_truth]: [usize; 2],
+) -> Option<Comparison> {
     if errors.is_empty() {
         return None;
     }
@@ -128,6 +143,7 @@ fn summarise(mut errors: Vec<f64>, relative: &[f64], asked: usize) -> Option<Com
         rmse_percent_of_depth: 100.0 * mean(square, relative).sqrt(),
         pixels: errors.len(),
         missing_fraction: 1.0 - n / asked as f64,
+        pixels_without_truth: without_truth,
     })
 }
 
@@ -137,6 +153,7 @@ fn summarise(mut errors: Vec<f64>, relative: &[f64], asked: usize) -> Option<Com
 /// times the median difference, so that a slant, a cone or a sphere has none.
 pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
     let (height, width) = truth.dim();
+    let truth = truth.mapv(|t| if is_depth(t) { t } else { f32::NAN });
     let finite = || truth.iter().copied().filter(|t| t.is_finite());
     let range = finite().fold(f32::MIN, f32::max) - finite().fold(f32::MAX, f32::min);
     let neighbours = |(y, x): (usize, usize)| {
@@ -156,8 +173,8 @@ pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
     for (at, _) in truth.indexed_iter() {
         for next in neighbours(at) {
             let step = difference(at, next);
-            // A hole beside a value gives NaN and counts as a step; hole beside hole as well, which harms nothing.
-            if step.is_nan() || step > threshold {
+            // A hole next to a value is a step.
+            if truth[at].is_nan() != truth[next].is_nan() || step > threshold {
                 steps[at] = true;
                 steps[next] = true;
             }
@@ -226,6 +243,21 @@ mod tests {
                 assert_eq!(*value, near, "{distance} ({y}, {x})");
             }
         }
+    }
+
+    #[test]
+    fn zeros_and_negative_values_are_holes_and_counted() {
+        let truth = array![[900.0, 0.0, -1.0, f32::NAN, 910.0, 920.0]];
+        let depth = array![[901.0, 900.0, 900.0, 900.0, 0.0, 920.0]];
+        let c = compare(depth.view(), truth.view(), None, &CompareSettings::default()).unwrap();
+        assert_eq!((c.pixels, c.pixels_without_truth), (2, 3));
+        assert!(
+            (c.rmse_mm - 0.5_f64.sqrt()).abs() < 1e-9 && (c.missing_fraction - 1.0 / 3.0).abs() < 1e-9,
+            "{c:?}"
+        );
+        // A step to a hole is a step, as it is to NaN.
+        let steps = near_steps(array![[900.0, 900.0, 0.0, 0.0, 0.0, 0.0]].view(), 0);
+        assert_eq!(steps, array![[false, true, true, false, false, false]]);
     }
 
     #[test]

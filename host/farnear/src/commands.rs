@@ -7,7 +7,6 @@ pub mod camera;
 pub mod compare;
 pub mod completions;
 pub mod doctor;
-pub mod focus_stack;
 pub mod man;
 pub mod measure;
 pub mod optics;

@@ -18,8 +18,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use farnear_workflows::{
-    WorkflowError, correct::CorrectRequest, depth::DepthRequest, operators::OperatorRequest,
-    target::TargetRequest,
+    WorkflowError, correct::CorrectRequest, depth::DepthRequest, focus_stack::FocusStackRequest,
+    operators::OperatorRequest, target::TargetRequest,
 };
 
 use run::Run;
@@ -44,7 +44,7 @@ enum Command {
     Optics(commands::optics::Arguments),
     Operators(Run<OperatorRequest>),
     Depth(Run<DepthRequest>),
-    FocusStack(commands::focus_stack::Arguments),
+    FocusStack(Run<FocusStackRequest>),
     Calibrate(commands::calibrate::Arguments),
     Camera(commands::camera::Arguments),
     Correct(Run<CorrectRequest>),
@@ -70,7 +70,7 @@ fn main() -> ExitCode {
         Command::Optics(arguments) => commands::optics::run(arguments),
         Command::Operators(task) => task.run(),
         Command::Depth(task) => task.run(),
-        Command::FocusStack(arguments) => commands::focus_stack::run(arguments),
+        Command::FocusStack(task) => task.run(),
         Command::Calibrate(arguments) => commands::calibrate::run(arguments),
         Command::Camera(arguments) => commands::camera::run(arguments),
         Command::Correct(task) => task.run(),

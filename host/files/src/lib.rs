@@ -3,8 +3,9 @@
 //! What farnear reads and writes, without knowing what it means: pictures, maps of numbers, masks, meshes and video, and
 //! results that are there whole or not at all.
 //!
-//! - [`image_file`]: a grey image of any common kind; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes as
+//! - [`image_file`]: an image of any common kind, as grey values; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes as
 //!   pictures; [`mesh`]: a surface as PLY; [`video`]: frames one by one.
+//! - [`stack`]: images at different focus in a folder or a TIFF of many pages; [`order`]: the order in which they were taken.
 //! - [`npy`], [`exr`]: the formats themselves, where no crate is worth its compile time.
 //! - [`view`]: a depth map as a picture for people; [`text`]: words on a picture.
 //! - [`staging`]: written aside, then renamed.
@@ -28,7 +29,9 @@ pub mod map;
 pub mod masks;
 pub mod mesh;
 pub mod npy;
+pub mod order;
 pub mod quantiles;
+pub mod stack;
 pub mod staging;
 pub mod text;
 pub mod video;

@@ -79,6 +79,14 @@ pub enum VideoError {
         /// The folder.
         path: PathBuf,
     },
+    /// One picture in two files.
+    #[error("{} and {} have one name: they may be the same picture twice; move one of them away", first.display(), second.display())]
+    SameStem {
+        /// One.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
     /// A video without a frame.
     #[error("{}: no frame in this video", path.display())]
     NoFrames {

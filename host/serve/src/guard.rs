@@ -75,7 +75,6 @@ pub enum TokenError {
 }
 
 impl Token {
-    /// Reads a token.
     pub fn read(path: &Path) -> Result<Self, TokenError> {
         let text =
             fs::read_to_string(path).map_err(|source| TokenError::Read { path: path.into(), source })?;

@@ -28,16 +28,13 @@ pub struct CameraSettings {
     pub dark: Vec<PathBuf>,
     /// Exposures of even light, at about half of full scale.
     pub flat: Vec<PathBuf>,
-    /// The folder.
     pub out: PathBuf,
 }
 
 /// What there is to say of a camera.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CameraFigures {
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
     /// Mean value in the dark, 1 = full scale.
     pub dark_mean: f64,

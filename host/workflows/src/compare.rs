@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use farnear_depth::metrics::{self, CompareSettings, Comparison};
 use farnear_files::map;
 
-use crate::error::Result;
+use crate::{
+    error::{Result, WorkflowError},
+    measure::unit_of,
+};
 
 /// The files, and which pixels count.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -25,6 +28,16 @@ pub struct ComparisonSettings {
 /// # Errors
 /// [`crate::WorkflowError::Map`], [`crate::WorkflowError::Image`] for the mask, [`crate::WorkflowError::Compare`].
 pub fn compare(settings: &ComparisonSettings) -> Result<Comparison> {
+    let unit = unit_of(&settings.depth)?;
+    if unit != "mm" {
+        return Err(WorkflowError::parameter(
+            "depth",
+            settings.depth.display(),
+            format!(
+                "a depth map in mm, not in {unit} as its stack.toml gives; measure the stack with --distances-mm"
+            ),
+        ));
+    }
     let depth = map::read(&settings.depth)?;
     let truth = map::read(&settings.truth)?;
     let mask = settings.mask.as_deref().map(map::read_mask).transpose()?;

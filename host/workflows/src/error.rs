@@ -157,6 +157,9 @@ pub enum WorkflowError {
     /// Images that are no focus stack.
     #[error(transparent)]
     Stack(#[from] StackError),
+    /// Files that are no focus stack.
+    #[error(transparent)]
+    StackFiles(#[from] farnear_files::stack::StackError),
     /// Maps that cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),

@@ -1,66 +1,246 @@
-//! Depth from focus: a folder of images at different focus, to a depth map and an image that is sharp everywhere.
+//! Depth from focus: images at different focus, to a depth map and an image that is sharp everywhere.
 
-mod places;
+mod frames;
+mod positions;
 
-use std::path::PathBuf;
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use farnear_depth::{
-    focus_stack::{self, StackMap, StackSettings},
+    focus_stack::{self, Sharpness, StackMap, StackSettings},
     optics::{Distortion, DistortionSection},
-    prepare::{
-        align::{self, Model},
-        straightened,
-        warp::{Warp, resample},
-    },
+    prepare::{align::Model, straightened},
 };
-use farnear_files::{image_file, npy, staging::Staging, view};
+use farnear_files::{
+    image_file::{self, Grey, ReadSettings},
+    npy, stack,
+    staging::Staging,
+    view,
+};
 use ndarray::{Array2, ArrayView2};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
-pub use places::{Places, depth_of_places, numbers};
+pub use positions::{depth_of_places, even_positions};
 
 use crate::{
     MADE_BY,
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    request::{PathKind, Request},
 };
 
-/// Which images, and what is made of them.
-#[derive(Clone, PartialEq, Debug)]
-pub struct FocusStackSettings {
-    /// The folder: with `capture.toml`, as `rig sequence` writes it, or images in the order of their names.
+/// Compute depth from a stack of images at different focus, and the image that is sharp everywhere.
+///
+/// Writes depth.npy, confidence.npy (the reliability), all-in-focus.png, view.png and stack.toml.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear focus-stack stack/ --out stack/depth\n\
+                          \x20        farnear focus-stack cells.ome.tif --out depth/\n\
+                          \x20        farnear focus-stack photos/ --align similarity --distances-mm 300,310,320,330,340 --out depth/")
+)]
+#[serde(default)]
+pub struct FocusStackRequest {
+    /// The folder of `farnear rig sequence`, a folder with images in the order of their numbers, or a TIFF with several pages.
     pub stack: PathBuf,
-    /// Where each image is focused; without it `capture.toml` knows, or depth is the number of the image.
-    pub places: Option<Places>,
-    /// The lens; without it `capture.toml` knows.
+    /// Distances from lens to object at which the images are focused, in mm. Without any, the folder's capture.toml or the TIFF's
+    /// metadata give positions, else depth is the number of the image.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM,...", value_delimiter = ','))]
+    pub distances_mm: Option<Vec<f64>>,
+    /// Distances from lens to sensor, in mm.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "MM,...", value_delimiter = ',', conflicts_with = "distances_mm")
+    )]
+    pub sensor_mm: Option<Vec<f64>>,
+    /// Positions of the stage, in um, also zero or negative (--positions-um=-5,0,5); depth.npy is in um then.
+    #[cfg_attr(
+        feature = "clap",
+        arg(
+            long,
+            value_name = "UM,...",
+            value_delimiter = ',',
+            allow_hyphen_values = true,
+            conflicts_with_all = ["distances_mm", "sensor_mm"]
+        )
+    )]
+    pub positions_um: Option<Vec<f64>>,
+    /// Optics file [default: the folder's capture.toml or optics.toml].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: Option<PathBuf>,
-    /// How the stack is measured.
-    pub computation: StackSettings,
-    /// What may differ from image to image; `None` = they lie on each other.
-    pub align: Option<Model>,
-    /// The new folder.
+    /// How colour becomes grey: mean, luma, red, green or blue.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub grey: Grey,
+    /// Focus measure (a wrong name lists all).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", default_value_t = Self::default().measure))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub measure: Sharpness,
+    /// Blur the images by a Gaussian of this standard deviation before measuring sharpness, in pixels, 0 to 10: finer detail is
+    /// mostly noise.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().smoothing_px))]
+    pub smoothing_px: f32,
+    /// Side of the median over the depths found, in pixels: odd, 1 (none) to 31.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().median_px))]
+    pub median_px: usize,
+    /// Mend the depths along the edges of the sharp image, so that objects do not grow over a dull background: standard
+    /// deviation of the window in pixels, 1 to 100; 0 = off.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().guided_px))]
+    pub guided_px: f32,
+    /// Side of the window over which sharpness is measured, in pixels: odd, 3 to 101.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = Self::default().window_px))]
+    pub window_px: usize,
+    /// Images that the tip of a pixel's sharpness is fitted to, at most: odd, 3 to 31.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().fit_points))]
+    pub fit_points: usize,
+    /// Registration of the images: none, shift, similarity (breathing lenses, hand-held cameras) or affine.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MODEL", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub align: StackAlign,
+    /// Use all images, also those that show another scene, are turned or shaken.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub use_all: bool,
+    /// Remove depths with a lower reliability, 0 to 1; 0 keeps all.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "R", default_value_t = Self::default().min_reliability))]
+    pub min_reliability: f32,
+    /// The new folder for the results.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
 }
 
-/// What there is to say of a stack.
+impl Default for FocusStackRequest {
+    fn default() -> Self {
+        let StackSettings {
+            measure,
+            smoothing_px,
+            window_px,
+            fit_points,
+            median_px,
+            guided_px,
+            min_reliability,
+        } = StackSettings::default();
+        Self {
+            stack: PathBuf::new(),
+            distances_mm: None,
+            sensor_mm: None,
+            positions_um: None,
+            optics: None,
+            grey: Grey::default(),
+            measure,
+            smoothing_px,
+            median_px,
+            guided_px,
+            window_px,
+            fit_points,
+            align: StackAlign::default(),
+            use_all: false,
+            min_reliability,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for FocusStackRequest {
+    const NAME: &'static str = "focus-stack";
+    const REQUIRED: &'static [&'static str] = &["stack", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("stack", PathKind::Input), ("optics", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = FocusStackFigures;
+
+    fn check(&self) -> Result<()> {
+        for (name, numbers) in [("distances-mm", &self.distances_mm), ("sensor-mm", &self.sensor_mm)] {
+            if let Some(wrong) = numbers.iter().flatten().find(|v| !(v.is_finite() && **v > 0.0)) {
+                return Err(WorkflowError::parameter(
+                    name,
+                    wrong,
+                    "distances from the lens are above 0; for positions of a stage give --positions-um",
+                ));
+            }
+        }
+        if let Some(wrong) = self.positions_um.iter().flatten().find(|v| !v.is_finite()) {
+            return Err(WorkflowError::parameter("positions-um", wrong, "a number"));
+        }
+        let given = [&self.distances_mm, &self.sensor_mm, &self.positions_um];
+        if given.iter().filter(|numbers| numbers.is_some()).count() > 1 {
+            let expected = "one of distances-mm, sensor-mm and positions-um";
+            return Err(WorkflowError::parameter("distances-mm", "several kinds of positions", expected));
+        }
+        Ok(())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<FocusStackFigures> {
+        focus_stack(self, context)
+    }
+}
+
+impl FocusStackRequest {
+    fn computation(&self) -> StackSettings {
+        StackSettings {
+            measure: self.measure,
+            smoothing_px: self.smoothing_px,
+            window_px: self.window_px,
+            fit_points: self.fit_points,
+            median_px: self.median_px,
+            guided_px: self.guided_px,
+            min_reliability: self.min_reliability,
+        }
+    }
+}
+
+/// Registration of a stack's images.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct StackAlign(pub Option<Model>);
+
+impl fmt::Display for StackAlign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.0 {
+            None => "none",
+            Some(Model::Shift) => "shift",
+            Some(Model::Similarity) => "similarity",
+            Some(Model::Affine) => "affine",
+        })
+    }
+}
+
+impl FromStr for StackAlign {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, &'static str> {
+        match text {
+            "none" => Ok(Self(None)),
+            "shift" => Ok(Self(Some(Model::Shift))),
+            "similarity" => Ok(Self(Some(Model::Similarity))),
+            "affine" => Ok(Self(Some(Model::Affine))),
+            _ => Err("expected none, shift, similarity or affine"),
+        }
+    }
+}
+
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FocusStackFigures {
-    /// Images.
+    /// Images that were used.
     pub images: usize,
-    /// `mm`, or `image` where nobody knows where the images are focused.
+    /// Files that were left out.
+    pub left_out: Vec<String>,
+    /// Unit of depth: `mm`, `um` (positions of a stage), or `image` where the positions are not known.
     pub unit: &'static str,
     /// Part of the pixels with a value.
     pub known: f64,
-    /// Median depth.
     pub median: Option<f64>,
     /// Farthest that a pixel was moved, px.
     pub moved_px: f64,
-    /// What is doubtful.
     pub warnings: Vec<String>,
 }
 
-/// What stands in `stack.toml`.
+/// What is in `stack.toml`.
 #[derive(Serialize)]
 struct Record<'a> {
     made_by: &'static str,
@@ -73,66 +253,81 @@ struct Record<'a> {
     fit_points: usize,
     min_reliability: f32,
     align: Option<Model>,
-    /// The distortion that was taken out.
-    distortion: Option<DistortionSection>,
+    grey: Grey,
     images: &'a [String],
-    /// Object distances in mm at which the images are sharp.
-    focused_at_mm: Option<&'a [f64]>,
+    left_out: &'a [String],
+    /// Where the images are focused, in the unit.
+    positions: &'a [f64],
+    /// The distortion that was removed.
+    distortion: Option<DistortionSection>,
 }
 
-/// Part of the pixels below which a stack is said to show too little.
+/// Part of the pixels below which a stack shows too little.
 const LITTLE: f64 = 0.5;
 
-/// Measures a stack and writes `depth.npy`, `confidence.npy` (the reliability), `all-in-focus.png`, `view.png` and `stack.toml`.
+/// Measures a stack and writes the results.
 ///
 /// # Errors
-/// Images that cannot be read or are no stack; distances that are not as many as the images or go both ways; a folder that is
-/// there already; [`WorkflowError::Cancelled`].
-pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Result<FocusStackFigures> {
-    let staging = Staging::new_folder(&settings.out)?;
-    let listed = places::of(settings)?;
-    let mut images = read(&listed.images, context)?;
-    let unseen = listed.distortion.map(|distortion| straighten(&mut images, &distortion));
-    let moved_px = match settings.align {
-        Some(model) => aligned(&mut images, model, context)?,
-        None => 0.0,
+/// Images that cannot be read or are no stack; positions that are not as many as the images; a folder that exists already;
+/// [`WorkflowError::Cancelled`].
+pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result<FocusStackFigures> {
+    request.check()?;
+    let staging = Staging::new_folder(&request.out)?;
+    let mut listed = positions::of(request)?;
+    let mut warnings = std::mem::take(&mut listed.remarks);
+    let mut images = read(&listed.images, request, &mut warnings, context)?;
+    let mut frames = if request.use_all && request.align.0.is_none() {
+        frames::Frames { warps: Vec::new(), left_out: Vec::new() }
+    } else {
+        frames::check(&images, request.align.0, context)?
     };
+    if request.use_all {
+        frames.left_out.clear();
+    }
+    let mut left_out = Vec::new();
+    for (index, reason) in &frames.left_out {
+        left_out.push(name(&listed.images[*index]));
+        warnings.push(format!("left out {}: {reason}", name(&listed.images[*index])));
+    }
+    let indices: Vec<usize> = frames.left_out.iter().map(|(index, _)| *index).collect();
+    for index in indices.iter().rev() {
+        images.remove(*index);
+        frames.warps.remove(*index);
+    }
+    listed.without(&indices);
+    let unseen = listed.distortion.map(|distortion| straighten(&mut images, &distortion));
+    let moved_px = if request.align.0.is_some() { frames::moved(&mut images, &frames.warps) } else { 0.0 };
     context.cancel.check("measuring the stack")?;
-    context.info(&format!("measuring {} images by {}", images.len(), settings.computation.measure));
+    context.info(&format!("measuring {} images by {}", images.len(), request.measure));
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
-    let mut map = focus_stack::depth_from_stack(&views, &settings.computation)?;
-    if let Some(unseen) = &unseen {
-        for (at, _) in unseen.indexed_iter().filter(|(_, unseen)| **unseen) {
-            (map.place[at], map.reliability[at]) = (f32::NAN, 0.0);
-        }
+    let mut map =
+        focus_stack::depth_from_positions(&views, &listed.even_positions(), &request.computation())?;
+    for (at, _) in unseen.iter().flat_map(|unseen| unseen.indexed_iter()).filter(|(_, unseen)| **unseen) {
+        (map.place[at], map.reliability[at]) = (f32::NAN, 0.0);
     }
     context.cancel.check("writing the results")?;
     let depth = listed.depth(&map.place);
-    let figures = figures(&depth, &listed, &map, moved_px);
+    let figures = figures(&depth, &listed, &map, moved_px, left_out, warnings);
     for warning in &figures.warnings {
         context.progress.warn(warning);
     }
-    let names: Vec<String> = listed
-        .images
-        .iter()
-        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
-        .collect();
-    let StackSettings { measure, smoothing_px, window_px, fit_points, median_px, guided_px, min_reliability } =
-        settings.computation;
+    let names: Vec<String> = listed.images.iter().map(|path| name(path)).collect();
     let record = Record {
         made_by: MADE_BY,
         unit: figures.unit,
-        measure: measure.name(),
-        smoothing_px,
-        median_px,
-        guided_px,
-        window_px,
-        fit_points,
-        min_reliability,
-        align: settings.align,
-        distortion: listed.distortion.map(DistortionSection::from),
+        measure: request.measure.name(),
+        smoothing_px: request.smoothing_px,
+        median_px: request.median_px,
+        guided_px: request.guided_px,
+        window_px: request.window_px,
+        fit_points: request.fit_points,
+        min_reliability: request.min_reliability,
+        align: request.align.0,
+        grey: request.grey,
         images: &names,
-        focused_at_mm: listed.focused_at_mm.as_deref(),
+        left_out: &figures.left_out,
+        positions: &listed.positions,
+        distortion: listed.distortion.map(DistortionSection::from),
     };
     staging.write("depth.npy", &npy::write(depth.view()))?;
     staging.write("confidence.npy", &npy::write(map.reliability.view()))?;
@@ -141,22 +336,34 @@ pub fn focus_stack(settings: &FocusStackSettings, context: &Context<'_>) -> Resu
     staging.write("view.png", &view::view_png_in(figures.unit, depth.view(), map.reliability.view())?)?;
     staging.write("stack.toml", toml::to_string(&record)?.as_bytes())?;
     staging.finish()?;
-    context.info(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", request.out.display()));
     Ok(figures)
 }
 
-fn read(images: &[PathBuf], context: &Context<'_>) -> Result<Vec<Array2<f32>>> {
-    let mut all = Vec::with_capacity(images.len());
-    for (index, path) in images.iter().enumerate() {
-        context.cancel.check("reading the stack")?;
-        all.push(image_file::read_grey(path)?.pixels);
-        context.progress.advance("images", index + 1, Some(images.len()));
-    }
-    Ok(all)
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Takes the lens' distortion out of all images; where it showed nothing of what would lie there, they keep their own pixels, and
-/// the mask says so.
+fn read(
+    images: &[PathBuf],
+    request: &FocusStackRequest,
+    warnings: &mut Vec<String>,
+    context: &Context<'_>,
+) -> Result<Vec<Array2<f32>>> {
+    let settings = ReadSettings { grey: request.grey, white_level: None };
+    let read = stack::read(images, &settings, |index| -> Result<()> {
+        context.cancel.check("reading the stack")?;
+        context.progress.advance("images", index + 1, Some(images.len()));
+        Ok(())
+    })?;
+    if request.grey == Grey::Mean && read.iter().any(|image| image.colour) {
+        warnings.push("colour images: grey is the mean of red, green and blue (--grey)".into());
+    }
+    Ok(read.into_iter().map(|image| image.pixels).collect())
+}
+
+/// Removes the lens' distortion from all images. Where it showed nothing, which is the same in all, they keep their own pixels, and
+/// the mask marks these.
 fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<bool> {
     let mut unseen = Array2::from_elem((0, 0), false);
     for image in images {
@@ -172,76 +379,41 @@ fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<boo
     unseen
 }
 
-/// Aligns the images of a stack; returns the farthest distance that a pixel was moved, px.
+/// Aligns the images of a stack, NaN where they do not show the scene; returns the farthest distance that a pixel was moved, px.
 ///
 /// # Errors
-/// [`WorkflowError::Parameter`] if neighbours show nothing in common.
+/// Those of a context that cancels.
 pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
-    aligned(images, model, &Context::unattended())
+    let frames = frames::check(images, Some(model), &Context::unattended())?;
+    Ok(frames::moved(images, &frames.warps))
 }
 
-/// Lays each image on the one in the middle, by way of its neighbours, which differ least; gives the farthest way of a pixel.
-/// What an image does not show is taken from its own border.
-fn aligned(images: &mut [Array2<f32>], model: Model, context: &Context<'_>) -> Result<f64> {
-    let middle = images.len() / 2;
-    let size = images.first().map_or((0, 0), Array2::dim);
-    let mut warps = vec![Warp::IDENTITY; images.len()];
-    let outwards =
-        (middle + 1..images.len()).map(|i| (i - 1, i)).chain((0..middle).rev().map(|i| (i + 1, i)));
-    for (done, (nearer, index)) in outwards.enumerate() {
-        context.cancel.check("aligning the stack")?;
-        if images[index].dim() != size {
-            // The measure names it.
-            return Ok(0.0);
-        }
-        let step = align::estimate(images[nearer].view(), images[index].view(), model, Warp::IDENTITY);
-        let step = step.ok_or_else(|| {
-            let value = format!("between images {} and {}", nearer + 1, index + 1);
-            WorkflowError::parameter("align", value, "the images show nothing in common to align by")
-        })?;
-        warps[index] = step.warp.after(&warps[nearer]);
-        context.progress.advance("images aligned", done + 1, Some(images.len() - 1));
-    }
-    let mut farthest = 0.0_f64;
-    for (image, warp) in images.iter_mut().zip(&warps) {
-        if *warp == Warp::IDENTITY {
-            continue;
-        }
-        let [right, bottom] = [size.1 as f64 - 1.0, size.0 as f64 - 1.0];
-        for [x, y] in [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]] {
-            let [to_x, to_y] = warp.at([x, y]);
-            farthest = farthest.max((to_x - x).hypot(to_y - y));
-        }
-        let seen = resample(image.view(), warp);
-        let own = std::mem::replace(image, seen);
-        image.zip_mut_with(&own, |seen, own| {
-            if !seen.is_finite() {
-                *seen = *own;
-            }
-        });
-    }
-    Ok(farthest)
-}
-
-fn figures(depth: &Array2<f32>, listed: &places::Listed, map: &StackMap, moved_px: f64) -> FocusStackFigures {
+fn figures(
+    depth: &Array2<f32>,
+    listed: &positions::Listed,
+    map: &StackMap,
+    moved_px: f64,
+    left_out: Vec<String>,
+    mut warnings: Vec<String>,
+) -> FocusStackFigures {
     let mut values: Vec<f32> = depth.iter().copied().filter(|v| v.is_finite()).collect();
     let middle = values.len() / 2;
     let median = (!values.is_empty())
         .then(|| rounded(f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1), 3));
     let known = values.len() as f64 / depth.len().max(1) as f64;
     let ends = map.reliability.iter().filter(|r| **r == 0.0).count() as f64 / depth.len().max(1) as f64;
-    let mut warnings = Vec::new();
     if known < LITTLE {
         warnings.push(format!(
             "only {:.0} % of the picture has a depth; {:.0} % is sharpest at an end of the stack or nowhere: a longer stack, more \
-             texture or a larger --window may help",
+             texture or a larger --window-px may help",
             100.0 * known,
             100.0 * ends
         ));
     }
     FocusStackFigures {
         images: listed.images.len(),
-        unit: if listed.focused_at_mm.is_some() { "mm" } else { "image" },
+        left_out,
+        unit: listed.axis.unit(),
         known: rounded(known, 4),
         median,
         moved_px: rounded(moved_px, 2),

@@ -11,7 +11,7 @@ mod region;
 
 use std::{fs, path::Path};
 
-use farnear_depth::optics::Optics;
+use farnear_depth::{metrics::is_depth, optics::Optics};
 use farnear_files::{map, mesh::Projection};
 use ndarray::{Array2, Array3, ArrayView2, s};
 use serde::{Deserialize, Serialize};
@@ -46,6 +46,25 @@ struct Record {
     part: Option<Part>,
 }
 
+/// Unit of a depth map by the stack.toml next to it: `mm`, `um` or `image`; `mm` without one.
+///
+/// # Errors
+/// A stack.toml that cannot be read.
+pub fn unit_of(map: &Path) -> Result<String> {
+    #[derive(Deserialize)]
+    struct Stack {
+        unit: String,
+    }
+    let record = map.parent().unwrap_or(Path::new(".")).join("stack.toml");
+    if !record.exists() {
+        return Ok("mm".into());
+    }
+    let text = fs::read_to_string(&record).map_err(WorkflowError::read("the stack's record", &record))?;
+    let Stack { unit } =
+        toml::from_str(&text).map_err(WorkflowError::file(&record, "a record of a focus stack"))?;
+    Ok(unit)
+}
+
 /// The optics that made the map of a folder: its record's, else the pair's; and which part of the images it is of.
 fn optics_of(folder: &Path) -> Result<(Optics, Option<Part>)> {
     let record = folder.join("depth.toml");
@@ -62,13 +81,9 @@ fn optics_of(folder: &Path) -> Result<(Optics, Option<Part>)> {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
-    /// Leftmost column.
     pub x: usize,
-    /// Topmost row.
     pub y: usize,
-    /// Columns.
     pub width: usize,
-    /// Rows.
     pub height: usize,
 }
 
@@ -103,7 +118,16 @@ impl Measured {
     pub fn read(capture: &Path) -> Result<Self> {
         let file = if capture.is_dir() { capture.join("depth.npy") } else { capture.to_owned() };
         let folder = file.parent().unwrap_or(Path::new("."));
-        let depth_mm = map::read(&file)?;
+        let unit = unit_of(&file)?;
+        if unit != "mm" {
+            return Err(WorkflowError::parameter(
+                "depth.npy",
+                format!("depths in {unit}"),
+                "a map in mm: measure the stack with --distances-mm or --sensor-mm, for figures are in mm",
+            ));
+        }
+        // 0, negative values and infinity are holes in maps of many sources.
+        let depth_mm = map::read(&file)?.mapv(|z| if is_depth(z) { z } else { f32::NAN });
         let path = folder.join("uncertainty.npy");
         let deviation_mm = path.exists().then(|| map::read(&path)).transpose()?;
         if let Some(deviation) = deviation_mm.as_ref().filter(|map| map.dim() != depth_mm.dim()) {

@@ -15,14 +15,10 @@ const DARK: f64 = 0.04;
 /// Contrast (standard deviation over mean) below which there is hardly a texture to defocus.
 const TEXTURELESS: f64 = 0.02;
 
-/// Figures of an image.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PictureFigures {
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
-    /// Bits of a pixel.
     pub bits: u8,
     /// Mean, as part of the full scale.
     pub mean: f64,

@@ -29,7 +29,6 @@ use style::STYLE;
 pub struct ReportSettings {
     /// The capture's folder.
     pub capture: PathBuf,
-    /// The page to write.
     pub out: PathBuf,
 }
 
@@ -38,7 +37,6 @@ pub struct ReportSettings {
 pub struct ReportFigures {
     /// Pictures in the page.
     pub pictures: usize,
-    /// Its size.
     pub bytes: usize,
 }
 

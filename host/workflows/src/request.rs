@@ -151,6 +151,7 @@ pub fn schema_without_paths<R: Request>() -> Value {
 /// All tasks that are described by a request.
 pub const TASKS: &[Task] = &[
     Task::of::<crate::depth::DepthRequest>(),
+    Task::of::<crate::focus_stack::FocusStackRequest>(),
     Task::of::<crate::correct::CorrectRequest>(),
     Task::of::<crate::operators::OperatorRequest>(),
     Task::of::<crate::target::TargetRequest>(),

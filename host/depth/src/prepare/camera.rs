@@ -13,6 +13,13 @@ use crate::reason::Reason;
 const SURROUNDINGS_PX: usize = 31;
 /// Robust standard deviations from which a pixel is bad.
 const BAD: f32 = 8.0;
+/// Part of saturated pixels from which an exposure is refused: more than hot pixels make.
+const SATURATED: f64 = 0.01;
+/// Side of the window whose mean has little noise left, and the structure in it that dust and falloff do not make: standard
+/// deviation as part of the mean for a flat, of full scale for a dark exposure.
+const SMOOTHED_PX: usize = 7;
+const FLAT_STRUCTURE: f64 = 0.04;
+const DARK_STRUCTURE: f64 = 0.02;
 /// Least and largest response of a good pixel.
 const RESPONSE: [f32; 2] = [0.5, 1.5];
 
@@ -39,6 +46,36 @@ pub enum CameraError {
         /// Which kind.
         kind: &'static str,
     },
+    /// A flat exposure is saturated.
+    #[error(
+        "{kind} exposure {number}: {percent:.1} % of its pixels are saturated; give evenly lit exposures at about half of full scale"
+    )]
+    Saturated {
+        /// Flat or dark.
+        kind: &'static str,
+        /// Which one, from 1.
+        number: usize,
+        /// Part of the pixels at full scale, percent.
+        percent: f64,
+    },
+    /// An exposure shows something.
+    #[error(
+        "{kind} exposure {number} has structure: its brightness varies by {percent:.1} % over {SURROUNDINGS_PX} px, {expected}; is it a picture of the \
+         scene? Give {advice}"
+    )]
+    Structured {
+        /// Flat or dark.
+        kind: &'static str,
+        /// Which one, from 1.
+        number: usize,
+        /// Standard deviation of the smoothed brightness around its surroundings, percent of the mean (of full scale in the
+        /// dark).
+        percent: f64,
+        /// What is usual.
+        expected: &'static str,
+        /// What to do.
+        advice: &'static str,
+    },
     /// The flat exposures are hardly brighter than the dark ones.
     #[error(
         "the flat exposures have a mean of {flat:.4}, the dark ones of {dark:.4}: give evenly lit exposures at about half of \
@@ -50,6 +87,44 @@ pub enum CameraError {
         /// Mean of the dark ones.
         dark: f64,
     },
+}
+
+/// Refuses exposures that are saturated or show a scene.
+fn check_exposure(kind: &'static str, number: usize, image: &Array2<f32>) -> Result<(), CameraError> {
+    let count = image.len().max(1) as f64;
+    let saturated = image.iter().filter(|value| **value >= 1.0).count() as f64 / count;
+    if saturated > SATURATED {
+        return Err(CameraError::Saturated { kind, number, percent: 100.0 * saturated });
+    }
+    let smooth = box_mean(image.view(), SMOOTHED_PX);
+    let around = box_mean(smooth.view(), SURROUNDINGS_PX);
+    let differences = || smooth.iter().zip(&around).map(|(value, around)| f64::from(value - around));
+    // Robust: single bad pixels and grains of dust are no scene.
+    let mut sizes: Vec<f32> = differences().map(|difference| difference.abs() as f32).collect();
+    let at = (0.9 * sizes.len().saturating_sub(1) as f64) as usize;
+    let usual = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(at, f32::total_cmp).1 };
+    // 90 % of a normal distribution lie within 1.645 standard deviations.
+    let deviation = f64::from(usual) / 1.645;
+    let mean = image.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
+    let (relative, limit, expected, advice) = if kind == "flat" {
+        (
+            deviation / mean.max(1e-6),
+            FLAT_STRUCTURE,
+            "an even one by less than 4 %",
+            "exposures of an evenly lit surface, out of focus",
+        )
+    } else {
+        (
+            deviation,
+            DARK_STRUCTURE,
+            "a dark one by less than 2 % of full scale",
+            "exposures with the lens covered",
+        )
+    };
+    if relative > limit {
+        return Err(CameraError::Structured { kind, number, percent: 100.0 * relative, expected, advice });
+    }
+    Ok(())
 }
 
 /// A camera's frames, (height, width).
@@ -81,6 +156,11 @@ impl CameraFrames {
     /// # Errors
     /// [`CameraError`].
     pub fn learn(dark: &[Array2<f32>], flat: &[Array2<f32>]) -> Result<Self, CameraError> {
+        for (kind, exposures) in [("flat", flat), ("dark", dark)] {
+            for (index, exposure) in exposures.iter().enumerate() {
+                check_exposure(kind, index + 1, exposure)?;
+            }
+        }
         let flat = mean(flat, "flat")?;
         let dark = if dark.is_empty() { Array2::zeros(flat.dim()) } else { mean(dark, "dark")? };
         if dark.dim() != flat.dim() {
@@ -241,5 +321,26 @@ mod tests {
         ));
         let frames = CameraFrames::learn(&[], &[image(30, 0.5)]).unwrap();
         assert!(frames.check((31, 40)).unwrap_err().to_string().contains("40x30"));
+    }
+
+    #[test]
+    fn rejects_saturated_and_structured_exposures_with_the_figure() {
+        let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32 / 97.0 - 0.5;
+        // Falloff of a fifth to the border, noise of 5 %: as flats are.
+        let flat = Array2::from_shape_fn((90, 120), |(y, x)| {
+            let [u, v] = [x as f32 / 60.0 - 1.0, y as f32 / 45.0 - 1.0];
+            0.5 * (1.0 - 0.1 * (u * u + v * v)) * (1.0 + 0.1 * noise(x, y))
+        });
+        assert!(CameraFrames::learn(&[], &[flat.clone()]).is_ok());
+        let white = Array2::from_elem((90, 120), 1.0);
+        let error = CameraFrames::learn(&[], &[flat.clone(), white]).unwrap_err().to_string();
+        assert!(error.starts_with("flat exposure 2: 100.0 % of its pixels are saturated"), "{error}");
+        let scene = Array2::from_shape_fn((90, 120), |(y, x)| {
+            0.4 + 0.3 * ((x as f32 / 5.0).sin() * (y as f32 / 7.0).cos())
+        });
+        let error = CameraFrames::learn(&[], &[scene.clone()]).unwrap_err().to_string();
+        assert!(error.contains("flat exposure 1 has structure") && error.contains('%'), "{error}");
+        let error = CameraFrames::learn(&[scene], &[flat]).unwrap_err().to_string();
+        assert!(error.contains("dark exposure 1 has structure") && error.contains("lens covered"), "{error}");
     }
 }

@@ -8,6 +8,9 @@ use crate::cubic::{LEAST_T, MAX_ALPHA, SLOPE_FLOOR, START, STEPS};
 /// Texture energy that stands for none: keeps divisions finite, far below any real one (images are normalised).
 const TINY: f32 = 1e-30;
 
+/// Pixels that are counted in one f32, which is exact up to 2^24.
+const COUNTED_PX: usize = 1 << 22;
+
 /// Smallest and largest value of a row, and whether all are finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extremes {
@@ -406,13 +409,25 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
 
 dispatch! {
     /// Texture to confidence in place ([`confidence::confidence`]); returns the numbers of low-texture pixels and of pixels
-    /// without any confidence. At most 2^24 pixels.
+    /// without any confidence.
     fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] = confidence_generic
 }
 
 #[inline(always)]
 fn confidence_generic<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] {
-    assert!(texture.len() == misfit.len() && texture.len() <= 1 << 24);
+    assert!(texture.len() == misfit.len());
+    let (mut low, mut without) = (0, 0);
+    for (texture, misfit) in texture.chunks_mut(COUNTED_PX).zip(misfit.chunks(COUNTED_PX)) {
+        let [of_low, of_without] = confidence_chunk::<L>(texture, misfit, scale);
+        low += of_low;
+        without += of_without;
+    }
+    [low, without]
+}
+
+/// [`confidence_generic`] of at most [`COUNTED_PX`] pixels.
+#[inline(always)]
+fn confidence_chunk<L: Lanes>(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] {
     let threshold = confidence::LOW_TEXTURE * scale;
     let least = confidence::NO_TEXTURE * scale;
     let [mut low, mut with] = [L::splat(0.0); 2];
@@ -461,6 +476,16 @@ mod tests {
                     assert!((found - expected).abs() < 1e-6, "{backend:?} {texture}: {found} {expected}");
                 }
             }
+        }
+    }
+
+    /// 17 million pixels in one row of work, as two threads have of a 34 MP image.
+    #[test]
+    fn counts_are_exact_beyond_what_one_float_can_count() {
+        let misfit = vec![0.0; (1 << 24) + 1001];
+        for backend in Backend::available() {
+            let mut texture = vec![0.0; misfit.len()];
+            assert_eq!(confidence_row(backend, &mut texture, &misfit, 1.0), [misfit.len(); 2]);
         }
     }
 

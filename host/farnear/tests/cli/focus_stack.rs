@@ -88,11 +88,68 @@ fn distances_make_it_millimetres_in_either_order() {
     let falling = "380,370,360,350,340,330,320,310,300";
     for (distances, [left, right]) in [(rising, [330.0, 354.9]), (falling, [350.0, 325.0])] {
         let out = folder.text(&distances[..3]);
-        let arguments = ["focus-stack", &stack, "--out", &out, "--distances", distances, "--json"];
+        let arguments = ["focus-stack", &stack, "--out", &out, "--distances-mm", distances, "--json"];
         assert_eq!(figures(&mut farnear(&arguments))["unit"], "mm");
         let found = halves(&read(&out));
         assert!((found[0] - left).abs() < 1.0 && (found[1] - right).abs() < 1.0, "{found:?}");
     }
+}
+
+#[test]
+fn stage_positions_are_any_numbers_in_um() {
+    let folder = Folder::new();
+    let (stack, out) = (stack(&folder), folder.text("out"));
+    let arguments = ["focus-stack", &stack, "--out", &out, "--positions-um=-4,-3,-2,-1,0,2,4,6,8", "--json"];
+    assert_eq!(figures(&mut farnear(&arguments))["unit"], "um");
+    let found = halves(&read(&out));
+    assert!((found[0] + 1.0).abs() < 0.5 && (found[1] - 3.0).abs() < 1.0, "{found:?}");
+    fails(&mut farnear(&["measure", "region", &out]), 2, &["depths in um", "--distances-mm"]);
+}
+
+#[test]
+fn a_foreign_frame_is_named_and_left_out() {
+    let folder = Folder::new();
+    let (path, out) = (stack(&folder), folder.text("out"));
+    let other =
+        Array2::from_shape_fn((60, 80), |(y, x)| ((x * 104_729 + y * 7919 + x * x * 17) % 199) as u16);
+    fs::write(format!("{path}/6.png"), image_file::encode_png(other.view(), 8).expect("a picture"))
+        .expect("a file");
+    let found = figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--json"]));
+    assert_eq!((number(&found, "images"), found["left_out"][0].as_str()), (8.0, Some("6.png")));
+    for (half, expected) in halves(&read(&out)).iter().zip(SHARPEST) {
+        assert!((half - expected - 1.0).abs() < 0.15, "{half}");
+    }
+}
+
+#[test]
+fn a_folder_of_tiff_is_a_stack_and_mixed_formats_are_refused() {
+    let folder = Folder::new();
+    let (path, out) = (stack(&folder), folder.text("out"));
+    for number in 1..=IMAGES {
+        let file = format!("{path}/{number}.png");
+        let pixels =
+            image_file::read_grey(file.as_ref()).expect("a picture").pixels.mapv(|v| (4095.0 * v) as u16);
+        fs::write(
+            format!("{path}/{number}.tif"),
+            image_file::encode_tiff(pixels.view(), 12).expect("a TIFF"),
+        )
+        .expect("a file");
+        if number > 3 {
+            fs::remove_file(file).expect("a file");
+        }
+    }
+    fails(&mut farnear(&["focus-stack", &path, "--out", &out]), 1, &["1.png", "1.tif", "one name"]);
+    for number in 1..=3 {
+        fs::rename(format!("{path}/{number}.png"), format!("{path}/preview{number}.png")).expect("a file");
+    }
+    fails(&mut farnear(&["focus-stack", &path, "--out", &out]), 1, &["3 PNG and 9 TIFF files"]);
+    for number in 1..=3 {
+        fs::remove_file(format!("{path}/preview{number}.png")).expect("a file");
+    }
+    assert_eq!(
+        number(&figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--json"])), "images"),
+        9.0
+    );
 }
 
 #[test]
@@ -121,17 +178,21 @@ fn what_is_no_stack_is_refused_and_nothing_is_written() {
         fails(farnear(&["focus-stack"]).args(arguments).args(["--out", &out]), code, &[phrase]);
         assert!(!folder.listing().iter().any(|name| name.starts_with("out")), "{phrase}");
     };
-    refuse(&[&stack, "--distances", "300,310"], 2, "one for each of the 9 images is needed");
-    refuse(&[&stack, "--distances", "300,300,320,330,340,350,360,370,380"], 2, "300 mm twice");
-    refuse(&[&stack, "--distances", "300,far"], 2, "`far` is no distance in mm");
+    refuse(&[&stack, "--distances-mm", "300,310"], 2, "one for each of the 9 images is needed");
+    refuse(&[&stack, "--distances-mm", "300,300,320,330,340,350,360,370,380"], 2, "300 mm twice");
+    refuse(&[&stack, "--distances-mm", "300,far"], 2, "invalid value 'far'");
     refuse(
         &[&stack, "--measure", "sharp"],
         2,
         "`sharp` is no focus measure: expected one of modified-laplacian",
     );
-    refuse(&[&stack, "--window", "8"], 1, "the window is 8: an odd number from 3");
-    refuse(&[&stack, "--guided", "0.5"], 1, "mended within 0.5 px: 0 (not at all) or 1 to 100 is possible");
-    refuse(&["/absent"], 1, "/absent: no such picture or folder");
+    refuse(&[&stack, "--window-px", "8"], 1, "the window is 8: an odd number from 3");
+    refuse(
+        &[&stack, "--guided-px", "0.5"],
+        1,
+        "mended within 0.5 px: 0 (not at all) or 1 to 100 is possible",
+    );
+    refuse(&["/absent"], 1, "/absent: no such folder or file");
     fs::write(
         format!("{stack}/5.png"),
         image_file::encode_png(Array2::zeros((8, 8)).view(), 8).expect("a picture"),

@@ -83,7 +83,6 @@ pub struct ModelFigures {
     pub activities: Vec<String>,
 }
 
-/// All shipped models.
 pub fn list() -> Result<Vec<ModelFigures>> {
     MODELS
         .iter()

@@ -14,6 +14,7 @@ use crate::{
     correct::CorrectRequest,
     depth::DepthRequest,
     error::{Result, WorkflowError},
+    focus_stack::FocusStackRequest,
     request::{Job, PathKind, Request, Task},
 };
 
@@ -29,6 +30,7 @@ pub(super) struct Kind {
 #[rustfmt::skip]
 const KINDS: &[Kind] = &[
     Kind::of::<DepthRequest>(),
+    Kind::of::<FocusStackRequest>(),
     Kind::of::<CorrectRequest>(),
     Kind { name: "silhouettes-video", makes_file: false, work: people::video },
     Kind { name: "silhouettes-markers", makes_file: false, work: people::markers },

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use farnear_capture::record::CAPTURE_FILE;
-use farnear_files::image_file::{Samples, read_grey};
+use farnear_files::image_file::{Samples, read_grey, shared_white_level};
 use ndarray::Array2;
 
 use crate::error::{Result, WorkflowError};
@@ -20,14 +20,17 @@ pub struct Pair {
 
 impl Pair {
     /// Reads both images. Their pixels must mean the same: integers of any depth share one scale, float files have their
-    /// own.
+    /// own. Where a camera of fewer bits saturates below the full scale, its white becomes 1.
     ///
     /// # Errors
     /// [`WorkflowError::Image`]; [`WorkflowError::Pair`] for integers beside float and for one image given twice.
     pub fn read(far: &Path, near: &Path) -> Result<Self> {
         // Side by side: unpacking is what reading takes.
         let (far_image, near_image) = rayon::join(|| read_grey(far), || read_grey(near));
-        let (far_image, near_image) = (far_image?, near_image?);
+        let (mut far_image, mut near_image) = (far_image?, near_image?);
+        if let Some(white) = shared_white_level([&far_image, &near_image].into_iter()) {
+            (far_image, near_image) = (far_image.relative_to(white), near_image.relative_to(white));
+        }
         let unfit = |reason| WorkflowError::Pair { far: far.into(), near: near.into(), reason };
         let samples = match (far_image.samples, near_image.samples) {
             (Samples::Integer(a), Samples::Integer(b)) => Samples::Integer(a.min(b)),

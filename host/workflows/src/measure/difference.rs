@@ -16,7 +16,6 @@ pub struct DifferenceFigures {
     /// Standard deviation of the differences.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_deviation_mm: Option<f64>,
-    /// Root mean square.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_mm: Option<f64>,
 }

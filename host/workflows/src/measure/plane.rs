@@ -9,7 +9,6 @@ pub struct Plane {
     pub z_mm: f64,
     /// Slope to the right, mm per mm.
     pub slope_x: f64,
-    /// Slope upwards.
     pub slope_y: f64,
     /// Angle between the plane and one square to the optical axis.
     pub tilt_deg: f64,

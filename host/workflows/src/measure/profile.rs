@@ -8,9 +8,7 @@ use crate::error::{Result, WorkflowError};
 /// A point of a profile.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct ProfilePoint {
-    /// Column.
     pub x: usize,
-    /// Row.
     pub y: usize,
     /// From the profile's begin, in pixels.
     pub at_px: f64,

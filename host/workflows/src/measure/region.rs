@@ -9,12 +9,9 @@ use crate::error::Result;
 /// Side of the blocks whose means count as independent, px: wider than usual windows.
 const BLOCK_PX: usize = 24;
 
-/// Figures of a region.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RegionFigures {
-    /// Which region.
     pub region: Rectangle,
-    /// Pixels with a depth.
     pub pixels: usize,
     /// Their part of all pixels of the region.
     pub fill_rate: f64,
@@ -25,7 +22,6 @@ pub struct RegionFigures {
     /// windows; none with fewer than four blocks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error_mm: Option<f64>,
-    /// Median depth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub median_mm: Option<f64>,
     /// Standard deviation of the depths.

@@ -10,7 +10,6 @@ use crate::error::Result;
 
 /// Bins of the histogram.
 const BINS: usize = 96;
-/// What has no value.
 const NONE: Rgb<u8> = Rgb([150, 150, 152]);
 
 /// The value below which this part of the finite values lies; `None` where there are none.

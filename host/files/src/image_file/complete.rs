@@ -1,0 +1,78 @@
+//! Whether the bytes of an image file are all there, and which formats are not read.
+
+/// What to do with a raw file.
+pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
+                              RawTherapee or darktable), and give that";
+
+/// What an image file in a format that is not read is, and what to do with it; `None` for all others.
+pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
+    let brand = |names: &[&[u8]]| {
+        bytes.get(4..8) == Some(b"ftyp") && names.iter().any(|name| bytes.get(8..12) == Some(name))
+    };
+    let raw_magics: [&[u8]; 6] = [b"FUJIFILMCCD-RAW", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FOVb"];
+    if bytes.get(8..10) == Some(b"CR") && bytes.starts_with(b"II*\0")
+        || brand(&[b"crx "])
+        || raw_magics.iter().any(|magic| bytes.starts_with(magic))
+    {
+        return Some(RAW);
+    }
+    if brand(&[b"heic", b"heix", b"mif1", b"msf1", b"hevc"]) {
+        return Some(
+            "it is a HEIC file, which is not read: convert it to PNG or TIFF, or set the phone to \"most compatible\"",
+        );
+    }
+    if brand(&[b"avif", b"avis"]) || bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+        return Some("AVIF and WebP are not read: convert it to PNG or TIFF");
+    }
+    const OTHERS: [(&[u8], &str); 8] = [
+        (b"GIF8", "GIF is not read: convert it to PNG or TIFF"),
+        (b"\x76\x2f\x31\x01", "OpenEXR is not read: convert it to float TIFF"),
+        (b"\xff\x0a", "JPEG XL is not read: convert it to PNG or TIFF"),
+        (b"\0\0\0\x0cJXL ", "JPEG XL is not read: convert it to PNG or TIFF"),
+        (b"\0\0\0\x0cjP  ", "JPEG 2000 is not read: convert it to PNG or TIFF"),
+        (b"\xff\x4f\xff\x51", "JPEG 2000 is not read: convert it to PNG or TIFF"),
+        (b"SIMPLE  =", "FITS is not read: convert it to float TIFF"),
+        (b"#?RADIANCE", "Radiance HDR is not read: convert it to float TIFF"),
+    ];
+    OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, advice)| *advice)
+}
+
+/// Whether a JPEG has its end: the marker after the last scan. What follows it (previews, films) does not matter.
+pub(super) fn jpeg_has_its_end(bytes: &[u8]) -> bool {
+    let mut at = 2;
+    loop {
+        // Between segments: a marker, perhaps after fill bytes.
+        let Some(found) = bytes
+            .get(at..)
+            .and_then(|rest| rest.windows(2).position(|two| two[0] == 0xff && two[1] != 0xff && two[1] != 0))
+        else {
+            return false;
+        };
+        let marker = bytes[at + found + 1];
+        at += found + 2;
+        match marker {
+            0xd9 => return true,
+            0x01 | 0xd0..=0xd8 => {}
+            _ => {
+                let Some(&[high, low]) = bytes.get(at..at + 2) else { return false };
+                at += usize::from(u16::from_be_bytes([high, low])).max(2);
+                // Data of a scan has no marker but resets, and the search above passes over it.
+            }
+        }
+    }
+}
+
+/// Significant bits of a PNG's first channel (chunk sBIT), where it gives them.
+pub(super) fn png_significant_bits(bytes: &[u8]) -> Option<u8> {
+    let mut at = 8;
+    loop {
+        let length = u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize;
+        match bytes.get(at + 4..at + 8)? {
+            b"sBIT" => {
+                return bytes.get(at + 8).copied().filter(|bits| (1..=16).contains(bits) && length > 0);
+            }
+            b"IDAT" | b"IEND" => return None,
+            _ => at = at.checked_add(length)?.checked_add(12)?,
+        }
+    }
+}

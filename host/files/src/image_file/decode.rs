@@ -1,0 +1,283 @@
+//! From bytes to samples: the right format, the right way up, grey.
+
+use std::io::Cursor;
+
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ndarray::{Array2, Array3};
+use zune_jpeg::{
+    JpegDecoder,
+    zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
+};
+
+use super::{GreyImage, ReadSettings, Samples, complete, tiff_file, tiff_tags};
+use crate::video::Pixels;
+
+/// Images in 8 bits a sample.
+pub(crate) type Samples8 = Pixels;
+
+/// Most bytes that a byte of a file can stand for (deflate: 1032), and what small files may have anyway.
+const EXPANSION: u64 = 1100;
+const SMALL_BYTES: u64 = 64 << 20;
+/// Bits in which a saturated camera's largest code is looked for within 16.
+const CAMERA_BITS: std::ops::RangeInclusive<u32> = 8..=15;
+/// Pixels at the largest code from which that is the white level.
+const SATURATED_PX: usize = 4;
+
+/// Samples as a file stores them.
+pub(crate) enum Values {
+    U8(Vec<u8>),
+    U16(Vec<u16>),
+    /// 32-bit integers as their part of the full scale.
+    U32(Vec<f32>),
+    F32(Vec<f32>),
+}
+
+/// A decoded image: rows of pixels of `channels` samples each.
+pub(crate) struct Decoded {
+    pub width: usize,
+    pub height: usize,
+    pub channels: usize,
+    /// 1 or 3: samples of a pixel that are grey or colour; the rest is alpha.
+    pub colours: usize,
+    pub values: Values,
+    /// Bits of the camera within a 16-bit sample, from the file's metadata: a white level in codes.
+    pub white_level: Option<u16>,
+}
+
+/// Most bytes that a file of this length can hold decoded.
+pub(super) fn most_bytes(file: usize) -> u64 {
+    SMALL_BYTES.max((file as u64).saturating_mul(EXPANSION))
+}
+
+/// Decodes a file's only image, or the page (from 1).
+pub(crate) fn decode(bytes: &[u8], page: Option<usize>) -> Result<Decoded, String> {
+    if let Some(advice) = complete::unsupported(bytes) {
+        return Err(advice.into());
+    }
+    let (decoded, orientation) = if tiff_tags::is_tiff(bytes) {
+        tiff_file::decode(bytes, page)?
+    } else {
+        if page.is_some_and(|page| page != 1) {
+            return Err("it has one image: only TIFF files have pages".into());
+        }
+        if bytes.starts_with(b"\xff\xd8") { jpeg(bytes)? } else { other(bytes)? }
+    };
+    Ok(decoded.turned(orientation))
+}
+
+fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
+    const INCOMPLETE: &str =
+        "it is incomplete: the data end before the image does; copy it again from the camera";
+    if !complete::jpeg_has_its_end(bytes) {
+        return Err(INCOMPLETE.into());
+    }
+    let options = DecoderOptions::default().set_max_width(usize::MAX).set_max_height(usize::MAX);
+    let options = options.set_strict_mode(true);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let broken =
+        |error: zune_jpeg::errors::DecodeErrors| format!("its data are damaged or incomplete: {error:?}");
+    decoder.decode_headers().map_err(broken)?;
+    let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
+    let (to, channels) = if grey { (ColorSpace::Luma, 1) } else { (ColorSpace::RGB, 3) };
+    decoder.set_options(options.jpeg_set_out_colorspace(to));
+    let info = decoder.info().ok_or("it has no header")?;
+    let (width, height) = (usize::from(info.width), usize::from(info.height));
+    let pixels = (width * height * channels) as u64;
+    if pixels > most_bytes(bytes.len()) {
+        return Err(INCOMPLETE.into());
+    }
+    let values = decoder.decode().map_err(broken)?;
+    if needs_more(bytes, &values, options, to) {
+        return Err(INCOMPLETE.into());
+    }
+    let orientation = decoder.exif().and_then(|exif| image::metadata::Orientation::from_exif_chunk(exif));
+    let decoded =
+        Decoded { width, height, channels, colours: channels, values: Values::U8(values), white_level: None };
+    Ok((decoded, orientation.map_or(1, image::metadata::Orientation::to_exif)))
+}
+
+/// Whether a decoder still reads when the data go on before the end marker: then they ended early.
+fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpace) -> bool {
+    const FURTHER: [u8; 64] = [0xa6; 64];
+    let Some(end) = bytes.windows(2).rposition(|two| two == [0xff, 0xd9]) else { return true };
+    let longer = [&bytes[..end], &FURTHER, &bytes[end..]].concat();
+    let options = options.set_strict_mode(false).jpeg_set_out_colorspace(to);
+    let again = JpegDecoder::new_with_options(ZCursor::new(&longer), options).decode();
+    again.is_ok_and(|again| again != values)
+}
+
+fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
+    let format =
+        image::guess_format(bytes).map_err(|_| "its first bytes match none of these formats".to_string())?;
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.no_limits();
+    let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;
+    if decoder.total_bytes() > most_bytes(bytes.len()) {
+        let (width, height) = decoder.dimensions();
+        return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
+    }
+    // What it decodes to was checked; what the decoder needs on its way is of that size.
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(2 * most_bytes(bytes.len()));
+    decoder.set_limits(limits).map_err(|error| error.to_string())?;
+    let orientation = decoder.orientation().map_or(1, image::metadata::Orientation::to_exif);
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    use DynamicImage as Image;
+    let (channels, values) = match image {
+        Image::ImageLuma8(i) => (1, Values::U8(i.into_raw())),
+        Image::ImageLumaA8(i) => (2, Values::U8(i.into_raw())),
+        Image::ImageRgb8(i) => (3, Values::U8(i.into_raw())),
+        Image::ImageRgba8(i) => (4, Values::U8(i.into_raw())),
+        Image::ImageLuma16(i) => (1, Values::U16(i.into_raw())),
+        Image::ImageLumaA16(i) => (2, Values::U16(i.into_raw())),
+        Image::ImageRgb16(i) => (3, Values::U16(i.into_raw())),
+        Image::ImageRgba16(i) => (4, Values::U16(i.into_raw())),
+        other => return Err(format!("its pixels are {:?}; convert it to grey or RGB", other.color())),
+    };
+    let significant = (format == ImageFormat::Png).then(|| complete::png_significant_bits(bytes)).flatten();
+    // Shifted up to 16 bits: the largest code has zeros at its end.
+    let white_level = significant.filter(|bits| (8..16).contains(bits)).map(|bits| 0xffff << (16 - bits));
+    let colours = if channels < 3 { 1 } else { 3 };
+    Ok((Decoded { width, height, channels, colours, values, white_level }, orientation))
+}
+
+impl Decoded {
+    /// Grey values, by the settings.
+    pub(crate) fn grey(self, settings: &ReadSettings) -> Result<GreyImage, String> {
+        let of_file = if let Values::U16(codes) = &self.values {
+            settings
+                .white_level
+                .is_none()
+                .then(|| self.white_level.or_else(|| white_of_values(codes)))
+                .flatten()
+        } else {
+            None
+        };
+        let full_scale = match self.values {
+            Values::U8(_) => 255.0,
+            Values::U16(_) => 65535.0,
+            _ => 1.0,
+        };
+        let white_level = match settings.white_level {
+            Some(code) if !matches!(self.values, Values::U8(_) | Values::U16(_)) => {
+                return Err(format!("it has no integer codes, of which {code} could be the white level"));
+            }
+            Some(code) if code == 0 || f64::from(code) > full_scale => {
+                return Err(format!("a white level of {code} is outside its codes, 1 to {full_scale}"));
+            }
+            Some(code) => Some((f64::from(code) / full_scale) as f32),
+            None => of_file.map(|code| (f64::from(code) / full_scale) as f32),
+        };
+        let weights = settings.grey.weights();
+        let pick = (self.channels, self.colours);
+        let even = settings.grey == super::Grey::Mean;
+        let (values, samples) = match &self.values {
+            Values::U8(v) => (greys(v, pick, weights, even, 255.0), Samples::Integer(8)),
+            Values::U16(v) => (greys(v, pick, weights, even, 65535.0), Samples::Integer(16)),
+            Values::U32(v) => (greys(v, pick, weights, even, 1.0), Samples::Integer(32)),
+            Values::F32(v) => (greys(v, pick, weights, even, 1.0), Samples::Float),
+        };
+        let pixels = Array2::from_shape_vec((self.height, self.width), values)
+            .map_err(|_| "it has fewer pixels than its header says".to_string())?;
+        Ok(GreyImage { pixels, samples, colour: self.colours == 3, white_level })
+    }
+
+    /// 8 bits a sample, without alpha.
+    pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
+        let bytes = match self.values {
+            Values::U8(values) => values,
+            Values::U16(values) => values.into_iter().map(|v| ((u32::from(v) + 128) / 257) as u8).collect(),
+            Values::U32(values) => values.into_iter().map(|v| (255.0 * v).round() as u8).collect(),
+            Values::F32(_) => {
+                return Err("it has float pixels, whose white is not known: convert it to 8 or 16 bits".into());
+            }
+        };
+        let size = (self.height, self.width);
+        let wrong = |_| "it has fewer pixels than its header says".to_string();
+        let kept: Vec<u8> = if self.channels == self.colours {
+            bytes
+        } else {
+            bytes.chunks_exact(self.channels).flat_map(|pixel| &pixel[..self.colours]).copied().collect()
+        };
+        if self.colours == 1 {
+            return Array2::from_shape_vec(size, kept).map(Pixels::Grey).map_err(wrong);
+        }
+        Array3::from_shape_vec((size.0, size.1, 3), kept).map(Pixels::Rgb).map_err(wrong)
+    }
+
+    /// The image the right way up, by an EXIF orientation from 1 to 8.
+    fn turned(mut self, orientation: u8) -> Self {
+        if !(2..=8).contains(&orientation) {
+            return self;
+        }
+        let (size, channels) = ((self.height, self.width), self.channels);
+        match &mut self.values {
+            Values::U8(v) => turn(v, size, channels, orientation),
+            Values::U16(v) => turn(v, size, channels, orientation),
+            Values::U32(v) | Values::F32(v) => turn(v, size, channels, orientation),
+        }
+        if orientation >= 5 {
+            (self.width, self.height) = (self.height, self.width);
+        }
+        self
+    }
+}
+
+fn turn<T: Copy>(values: &mut Vec<T>, (height, width): (usize, usize), channels: usize, orientation: u8) {
+    let (to_height, to_width) = if orientation >= 5 { (width, height) } else { (height, width) };
+    let mut turned = Vec::with_capacity(values.len());
+    for y in 0..to_height {
+        for x in 0..to_width {
+            let (row, column) = match orientation {
+                2 => (y, width - 1 - x),
+                3 => (height - 1 - y, width - 1 - x),
+                4 => (height - 1 - y, x),
+                5 => (x, y),
+                6 => (height - 1 - x, y),
+                7 => (height - 1 - x, width - 1 - y),
+                _ => (x, width - 1 - y),
+            };
+            let at = (row * width + column) * channels;
+            turned.extend_from_slice(&values[at..at + channels]);
+        }
+    }
+    *values = turned;
+}
+
+/// Weighted mean of each pixel's colours, divided by the full scale.
+fn greys<T: Copy + Into<f64>>(
+    samples: &[T],
+    (channels, colours): (usize, usize),
+    weights: [f64; 3],
+    even: bool,
+    full_scale: f64,
+) -> Vec<f32> {
+    if colours == 1 {
+        let scale = 1.0 / full_scale;
+        return samples.iter().step_by(channels).map(|sample| ((*sample).into() * scale) as f32).collect();
+    }
+    if even {
+        let scale = 1.0 / (full_scale * 3.0);
+        let pixels = samples.chunks_exact(channels);
+        return pixels.map(|p| ((p[0].into() + p[1].into() + p[2].into()) * scale) as f32).collect();
+    }
+    let [r, g, b] = weights.map(|weight| weight / full_scale);
+    let pixels = samples.chunks_exact(channels);
+    pixels.map(|p| (p[0].into() * r + p[1].into() * g + p[2].into() * b) as f32).collect()
+}
+
+/// The code at which a camera of fewer than 16 bits saturates, where several pixels have it: 2^n - 1 in the lower bits, or with
+/// zeros below in the upper bits. `None` where nothing is saturated, for then it does not matter.
+fn white_of_values(codes: &[u16]) -> Option<u16> {
+    let (mut largest, mut used) = (0, 0);
+    for code in codes {
+        largest = largest.max(*code);
+        used |= code;
+    }
+    let lower = CAMERA_BITS.map(|bits| ((1_u32 << bits) - 1) as u16).any(|white| white == largest);
+    let zeros = used.trailing_zeros();
+    let upper = (1..=8).contains(&zeros) && largest == 0xffff << zeros;
+    let saturated = (lower || upper) && codes.iter().filter(|code| **code == largest).count() >= SATURATED_PX;
+    saturated.then_some(largest)
+}

@@ -1,0 +1,147 @@
+//! TIFF as microscopes, cameras and scientists write it.
+
+use ndarray::{Array2, array};
+
+use super::super::*;
+use super::made::{CLASSIC, Layout, Page, tiff};
+
+fn ramp() -> Vec<u8> {
+    (0..12).map(|i| 20 * i).collect()
+}
+
+fn read(bytes: &[u8]) -> Array2<f32> {
+    decode_grey(bytes).unwrap().pixels.mapv(|v| (255.0 * v).round())
+}
+
+#[test]
+fn both_byte_orders_and_big_tiff_are_read() {
+    for (little, big) in [(true, false), (false, false), (true, true), (false, true)] {
+        let bytes = tiff(Layout { little, big }, &[Page::grey(4, 3, 8, ramp())]);
+        let image = read(&bytes);
+        assert_eq!((image.dim(), image[(2, 3)], image[(0, 1)]), ((3, 4), 220.0, 20.0), "{little} {big}");
+    }
+}
+
+#[test]
+fn planar_colour_is_read_plane_by_plane() {
+    let planes = [[30_u8, 60], [60, 90], [90, 30]].map(Vec::from).to_vec();
+    let page = Page { strips: planes, ..Page::grey(2, 1, 8, Vec::new()) };
+    let page = page.with(262, &[2]).with(277, &[3]).with(258, &[8, 8, 8]).with(284, &[2]);
+    assert_eq!(read(&tiff(CLASSIC, &[page.clone()])), array![[60.0, 60.0]]);
+    let settings = ReadSettings { grey: Grey::Green, ..ReadSettings::default() };
+    let green = decode(&tiff(CLASSIC, &[page]), None).unwrap().grey(&settings).unwrap();
+    assert!(green.colour);
+    assert_eq!(green.pixels.mapv(|v| (255.0 * v).round()), array![[60.0, 90.0]]);
+}
+
+#[test]
+fn half_float_and_few_bits_are_read() {
+    // 1.0 and -0.5 in half precision.
+    let half = Page::grey(2, 1, 16, vec![0x00, 0x3c, 0x00, 0xb8]).with(339, &[3]);
+    let image = decode_grey(&tiff(CLASSIC, &[half])).unwrap();
+    assert_eq!((image.pixels, image.samples), (array![[1.0, -0.5]], Samples::Float));
+    let bits = Page::grey(3, 2, 1, vec![0b1010_0000, 0b0110_0000]);
+    assert_eq!(read(&tiff(CLASSIC, &[bits])), array![[255.0, 0.0, 255.0], [0.0, 255.0, 255.0]]);
+    let nibbles = Page::grey(3, 1, 4, vec![0x0f, 0x30]);
+    assert_eq!(read(&tiff(CLASSIC, &[nibbles])), array![[0.0, 255.0, 51.0]]);
+    let long = Page::grey(1, 1, 32, u32::MAX.to_le_bytes().to_vec());
+    assert_eq!(read(&tiff(CLASSIC, &[long])), array![[255.0]]);
+}
+
+#[test]
+fn a_file_of_several_pages_needs_a_page_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stack.tif");
+    let pages: Vec<Page> = (0..3).map(|i| Page::grey(1, 1, 8, vec![10 * i])).collect();
+    fs::write(&path, tiff(CLASSIC, &pages)).unwrap();
+    let refused = read_grey(&path).unwrap_err().to_string();
+    assert!(refused.contains("3 images") && refused.contains("focus-stack"), "{refused}");
+    let page = |number: &str| read_grey(&folder.path().join(format!("stack.tif#{number}")));
+    assert_eq!(page("3").unwrap().pixels[(0, 0)], 20.0 / 255.0);
+    assert!(page("4").unwrap_err().to_string().contains("1 to 3"));
+    assert!(page("0").is_err());
+    assert_eq!(page_count(&path).unwrap(), 3);
+    // A file whose own name has such an end is that file.
+    fs::write(folder.path().join("odd#2"), tiff(CLASSIC, &pages[2..])).unwrap();
+    assert_eq!(read_grey(&folder.path().join("odd#2")).unwrap().pixels[(0, 0)], 20.0 / 255.0);
+}
+
+#[test]
+fn previews_next_to_the_image_are_passed_over() {
+    let image = Page::grey(4, 3, 8, ramp());
+    let preview = Page::grey(2, 1, 8, vec![1, 2]).with(254, &[1]);
+    for pages in [[image.clone(), preview.clone()], [preview, image]] {
+        assert_eq!(read(&tiff(CLASSIC, &pages)).dim(), (3, 4));
+    }
+}
+
+#[test]
+fn the_orientation_is_applied() {
+    // 1 2 3
+    // 4 5 6
+    let stored = Page::grey(3, 2, 8, vec![1, 2, 3, 4, 5, 6]);
+    let expected = [
+        (2, array![[3., 2., 1.], [6., 5., 4.]]),
+        (3, array![[6., 5., 4.], [3., 2., 1.]]),
+        (4, array![[4., 5., 6.], [1., 2., 3.]]),
+        (5, array![[1., 4.], [2., 5.], [3., 6.]]),
+        (6, array![[4., 1.], [5., 2.], [6., 3.]]),
+        (7, array![[6., 3.], [5., 2.], [4., 1.]]),
+        (8, array![[3., 6.], [2., 5.], [1., 4.]]),
+    ];
+    for (orientation, expected) in expected {
+        let bytes = tiff(CLASSIC, &[stored.clone().with(274, &[orientation])]);
+        assert_eq!(read(&bytes), expected, "{orientation}");
+    }
+}
+
+#[test]
+fn the_white_level_of_fewer_bits_is_found() {
+    let codes = |codes: &[u16]| codes.iter().flat_map(|code| code.to_le_bytes()).collect::<Vec<u8>>();
+    let white =
+        |page: Page| decode_grey(&tiff(CLASSIC, &[page])).unwrap().white_level.map(|v| (v * 65535.0).round());
+    let saturated = [4095, 4095, 4095, 4095, 17, 900];
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated))), Some(4095.0));
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated.map(|v| v << 4)))), Some(65520.0));
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated.map(|v| v / 4)))), Some(1023.0));
+    // One pixel at that code may be chance, and others are no limit of any camera.
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&[4095, 4094, 1, 2, 3, 4]))), None);
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&[3000; 6]))), None);
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&[3, 4, 5, 6, 7, 8])).with(281, &[16383])), Some(16383.0));
+    assert_eq!(white(Page::grey(6, 1, 16, codes(&[3, 4, 5, 6, 7, 3001])).with(281, &[3001])), None);
+    let asked = ReadSettings { white_level: Some(3000), ..ReadSettings::default() };
+    let bytes = tiff(CLASSIC, &[Page::grey(2, 1, 16, codes(&[3000, 1500]))]);
+    let image = decode(&bytes, None).unwrap().grey(&asked).unwrap();
+    let image = image.clone().relative_to(image.white_level.unwrap());
+    assert_eq!(image.samples, Samples::Integer(12));
+    assert!((image.pixels[(0, 1)] - 0.5).abs() < 1e-6 && image.pixels[(0, 0)] == 1.0);
+    assert!(
+        decode(&bytes, None).unwrap().grey(&ReadSettings { white_level: Some(70_000), ..asked }).is_err()
+    );
+}
+
+#[test]
+fn our_own_cameras_keep_their_white_level_in_the_file() {
+    let pixels = array![[0u16, 1, 1022], [17, 200, 300]];
+    for bytes in [encode_tiff(pixels.view(), 10).unwrap(), encode_png(pixels.view(), 10).unwrap()] {
+        let image = decode_grey(&bytes).unwrap();
+        let image = image.clone().relative_to(image.white_level.expect("a white level"));
+        assert_eq!(image.samples, Samples::Integer(10));
+        assert_eq!(image.pixels.mapv(|v| (v * 1023.0).round() as u16), pixels);
+    }
+    assert_eq!(decode_grey(&encode_tiff(pixels.view(), 16).unwrap()).unwrap().white_level, None);
+}
+
+#[test]
+fn images_of_one_camera_share_the_lowest_white_level() {
+    let image = |white_level, value| GreyImage {
+        pixels: array![[value]],
+        samples: Samples::Integer(16),
+        colour: false,
+        white_level,
+    };
+    let of = |images: &[GreyImage]| shared_white_level(images.iter());
+    assert_eq!(of(&[image(Some(0.25), 0.25), image(None, 0.1)]), Some(0.25));
+    assert_eq!(of(&[image(Some(0.25), 0.25), image(None, 0.3)]), None);
+    assert_eq!(of(&[image(None, 0.25), image(None, 0.3)]), None);
+}

@@ -1,0 +1,234 @@
+//! TIFF files: which of their images are pages, and the pixels of one.
+
+use std::{io::Cursor, path::Path};
+
+use tiff::{
+    ColorType,
+    decoder::{Decoder, DecodingResult, Limits},
+};
+
+use super::{
+    ImageError, complete,
+    decode::{Decoded, Values, most_bytes},
+    read_bytes,
+    tiff_tags::{self, Directory},
+};
+
+/// Photometric interpretations of raw files: colour filter array and linear raw (TIFF/EP, DNG).
+const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
+
+/// An image of full resolution in a TIFF file.
+#[derive(Debug, Clone)]
+pub(crate) struct Page {
+    /// Its place among all images of the file, from 0.
+    pub index: usize,
+    pub directory: Directory,
+}
+
+/// Number of images of full resolution in a file: 1 unless it is a TIFF with several pages.
+///
+/// # Errors
+/// [`ImageError`] for a file that cannot be read, a raw file, one with previews only.
+pub fn page_count(path: &Path) -> Result<usize, ImageError> {
+    let bytes = read_bytes(path)?;
+    if !tiff_tags::is_tiff(&bytes) || complete::unsupported(&bytes).is_some() {
+        return Ok(1);
+    }
+    pages(&bytes).map(|pages| pages.len()).map_err(|reason| ImageError::Format { path: path.into(), reason })
+}
+
+/// The images of full resolution.
+///
+/// # Errors
+/// In words, for raw files and files that hold only previews.
+pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
+    let directories = tiff_tags::directories(bytes)?;
+    let Some(first) = directories.first() else { return Err("it holds no image".into()) };
+    if directories.iter().any(|d| d.is_dng || RAW_PHOTOMETRIC.contains(&d.photometric)) {
+        return Err(complete::RAW.into());
+    }
+    let larger = |d: &Directory| {
+        d.sub_images.iter().copied().filter(|(w, h)| w * h > d.width * d.height).max_by_key(|(w, h)| w * h)
+    };
+    if let Some((width, height)) = directories.iter().filter_map(larger).next() {
+        return Err(format!(
+            "its page is a preview of {}x{} px, the image of {width}x{height} px is inside: {}",
+            first.width,
+            first.height,
+            complete::RAW
+        ));
+    }
+    let (width, height) = (first.width, first.height);
+    let pages: Vec<Page> = directories
+        .into_iter()
+        .enumerate()
+        .filter(|(_, directory)| !directory.reduced() && !directory.mask())
+        .map(|(index, directory)| Page { index, directory })
+        .collect();
+    if pages.is_empty() {
+        return Err(format!(
+            "it holds only a preview of {width}x{height} px (reduced resolution): give the image of full resolution; of a \
+             camera's raw file develop it first, for instance with `dcraw -4 -T`"
+        ));
+    }
+    Ok(pages)
+}
+
+/// Decodes the only page, or page `number` (from 1), with its orientation.
+pub(super) fn decode(bytes: &[u8], number: Option<usize>) -> Result<(Decoded, u8), String> {
+    let pages = pages(bytes)?;
+    let page = match number {
+        Some(number) => number.checked_sub(1).and_then(|index| pages.get(index)).ok_or_else(|| {
+            format!("it has no page {number}: pages are numbered from 1 to {}", pages.len())
+        })?,
+        None if pages.len() == 1 => &pages[0],
+        None => {
+            let sizes: Vec<String> = pages
+                .iter()
+                .take(3)
+                .map(|p| format!("{}x{}", p.directory.width, p.directory.height))
+                .collect();
+            return Err(format!(
+                "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or measure all of them with `farnear focus-stack`",
+                pages.len(),
+                sizes.join(", "),
+                if pages.len() > 3 { ", ..." } else { "" },
+                pages.len()
+            ));
+        }
+    };
+    let decoded = decode_page(bytes, page)?;
+    Ok((decoded, page.directory.orientation as u8))
+}
+
+fn compression(code: u64) -> String {
+    let name = match code {
+        2..=4 => "fax",
+        6 | 7 => "JPEG",
+        34712 => "JPEG 2000",
+        34925 => "LZMA",
+        50000 => "zstd",
+        50001 => "WebP",
+        33003..=33005 => "Aperio JPEG 2000",
+        34892 => "lossy DNG",
+        _ => return format!("compression {code}"),
+    };
+    format!("{name} compression")
+}
+
+fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
+    let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
+    if !matches!(page.directory.compression, 1 | 5 | 8 | 32773 | 32946) {
+        return Err(format!(
+            "its {} is not read: store it uncompressed, with LZW or with deflate (`tiffcp -c lzw`)",
+            compression(page.directory.compression)
+        ));
+    }
+    let decoded_bytes = (width * height).saturating_mul(samples_per_pixel).saturating_mul(bits.max(8) / 8);
+    if decoded_bytes > most_bytes(bytes.len()) {
+        return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
+    }
+    let say = |error: tiff::TiffError| error.to_string();
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = usize::try_from(most_bytes(bytes.len())).unwrap_or(usize::MAX);
+    limits.intermediate_buffer_size = limits.decoding_buffer_size;
+    limits.ifd_value_size = bytes.len().max(1 << 20);
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(say)?.with_limits(limits);
+    if page.index > 0 {
+        decoder.seek_to_image(page.index).map_err(say)?;
+    }
+    let colour = decoder.colortype().map_err(say)?;
+    let alpha = matches!(page.directory.extra_samples, Some(1 | 2));
+    let (channels, colours) = match colour {
+        ColorType::Gray(_) => (1, 1),
+        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } if alpha => (2, 1),
+        ColorType::RGB(_) => (3, 3),
+        ColorType::RGBA(_) => (4, 3),
+        ColorType::Multiband { num_samples, .. } => {
+            return Err(format!(
+                "it has {num_samples} channels that are not colours: store one channel as grey"
+            ));
+        }
+        other => return Err(format!("its pixels are {other:?}: convert it to grey or RGB")),
+    };
+    // With other extra samples than alpha a pixel has more samples than its colours.
+    let channels = channels.max(samples_per_pixel as usize);
+    let mut data = DecodingResult::U8(Vec::new());
+    let layout = decoder.read_image_to_buffer(&mut data).map_err(say)?;
+    if data.as_buffer(0).byte_len() < layout.complete_len {
+        return Err(format!("its {width}x{height} px in {channels} planes are more than it can hold"));
+    }
+    let planes = if layout.plane_stride.is_some() && layout.planes > 1 { layout.planes } else { 1 };
+    let (width, height) = (width as usize, height as usize);
+    let values = match data {
+        DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && channels == 1 => {
+            Values::U8(unpacked(&v, width, height, colour.bit_depth())?)
+        }
+        DecodingResult::U8(v) if colour.bit_depth() == 8 => Values::U8(interleaved(v, planes)),
+        DecodingResult::U16(v) if colour.bit_depth() == 16 => Values::U16(interleaved(v, planes)),
+        DecodingResult::U32(v) => {
+            let full = f64::from(u32::MAX);
+            Values::U32(interleaved(v, planes).into_iter().map(|v| (f64::from(v) / full) as f32).collect())
+        }
+        DecodingResult::F16(v) => Values::F32(interleaved(v, planes).into_iter().map(f32::from).collect()),
+        DecodingResult::F32(v) => Values::F32(interleaved(v, planes)),
+        DecodingResult::F64(v) => Values::F32(interleaved(v, planes).into_iter().map(|v| v as f32).collect()),
+        DecodingResult::I8(_) | DecodingResult::I16(_) | DecodingResult::I32(_) | DecodingResult::I64(_) => {
+            return Err("its samples are signed integers, whose black and white are not known: convert it to float or \
+                        unsigned integers"
+                .into());
+        }
+        _ => {
+            return Err(format!(
+                "its samples have {} bits; 1, 2, 4, 8, 16 and 32 are read",
+                colour.bit_depth()
+            ));
+        }
+    };
+    let white_level = camera_white(&page.directory);
+    Ok(Decoded { width, height, channels, colours, values, white_level })
+}
+
+/// The code at which the camera saturates, where the file gives it: in the description, as farnear writes it, or as the largest
+/// sample of fewer than 16 bits.
+fn camera_white(directory: &Directory) -> Option<u16> {
+    let described = directory.description.as_deref().and_then(|text| {
+        text.split_whitespace().find_map(|word| word.strip_prefix("white_level=")?.parse().ok())
+    });
+    // Tag 281 is often the largest value of the image instead.
+    let largest = directory.max_sample_value.and_then(|v| u16::try_from(v).ok());
+    let of_bits = largest.filter(|v| *v >= 255 && *v < u16::MAX && (u32::from(*v) + 1).is_power_of_two());
+    described.or(of_bits)
+}
+
+/// Planes one after the other become pixels.
+fn interleaved<T: Copy>(values: Vec<T>, planes: usize) -> Vec<T> {
+    if planes == 1 {
+        return values;
+    }
+    let size = values.len() / planes;
+    (0..size)
+        .flat_map(|at| (0..planes).map(move |plane| (plane, at)))
+        .map(|(plane, at)| values[plane * size + at])
+        .collect()
+}
+
+/// Samples of 1, 2 or 4 bits, highest first, rows beginning with a byte, spread over 8 bits.
+fn unpacked(bytes: &[u8], width: usize, height: usize, bits: u8) -> Result<Vec<u8>, String> {
+    let per_byte = usize::from(8 / bits);
+    let row_bytes = width.div_ceil(per_byte);
+    if bytes.len() < row_bytes * height {
+        return Err("it has fewer pixels than its header says".into());
+    }
+    let largest = (1_u16 << bits) - 1;
+    let sample = |row: &[u8], x: usize| {
+        let shift = 8 - bits as usize * (x % per_byte + 1);
+        let value = (u16::from(row[x / per_byte]) >> shift) & largest;
+        (value * 255 / largest) as u8
+    };
+    Ok(bytes
+        .chunks_exact(row_bytes)
+        .take(height)
+        .flat_map(|row| (0..width).map(move |x| sample(row, x)))
+        .collect())
+}

@@ -1,0 +1,178 @@
+//! The directories of a TIFF file: sizes, kinds and descriptions of its images, without their pixels.
+//!
+//! The `tiff` crate refuses a file whose first directory it cannot decode, as raw files of cameras have; what such a file is
+//! has to be known to say what to do. TIFF 6.0, section 2; BigTIFF as in libtiff's design.
+
+/// Most directories that are followed.
+const DIRECTORIES_MAX: usize = 100_000;
+/// Most entries of a directory that are read.
+const ENTRIES_MAX: u64 = 4096;
+/// Longest text that is read, bytes: OME-XML of large stacks has megabytes.
+const TEXT_MAX: u64 = 64 << 20;
+/// Most sub-images that are looked at.
+const SUB_IMAGES_MAX: usize = 16;
+
+/// One image of a TIFF file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Directory {
+    pub width: u64,
+    pub height: u64,
+    /// Tag 254: bit 0 = reduced resolution, bit 2 = a mask.
+    pub subfile: u64,
+    /// Tag 255, the old form of it: 2 = reduced resolution.
+    pub old_subfile: u64,
+    pub photometric: u64,
+    /// Tag 274, 1 to 8.
+    pub orientation: u64,
+    pub samples_per_pixel: u64,
+    pub bits: u64,
+    pub compression: u64,
+    pub strip_offset: u64,
+    pub strips: u64,
+    /// Tag 281.
+    pub max_sample_value: Option<u64>,
+    /// Tag 338 of the first extra sample: 1 or 2 = alpha.
+    pub extra_samples: Option<u64>,
+    pub description: Option<String>,
+    pub make: Option<String>,
+    pub software: Option<String>,
+    pub date_time: Option<String>,
+    pub is_dng: bool,
+    /// (width, height) of the images in tag 330.
+    pub sub_images: Vec<(u64, u64)>,
+    /// Tag 51123: JSON of Micro-Manager.
+    pub micro_manager: Option<String>,
+}
+
+impl Directory {
+    pub fn reduced(&self) -> bool {
+        self.subfile & 1 != 0 || self.old_subfile == 2
+    }
+
+    pub fn mask(&self) -> bool {
+        self.subfile & 4 != 0
+    }
+}
+
+/// Whether these bytes begin a TIFF or a BigTIFF.
+pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
+    [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
+}
+
+/// All directories in the order of the file.
+///
+/// # Errors
+/// In words: a directory beyond the end of the file, or a chain of directories that does not end.
+pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
+    let file = File::new(bytes)?;
+    let mut at = file.first;
+    let mut seen = std::collections::HashSet::new();
+    let mut found = Vec::new();
+    while at != 0 {
+        if !seen.insert(at) || found.len() >= DIRECTORIES_MAX {
+            return Err("its list of images has no end".into());
+        }
+        let (directory, next) =
+            file.directory(at, true).ok_or("it is incomplete: an image's directory lies beyond its end")?;
+        found.push(directory);
+        at = next;
+    }
+    Ok(found)
+}
+
+struct File<'a> {
+    bytes: &'a [u8],
+    little: bool,
+    big: bool,
+    first: u64,
+}
+
+impl<'a> File<'a> {
+    fn new(bytes: &'a [u8]) -> Result<Self, String> {
+        let little = bytes.starts_with(b"II");
+        let mut file = Self { bytes, little, big: false, first: 0 };
+        file.big = file.number(2, 2) == Some(43);
+        let first = if file.big { file.number(8, 8) } else { file.number(4, 4) };
+        file.first = first.ok_or("it ends within its header")?;
+        Ok(file)
+    }
+
+    fn number(&self, at: u64, size: usize) -> Option<u64> {
+        let at = usize::try_from(at).ok()?;
+        let bytes = self.bytes.get(at..at.checked_add(size)?)?;
+        let shift = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
+        Some(if self.little { bytes.iter().rev().fold(0, shift) } else { bytes.iter().fold(0, shift) })
+    }
+
+    fn directory(&self, at: u64, with_sub_images: bool) -> Option<(Directory, u64)> {
+        let (count_size, entry_size, offset_size) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
+        let count = self.number(at, count_size)?;
+        if count > ENTRIES_MAX {
+            return None;
+        }
+        let entries = at + count_size as u64;
+        let next = self.number(entries + count * entry_size, offset_size)?;
+        let mut directory = Directory {
+            orientation: 1,
+            samples_per_pixel: 1,
+            bits: 1,
+            compression: 1,
+            ..Directory::default()
+        };
+        for entry in (0..count).map(|index| entries + index * entry_size) {
+            self.entry(entry, &mut directory, with_sub_images)?;
+        }
+        Some((directory, next))
+    }
+
+    fn entry(&self, at: u64, directory: &mut Directory, with_sub_images: bool) -> Option<()> {
+        let tag = self.number(at, 2)?;
+        let size = match self.number(at + 2, 2)? {
+            1 | 2 | 6 | 7 => 1,
+            3 | 8 => 2,
+            4 | 9 | 11 | 13 => 4,
+            5 | 10 | 12 | 16 | 17 | 18 => 8,
+            _ => return Some(()),
+        };
+        let inline = if self.big { 8 } else { 4 };
+        let count = self.number(at + 4, inline)?;
+        let field = at + 4 + inline as u64;
+        let fits = count.checked_mul(size as u64).is_some_and(|bytes| bytes <= inline as u64);
+        let place = if fits { field } else { self.number(field, inline)? };
+        let value = |index: u64| self.number(place.checked_add(index * size as u64)?, size);
+        let text = || {
+            let from = usize::try_from(place).ok()?;
+            let to = from.checked_add(usize::try_from(count.min(TEXT_MAX)).ok()?)?;
+            let text = self.bytes.get(from..to.min(self.bytes.len()))?;
+            Some(String::from_utf8_lossy(text).trim_end_matches('\0').to_owned())
+        };
+        let first = || value(0).unwrap_or(0);
+        match tag {
+            254 => directory.subfile = first(),
+            255 => directory.old_subfile = first(),
+            256 => directory.width = first(),
+            257 => directory.height = first(),
+            258 => directory.bits = first(),
+            259 => directory.compression = first(),
+            262 => directory.photometric = first(),
+            270 => directory.description = text(),
+            271 => directory.make = text(),
+            273 => (directory.strip_offset, directory.strips) = (first(), count),
+            274 => directory.orientation = first(),
+            277 => directory.samples_per_pixel = first(),
+            281 => directory.max_sample_value = value(0),
+            305 => directory.software = text(),
+            306 => directory.date_time = text(),
+            330 if with_sub_images => {
+                let sub = |index| self.directory(value(index)?, false);
+                let sizes = (0..count).take(SUB_IMAGES_MAX).filter_map(sub);
+                directory.sub_images = sizes.map(|(sub, _)| (sub.width, sub.height)).collect();
+            }
+            338 => directory.extra_samples = value(0),
+            50706 => directory.is_dng = true,
+            51123 => directory.micro_manager = text(),
+            _ => {}
+        }
+        Some(())
+    }
+}

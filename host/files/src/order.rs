@@ -1,0 +1,182 @@
+//! The order in which the images of a folder were taken, by the numbers in their names.
+//!
+//! Text counts by letters and runs of digits by value: `in9` before `in10`. A camera's counter starts again after 9999 (DCF):
+//! where the numbers lie in two dense groups at both ends of their range, the upper group comes first, unless the files'
+//! time stamps show the other order.
+
+use std::{
+    cmp::Ordering,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+/// Sorts files by the numbers in their names, across the end of a camera's counter.
+pub fn sort(paths: &mut [PathBuf]) {
+    paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
+    if let Some(first) = roll_over(paths) {
+        paths.rotate_left(first);
+    }
+}
+
+/// Two neighbours of a sorted list between which the camera's counter started again.
+pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
+    sorted.windows(2).find_map(|two| {
+        let [before, after] = two else { return None };
+        let ((a, text), (b, other)) = (number(before)?, number(after)?);
+        (text == other && a > b).then_some([before, after])
+    })
+}
+
+/// Two files whose names differ in their endings only.
+pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
+    let mut stems = std::collections::HashMap::new();
+    paths.iter().find_map(|path| stems.insert(stem(path), path).map(|other| [other.clone(), path.clone()]))
+}
+
+/// A file's name without its ending.
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The last number of a name, and the text around it with the number of its digits.
+fn number(path: &Path) -> Option<(u64, (String, usize, String))> {
+    let stem = stem(path);
+    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let begin = stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    // `rfind` gives the first byte of a character that may have several.
+    let begin = (begin..end).find(|at| stem.is_char_boundary(*at))?;
+    let digits = &stem[begin..end];
+    Some((digits.parse().ok()?, (stem[..begin].into(), digits.len(), stem[end..].into())))
+}
+
+/// Where the order begins, if the counter started again within it.
+fn roll_over(sorted: &[PathBuf]) -> Option<usize> {
+    let numbers: Vec<_> = sorted.iter().map(|path| number(path)).collect::<Option<_>>()?;
+    let (largest, text) = numbers.last()?;
+    if numbers.iter().any(|(_, other)| other != text) {
+        return None;
+    }
+    let gaps = || numbers.windows(2).enumerate().map(|(at, two)| (two[1].0 - two[0].0, at + 1));
+    let (gap, first) = gaps().max()?;
+    let second = gaps().filter(|(_, at)| *at != first).map(|(gap, _)| gap).max().unwrap_or(1);
+    // Counters end at 999, 9999 or further nines; the name may have more digits (DSC09999).
+    let end = (3..=9).map(|digits| 10_u64.pow(digits)).find(|end| end > largest)?;
+    let across = numbers[0].0 + end - largest;
+    let two_groups = 2 * gap > end && 8 * second < gap && 8 * across < gap;
+    (two_groups && !written_in_order(sorted)).then_some(first)
+}
+
+/// Whether the files were clearly written one after the other in this order, seconds apart.
+fn written_in_order(paths: &[PathBuf]) -> bool {
+    let times: Option<Vec<SystemTime>> =
+        paths.iter().map(|path| path.metadata().ok()?.modified().ok()).collect();
+    let Some(times) = times else { return false };
+    let rising = times.windows(2).all(|two| two[0] < two[1]);
+    let last = times.len().saturating_sub(1);
+    let span = times.get(last).zip(times.first()).and_then(|(last, first)| last.duration_since(*first).ok());
+    // Copying writes files in the order of their names within moments; taking them takes longer.
+    rising && span.is_some_and(|span| span.as_secs_f64() >= last as f64)
+}
+
+/// Text by letters, runs of digits by value.
+fn natural(a: &str, b: &str) -> Ordering {
+    let (mut a_rest, mut b_rest) = (a, b);
+    while let (Some(x), Some(y)) = (a_rest.chars().next(), b_rest.chars().next()) {
+        let (a_digits, b_digits) = (digits(a_rest), digits(b_rest));
+        let (order, a_step, b_step) = if a_digits > 0 && b_digits > 0 {
+            let (m, n) =
+                (a_rest[..a_digits].trim_start_matches('0'), b_rest[..b_digits].trim_start_matches('0'));
+            (m.len().cmp(&n.len()).then_with(|| m.cmp(n)), a_digits, b_digits)
+        } else {
+            (x.cmp(&y), x.len_utf8(), y.len_utf8())
+        };
+        if order != Ordering::Equal {
+            return order;
+        }
+        (a_rest, b_rest) = (&a_rest[a_step..], &b_rest[b_step..]);
+    }
+    // Equal up to here: the shorter first, and `01` before `1` so that the order is total.
+    a_rest.len().cmp(&b_rest.len()).then_with(|| a.cmp(b))
+}
+
+fn digits(text: &str) -> usize {
+    text.bytes().take_while(u8::is_ascii_digit).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_sort_by_value_and_letters_by_letter() {
+        let mut names =
+            ["in10", "in9", "in010", "b", "in9b", "in", "a2b10", "a2b9", "in123456789012345678901234"];
+        names.sort_by(|a, b| natural(a, b));
+        assert_eq!(
+            names,
+            ["a2b9", "a2b10", "b", "in", "in9", "in9b", "in010", "in10", "in123456789012345678901234"]
+        );
+    }
+
+    fn sorted(names: &[&str]) -> Vec<String> {
+        let mut paths: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+        sort(&mut paths);
+        paths.iter().map(|path| path.display().to_string()).collect()
+    }
+
+    #[test]
+    fn a_counter_that_starts_again_continues_the_stack() {
+        let names = ["IMG_0001.jpg", "IMG_0002.jpg", "IMG_9997.jpg", "IMG_9998.jpg", "IMG_9999.jpg"];
+        let expected = ["IMG_9997.jpg", "IMG_9998.jpg", "IMG_9999.jpg", "IMG_0001.jpg", "IMG_0002.jpg"];
+        assert_eq!(sorted(&names), expected);
+        let paths: Vec<PathBuf> = expected.iter().map(PathBuf::from).collect();
+        assert_eq!(counter_started_again(&paths), Some([&paths[2], &paths[3]]));
+        assert_eq!(counter_started_again(&paths[..3]), None);
+        assert_eq!(sorted(&["DSC00001.tif", "DSC09999.tif"]), ["DSC09999.tif", "DSC00001.tif"]);
+        // Some pictures were deleted around the end.
+        assert_eq!(sorted(&["p0004.png", "p0006.png", "p9990.png"]), ["p9990.png", "p0004.png", "p0006.png"]);
+    }
+
+    #[test]
+    fn numbers_that_are_no_counter_stay_in_order() {
+        for names in [
+            &["z0001.tif", "z0500.tif", "z0999.tif"][..],
+            &["1.png", "2.png", "3.png", "1000.png"],
+            &["a0001.png", "b9999.png"],
+            &["s1.png", "s2.png", "s10.png", "s11.png"],
+            &["x0100.png", "x0200.png", "x0900.png"],
+        ] {
+            assert_eq!(sorted(names), names);
+        }
+    }
+
+    #[test]
+    fn time_stamps_overrule_the_counter() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut paths: Vec<PathBuf> =
+            ["p0001.png", "p9998.png", "p9999.png"].iter().map(|name| folder.path().join(name)).collect();
+        let written = |path: &PathBuf, seconds: u64| {
+            let file = std::fs::File::create(path).unwrap();
+            file.set_modified(SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000 + seconds))
+                .unwrap();
+        };
+        let by_number = paths.clone();
+        for (path, seconds) in paths.iter().zip([0, 60, 120]) {
+            written(path, seconds);
+        }
+        sort(&mut paths);
+        assert_eq!(paths, by_number);
+        for (path, seconds) in paths.iter().zip([120, 0, 60]) {
+            written(path, seconds);
+        }
+        sort(&mut paths);
+        assert_eq!(paths, [by_number[1].clone(), by_number[2].clone(), by_number[0].clone()]);
+    }
+
+    #[test]
+    fn one_name_with_two_endings_is_found() {
+        let paths = ["a.tif", "b.tif", "b.png"].map(PathBuf::from);
+        assert_eq!(same_stem(&paths), Some([paths[1].clone(), paths[2].clone()]));
+        assert_eq!(same_stem(&paths[..2]), None);
+    }
+}

@@ -1,0 +1,151 @@
+//! Images at different focus: the files of a folder, or the pages of a TIFF with their positions.
+//!
+//! Positions come from the ImageJ description (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or
+//! Micro-Manager's page tag (`ZPositionUm`).
+
+mod positions;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    image_file::{self, GreyImage, ImageError, ReadSettings, decode, pages, read_bytes, tiff_tags},
+    order,
+    video::{VideoError, pictures},
+};
+
+/// The images of a stack, in their order.
+#[derive(Debug, Clone, Default)]
+pub struct Stack {
+    /// Each image; a page is `file.tif#3`.
+    pub images: Vec<PathBuf>,
+    /// Where each is focused along the axis, um, from the file's metadata.
+    pub positions_um: Option<Vec<f64>>,
+    /// What a person should know of the order.
+    pub remarks: Vec<String>,
+}
+
+/// Files that make no stack.
+#[derive(Debug, thiserror::Error)]
+pub enum StackError {
+    /// An image or the stack's file cannot be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The folder cannot be listed.
+    #[error(transparent)]
+    Folder(#[from] VideoError),
+    /// Neither.
+    #[error("{}: no such folder or file", path.display())]
+    Missing {
+        /// The place.
+        path: PathBuf,
+    },
+    /// Files of several formats in one folder.
+    #[error("{} holds {found}: the images of a stack have one format; move the others away", path.display())]
+    Mixed {
+        /// The folder.
+        path: PathBuf,
+        /// How many of which.
+        found: String,
+    },
+    /// Two images are one.
+    #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]
+    Twice {
+        /// One.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
+    /// A file whose planes are not a focus series.
+    #[error("{}: {reason}", path.display())]
+    Planes {
+        /// The file.
+        path: PathBuf,
+        /// What it holds.
+        reason: String,
+    },
+}
+
+/// Lists a stack: a folder with images of one format, or a TIFF with several pages.
+///
+/// # Errors
+/// [`StackError`], except [`StackError::Twice`].
+pub fn list(path: &Path) -> Result<Stack, StackError> {
+    if path.is_dir() { folder(path) } else { file(path) }
+}
+
+fn folder(path: &Path) -> Result<Stack, StackError> {
+    let images = pictures::list(path)?;
+    let mut formats: BTreeMap<&str, usize> = BTreeMap::new();
+    for image in &images {
+        let ending = image.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let format = match ending.as_str() {
+            "tif" | "tiff" => "TIFF",
+            "jpg" | "jpeg" => "JPEG",
+            "png" => "PNG",
+            "bmp" => "BMP",
+            _ => "PGM",
+        };
+        *formats.entry(format).or_default() += 1;
+    }
+    if formats.len() > 1 {
+        let found = formats.iter().map(|(format, count)| format!("{count} {format}")).collect::<Vec<_>>();
+        return Err(StackError::Mixed { path: path.into(), found: format!("{} files", found.join(" and ")) });
+    }
+    if let [only] = images.as_slice() {
+        return file(only);
+    }
+    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let remarks = order::counter_started_again(&images).map(|[before, after]| {
+        format!("the camera's counter started again: {} follows {}", name(after), name(before))
+    });
+    Ok(Stack { remarks: remarks.into_iter().collect(), images, positions_um: None })
+}
+
+fn file(path: &Path) -> Result<Stack, StackError> {
+    if !path.is_file() {
+        return Err(StackError::Missing { path: path.into() });
+    }
+    let bytes = read_bytes(path)?;
+    if !tiff_tags::is_tiff(&bytes) {
+        return Ok(Stack { images: vec![path.into()], ..Stack::default() });
+    }
+    let broken = |reason| ImageError::Format { path: path.into(), reason };
+    let pages = pages(&bytes).map_err(broken)?;
+    let positions_um =
+        positions::of(&pages).map_err(|reason| StackError::Planes { path: path.into(), reason })?;
+    let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
+    let images = (1..=pages.len()).map(page).collect();
+    Ok(Stack { images, positions_um, remarks: Vec::new() })
+}
+
+/// Reads the images of a stack one after the other; `each` is called before each with its index and may stop the reading.
+///
+/// # Errors
+/// [`StackError::Image`], [`StackError::Twice`] for two images that are equal in every pixel; what `each` returns.
+pub fn read<E: From<StackError>>(
+    images: &[PathBuf],
+    settings: &ReadSettings,
+    mut each: impl FnMut(usize) -> Result<(), E>,
+) -> Result<Vec<GreyImage>, E> {
+    let mut all: Vec<GreyImage> = Vec::with_capacity(images.len());
+    let mut open: Option<(PathBuf, Vec<u8>)> = None;
+    for (index, path) in images.iter().enumerate() {
+        each(index)?;
+        let (file, page) = image_file::file_and_page(path);
+        let bytes = match &mut open {
+            Some((of, bytes)) if *of == file => bytes,
+            open => &mut open.insert((file.clone(), read_bytes(&file).map_err(StackError::from)?)).1,
+        };
+        let image = decode(bytes, page).and_then(|decoded| decoded.grey(settings));
+        let image =
+            image.map_err(|reason| StackError::from(ImageError::Format { path: path.clone(), reason }))?;
+        if let Some(twin) = all.iter().position(|other| other.pixels == image.pixels) {
+            return Err(StackError::Twice { first: images[twin].clone(), second: path.clone() }.into());
+        }
+        all.push(image);
+    }
+    Ok(all)
+}

@@ -1,0 +1,176 @@
+//! Where the pages of a TIFF are focused, from what microscopes and ImageJ write.
+
+use crate::image_file::Page;
+
+/// Positions of the pages along the axis, um; `None` where the file says nothing of them.
+///
+/// # Errors
+/// In words: channels or times in one file, planes that are in other files.
+pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
+    let Some(first) = pages.first() else { return Ok(None) };
+    let description = first.directory.description.as_deref().unwrap_or_default();
+    if description.starts_with("ImageJ=") {
+        return image_j(description, pages.len());
+    }
+    if let Some(pixels) = description.contains("<OME").then(|| element(description, "Pixels")).flatten() {
+        return ome(description, pixels, pages);
+    }
+    let of_pages =
+        pages.iter().map(|page| json_number(page.directory.micro_manager.as_deref()?, "ZPositionUm"));
+    Ok(of_pages.collect::<Option<Vec<f64>>>().filter(|all| all.len() > 1 && distinct(all)))
+}
+
+fn distinct(positions: &[f64]) -> bool {
+    positions.windows(2).all(|two| two[0] != two[1])
+}
+
+fn image_j(description: &str, pages: usize) -> Result<Option<Vec<f64>>, String> {
+    let value = |key: &str| {
+        description.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('=')).map(str::trim)
+    };
+    let count = |key| value(key).and_then(|text| text.parse::<usize>().ok()).unwrap_or(1);
+    one_series(count("channels"), count("frames"))?;
+    let images = count("images");
+    if images != pages && images > 1 {
+        return Err(format!(
+            "its description has {images} images and the file lists {pages}: open it in ImageJ and save it as an image sequence"
+        ));
+    }
+    let micrometres = value("unit").and_then(unit_um);
+    let spacing = value("spacing").and_then(|text| text.parse::<f64>().ok()).filter(|v| *v != 0.0);
+    let (Some(spacing), Some(micrometres)) = (spacing, micrometres) else { return Ok(None) };
+    Ok((pages > 1).then(|| (0..pages).map(|page| page as f64 * spacing * micrometres).collect()))
+}
+
+fn one_series(channels: usize, times: usize) -> Result<(), String> {
+    if channels > 1 || times > 1 {
+        return Err(format!(
+            "it holds {channels} channels and {times} times: a stack is one focus series; split it (ImageJ: Image > Hyperstacks > \
+             Make Subset)"
+        ));
+    }
+    Ok(())
+}
+
+fn ome(xml: &str, pixels: &str, pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
+    let count = |name| attribute(pixels, name).and_then(|text| text.parse::<usize>().ok()).unwrap_or(1);
+    let samples = pages.first().map_or(1, |page| page.directory.samples_per_pixel.max(1) as usize);
+    one_series(count("SizeC") / samples.min(count("SizeC").max(1)), count("SizeT"))?;
+    let planes = count("SizeZ");
+    if planes != pages.len() {
+        return Err(format!(
+            "its OME metadata have {planes} planes and the file has {}: give the file with all of them, or a folder of \
+             single images",
+            pages.len()
+        ));
+    }
+    if planes < 2 {
+        return Ok(None);
+    }
+    let mut positions = vec![None; planes];
+    for plane in xml.split("<Plane").skip(1).map(|rest| rest.split('>').next().unwrap_or_default()) {
+        let at = attribute(plane, "TheZ").and_then(|text| text.parse::<usize>().ok());
+        let unit = attribute(plane, "PositionZUnit").map_or(Some(1.0), unit_um);
+        let z = attribute(plane, "PositionZ").and_then(|text| text.parse::<f64>().ok());
+        if let (Some(at), Some(unit), Some(z)) = (at.filter(|at| *at < planes), unit, z) {
+            positions[at] = Some(z * unit);
+        }
+    }
+    if let Some(all) = positions.into_iter().collect::<Option<Vec<f64>>>().filter(|all| distinct(all)) {
+        return Ok(Some(all));
+    }
+    let unit = attribute(pixels, "PhysicalSizeZUnit").map_or(Some(1.0), unit_um);
+    let spacing = attribute(pixels, "PhysicalSizeZ").and_then(|text| text.parse::<f64>().ok());
+    let spacing = spacing.zip(unit).map(|(z, unit)| z * unit).filter(|v| v.is_finite() && *v != 0.0);
+    Ok(spacing.map(|spacing| (0..planes).map(|plane| plane as f64 * spacing).collect()))
+}
+
+/// Micrometres in a unit of length; `None` for pixels and what is no length.
+fn unit_um(unit: &str) -> Option<f64> {
+    let unit = unit.replace("\\u00B5", "u").replace("&#181;", "u").replace("&#xB5;", "u");
+    let unit = unit.replace(['\u{b5}', '\u{3bc}'], "u");
+    Some(match unit.trim().to_lowercase().as_str() {
+        "um" | "micron" | "microns" | "micrometer" | "micrometre" | "micrometers" => 1.0,
+        "nm" | "nanometer" | "nanometre" => 1e-3,
+        "mm" | "millimeter" | "millimetre" => 1e3,
+        "cm" | "centimeter" | "centimetre" => 1e4,
+        "m" | "meter" | "metre" => 1e6,
+        "inch" | "in" => 25_400.0,
+        "\u{c5}" | "\u{e5}" | "angstrom" => 1e-4,
+        _ => return None,
+    })
+}
+
+/// The text of an element's tag.
+fn element<'a>(xml: &'a str, name: &str) -> Option<&'a str> {
+    let begin = xml.find(&format!("<{name} "))?;
+    let end = xml[begin..].find('>')?;
+    Some(&xml[begin..begin + end])
+}
+
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    tag.match_indices(name).find_map(|(at, _)| {
+        let before = tag[..at].chars().next_back()?;
+        let rest = tag[at + name.len()..].trim_start().strip_prefix('=')?.trim_start();
+        let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
+        before.is_ascii_whitespace().then(|| rest[1..].split(quote).next()).flatten()
+    })
+}
+
+fn json_number(json: &str, key: &str) -> Option<f64> {
+    let rest = json.split(&format!("\"{key}\"")).nth(1)?.trim_start().strip_prefix(':')?.trim_start();
+    let end = rest.find([',', '}', '\n']).unwrap_or(rest.len());
+    rest[..end].trim().trim_matches('"').parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image_file::tiff_tags::Directory;
+
+    fn pages(count: usize, description: &str) -> Vec<Page> {
+        let directory = |index| Directory {
+            description: (index == 0).then(|| description.to_owned()),
+            ..Directory::default()
+        };
+        (0..count).map(|index| Page { index, directory: directory(index) }).collect()
+    }
+
+    #[test]
+    fn image_j_gives_the_spacing_with_its_unit() {
+        let text = "ImageJ=1.54f\nimages=3\nslices=3\nunit=nm\nspacing=250.0\nloop=false\n";
+        assert_eq!(of(&pages(3, text)), Ok(Some(vec![0.0, 0.25, 0.5])));
+        assert_eq!(
+            of(&pages(3, "ImageJ=1.54f\nimages=3\nunit=\\u00B5m\nspacing=-2")),
+            Ok(Some(vec![0.0, -2.0, -4.0]))
+        );
+        assert_eq!(of(&pages(3, "ImageJ=1.54f\nimages=3\nunit=pixel\nspacing=2")), Ok(None));
+        assert!(
+            of(&pages(6, "ImageJ=1.54f\nimages=6\nchannels=2\nslices=3")).unwrap_err().contains("2 channels")
+        );
+        assert!(of(&pages(1, "ImageJ=1.54f\nimages=900\nslices=900")).unwrap_err().contains("900 images"));
+    }
+
+    #[test]
+    fn ome_gives_uneven_positions_or_an_even_spacing() {
+        let even = "<?xml?><OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeC=\"1\" SizeT=\"1\" SizeZ=\"3\" SizeX=\"8\" \
+                    PhysicalSizeZ=\"1.5\" PhysicalSizeZUnit=\"\u{b5}m\"></Pixels></Image></OME>";
+        assert_eq!(of(&pages(3, even)), Ok(Some(vec![0.0, 1.5, 3.0])));
+        let planes = "<Plane TheZ='0' PositionZ='-3'/><Plane TheZ='2' PositionZ='5'/><Plane TheZ='1' PositionZ='0.5'/>";
+        let uneven = even.replace("</Pixels>", &format!("{planes}</Pixels>"));
+        assert_eq!(of(&pages(3, &uneven)), Ok(Some(vec![-3.0, 0.5, 5.0])));
+        assert!(of(&pages(1, even)).unwrap_err().contains("3 planes"));
+        let times = even.replace("SizeT=\"1\"", "SizeT=\"3\"").replace("SizeZ=\"3\"", "SizeZ=\"1\"");
+        assert!(of(&pages(3, &times)).unwrap_err().contains("3 times"));
+    }
+
+    #[test]
+    fn micro_manager_gives_a_position_for_each_page() {
+        let mut pages = pages(3, "");
+        for (page, z) in pages.iter_mut().zip([-1.0, 0.5, 2.0]) {
+            page.directory.micro_manager =
+                Some(format!("{{\"Slice\": 1, \"ZPositionUm\": {z}, \"Width\": 8}}"));
+        }
+        assert_eq!(of(&pages), Ok(Some(vec![-1.0, 0.5, 2.0])));
+    }
+}

@@ -1,0 +1,213 @@
+//! Which images make a stack, and where each is focused.
+
+use std::path::PathBuf;
+
+use farnear_capture::record::{CaptureRecord, read_record};
+use farnear_depth::optics::{Distortion, Optics};
+use farnear_files::stack;
+use ndarray::Array2;
+
+use super::FocusStackRequest;
+use crate::{
+    error::{Result, WorkflowError},
+    optics,
+};
+
+/// The coordinate along the axis in which the images of a stack lie.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Axis {
+    /// Distance from lens to object, mm. The sensor's distance changes evenly with its reciprocal.
+    ObjectMm,
+    /// Position of a stage, um.
+    StageUm,
+    /// The number of the image, from 1.
+    Number,
+}
+
+/// The images of a stack in the order of their focus.
+pub(super) struct Listed {
+    pub images: Vec<PathBuf>,
+    pub axis: Axis,
+    /// Where each is focused, on the axis.
+    pub positions: Vec<f64>,
+    /// What the lens bends, where that is known.
+    pub distortion: Option<Distortion>,
+    /// What a person should know of the stack.
+    pub remarks: Vec<String>,
+}
+
+/// The images, and what is known of them.
+pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
+    let record = if request.stack.is_dir() { read_record(&request.stack)? } else { None };
+    let listed = match &record {
+        Some(record) => stack::Stack {
+            images: record.exposure.iter().map(|exposure| request.stack.join(&exposure.image)).collect(),
+            ..stack::Stack::default()
+        },
+        None => stack::list(&request.stack)?,
+    };
+    let images = listed.images;
+    let (axis, positions) = match (&request.distances_mm, &request.sensor_mm, &request.positions_um, &record)
+    {
+        (Some(distances), ..) => (Axis::ObjectMm, distances.clone()),
+        (_, Some(distances), ..) => (Axis::ObjectMm, objects(distances, request)?),
+        (_, _, Some(positions), _) => (Axis::StageUm, positions.clone()),
+        (.., Some(record)) => (Axis::ObjectMm, objects(&sensors(record), request)?),
+        (.., None) => match listed.positions_um {
+            Some(positions) => (Axis::StageUm, positions),
+            None => (Axis::Number, (1..=images.len()).map(|number| number as f64).collect()),
+        },
+    };
+    let distortion = lens(request)?.and_then(|lens| lens.distortion());
+    if positions.len() != images.len() {
+        let expected = format!("one for each of the {} images is needed", images.len());
+        let name = if axis == Axis::StageUm { "positions-um" } else { "distances-mm" };
+        return Err(WorkflowError::parameter(name, format!("{} numbers", positions.len()), expected));
+    }
+    let mut order: Vec<(f64, PathBuf)> = positions.into_iter().zip(images).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(twice) = order.windows(2).find(|two| two[0].0 == two[1].0) {
+        let expected =
+            "each image of a stack has its own focus: a program's further runs are separate stacks";
+        return Err(WorkflowError::parameter(
+            "distance",
+            format!("{} {} twice", twice[0].0, axis.unit()),
+            expected,
+        ));
+    }
+    let (positions, images) = order.into_iter().unzip();
+    Ok(Listed { images, axis, positions, distortion, remarks: listed.remarks })
+}
+
+/// The lens, if any file gives it; optics that are named or lie in the folder must be right.
+fn lens(request: &FocusStackRequest) -> Result<Option<Optics>> {
+    // A pair's far image names the folder; here any name in it does.
+    let found = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
+    match found {
+        Ok((lens, _)) => Ok(Some(lens)),
+        Err(error) if request.optics.is_some() || request.stack.join("optics.toml").is_file() => Err(error),
+        Err(_) => Ok(None),
+    }
+}
+
+fn sensors(record: &CaptureRecord) -> Vec<f64> {
+    record.exposure.iter().map(|exposure| exposure.sensor_measured_mm).collect()
+}
+
+/// Distances of the objects that are sharp with the sensor at these distances from the lens: the thin lens, u = F w / (w - F).
+fn objects(sensor_mm: &[f64], request: &FocusStackRequest) -> Result<Vec<f64>> {
+    let (lens, _) = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"))?;
+    let focal_length_mm = lens.focal_length_mm();
+    let object = |&sensor_mm: &f64| {
+        if sensor_mm > focal_length_mm {
+            Ok(focal_length_mm * sensor_mm / (sensor_mm - focal_length_mm))
+        } else {
+            Err(WorkflowError::InsideFocalLength { sensor_mm, focal_length_mm })
+        }
+    };
+    sensor_mm.iter().map(object).collect()
+}
+
+impl Axis {
+    pub(super) fn unit(self) -> &'static str {
+        match self {
+            Self::ObjectMm => "mm",
+            Self::StageUm => "um",
+            Self::Number => "image",
+        }
+    }
+
+    /// From a position to the coordinate in which a curve of sharpness is symmetric, rising or falling with it.
+    fn even(self, position: f64) -> f64 {
+        if self == Self::ObjectMm { -1.0 / position } else { position }
+    }
+
+    fn position(self, even: f64) -> f64 {
+        if self == Self::ObjectMm { -1.0 / even } else { even }
+    }
+}
+
+impl Listed {
+    /// Positions in the coordinate that the tips are fitted over.
+    pub(super) fn even_positions(&self) -> Vec<f64> {
+        self.positions.iter().map(|position| self.axis.even(*position)).collect()
+    }
+
+    /// Depth at each place in the stack, in the axis' unit.
+    pub(super) fn depth(&self, place: &Array2<f32>) -> Array2<f32> {
+        depth_at(place, self.axis, &self.even_positions())
+    }
+
+    /// Leaves out images by their index.
+    pub(super) fn without(&mut self, left_out: &[usize]) {
+        for index in left_out.iter().rev() {
+            self.images.remove(*index);
+            self.positions.remove(*index);
+        }
+    }
+}
+
+/// Coordinates for [`farnear_depth::focus_stack::depth_from_positions`] of images focused at these distances, or of evenly spaced
+/// ones.
+pub fn even_positions(count: usize, focused_at_mm: Option<&[f64]>) -> Vec<f64> {
+    match focused_at_mm {
+        Some(mm) => mm.iter().map(|mm| Axis::ObjectMm.even(*mm)).collect(),
+        None => (1..=count).map(|number| number as f64).collect(),
+    }
+}
+
+/// Depth of each place in a stack of `count` images: mm if the distances are known, else the number of the image, from 1.
+pub fn depth_of_places(place: &Array2<f32>, count: usize, focused_at_mm: Option<&[f64]>) -> Array2<f32> {
+    let axis = if focused_at_mm.is_some() { Axis::ObjectMm } else { Axis::Number };
+    depth_at(place, axis, &even_positions(count, focused_at_mm))
+}
+
+fn depth_at(place: &Array2<f32>, axis: Axis, even: &[f64]) -> Array2<f32> {
+    place.mapv(|place| {
+        if !place.is_finite() {
+            return f32::NAN;
+        }
+        let below = (place as usize).min(even.len().saturating_sub(2));
+        let part = f64::from(place) - below as f64;
+        axis.position((1.0 - part) * even[below] + part * even[below + 1]) as f32
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    fn listed(axis: Axis, positions: Vec<f64>) -> Listed {
+        Listed {
+            images: vec![PathBuf::new(); positions.len()],
+            axis,
+            positions,
+            distortion: None,
+            remarks: vec![],
+        }
+    }
+
+    #[test]
+    fn between_images_the_reciprocal_of_a_distance_is_even() {
+        let of_distances = listed(Axis::ObjectMm, vec![500.0, 1000.0]);
+        let depth = of_distances.depth(&array![[0.0, 0.5, 1.0, f32::NAN]]);
+        assert_eq!(depth[(0, 0)], 500.0);
+        assert!((depth[(0, 1)] - 666.667).abs() < 1e-2);
+        assert_eq!(depth[(0, 2)], 1000.0);
+        assert!(depth[(0, 3)].is_nan());
+    }
+
+    #[test]
+    fn numbers_and_stage_positions_are_even_themselves() {
+        assert_eq!(
+            listed(Axis::Number, vec![1.0, 2.0, 3.0, 4.0]).depth(&array![[2.5_f32]]),
+            array![[3.5_f32]]
+        );
+        let stage = listed(Axis::StageUm, vec![-4.0, 0.0, 2.0]);
+        assert_eq!(stage.depth(&array![[0.0_f32, 1.0, 1.5]]), array![[-4.0_f32, 0.0, 1.0]]);
+        let mut without = listed(Axis::Number, vec![1.0, 2.0, 3.0, 4.0]);
+        without.without(&[1]);
+        assert_eq!(without.depth(&array![[0.5_f32]]), array![[2.0_f32]]);
+    }
+}
