@@ -190,7 +190,9 @@ impl Decoded {
             Values::U16(values) => values.into_iter().map(|v| ((u32::from(v) + 128) / 257) as u8).collect(),
             Values::U32(values) => values.into_iter().map(|v| (255.0 * v).round() as u8).collect(),
             Values::F32(_) => {
-                return Err("it has float pixels, whose white is not known: convert it to 8 or 16 bits".into());
+                return Err(
+                    "it has float pixels, whose white is not known: convert it to 8 or 16 bits".into()
+                );
             }
         };
         let size = (self.height, self.width);
