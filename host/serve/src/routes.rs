@@ -160,7 +160,7 @@ impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
     async fn from_request(request: Request, app: &Arc<App>) -> Result<Self, Failure> {
         let json = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
         // A form of another site cannot send this type.
-        if !json.is_some_and(|media| media.split(';').next() == Some("application/json")) {
+        if json.is_none_or(|media| media.split(';').next() != Some("application/json")) {
             let error = "expected the header Content-Type: application/json";
             return Err(Failure::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, error));
         }

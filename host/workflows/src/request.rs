@@ -160,6 +160,9 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::calibrate::stack::CalibrateStackRequest>(),
 ];
 
+/// Reads a job from its fields; paths are relative to the folder.
+type ReadJob = fn(Map<String, Value>, &Path) -> Result<Box<dyn Job>>;
+
 /// A task by its name, for callers that know it at run time only.
 pub struct Task {
     /// The words of the command.
@@ -171,7 +174,7 @@ pub struct Task {
     /// Fields that hold paths.
     pub paths: &'static [(&'static str, PathKind)],
     /// Reads its request for [`Job::run`].
-    pub job: fn(Map<String, Value>, &Path) -> Result<Box<dyn Job>>,
+    pub job: ReadJob,
 }
 
 impl Task {

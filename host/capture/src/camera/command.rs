@@ -63,7 +63,9 @@ impl Raw {
         }
         let row = layout.row_bytes(width).unwrap_or(width);
         let stride = stride.unwrap_or(row);
-        if !(row..=8 * LONGEST_SIDE_PX).contains(&stride) || stride % layout.row_bytes(1).unwrap_or(1) != 0 {
+        if !(row..=8 * LONGEST_SIDE_PX).contains(&stride)
+            || !stride.is_multiple_of(layout.row_bytes(1).unwrap_or(1))
+        {
             return Err(format!("a stride of {stride} bytes: a row of {width} px has {row} bytes"));
         }
         Ok(Self { width, height, stride, layout })

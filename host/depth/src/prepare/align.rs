@@ -418,8 +418,8 @@ fn sums_of_row<const N: usize>(
     let mut sums = Sums { squares: whole(squares), count: count as f64, ..Sums::NONE };
     for i in 0..N {
         sums.right[i] = whole(right[i]);
-        for j in i..N {
-            sums.normal[i][j] = whole(normal[i][j]);
+        for (j, parts) in normal[i].iter().enumerate().skip(i) {
+            sums.normal[i][j] = whole(*parts);
             sums.normal[j][i] = sums.normal[i][j];
         }
     }

@@ -331,14 +331,14 @@ mod tests {
             let [u, v] = [x as f32 / 60.0 - 1.0, y as f32 / 45.0 - 1.0];
             0.5 * (1.0 - 0.1 * (u * u + v * v)) * (1.0 + 0.1 * noise(x, y))
         });
-        assert!(CameraFrames::learn(&[], &[flat.clone()]).is_ok());
+        assert!(CameraFrames::learn(&[], std::slice::from_ref(&flat)).is_ok());
         let white = Array2::from_elem((90, 120), 1.0);
         let error = CameraFrames::learn(&[], &[flat.clone(), white]).unwrap_err().to_string();
         assert!(error.starts_with("flat exposure 2: 100.0 % of its pixels are saturated"), "{error}");
         let scene = Array2::from_shape_fn((90, 120), |(y, x)| {
             0.4 + 0.3 * ((x as f32 / 5.0).sin() * (y as f32 / 7.0).cos())
         });
-        let error = CameraFrames::learn(&[], &[scene.clone()]).unwrap_err().to_string();
+        let error = CameraFrames::learn(&[], std::slice::from_ref(&scene)).unwrap_err().to_string();
         assert!(error.contains("flat exposure 1 has structure") && error.contains('%'), "{error}");
         let error = CameraFrames::learn(&[scene], &[flat]).unwrap_err().to_string();
         assert!(error.contains("dark exposure 1 has structure") && error.contains("lens covered"), "{error}");

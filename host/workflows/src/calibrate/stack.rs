@@ -219,7 +219,7 @@ fn slices(folder: &Path) -> Result<Vec<Array2<f32>>> {
 /// The last number in a file's name.
 fn last_number(path: &Path) -> Option<f64> {
     let stem = path.file_stem()?.to_string_lossy().into_owned();
-    stem.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty()).next_back()?.parse().ok()
+    stem.split(|c: char| !c.is_ascii_digit()).rfind(|digits| !digits.is_empty())?.parse().ok()
 }
 
 #[cfg(test)]

@@ -68,7 +68,10 @@ impl FocusPlane {
 fn peak(curve: &[f64]) -> Option<f64> {
     let floor = curve.iter().copied().fold(f64::INFINITY, f64::min);
     let (top, most) = curve.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if !(most > PEAK * floor) || top == 0 || top + 1 == curve.len() {
+    if most.partial_cmp(&(PEAK * floor)) != Some(std::cmp::Ordering::Greater)
+        || top == 0
+        || top + 1 == curve.len()
+    {
         return None;
     }
     let reach = 2.min(top).min(curve.len() - 1 - top);

@@ -136,7 +136,7 @@ fn measure(
                             measured,
                             truth,
                             noise: f64::from(found.validity.deviation_mm[(y, x)]) / slope,
-                            even: (y / BLOCK_PX + x / BLOCK_PX) % 2 == 0,
+                            even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
                         });
                     }
                 }

@@ -45,12 +45,11 @@ impl Page {
 /// The bytes of a TIFF file.
 pub(super) fn tiff(layout: Layout, pages: &[Page]) -> Vec<u8> {
     let number = |value: u64, size: usize| {
-        let bytes = if layout.little {
+        if layout.little {
             value.to_le_bytes()[..size].to_vec()
         } else {
             value.to_be_bytes()[8 - size..].to_vec()
-        };
-        bytes
+        }
     };
     let offset_size = if layout.big { 8 } else { 4 };
     let mut file = if layout.little { b"II".to_vec() } else { b"MM".to_vec() };

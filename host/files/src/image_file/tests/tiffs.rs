@@ -27,7 +27,7 @@ fn planar_colour_is_read_plane_by_plane() {
     let planes = [[30_u8, 60], [60, 90], [90, 30]].map(Vec::from).to_vec();
     let page = Page { strips: planes, ..Page::grey(2, 1, 8, Vec::new()) };
     let page = page.with(262, &[2]).with(277, &[3]).with(258, &[8, 8, 8]).with(284, &[2]);
-    assert_eq!(read(&tiff(CLASSIC, &[page.clone()])), array![[60.0, 60.0]]);
+    assert_eq!(read(&tiff(CLASSIC, std::slice::from_ref(&page))), array![[60.0, 60.0]]);
     let settings = ReadSettings { grey: Grey::Green, ..ReadSettings::default() };
     let green = decode(&tiff(CLASSIC, &[page]), None).unwrap().grey(&settings).unwrap();
     assert!(green.colour);
