@@ -1,5 +1,5 @@
-//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`], [`running`] with the
-//! pictures, [`everybody`] in a picture by themselves), evaluating
+//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`], [`streaming`] with the
+//! pictures, [`multi_person`] in a picture by themselves), evaluating
 //! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
 
 mod annotated_video;

@@ -7,7 +7,7 @@
 //! where the images belong however different their blur.
 //!
 //! Cost: `cargo bench -p farnear-depth --bench registration`; of large images a smaller copy of at most 800,000 pixels is
-//! registered (`thinned`). Where the images already lie on each other, one level is enough to see it ([`displaced`]).
+//! registered (`thinned`). Where the images already lie on each other, one level is enough to see it (`displaced`).
 
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView2};
