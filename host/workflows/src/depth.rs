@@ -249,7 +249,9 @@ impl Request for DepthRequest {
 pub struct DepthFigures {
     /// For the depth, its deviation and its correction, without reading and writing.
     pub seconds: f64,
+    /// Pixels across.
     pub width: usize,
+    /// Pixels down.
     pub height: usize,
     /// Median of the depths that there are; NaN where there are none.
     pub median_mm: f64,
@@ -346,6 +348,7 @@ struct Inputs {
     doubts: Vec<String>,
 }
 
+/// What was computed.
 struct Computed {
     map: DepthMap,
     deviation: Option<(Array2<f32>, Uncertainty)>,

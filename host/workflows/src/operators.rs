@@ -98,6 +98,7 @@ impl Request for OperatorRequest {
     }
 }
 
+/// Quality of a design.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OperatorFigures {
     /// Family, design, point spread function and blur.

@@ -98,6 +98,7 @@ Print it in black, at its actual size (100 %), and glue it to something flat: th
 )]
 #[serde(default)]
 pub struct TargetRequest {
+    /// The optics file.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
     /// Distance of the target from the lens in mm [default: the far focus].
@@ -110,8 +111,10 @@ pub struct TargetRequest {
     /// The printer's dots per inch.
     #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().dpi))]
     pub dpi: u32,
+    /// Seed of the texture.
     #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().seed))]
     pub seed: u64,
+    /// The PDF file.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: PathBuf,
 }
@@ -153,7 +156,9 @@ pub struct TargetFigures {
     pub cell_px: f64,
     /// The same in dots of the printer.
     pub cell_dots: u32,
+    /// Cells of a row.
     pub columns: usize,
+    /// Rows of cells.
     pub rows: usize,
 }
 

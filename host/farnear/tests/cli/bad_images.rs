@@ -28,7 +28,7 @@ fn broken_images_are_named() {
     let absent = folder.text("absent.png");
     for (broken, phrases) in [
         (&empty, ["empty.png", "is empty"]),
-        (&cut, ["cut.png", "is not an image that farnear reads (PNG, TIFF, JPEG, PGM)"]),
+        (&cut, ["cut.png", "is not an image that farnear reads (PNG, TIFF, JPEG, BMP, PGM)"]),
         (&head, ["head.png", "is not an image"]),
         (&text, ["text.png", "is not an image"]),
         (&absent, ["absent.png", "No such file"]),

@@ -28,7 +28,7 @@ fn a_missing_simulator_is_named_with_what_to_do() {
     fails(
         &mut alone(&folder),
         1,
-        &["farnear-sim is neither beside this program nor on the PATH", "cargo xtask"],
+        &["farnear-sim is neither next to this program nor on the PATH", "cargo xtask"],
     );
     assert_eq!(folder.listing(), ["farnear"]);
 }

@@ -98,7 +98,7 @@ fn a_bad_job_does_not_stop_the_others() {
     let good = fs::read_to_string(&manifest).expect("the manifest");
     let wrong: [(&str, &[&str]); 7] = [
         ("do = 'depth'\nnear = 'gone.png'\nout = 'maps/a'", &["gone.png"]),
-        ("do = 'magic'\nout = 'maps/b'", &["magic", "depth, correct"]),
+        ("do = 'magic'\nout = 'maps/b'", &["magic", "depth, focus-stack, correct"]),
         ("do = 'depth'\nwindo = 3\nout = 'maps/c'", &["windo", "window"]),
         ("do = 'depth'\nout = ", &["line"]),
         ("do = 'depth'\nout = 'mine'", &["mine", "no batch made it"]),

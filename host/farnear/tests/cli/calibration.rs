@@ -162,7 +162,7 @@ fn filling_as_in_the_thesis_is_selectable() {
     assert!(record().contains("low_texture = \"variance:0.00001\""), "{}", record());
     bench.fails(2, &[&depth[..], &["--fill=cubic"]].concat(), "surface or thesis");
     bench.fails(2, &[&depth[..], &["--fill", "--low-texture", "entropy"]].concat(), "variance:T");
-    bench.fails(2, &[&depth[..], &["--low-texture", "variance"]].concat(), "--fill");
+    bench.fails(2, &[&depth[..], &["--low-texture", "variance"]].concat(), "give `fill` too");
 }
 
 #[test]

@@ -13,11 +13,17 @@ const SHARPEST: [f32; 2] = [3.0, 5.5];
 
 /// A stack whose texture fades with the distance from where its half is sharpest, as blur makes it; named 1.png to 9.png.
 fn stack(folder: &Folder) -> String {
+    stack_at(folder, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0], SHARPEST)
+}
+
+/// The same with a place for each image, of which both halves have one where they are sharpest; in mean steps.
+fn stack_at(folder: &Folder, places: &[f32; IMAGES], sharpest: [f32; 2]) -> String {
     let path = folder.text("stack");
     fs::create_dir(&path).expect("a folder");
-    for number in 0..IMAGES {
+    let step = (places[IMAGES - 1] - places[0]) / (IMAGES - 1) as f32;
+    for (number, place) in places.iter().enumerate() {
         let pixels = Array2::from_shape_fn((60, 80), |(y, x)| {
-            let away = number as f32 - SHARPEST[usize::from(x >= 40)];
+            let away = (place - sharpest[usize::from(x >= 40)]) / step;
             let texture = ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32 / 97.0 - 0.5;
             (128.0 + 200.0 * texture * (-0.06 * away * away).exp()) as u16
         });
@@ -81,12 +87,13 @@ fn read(out: &str) -> Array2<f32> {
 }
 
 #[test]
-fn distances_make_it_millimetres_in_either_order() {
+fn distances_make_it_millimetres() {
+    // The sensor moves evenly with the reciprocal of the distance.
+    let places = [300.0, 310.0, 320.0, 330.0, 340.0, 350.0, 360.0, 370.0, 380.0].map(|mm: f32| 1e4 / mm);
     let folder = Folder::new();
-    let stack = stack(&folder);
+    let stack = stack_at(&folder, &places, [1e4 / 330.0, 1e4 / 355.0]);
     let rising = "300,310,320,330,340,350,360,370,380";
-    let falling = "380,370,360,350,340,330,320,310,300";
-    for (distances, [left, right]) in [(rising, [330.0, 354.9]), (falling, [350.0, 325.0])] {
+    for (distances, [left, right]) in [(rising, [330.0, 355.0])] {
         let out = folder.text(&distances[..3]);
         let arguments = ["focus-stack", &stack, "--out", &out, "--distances-mm", distances, "--json"];
         assert_eq!(figures(&mut farnear(&arguments))["unit"], "mm");
@@ -98,7 +105,8 @@ fn distances_make_it_millimetres_in_either_order() {
 #[test]
 fn stage_positions_are_any_numbers_in_um() {
     let folder = Folder::new();
-    let (stack, out) = (stack(&folder), folder.text("out"));
+    let places = [-4.0, -3.0, -2.0, -1.0, 0.0, 2.0, 4.0, 6.0, 8.0];
+    let (stack, out) = (stack_at(&folder, &places, [-1.0, 3.0]), folder.text("out"));
     let arguments = ["focus-stack", &stack, "--out", &out, "--positions-um=-4,-3,-2,-1,0,2,4,6,8", "--json"];
     assert_eq!(figures(&mut farnear(&arguments))["unit"], "um");
     let found = halves(&read(&out));

@@ -142,7 +142,9 @@ fn an_aperture_is_given_as_a_picture() {
     let error = |psf: &str, out: &str| {
         let out = folder.text(out);
         let command = ["depth", &far, &near, "--optics", rig_optics(), "--psf", psf, "--out", &out, "--json"];
-        (number(&figures(&mut farnear(&command)), "median_mm") - 893.0).abs()
+        let figures = figures(&mut farnear(&command));
+        // A wrong PSF may leave no depth at all.
+        figures["median_mm"].as_f64().map_or(f64::INFINITY, |median_mm| (median_mm - 893.0).abs())
     };
     let (of_picture, of_formula, of_disc) =
         (error(&ring, "a"), error("ring:inner=0.7", "b"), error("pillbox", "c"));

@@ -11,6 +11,7 @@ const COMMANDS: &[&[&str]] = &[
     &["depth"],
     &["calibrate"],
     &["calibrate", "psf"],
+    &["calibrate", "stack"],
     &["calibrate", "camera"],
     &["calibrate", "correction"],
     &["camera"],

@@ -109,6 +109,7 @@ impl CalibratePsfRequest {
     }
 }
 
+/// What was found.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PsfFigures {
     /// The point spread function by name.
@@ -118,8 +119,10 @@ pub struct PsfFigures {
     pub p: Option<f64>,
     /// Width over blur radius; of a free profile that of a Gaussian with its second moment.
     pub k: f64,
+    /// Standard error of p.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error_p: Option<f64>,
+    /// Standard error of k.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error_k: Option<f64>,
     /// What is left of the images' energy when one is made from the other, 0 to 1.

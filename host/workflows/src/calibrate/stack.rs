@@ -15,6 +15,7 @@ use crate::{
     request::{PathKind, Request},
 };
 
+/// Endings of images.
 const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
 /// Part of the errors that three standard deviations must hold for the verdict `good`.
 const HONEST: f64 = 0.97;
@@ -55,6 +56,7 @@ pub struct CalibrateStackRequest {
     /// The first slice is focused nearest to the camera, not farthest.
     #[cfg_attr(feature = "clap", arg(long))]
     pub near_first: bool,
+    /// File for the lens.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: PathBuf,
 }
@@ -91,6 +93,7 @@ impl Request for CalibrateStackRequest {
 pub struct StackFigures {
     /// `good`, or what to change.
     pub verdict: String,
+    /// Number of slices.
     pub slices: usize,
     /// Slices from the far to the near image of a pair.
     pub pair_step: usize,
@@ -104,6 +107,7 @@ pub struct StackFigures {
     pub range_mm: f64,
     /// Blur radius per slice before and behind the focus, px of the camera.
     pub blur_per_slice_px: [f64; 2],
+    /// Blur of every slice.
     pub blur: Vec<BlurPoint>,
     /// `1.4826 x` median of |error| on held-out blocks, mm.
     pub robust_mm: f64,
@@ -119,6 +123,7 @@ pub struct StackFigures {
     pub within_three: f64,
     /// Standard deviation beyond what noise explains, mm.
     pub residual_mm: f64,
+    /// Number of pairs.
     pub pairs: usize,
 }
 
