@@ -152,17 +152,18 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
     settings.check()?;
     let start = Instant::now();
     let recording = recording(&settings.file, settings.choices)?;
-    let shown = settings.file.display();
+    // The name alone: records must not depend on the folder.
+    let name = settings.file.file_name().unwrap_or_default().display();
     let template = match &settings.template {
         Some(name) => template(name)?,
         None => best_template(&recording, &settings.file)?,
     };
     check_fit(&template, &recording, &settings.file)?;
     if settings.template.is_none() {
-        context.info(&format!("{shown}: the template `{}` fits best", template.name));
+        context.info(&format!("{name}: the template `{}` fits best", template.name));
     }
     let warnings: Vec<String> =
-        remarks(&recording).into_iter().map(|remark| format!("{shown}: {remark}")).collect();
+        remarks(&recording).into_iter().map(|remark| format!("{name}: {remark}")).collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
     let out = Staging::new_folder(&settings.out)?;
     let numbers = || (0..recording.frames.len()).step_by(settings.every);
@@ -179,7 +180,7 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         None => job.sequences(&views, &out)?,
     };
     for part in &missing.always {
-        context.info(&format!("{shown}: no marker of `{part}` was recorded; it is not drawn"));
+        context.info(&format!("{name}: no marker of `{part}` was recorded; it is not drawn"));
     }
     let index = Index {
         template: &template.name,
