@@ -394,7 +394,7 @@ mod tests {
 
     #[test]
     fn names_that_lead_elsewhere_are_refused() {
-        for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "a b", "x\0"] {
+        for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "x\0"] {
             assert!(folder_of(Path::new("s"), name).is_err(), "{name:?}");
         }
         assert_eq!(folder_of(Path::new("s"), "pair-001_b.2").unwrap(), Path::new("s/pair-001_b.2"));
