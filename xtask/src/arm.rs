@@ -18,7 +18,7 @@ const SYSROOT: &str = "/usr/aarch64-linux-gnu";
 pub const QEMU: &str = "qemu-aarch64";
 
 /// The modules of host/depth whose tests reach the vectors.
-const MODULES: [&str; 4] = ["simd", "filter", "pipeline", "windowed"];
+const MODULES: [&str; 4] = ["simd", "filter", "pipeline", "adaptive_window"];
 
 /// Runs the tests and adds them to the total, or says what is missing and counts them as skipped.
 ///
