@@ -862,7 +862,8 @@ class Recogniser:
         Returns
         -------
         dict
-            `activity` (None = unknown), `confidence` (its probability, 0 to 1), `outlier_score` (above 1 = unknown), and `probabilities` by name.
+            `activity` (None = unknown), `confidence` (its probability, 0 to 1), `outlier_score` (above 1 = unknown),
+            and `probabilities` by name.
         """
 
 class RigClient:

@@ -65,8 +65,8 @@ impl Recogniser {
     /// Returns
     /// -------
     /// dict
-    ///     `activity` (None = unknown), `confidence` (its probability, 0 to 1), a score of how unlike the trained activities the clip
-    ///     is (above 1 = unknown), and `probabilities` by name.
+    ///     `activity` (None = unknown), `confidence` (its probability, 0 to 1), `outlier_score` (above 1 = unknown),
+    ///     and `probabilities` by name.
     #[pyo3(signature = (*views, among=None))]
     fn recognise<'py>(
         &self,

@@ -54,17 +54,17 @@ def test_a_time_lapse_keeps_its_interval(emulated_rig):
 def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
     useq = pytest.importorskip("useq")
     for event, what in [
-        (useq.MDAEvent(z_pos=3, channel="DAPI"), "channel"),
-        (useq.MDAEvent(z_pos=3, x_pos=1), "x_pos"),
-        (useq.MDAEvent(z_pos=3, properties=[("device", "name", "1")]), "properties"),
-        (useq.MDAEvent(z_pos=3, action=useq.HardwareAutofocus(autofocus_motor_offset=1)), "autofocus"),
-        (useq.MDAEvent(z_pos=3, action=useq.CustomAction(name="shake")), "custom"),
-        (useq.MDAEvent(z_pos=3, exposure=1e6), "exposure"),
+        (useq.MDAEvent(z_pos=50, channel="DAPI"), "channel"),
+        (useq.MDAEvent(z_pos=50, x_pos=1), "x_pos"),
+        (useq.MDAEvent(z_pos=50, properties=[("device", "name", "1")]), "properties"),
+        (useq.MDAEvent(z_pos=50, action=useq.HardwareAutofocus(autofocus_motor_offset=1)), "autofocus"),
+        (useq.MDAEvent(z_pos=50, action=useq.CustomAction(name="shake")), "custom"),
+        (useq.MDAEvent(z_pos=50, exposure=1e6), "exposure"),
         (useq.MDAEvent(z_pos=1e5), "outside"),
         (useq.MDAEvent(), "z position"),
     ]:
         with pytest.raises(farnear.FarnearError, match=what):
-            emulated_rig.run_sequence([useq.MDAEvent(z_pos=3), event])
+            emulated_rig.run_sequence([useq.MDAEvent(z_pos=50), event])
 
 
 def test_a_rig_that_was_left_is_closed(emulated_rig):
