@@ -38,11 +38,16 @@ export function make(host) {
     place.replaceChildren(found[3].element);
     found[3].shown?.();
     if (!host.hidden) history.replaceState(null, "", `#guides/${found[0]}`);
+    enable();
   };
-  on("state", ({ rig, job, computation }) => {
+  const enable = () => {
+    if (!store.state) return;
+    const { rig, job, computation } = store.state;
     for (const control of host.querySelectorAll("[data-needs=rig]")) control.disabled = !hasControl() || rig.phase !== "ready" || job?.phase === "running";
+    for (const control of host.querySelectorAll("[data-needs=computation]")) control.disabled = !hasControl() || computation?.phase === "running";
     for (const control of host.querySelectorAll("[data-needs=client]")) control.disabled = !store.client || computation?.phase === "running";
-  });
+  };
+  on("state", enable);
   pick("power");
   return { shown: (name) => pick(name ?? place.dataset.guide) };
 }
@@ -98,7 +103,7 @@ function psf() {
     if (begun && (await ended("job", begun.job)).phase === "done") await shown();
   };
   const find = async () => {
-    const targets = [...pairs.querySelectorAll("li")].filter((row) => row.querySelector("[type=checkbox]").checked).map((row) => {
+    const targets = [...pairs.querySelectorAll("li")].filter((row) => row.querySelector("[type=checkbox]")?.checked).map((row) => {
       const mm = row.querySelector("[type=number]").value;
       return mm === "" ? { capture: row.dataset.name } : { capture: row.dataset.name, depth_mm: Number(mm) };
     });

@@ -167,8 +167,16 @@ async function showQuestion(state) {
   else act("/api/answer", { text: answer });
 }
 
+/** A fault of the page itself is reported: silence would look like a dead button. */
+function reportFaults() {
+  // Delayed size notifications are no fault.
+  addEventListener("error", ({ message }) => !message.startsWith("ResizeObserver") && notice(`Fault of the page: ${message}`, "error", "Reload the page; please report it."));
+  addEventListener("unhandledrejection", ({ reason }) => notice(`Fault of the page: ${reason?.message ?? reason}`, "error", "Reload the page; please report it."));
+}
+
 function begin() {
   theme();
+  reportFaults();
   $("waiting").remove(); // what an old browser keeps, which gets no further than the page's text
   rig.mount($("rig"));
   addView("live", "Live", live.make);

@@ -8,7 +8,7 @@ const LAST = 240;
 /** A choice of the videos that were sent, with a way to send one. */
 function videos() {
   const chosen = h("select", { "aria-label": "Video" });
-  const file = h("input", { type: "file", accept: "video/*,.y4m", "aria-label": "Video file to send" });
+  const file = h("input", { type: "file", accept: "video/*,.y4m", "data-needs": "computation", "aria-label": "Video file to send" });
   const said = h("p", { class: "dim", "aria-live": "polite" });
   async function shown() {
     try {
@@ -83,7 +83,7 @@ export function activity() {
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "What somebody does"),
       h("p", {}, "A camera that stands still and one person who moves. The first frames teach the background. Stop ends it."), video.parts, known,
-      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "client" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
+      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "computation" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
     panel("Answer", h("div", { class: "person-answer" }, canvas, h("div", {}, answer, strip, details))));
   const shown = async () => {
     await video.shown();

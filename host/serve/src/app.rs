@@ -251,7 +251,7 @@ impl App {
         let mut control = lock(&self.control);
         let given = work(&mut control);
         let (holder, requested_by, clients) = (control.holder(), control.requested_by(), control.clients());
-        drop(control);
+        // While the lock is held: the last change is the last that is published.
         self.change(|state| state.control = ControlState { holder, requested_by, clients });
         given
     }

@@ -12,8 +12,7 @@ before(async () => {
 });
 afterEach(async () => {
   for (const context of browser.contexts()) await context.close();
-  // Control is reserved for the last page; the next test's page gets it after that.
-  while ((await server.ask("/api/state")).control.holder !== null) await new Promise((done) => setTimeout(done, 200));
+  await server.released();
 });
 after(async () => {
   await browser?.close();

@@ -24,7 +24,12 @@ export async function serve(what = ["--rig", "sim"], blocks = 0) {
     child.once("exit", (code) => { rmSync(session, { recursive: true, force: true }); done(code); });
     child.kill("SIGINT");
   });
-  return { address, session, pid: child.pid, close, ask: async (path) => (await fetch(new URL(path, address))).json() };
+  const ask = async (path) => (await fetch(new URL(path, address))).json();
+  /** Waits until control is not reserved for a page that has closed. */
+  const released = async () => {
+    while ((await ask("/api/state")).control.holder !== null) await new Promise((done) => setTimeout(done, 100));
+  };
+  return { address, session, pid: child.pid, close, ask, released };
 }
 
 /** Whether the program was built with this kind of camera. */
