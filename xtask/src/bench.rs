@@ -6,6 +6,7 @@
 
 mod arm;
 mod people;
+mod programs;
 
 use std::{
     fmt::Write as _,
@@ -42,6 +43,13 @@ pub struct Arguments {
     /// aarch64-unknown-linux-gnu. With --write only that section is renewed.
     #[arg(long, conflicts_with_all = ["peers", "only"])]
     arm: bool,
+    /// Time `farnear depth` as a whole program compared with a numpy and OpenCV script, 0.3 to 45 megapixels; with --write the
+    /// page docs/speed-programs.md is renewed.
+    #[arg(long, conflicts_with_all = ["peers", "only", "arm"])]
+    programs: bool,
+    /// Runs of each program.
+    #[arg(long, default_value_t = 5, requires = "programs")]
+    runs: usize,
     /// Write the page docs/speed.md from the figures.
     #[arg(long)]
     write: bool,
@@ -78,6 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.arm {
         return arm::renew(arguments.write);
     }
+    if arguments.programs {
+        let page = programs::run(arguments.runs)?;
+        println!("\n{page}");
+        return if arguments.write { write(&ROOT.join("docs/speed-programs.md"), &page) } else { Ok(()) };
+    }
     let (mut with_features, mut with_pair) = (Vec::new(), Vec::new());
     for script in &arguments.peer_script {
         let text = fs::read_to_string(script).with_context(|| format!("cannot read {}", script.display()))?;
@@ -105,8 +118,11 @@ fn page_file() -> PathBuf {
 }
 
 fn write_page(text: &str) -> Result<()> {
-    let file = page_file();
-    fs::write(&file, text.trim_end().to_owned() + "\n")
+    write(&page_file(), text)
+}
+
+fn write(file: &Path, text: &str) -> Result<()> {
+    fs::write(file, text.trim_end().to_owned() + "\n")
         .with_context(|| format!("cannot write {}", file.display()))?;
     println!("wrote {}", file.display());
     Ok(())
@@ -282,13 +298,19 @@ fn shares_of_peak(rows: &[Row]) -> String {
     text
 }
 
-fn page_of(tables: &str) -> String {
+/// Model of the processor and its hardware threads.
+fn processor() -> String {
     let cpu = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpu.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let model = model.map_or("an unnamed processor", |(_, name)| name.trim());
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{model}, {threads} hardware threads")
+}
+
+fn page_of(tables: &str) -> String {
+    let processor = processor();
     format!(
-        "# Speed\n\nWritten by `cargo xtask bench --peers --write` on {model}, {threads} hardware threads. Times are of this machine; \
+        "# Speed\n\nWritten by `cargo xtask bench --peers --write` on {processor}. Times are of this machine; \
          ratios travel better. A ratio above 1 means that ours is faster.\n\n\
          ## Depth\n\n`chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
          confidence. `chain_640x480_side_by_side` is the time per pair when four chains of one thread each run at once and share \

@@ -111,7 +111,7 @@ async fn main(_spawner: Spawner) {
         error!("there is no clock from outside: the chip's own is used");
     }
     if !option_bytes::has_brown_out_reset() {
-        error!("the brown-out reset is off or below level 2: set BOR_LEV with the probe (docs/rig.md)");
+        error!("the brown-out reset is off or below level 2: set BOR_LEV with the probe (docs/bring-up.md)");
     }
     let Parts { mut board, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,

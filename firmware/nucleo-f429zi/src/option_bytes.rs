@@ -5,7 +5,7 @@
 //!
 //! The firmware reads the option bytes and never programs them. Programming erases their sector first; a supply that fails in
 //! that moment leaves read protection and PCROP on. Right after power-on, while a plug still bounces, is the worst moment for it.
-//! `docs/rig.md` has the step with the debug probe.
+//! `docs/bring-up.md` has the step with the debug probe.
 
 use embassy_stm32::pac;
 

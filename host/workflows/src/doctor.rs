@@ -169,12 +169,12 @@ fn firmware(port: Option<&str>) -> Finding {
             }
             Some(note) => {
                 let remedy =
-                    "`cargo xtask firmware` builds the one that belongs to this program (docs/rig.md)";
+                    "`cargo xtask firmware` builds the one that belongs to this program (docs/bring-up.md)";
                 Finding::bad(Health::Missing, WHAT, note, remedy)
             }
         },
         Err(error) => {
-            let remedy = "docs/rig.md says how the board is connected and flashed";
+            let remedy = "docs/bring-up.md says how the board is connected and flashed";
             Finding::bad(Health::Missing, WHAT, error.to_string(), remedy)
         }
     }

@@ -86,7 +86,7 @@ pub enum WorkflowError {
     #[error("the board's answer differs from this computer's: {0}")]
     Differs(String),
     /// The bring-up checklist found something.
-    #[error("{failed} of the steps failed; put that right before anything moves further (docs/rig.md)")]
+    #[error("{failed} of the steps failed; put that right before anything moves further (docs/bring-up.md)")]
     StepsFailed {
         failed: usize,
         /// Number of the alarm that is latched.

@@ -34,7 +34,7 @@ struct Phase {
     steps: &'static [Step],
 }
 
-/// The order is that of docs/rig.md: the first half is done with the motors disconnected.
+/// The order is that of docs/bring-up.md: the first half is done with the motors disconnected.
 const PHASES: [Phase; 3] = [
     Phase {
         moves: false,

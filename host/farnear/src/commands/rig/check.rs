@@ -10,7 +10,7 @@ use crate::{report, terminal};
 /// Walk through the bring-up of a rig: link, identity, memory, switches, emergency stop, encoders, first move, homing,
 /// piezo, camera.
 ///
-/// The order is that of docs/rig.md: the first half is done with the motors disconnected. Ends with 1 if a step failed.
+/// The order is that of docs/bring-up.md: the first half is done with the motors disconnected. Ends with 1 if a step failed.
 #[derive(Args)]
 #[command(after_help = "Example: farnear rig check --port /dev/ttyACM0 --camera folder:incoming/")]
 pub struct Arguments {
