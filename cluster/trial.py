@@ -49,7 +49,7 @@ def results(folder):
 
 
 def done(folder):
-    """What is done, and when it was."""
+    """Finished jobs and their times."""
     return {path.parent.name: path.stat().st_mtime_ns for path in folder.glob("*/batch.toml")}
 
 
@@ -67,7 +67,7 @@ class Trial:
         command = ["snakemake", "--snakefile", HERE / "Snakefile", "--profile", HERE / "profiles/slurm"]
         command += ["--directory", self.folder / "work", "--config", f"manifest={self.folder / 'shared.csv'}"]
         command += [f"shares={self.arguments.shares}", f"farnear={self.arguments.farnear}", *more]
-        # This Slurm keeps no accounts; and nobody wants to wait for a share of seconds as for one of hours.
+        # This Slurm keeps no accounts, and a share of seconds should not wait like one of hours.
         command += ["--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", 3]
         log = (self.folder / "snakemake.log").open("ab")
         return subprocess.Popen(
@@ -75,7 +75,7 @@ class Trial:
         )
 
     def wait_for(self, share, workflow):
-        """Until that share of the jobs is done; gives what is done then."""
+        """Waits until that share of the jobs is finished; returns the finished ones."""
         last, since = 0, time.monotonic()
         while (count := len(done(self.out))) < share * self.arguments.jobs:
             if workflow.poll() is not None:
@@ -93,7 +93,7 @@ class Trial:
         print(f"{self.told[-1][0]:6.1f} s, {self.told[-1][1]:4} done: {what}", flush=True)
 
     def crash(self):
-        """The run with its crashes; gives what was done at each."""
+        """The run with its crashes; returns the finished jobs at each."""
         seen = []
         workflow = self.workflow()
         for share, daemon, pause in [(0.2, "controller", 5), (0.4, "two", 15)]:
@@ -153,7 +153,7 @@ def main():
     parser.add_argument("--farnear", default=shutil.which("farnear"), help="the program, if it is not on the PATH")
     arguments = parser.parse_args()
     if not arguments.farnear:
-        parser.error("there is no farnear on the PATH: name it with --farnear")
+        parser.error("farnear is not on the PATH: name it with --farnear")
     folder = arguments.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "work").mkdir(exist_ok=True)

@@ -110,7 +110,7 @@ class Rig:
             until = time.monotonic() + REPLY_S
             while time.monotonic() < until:
                 self.receive()
-                # One read may hold an answer and events behind it: what is not used now stays in the queue.
+                # One read may hold an answer and events after it: unused bytes stay in the queue.
                 while self.waiting:
                     kind, number, body = self.waiting.popleft()
                     if kind == EVENT:
@@ -122,7 +122,7 @@ class Rig:
         raise TimeoutError("the board does not answer")
 
     def receive(self):
-        """Reads what has arrived and queues the good frames: kind, id and body."""
+        """Reads the received bytes and queues the valid frames: kind, id and body."""
         self.rest += self.line.read(max(1, self.line.in_waiting))
         *frames, self.rest = self.rest.split(b"\0")
         for frame in frames:
