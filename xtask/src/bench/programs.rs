@@ -38,7 +38,8 @@ pub fn run(runs: usize) -> Result<String> {
     step("rendering");
     let tile = folder.join("tile");
     let [width, height] = TILE.map(|side| side.to_string());
-    let render = ["render", "--scene", "staircase", "--noise", "8bit", "--width", &width, "--height", &height];
+    let render =
+        ["render", "--scene", "staircase", "--noise", "8bit", "--width", &width, "--height", &height];
     finish(Command::new(&farnear).args(render).arg("--optics").arg(&optics).arg("--out").arg(&tile))?;
 
     let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -49,11 +50,13 @@ pub fn run(runs: usize) -> Result<String> {
             let [far, near] = pair(&folder, &tile, size, shift)?;
             for npy_only in [true, false] {
                 let ours = |threads: &str| {
-                    let words = [&text(&farnear), "depth", &text(&far), &text(&near), "--optics", &text(&optics)];
+                    let words =
+                        [&text(&farnear), "depth", &text(&far), &text(&near), "--optics", &text(&optics)];
                     let mut words: Vec<String> = words.iter().map(ToString::to_string).collect();
                     let out = text(&folder.join("ours"));
                     words.extend(["--threads", threads, "--out", &out].map(String::from));
-                    words.extend(npy_only.then(|| ["--write", "npy"].map(String::from)).into_iter().flatten());
+                    words
+                        .extend(npy_only.then(|| ["--write", "npy"].map(String::from)).into_iter().flatten());
                     words
                 };
                 let peer = [text(&ROOT.join(PEER)), text(&far), text(&near), text(&folder.join("peer"))];
@@ -99,7 +102,10 @@ fn timed(groups: &[Value], runs: usize) -> Result<Vec<Value>> {
         bail!("{TIMER} failed: {}", output.status);
     }
     let lines = String::from_utf8_lossy(&output.stdout);
-    lines.lines().map(|line| serde_json::from_str(line).with_context(|| format!("not JSON: {line}"))).collect()
+    lines
+        .lines()
+        .map(|line| serde_json::from_str(line).with_context(|| format!("not JSON: {line}")))
+        .collect()
 }
 
 type Label = ([usize; 2], [usize; 2], bool);
@@ -141,7 +147,8 @@ mod tests {
 
     #[test]
     fn the_ratio_is_ours_over_the_scripts() {
-        let time = |cpu: f64| json!({"cpu_s": cpu, "user_s": cpu / 2.0, "wall_s": cpu / 4.0, "memory_mib": 100.0});
+        let time =
+            |cpu: f64| json!({"cpu_s": cpu, "user_s": cpu / 2.0, "wall_s": cpu / 4.0, "memory_mib": 100.0});
         let figures = [json!([time(1.0), time(1.2), time(2.0)])];
         let page = page(&[([640, 480], SHIFT, true)], &figures, 5);
         let row = "| 640x480, shifted | npy | 1.000 | 1.200 | 2.000 | 0.50 | 0.50 | 0.25 | 100 | 100 |";
