@@ -1,4 +1,6 @@
-//! Masks as pictures: grey PNGs (or other pictures), set from level 128 on, one per frame.
+//! Masks as pictures: grey PNGs (or other pictures) of two [`levels`], one per frame.
+
+pub mod levels;
 
 use std::{
     io::Cursor,
@@ -8,6 +10,7 @@ use std::{
 use image::{GrayImage, ImageFormat, Luma};
 use ndarray::{Array2, Axis};
 
+use self::levels::{Histogram, Levels};
 use crate::{
     EncodeError,
     video::{Pixels, VideoError, pictures},
@@ -39,6 +42,14 @@ pub enum MaskError {
         column: usize,
         /// Its place from the top.
         row: usize,
+    },
+    /// Several dark levels, of which none is known to be the person.
+    #[error(
+        "{}: grey levels {levels:?} and none from 128 on; masks have two levels, or 0, 127 and 255", path.display()
+    )]
+    Levels {
+        path: PathBuf,
+        levels: Vec<u8>,
     },
     /// A mask of another size than the first.
     #[error(
@@ -101,27 +112,59 @@ pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
 ///
 /// # Errors
 /// See [`grey`].
-pub fn read(path: &Path) -> Result<Mask, MaskError> {
-    Ok(grey(path)?.mapv(|level| level >= 128))
+pub fn read(path: &Path, levels: &Levels) -> Result<Mask, MaskError> {
+    Ok(grey(path)?.mapv(|level| level >= levels.set_from))
+}
+
+/// The levels of masks in these pictures.
+///
+/// # Errors
+/// See [`grey`] and [`Levels::of_masks`].
+pub fn levels_of(files: &[PathBuf]) -> Result<Levels, MaskError> {
+    let Some(first) = files.first() else { return Ok(Levels::default()) };
+    Levels::of_masks(&Levels::survey(files)?, first)
+}
+
+/// All masks of a folder.
+pub struct Masks {
+    pub named: Vec<Named>,
+    /// What a user should know about their grey levels.
+    pub remark: Option<String>,
+}
+
+impl Masks {
+    /// The masks without their names.
+    #[must_use]
+    pub fn pixels(self) -> Vec<Mask> {
+        self.named.into_iter().map(|named| named.mask).collect()
+    }
 }
 
 /// All masks of a folder (or one picture), in natural order; they must have one size.
 ///
 /// # Errors
-/// See [`grey`] and [`listed`]; a mask of another size than the first.
-pub fn read_all(path: &Path) -> Result<Vec<Named>, MaskError> {
-    let mut all: Vec<Named> = Vec::new();
-    for file in listed(path)? {
-        let mask = read(&file)?;
-        if let Some(first) = all.first() {
-            let (found, expected) = (mask.dim(), first.mask.dim());
+/// See [`grey`], [`listed`] and [`Levels::of_masks`]; a mask of another size than the first.
+pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
+    let mut all: Vec<(String, Array2<u8>)> = Vec::new();
+    let mut histogram = Histogram::default();
+    let files = listed(path)?;
+    for file in &files {
+        let levels = grey(file)?;
+        if let Some((first, other)) = all.first() {
+            let (found, expected) = (levels.dim(), other.dim());
             if found != expected {
-                return Err(MaskError::Size { path: file, found, first: first.name.clone(), expected });
+                return Err(MaskError::Size { path: file.clone(), found, first: first.clone(), expected });
             }
         }
-        all.push(Named { name: pictures::stem(&file), mask });
+        histogram.add(&levels);
+        all.push((pictures::stem(file), levels));
     }
-    Ok(all)
+    let levels = Levels::of_masks(&histogram, files.first().map_or(path, PathBuf::as_path))?;
+    let named = |(name, grey): (String, Array2<u8>)| Named {
+        name,
+        mask: grey.mapv(|level| level >= levels.set_from),
+    };
+    Ok(Masks { named: all.into_iter().map(named).collect(), remark: levels.remark.clone() })
 }
 
 /// A mask as PNG: 255 = set.

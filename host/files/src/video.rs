@@ -5,6 +5,7 @@
 
 mod ffmpeg;
 pub mod pictures;
+mod timing;
 mod y4m;
 
 use std::{
@@ -158,6 +159,8 @@ pub struct Video {
     frames: Frames,
     first: Option<Kind>,
     ended: bool,
+    /// What a user should know about how it is read.
+    pub remark: Option<String>,
 }
 
 impl std::fmt::Debug for Video {
@@ -173,15 +176,18 @@ impl Video {
     /// [`VideoError`] where nothing can be read at all; damage further on comes with its frame.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
+        let mut remark = None;
         let frames: Frames = if metadata.is_dir() {
             Box::new(pictures::open(path)?)
         } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m")) {
             let file = std::fs::File::open(path).map_err(|source| VideoError::io(path, source))?;
             Box::new(y4m::Y4m::new(path, io::BufReader::new(file))?)
         } else {
-            Box::new(ffmpeg::open(path)?)
+            let timing = timing::Timing::of(path);
+            remark = timing.as_ref().and_then(timing::Timing::remark);
+            Box::new(ffmpeg::open(path, timing.as_ref())?)
         };
-        Ok(Self { path: path.into(), frames, first: None, ended: false })
+        Ok(Self { path: path.into(), frames, first: None, ended: false, remark })
     }
 }
 
@@ -262,5 +268,46 @@ mod tests {
         std::fs::write(folder.path().join("a.png"), b"\x89PNG\r\n\x1a\nrubbish").unwrap();
         let error = Video::open(folder.path()).unwrap().next().unwrap().unwrap_err();
         assert!(error.to_string().contains("a.png"), "{error}");
+    }
+
+    /// Frames that ffmpeg wrote with the times of `filter`, read back; `None` without ffmpeg or its encoder.
+    fn through_ffmpeg(filter: &str) -> Option<(usize, Option<String>)> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("recorded.webm");
+        let made = std::process::Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=64x48:rate=30:duration=2", "-vf"])
+            .args([filter, "-vsync", "passthrough", "-enc_time_base", "1/1000", "-c:v", "libvpx"])
+            .arg(&file)
+            .status();
+        if !made.is_ok_and(|status| status.success()) {
+            return None;
+        }
+        let video = Video::open(&file).unwrap();
+        let remark = video.remark.clone();
+        Some((video.map(Result::unwrap).count(), remark))
+    }
+
+    #[test]
+    fn uneven_times_of_a_browser_are_resampled_to_the_nominal_rate() {
+        // Every seventh frame dropped, the others late by up to 2 ms, and a pause of half a second.
+        let filter = "select='not(eq(mod(n\\,7)\\,3))',settb=1/1000,setpts='PTS+mod(N*7\\,3)+500*gt(N\\,20)'";
+        let Some((frames, remark)) = through_ffmpeg(filter) else {
+            eprintln!("skipped: no ffmpeg");
+            return;
+        };
+        assert!((74..=76).contains(&frames), "{frames} frames of 2.5 s at 30 frames/s");
+        let remark = remark.expect("a remark");
+        assert!(remark.contains("frame rate varies") && remark.contains("30.00 frames/s"), "{remark}");
+    }
+
+    #[test]
+    fn a_constant_rate_in_milliseconds_is_read_frame_by_frame() {
+        for filter in ["settb=1/1000", "settb=1/1000,setpts=N*59"] {
+            let Some((frames, remark)) = through_ffmpeg(filter) else {
+                eprintln!("skipped: no ffmpeg");
+                return;
+            };
+            assert_eq!((frames, remark), (60, None), "{filter}");
+        }
     }
 }

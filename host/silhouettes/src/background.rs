@@ -6,6 +6,7 @@
 //! Letters 27 (2006), 773-780.
 
 mod kernel;
+pub mod light;
 mod model;
 mod settings;
 

@@ -9,6 +9,7 @@ pub mod bits;
 pub mod centre;
 pub mod cleaning;
 pub mod extractor;
+pub mod feedback;
 pub mod people;
 pub mod regions;
 pub mod subject;

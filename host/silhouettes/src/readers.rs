@@ -14,10 +14,12 @@
 //!
 //! Data sets of body joints come as MATLAB files ([`skeletons`]).
 
+mod amass;
 mod body;
 pub mod bvh;
 pub mod c3d;
 pub mod csv;
+pub mod keypoints;
 pub mod kinect;
 pub mod matlab;
 pub mod ntu;
@@ -25,13 +27,22 @@ pub mod reader;
 pub mod recording;
 pub mod skeletons;
 pub mod trc;
+mod zip;
 
 use reader::Reader;
-use recording::{Choices, Recording, RecordingError, Source};
+use recording::{Choices, Found, Recording, RecordingError, Source};
 
 /// All formats of motion capture.
-pub const READERS: [Reader; 6] =
-    [bvh::READER, c3d::READER, csv::READER, kinect::READER, ntu::READER, trc::READER];
+pub const READERS: [Reader; 8] = [
+    bvh::READER,
+    c3d::READER,
+    csv::READER,
+    keypoints::READER,
+    kinect::READER,
+    amass::READER,
+    ntu::READER,
+    trc::READER,
+];
 
 /// Reads a recording with the reader of its file's ending (any case, without the dot). What the caller names in `choices` goes before what the
 /// file says or suggests; what was guessed is in [`Recording::remarks`].
@@ -42,7 +53,26 @@ pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));
     let reader = reader.ok_or_else(|| RecordingError::Extension { found: ending, known: extensions() })?;
-    let recording = (reader.read)(bytes)?.settled(choices);
+    settled((reader.read)(bytes)?, choices)
+}
+
+/// Reads a folder of keypoint files, a frame each, in the order in which they are given.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_keypoint_files<'a>(
+    files: impl IntoIterator<Item = &'a [u8]>,
+    choices: Choices,
+) -> Result<Recording, RecordingError> {
+    settled(keypoints::read_files(files)?, choices)
+}
+
+fn settled(found: Found, choices: Choices) -> Result<Recording, RecordingError> {
+    let people = 1 + found.others.len();
+    if let Some(wanted) = choices.person.filter(|wanted| !(1..=people).contains(wanted)) {
+        return Err(RecordingError::Person { wanted, found: people });
+    }
+    let recording = found.settled(choices);
     match &recording.unit.source {
         Source::Unknown { stated } => Err(RecordingError::Unit(stated.clone())),
         _ => Ok(recording),

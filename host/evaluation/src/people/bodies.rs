@@ -63,7 +63,7 @@ fn from_markers(page: &mut Page, data: &Data) -> Result<()> {
     let recording = readers::read(&bytes, "c3d", Choices::default())?;
     let template = Template::named("plug-in-gait")?;
     let markers = recording.by_name(recording.frames.len() / 2);
-    let (has, of) = template.coverage(&recording.names);
+    let (has, of) = template.coverage(&recording.known_names());
     let sides = ["front", "right", "back", "left"];
     let (mut dots, mut hulls, mut whole) = (Vec::new(), Vec::new(), Vec::new());
     for (side, view) in sides.into_iter().zip(views_round(sides.len(), 0.0)) {

@@ -7,7 +7,7 @@ use std::{
     thread::JoinHandle,
 };
 
-use super::{VideoError, VideoFrame, y4m::Y4m};
+use super::{VideoError, VideoFrame, timing::Timing, y4m::Y4m};
 
 /// How much of ffmpeg's complaint an error quotes.
 const QUOTED_CHARS: usize = 400;
@@ -20,16 +20,17 @@ struct Ffmpeg {
     frames: Option<Y4m<BufReader<ChildStdout>>>,
 }
 
-/// Starts ffmpeg on a file.
+/// Starts ffmpeg on a file, whose frames come at a constant rate.
 pub(super) fn open(
     path: &Path,
+    timing: Option<&Timing>,
 ) -> Result<impl Iterator<Item = Result<VideoFrame, VideoError>> + 'static, VideoError> {
     let child = Command::new("ffmpeg")
         .args(["-nostdin", "-v", "error", "-i"])
         .arg(path)
-        // The first video stream; the option that keeps ffmpeg from evening out an uneven frame rate changed its name
-        // between versions, and a repeated frame harms nothing.
-        .args(["-map", "0:v:0", "-pix_fmt", "yuv444p", "-f", "yuv4mpegpipe", "-"])
+        .args(["-map", "0:v:0"])
+        .args(timing.into_iter().flat_map(Timing::arguments))
+        .args(["-pix_fmt", "yuv444p", "-f", "yuv4mpegpipe", "-"])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

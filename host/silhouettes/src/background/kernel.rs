@@ -68,6 +68,8 @@ pub struct Update<'a, const CHANNELS: usize> {
     /// Interleaved samples, row by row.
     pub pixels: &'a [u8],
     pub labels: &'a mut [u8],
+    /// Tiles that are labelled and learn nothing; none where it is empty.
+    pub held: &'a [bool],
 }
 
 impl<const CHANNELS: usize> WithSimd for Update<'_, CHANNELS> {
@@ -77,9 +79,11 @@ impl<const CHANNELS: usize> WithSimd for Update<'_, CHANNELS> {
     fn with_simd<S: Simd>(self, simd: S) {
         let tiles = self.used.len();
         let stride = tiles * component_len(CHANNELS);
-        let constants = Constants::new(simd, self.settings, self.rate);
+        let learning = Constants::new(simd, self.settings, self.rate);
+        let still = Constants::new(simd, self.settings, 0.0);
         let tile_pixels = self.pixels.chunks(TILE * CHANNELS).zip(self.labels.chunks_mut(TILE));
         for (tile, (pixels, labels)) in tile_pixels.enumerate() {
+            let constants = if self.held.get(tile) == Some(&true) { &still } else { &learning };
             let samples = planes::<CHANNELS>(pixels);
             let mut codes = [0.0_f32; TILE];
             let first = tile * component_len(CHANNELS);
@@ -89,7 +93,7 @@ impl<const CHANNELS: usize> WithSimd for Update<'_, CHANNELS> {
                 let mut mixture =
                     Mixture::<S, CHANNELS> { simd, state: &mut *self.state, first: first + lanes, stride };
                 let x = from_fn(|channel| load(simd, &samples[channel][lanes..]));
-                let (used, code) = mixture.observe(&constants, usize::from(self.used[tile]), x);
+                let (used, code) = mixture.observe(constants, usize::from(self.used[tile]), x);
                 store(simd, &mut codes[lanes..], code);
                 tile_used = tile_used.max(used);
             }

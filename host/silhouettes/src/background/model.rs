@@ -26,7 +26,8 @@ impl Frame<'_> {
         }
     }
 
-    fn channels(&self) -> usize {
+    #[must_use]
+    pub fn channels(&self) -> usize {
         match self {
             Self::Grey(_) => 1,
             Self::Rgb(pixels) => pixels.dim().2,
@@ -149,15 +150,29 @@ impl BackgroundModel {
     /// # Errors
     /// [`BackgroundError::Changed`] for a frame of another size or kind; the model is as before.
     pub fn apply(&mut self, frame: Frame<'_>) -> Result<Array2<Label>, BackgroundError> {
+        self.apply_at(frame, self.usual_rate())
+    }
+
+    /// The learning rate that [`Self::apply`] would use for the next frame.
+    #[must_use]
+    pub fn usual_rate(&self) -> f32 {
         let n = self.frames_seen.saturating_add(1);
-        let rate =
-            if n == 1 { 1.0 } else { 1.0 / self.settings.history_frames.min(n.saturating_mul(2)) as f32 };
-        self.apply_at(frame, rate)
+        if n == 1 { 1.0 } else { 1.0 / self.settings.history_frames.min(n.saturating_mul(2)) as f32 }
     }
 
     /// As [`BackgroundModel::apply`] with a learning rate of one's own, clamped to 0 (labels only; unexplained
     /// samples still leave a component of no weight) to 1 (forgets everything).
     pub fn apply_at(&mut self, frame: Frame<'_>, rate: f32) -> Result<Array2<Label>, BackgroundError> {
+        self.apply_outside(frame, rate, None)
+    }
+
+    /// As [`BackgroundModel::apply_at`]; nothing is learned where `held`, of the frame's shape, is set, nor within 15 pixels to its sides.
+    pub fn apply_outside(
+        &mut self,
+        frame: Frame<'_>,
+        rate: f32,
+        held: Option<&Array2<bool>>,
+    ) -> Result<Array2<Label>, BackgroundError> {
         if frame.size() != self.size || frame.channels() != self.channels {
             return Err(BackgroundError::Changed {
                 found: frame.size(),
@@ -166,15 +181,25 @@ impl BackgroundModel {
                 expected_channels: self.channels,
             });
         }
+        let held: Vec<bool> = match held.filter(|held| held.dim() == self.size) {
+            Some(held) => {
+                let mut tiles = vec![false; self.used.len()];
+                for (pixel, _) in held.iter().enumerate().filter(|(_, held)| **held) {
+                    tiles[pixel / TILE] = true;
+                }
+                tiles
+            }
+            None => Vec::new(),
+        };
         let rate = if rate.is_finite() { rate.clamp(0.0, 1.0) } else { 0.0 };
         match frame {
             Frame::Grey(pixels) => match pixels.as_slice() {
-                Some(samples) => self.update::<1>(samples, rate),
-                None => self.update::<1>(&pixels.iter().copied().collect::<Vec<_>>(), rate),
+                Some(samples) => self.update::<1>(samples, rate, &held),
+                None => self.update::<1>(&pixels.iter().copied().collect::<Vec<_>>(), rate, &held),
             },
             Frame::Rgb(pixels) => match pixels.as_slice() {
-                Some(samples) => self.update::<3>(samples, rate),
-                None => self.update::<3>(&pixels.iter().copied().collect::<Vec<_>>(), rate),
+                Some(samples) => self.update::<3>(samples, rate, &held),
+                None => self.update::<3>(&pixels.iter().copied().collect::<Vec<_>>(), rate, &held),
             },
         }
         self.frames_seen = self.frames_seen.saturating_add(1);
@@ -186,7 +211,7 @@ impl BackgroundModel {
         }))
     }
 
-    fn update<const CHANNELS: usize>(&mut self, pixels: &[u8], rate: f32) {
+    fn update<const CHANNELS: usize>(&mut self, pixels: &[u8], rate: f32, held: &[bool]) {
         self.arch.dispatch(Update::<CHANNELS> {
             settings: &self.settings,
             rate,
@@ -194,7 +219,20 @@ impl BackgroundModel {
             used: &mut self.used,
             pixels,
             labels: &mut self.codes,
+            held,
         });
+    }
+
+    /// (height, width) of its frames.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    /// Channels of its frames.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.channels
     }
 
     /// Frames taken in so far.
@@ -203,15 +241,37 @@ impl BackgroundModel {
         self.frames_seen
     }
 
+    /// Levels of the background and of a frame of the model's kind, every `step` pixels both ways, channel by channel.
+    #[must_use]
+    pub fn compared(&self, frame: Frame<'_>, step: usize) -> Vec<Vec<[u8; 2]>> {
+        let (height, width) = self.size;
+        let mut pairs = vec![Vec::new(); self.channels];
+        for row in (step / 2..height).step_by(step) {
+            for column in (step / 2..width).step_by(step) {
+                for (channel, pairs) in pairs.iter_mut().enumerate() {
+                    let level = match frame {
+                        Frame::Grey(pixels) => pixels.get([row, column]).copied(),
+                        Frame::Rgb(pixels) => pixels.get([row, column, channel]).copied(),
+                    };
+                    pairs.push([self.mean(row * width + column, channel), level.unwrap_or_default()]);
+                }
+            }
+        }
+        pairs
+    }
+
+    fn mean(&self, pixel: usize, channel: usize) -> u8 {
+        let (tile, lane) = split(pixel);
+        self.state[tile * kernel::component_len(self.channels) + kernel::mean_offset(channel) + lane].round() as u8
+    }
+
     /// The mean of each pixel's heaviest component, shape (height, width, channels): the empty scene as far as it is
     /// known. All 0 before the first frame.
     #[must_use]
     pub fn background(&self) -> Array3<u8> {
         let (height, width) = self.size;
         Array3::from_shape_fn((height, width, self.channels), |(row, column, channel)| {
-            let (tile, lane) = split(row * width + column);
-            self.state[tile * kernel::component_len(self.channels) + kernel::mean_offset(channel) + lane]
-                .round() as u8
+            self.mean(row * width + column, channel)
         })
     }
 

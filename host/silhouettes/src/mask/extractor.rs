@@ -7,9 +7,47 @@ use ndarray::Array2;
 use super::{
     Mask,
     cleaning::Cleaning,
+    feedback::Feedback,
+    people::{Person, people},
     subject::{Flag, Subject, SubjectChooser, SubjectSettings},
 };
-use crate::background::{BackgroundError, BackgroundModel, Frame, Label, Settings};
+use crate::background::{
+    BackgroundError, BackgroundModel, Frame, Label, Settings,
+    light::{Light, STEP_PX},
+};
+
+/// Which frames and pixels teach the background.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Learning {
+    /// All frames, but not where people are.
+    #[default]
+    WhereNobodyIs,
+    /// The same for so many frames; nothing is learned after them.
+    Until(u32),
+    /// All frames everywhere: who stands becomes background within seconds.
+    Always,
+    /// Nothing after the frames that only teach the background.
+    Never,
+}
+
+impl std::str::FromStr for Learning {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "where-nobody-is" => Ok(Self::WhereNobodyIs),
+            "always" => Ok(Self::Always),
+            "never" => Ok(Self::Never),
+            other => {
+                let frames = other.strip_prefix("until").map(|rest| rest.trim_start_matches([' ', ':', '=']).parse());
+                match frames {
+                    Some(Ok(frames)) => Ok(Self::Until(frames)),
+                    _ => Err(format!("`{other}`: expected where-nobody-is, until:FRAMES, always or never")),
+                }
+            }
+        }
+    }
+}
 
 /// Settings of the whole way from frame to silhouette.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +62,7 @@ pub struct ExtractorSettings {
     pub learning_frames: u32,
     /// Moving share of the picture, 0 to 1, from which the frame is flagged as a changed scene.
     pub scene_change_share: f64,
+    pub learning: Learning,
 }
 
 impl ExtractorSettings {
@@ -42,6 +81,7 @@ impl ExtractorSettings {
             subject: SubjectSettings::for_size(size),
             learning_frames: 10,
             scene_change_share: 0.6,
+            learning: Learning::default(),
         }
     }
 }
@@ -68,7 +108,19 @@ pub struct Extractor {
     settings: ExtractorSettings,
     model: BackgroundModel,
     chooser: SubjectChooser,
+    feedback: Feedback,
+    light: Light,
+    changes_of_light: usize,
 }
+
+/// A frame's people, or why nobody is looked for.
+struct Sighted {
+    people: Result<(Mask, Vec<Person>), Flag>,
+    labels: Array2<Label>,
+}
+
+/// Learning rate after the scene has changed.
+const ANEW: f32 = 1.0 / 15.0;
 
 impl Extractor {
     /// An extractor for frames like this one, which is not taken in yet.
@@ -79,16 +131,25 @@ impl Extractor {
         Ok(Self {
             model: BackgroundModel::like(frame, settings.background.clone())?,
             chooser: SubjectChooser::new(settings.subject),
+            feedback: Feedback::new(frame.size()),
+            light: Light::unchanged(frame.channels()),
+            changes_of_light: 0,
             settings,
         })
     }
 
-    /// Teaches the background a frame without asking where the subject is.
+    /// Teaches the background a frame without asking where the subject is; people in it are left out if [`Learning`] leaves them out.
     ///
     /// # Errors
     /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
     pub fn learn(&mut self, frame: Frame<'_>) -> Result<(), BackgroundError> {
-        self.model.apply(frame).map(|_| ())
+        let usual = self.settings.learning;
+        if usual != Learning::Always {
+            self.settings.learning = Learning::WhereNobodyIs;
+        }
+        let learned = self.sighted(frame).map(|_| ());
+        self.settings.learning = usual;
+        learned
     }
 
     /// Takes in the next frame. Pixels that the background model calls shadow are not the subject's.
@@ -96,29 +157,83 @@ impl Extractor {
     /// # Errors
     /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
-        let Moving { mask, labels } = self.moving(frame)?;
-        let subject = match mask {
-            Ok(mask) => self.chooser.choose(mask.view()),
+        let Sighted { people, labels } = self.sighted(frame)?;
+        let mut subject = match people {
+            Ok((_, people)) => self.chooser.among(people, labels.dim()),
             Err(flag) => {
                 Subject { mask: Array2::from_elem(labels.dim(), false), bounds: None, flags: vec![flag] }
             }
         };
+        if subject.bounds.is_some_and(|bounds| self.feedback.stopped(bounds)) {
+            subject.flags.push(Flag::StoppedMoving);
+        }
         Ok(Extracted { subject, labels })
     }
 
     /// As [`Self::extract`], for whoever wants all that moves and not one subject.
     pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
-        let labels = self.model.apply(frame)?;
+        let Sighted { people, labels } = self.sighted(frame)?;
+        Ok(Moving { mask: people.map(|(mask, _)| mask), labels })
+    }
+
+    /// How often the light of the whole scene has changed suddenly.
+    #[must_use]
+    pub fn changes_of_light(&self) -> usize {
+        self.changes_of_light
+    }
+
+    /// The rate at which the next frame teaches.
+    fn rate(&self) -> f32 {
+        let seen = self.model.frames_seen();
+        let learns = match self.settings.learning {
+            Learning::WhereNobodyIs | Learning::Always => true,
+            Learning::Until(frames) => seen < frames.max(self.settings.learning_frames),
+            Learning::Never => seen < self.settings.learning_frames.max(1),
+        };
+        if learns { self.model.usual_rate() } else { 0.0 }
+    }
+
+    fn sighted(&mut self, frame: Frame<'_>) -> Result<Sighted, BackgroundError> {
+        let alone = self.settings.learning != Learning::Always;
+        let known = self.model.frames_seen() >= self.settings.learning_frames.max(1);
+        let same_kind = frame.size() == self.model.size() && frame.channels() == self.model.channels();
+        if alone && known && same_kind {
+            let pairs = self.model.compared(frame, STEP_PX);
+            if let Some(light) = self.light.changed(&pairs) {
+                self.light = light;
+                self.changes_of_light += 1;
+            }
+        }
+        match if same_kind { self.light.relit(frame) } else { None } {
+            Some(relit) => self.sighted_in_old_light(relit.frame()),
+            None => self.sighted_in_old_light(frame),
+        }
+    }
+
+    fn sighted_in_old_light(&mut self, frame: Frame<'_>) -> Result<Sighted, BackgroundError> {
+        let alone = self.settings.learning != Learning::Always;
+        let rate = self.rate();
+        let held = if alone { self.feedback.held() } else { None };
+        let labels = self.model.apply_outside(frame, rate, held)?;
         let moving = labels.mapv(|label| label == Label::Foreground);
         if self.model.frames_seen() <= self.settings.learning_frames {
-            return Ok(Moving { mask: Err(Flag::Learning), labels });
+            return Ok(Sighted { people: Err(Flag::Learning), labels });
         }
         let share = super::area(moving.view()) as f64 / moving.len() as f64;
         if share >= self.settings.scene_change_share {
+            self.feedback.forget();
+            if alone && rate > 0.0 {
+                self.model.apply_at(frame, ANEW)?;
+            }
             let flag = Flag::SceneChanged { moving_percent: (100.0 * share) as u8 };
-            return Ok(Moving { mask: Err(flag), labels });
+            return Ok(Sighted { people: Err(flag), labels });
         }
-        Ok(Moving { mask: Ok(self.settings.cleaning.clean(moving.view())), labels })
+        let mask = self.settings.cleaning.clean(moving.view());
+        let people = people(mask.view(), &self.settings.subject);
+        if alone {
+            self.feedback.follow(&people, frame, || self.model.background());
+        }
+        Ok(Sighted { people: Ok((mask, people)), labels })
     }
 
     /// The background model, for its picture of the empty scene.

@@ -24,6 +24,12 @@ pub enum Flag {
     },
     /// The subject reaches the picture's edge: part of it may be outside.
     CutByEdge,
+    /// The subject is in several pieces: parts of it look like the background.
+    Fragments {
+        count: usize,
+    },
+    /// The subject has stood still for a second or longer: what is seen is a posture, not a movement.
+    StoppedMoving,
     /// The background is not known yet.
     Learning,
     /// More of the picture moves than a person does: the light or the camera changed.
@@ -39,6 +45,8 @@ impl fmt::Display for Flag {
             Self::Empty => write!(out, "empty"),
             Self::SeveralPeople { count } => write!(out, "several-people:{count}"),
             Self::CutByEdge => write!(out, "cut-by-edge"),
+            Self::Fragments { count } => write!(out, "fragments:{count}"),
+            Self::StoppedMoving => write!(out, "stopped-moving"),
             Self::Learning => write!(out, "learning"),
             Self::SceneChanged { moving_percent } => write!(out, "scene-changed:{moving_percent}%"),
         }
@@ -49,7 +57,7 @@ impl Flag {
     /// Whether the frame's mask is not a silhouette of one person and must not be used as one.
     #[must_use]
     pub fn spoils(self) -> bool {
-        !matches!(self, Self::CutByEdge)
+        !matches!(self, Self::CutByEdge | Self::Fragments { .. } | Self::StoppedMoving)
     }
 }
 
@@ -111,8 +119,11 @@ impl SubjectChooser {
 
     /// The subject of the next frame, from its cleaned mask of shape (height, width).
     pub fn choose(&mut self, mask: ArrayView2<'_, bool>) -> Subject {
-        let size = mask.dim();
-        let mut people = people(mask, &self.settings);
+        self.among(people(mask, &self.settings), mask.dim())
+    }
+
+    /// As [`Self::choose`], among the people of a mask of this (height, width).
+    pub fn among(&mut self, mut people: Vec<Person>, size: (usize, usize)) -> Subject {
         let largest = people.iter().map(|person| person.area).max().unwrap_or(0);
         people.retain(|person| person.area as f64 >= self.settings.rival_share * largest as f64);
         let subject = match self.last {
@@ -134,6 +145,9 @@ impl SubjectChooser {
         }
         if subject.bounds.touches_edge(size) {
             flags.push(Flag::CutByEdge);
+        }
+        if subject.fragments.len() > 1 {
+            flags.push(Flag::Fragments { count: subject.fragments.len() });
         }
         Subject { bounds: Some(subject.bounds), mask: subject.mask(size), flags }
     }
@@ -176,7 +190,8 @@ mod tests {
         let broken = people(&[[50, 100, 98, 140], [102, 105, 150, 135]]);
         let subject = chooser().choose(broken.view());
         assert_eq!(subject.mask, broken);
-        assert_eq!(subject.flags, []);
+        assert_eq!(subject.flags, [Flag::Fragments { count: 2 }]);
+        assert!(!subject.flags[0].spoils());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What recordings of bodies have in common, whatever their format: missing points written as zeros, and a plausible size.
 
-use super::recording::{Known, Source, Unit};
+use super::recording::{Known, Source, Unit, Up};
 use crate::silhouette::capsule::Point3;
 
 /// Points of a frame without which it has no size that could be checked.
@@ -65,6 +65,23 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
     Known { value: Unit { mm: best }, source: Source::Guess { reason, sure: off(best) < 0.7 } }
 }
 
+/// The axis along which the head lies above the feet on average; `usual` where it cannot be told.
+pub fn upright(frames: &[Vec<Option<Point3>>], head: usize, feet: &[usize], usual: Up) -> Known<Up> {
+    let mut upward = [0.0; 3];
+    for frame in frames {
+        let at = |place: usize| frame.get(place).copied().flatten().filter(|p| p.iter().all(|v| v.is_finite()));
+        for (head, foot) in at(head).into_iter().flat_map(|head| feet.iter().filter_map(move |foot| Some((head, at(*foot)?)))) {
+            (0..3).for_each(|k| upward[k] += head[k] - foot[k]);
+        }
+    }
+    let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let axes = [Up::X, Up::Y, Up::Z].into_iter().zip(upward);
+    let best = axes.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, along)| length > 0.0 && *along > 0.0);
+    let (value, part) = best.map_or((usual, 0.0), |(up, along)| (up, along / length));
+    let reason = format!("for {:.0} % of the way from the feet to the head lie along it", 100.0 * part);
+    Known { value, source: Source::Guess { reason, sure: part >= 0.8 } }
+}
+
 /// The median over frames of the largest extent along an axis, file units; `None` where no frame has enough points.
 fn median_extent(frames: &[Vec<Option<Point3>>]) -> Option<f64> {
     let extent = |frame: &Vec<Option<Point3>>| -> Option<f64> {
@@ -115,7 +132,7 @@ mod tests {
         let found = read(csv(&[row]).as_bytes(), "csv", Choices::default()).expect("a table");
         assert_eq!(found.unit.value.mm, 1000.0);
         assert!(found.remarks()[0].contains("1.600 mm long"), "{:?}", found.remarks());
-        let named = Choices { unit: Some(super::Unit { mm: 10.0 }), up: None };
+        let named = Choices { unit: Some(super::Unit { mm: 10.0 }), ..Choices::default() };
         assert_eq!(read(csv(&[row]).as_bytes(), "csv", named).expect("a table").unit.value.mm, 10.0);
     }
 
@@ -124,7 +141,7 @@ mod tests {
         let text = b"PathFileType\t4\t(X/Y/Z)\tM\xfcller.trc\nDataRate\tNumFrames\tNumMarkers\tUnits\n100\t3\t3\tmete\nFrame#\tTime\tA\t\t\t\t\t\tC\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n\n1\t0.0\t1\t2\t3\t4\t5\t6\t7\t8\t9\n2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9\n";
         let error = read(text, "trc", Choices::default()).expect_err("an unknown unit");
         assert!(error.to_string().contains("mete"), "{error}");
-        let named = Choices { unit: Some(super::Unit::MM), up: None };
+        let named = Choices { unit: Some(super::Unit::MM), ..Choices::default() };
         let found = read(text, "trc", named).expect("a recording");
         assert_eq!(
             (found.names.as_slice(), found.frames.len()),

@@ -31,6 +31,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         motion.frames.iter().map(|frame| kinematics.places(frame).into_iter().map(Some).collect()).collect();
     let rate_hz = 1.0 / motion.frame_time_s;
     Ok(Found {
+        others: Vec::new(),
+        planar: false,
         unit: guess::unit(&motion.joints),
         up: guess::up(&motion, &kinematics),
         remarks: Vec::new(),

@@ -80,6 +80,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     }
     let (frames, remarks) = layout.count(&file, &declared_frames(&file, &parameters));
     Ok(Found {
+        others: Vec::new(),
+        planar: false,
         names,
         rate_hz: if layout.rate_hz.is_finite() { layout.rate_hz } else { 0.0 },
         frames: layout.frames(&file, frames)?,

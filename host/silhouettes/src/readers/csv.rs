@@ -63,6 +63,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         frames.push(row?);
     }
     Ok(Found {
+        others: Vec::new(),
+        planar: false,
         names,
         rate_hz: 0.0,
         frames,

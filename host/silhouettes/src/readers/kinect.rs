@@ -96,6 +96,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         names[2] = JOINTS_25[20].into();
     }
     Ok(Found {
+        others: Vec::new(),
+        planar: false,
         names,
         rate_hz: RATE_HZ,
         frames,

@@ -19,6 +19,8 @@ pub const READER: Reader = Reader {
     read,
 };
 
+/// Bodies that are kept: the sensor follows six.
+const MOST_BODIES: usize = 6;
 /// Frames per second of the sensor.
 const RATE_HZ: f64 = 30.0;
 
@@ -47,20 +49,28 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     }
     let mut remarks = Vec::new();
     if bodies.len() > 1 {
-        remarks.push(format!("{} bodies in the file: the one that moves most is used", bodies.len()));
+        remarks.push(format!("{} bodies in the file: the one that moves most is used (--person 2 reads the next)", bodies.len()));
     }
     let longest = bodies.values().map(Vec::len).max().unwrap_or(0);
     let present =
         bodies.into_values().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
-    let chosen = present.max_by(|a, b| variance(a).total_cmp(&variance(b)));
-    let mut frames = vec![vec![None; JOINTS_25.len()]; count];
-    for (frame, body) in chosen.unwrap_or_default() {
-        frames[frame] = body;
-    }
+    let mut present: Vec<Vec<(usize, Body)>> = present.collect();
+    present.sort_by(|a, b| variance(b).total_cmp(&variance(a)));
+    let mut all = present.into_iter().take(MOST_BODIES).map(|body| {
+        let mut frames = vec![vec![None; JOINTS_25.len()]; count];
+        for (frame, joints) in body {
+            frames[frame] = joints;
+        }
+        frames
+    });
+    let frames = all.next().unwrap_or_else(|| vec![vec![None; JOINTS_25.len()]; count]);
+    let others = all.collect();
     Ok(Found {
         names: JOINTS_25.iter().map(|name| (*name).to_owned()).collect(),
         rate_hz: RATE_HZ,
         frames,
+        others,
+        planar: false,
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
         up: Known { value: Up::Y, source: Source::Format },
         remarks,
@@ -158,7 +168,7 @@ mod tests {
         let head = settled.by_name(1)["head"];
         assert!(head.iter().zip([600.0, -3000.0, 120.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
         assert!(!settled.by_name(0).contains_key("left hand"));
-        assert_eq!(settled.remarks(), ["2 bodies in the file: the one that moves most is used"]);
+        assert_eq!(settled.remarks(), ["2 bodies in the file: the one that moves most is used (--person 2 reads the next)"]);
     }
 
     #[test]

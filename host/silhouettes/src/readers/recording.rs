@@ -4,7 +4,7 @@
 //! [`Found::settled`] turns that to millimetres and z up, or to whatever the caller knows better.
 
 use super::body;
-use crate::silhouette::capsule::Point3;
+use crate::silhouette::{aliases, capsule::Point3};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;
@@ -156,6 +156,8 @@ pub struct Choices {
     pub unit: Option<Unit>,
     /// The axis that points up.
     pub up: Option<Up>,
+    /// Which of several people, from 1: without it the one whom the reader takes for the actor.
+    pub person: Option<usize>,
 }
 
 /// What a file holds, in its own unit and axes.
@@ -166,6 +168,10 @@ pub struct Found {
     pub rate_hz: f64,
     /// `frames[f][m]`: point m in frame f.
     pub frames: Vec<Vec<Option<Point3>>>,
+    /// The same of further people.
+    pub others: Vec<Vec<Vec<Option<Point3>>>>,
+    /// Seen from one side only: points lie in the plane of x and z.
+    pub planar: bool,
     pub unit: Known<Unit>,
     /// The axis that points up.
     pub up: Known<Up>,
@@ -185,6 +191,11 @@ impl Found {
     /// The recording in millimetres with z up. Points that are not finite count as hidden, and points at exactly 0, 0, 0, which is how
     /// many programs export a missing marker.
     pub fn settled(mut self, choices: Choices) -> Recording {
+        if let Some(number) = choices.person.and_then(|person| person.checked_sub(2))
+            && number < self.others.len()
+        {
+            self.frames = self.others.swap_remove(number);
+        }
         let hidden = body::hide_zeros(&mut self.frames);
         if hidden > 0 {
             self.remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
@@ -196,7 +207,21 @@ impl Found {
             let settled = point.map(|p| up.value.to_z(p.map(|v| unit.value.mm * v)));
             *point = settled.filter(|p| p.iter().all(|v| v.is_finite()));
         }
-        Recording { names: self.names, rate_hz: self.rate_hz, frames, unit, up, remarks: self.remarks }
+        let mut remarks = self.remarks;
+        let aliases = aliases::find(&self.names).map(|found| {
+            remarks.push(found.remark);
+            found.names
+        });
+        Recording {
+            names: self.names,
+            rate_hz: self.rate_hz,
+            frames,
+            planar: self.planar,
+            aliases: aliases.unwrap_or_default(),
+            unit,
+            up,
+            remarks,
+        }
     }
 }
 
@@ -208,6 +233,10 @@ pub struct Recording {
     pub rate_hz: f64,
     /// `frames[f][m]`: point m in frame f, millimetres.
     pub frames: Vec<Vec<Option<Point3>>>,
+    /// Seen from one side only: points lie in the plane of x and z, and no other view can be drawn.
+    pub planar: bool,
+    /// Other names of points, by which built-in templates know them.
+    aliases: Vec<(usize, String)>,
     /// The file's unit of length.
     pub unit: Known<Unit>,
     /// The file's axis that points up.
@@ -229,7 +258,17 @@ impl Recording {
                 }
             }
         }
+        for (place, alias) in &self.aliases {
+            if let Some(point) = self.frames.get(frame).and_then(|points| *points.get(*place)?) {
+                found.insert(alias.as_str(), point);
+            }
+        }
         found
+    }
+
+    /// The names of all points, with those by which built-in templates know them.
+    pub fn known_names(&self) -> Vec<String> {
+        self.names.iter().chain(self.aliases.iter().map(|(_, alias)| alias)).cloned().collect()
     }
 
     /// What was guessed about the file, one sentence each: to be shown, for the caller can name it better.
@@ -272,6 +311,14 @@ pub enum RecordingError {
         needed: usize,
         found: usize,
     },
+    /// Pose parameters, from which only a licensed body model makes joints.
+    #[error(
+        "it holds pose parameters of {model} (array `{array}`, {shape}) and no joint positions, which need the body model file \
+         {file}; write the joints that it gives to an array `joints` of frames x joints x 3"
+    )]
+    BodyModel { array: String, shape: String, model: &'static str, file: String },
+    #[error("person {wanted} was asked for, {found} are in the file")]
+    Person { wanted: usize, found: usize },
     /// A line that cannot be read.
     #[error("line {line}: {reason}")]
     Line {
@@ -314,6 +361,8 @@ mod tests {
             names: vec!["Nick:HEAD".into()],
             rate_hz: 0.0,
             frames: vec![vec![Some(point)], vec![None], vec![Some([f64::MAX, 0.0, 0.0])]],
+            others: Vec::new(),
+            planar: false,
             unit: Known { value: Unit { mm: 10.0 }, source: guess },
             up: Known { value: Up::Y, source: Source::Format },
             remarks: Vec::new(),
@@ -331,7 +380,7 @@ mod tests {
             "what the format fixes is not a guess"
         );
         assert_eq!(by_itself.frames[2], vec![None], "what overflows is hidden");
-        let told = found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X) });
+        let told = found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X), person: None });
         assert_eq!(told.frames[0], vec![Some([2.0, 3.0, 1.0])]);
         assert_eq!((told.unit.source.clone(), told.remarks().len()), (Source::Caller, 0));
     }

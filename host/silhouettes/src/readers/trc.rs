@@ -82,7 +82,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         }
         remarks.push(format!("NumFrames promises {promised} frames, the file has {}", frames.len()));
     }
-    Ok(Found { names, rate_hz, frames, unit, up: Known { value: Up::Y, source: Source::Format }, remarks })
+    let up = Known { value: Up::Y, source: Source::Format };
+    Ok(Found { names, rate_hz, frames, others: Vec::new(), planar: false, unit, up, remarks })
 }
 
 /// The frames of the lines after the header: number, time, then x, y and z of the markers at these places; missing cells at the end are hidden.

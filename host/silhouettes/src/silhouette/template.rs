@@ -119,10 +119,20 @@ impl Template {
         (all.iter().filter(|marker| !has(marker)).map(|m| (*m).clone()).collect(), all.len())
     }
 
-    /// Checks that a recording's markers fit: at least half of the template's must be there by name (a suit may lack a few).
+    /// Parts that can be drawn: at least two of their markers are there, or one where a thickness makes a disc of it.
+    fn drawn(&self, missing: &[String]) -> usize {
+        let there = |part: &&Part| {
+            let present = part.markers.iter().filter(|marker| !missing.contains(marker)).count();
+            present >= if part.thickness_mm > 0.0 { 1 } else { part.markers.len().min(2) }
+        };
+        self.parts.iter().filter(there).count()
+    }
+
+    /// Checks that a recording's markers fit: at least half of the template's must be there by name (a suit may lack a few), or enough for
+    /// four parts in five (templates of joints name more than any program records).
     pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
         let (missing, of) = self.missing(names);
-        if 2 * missing.len() > of {
+        if 2 * missing.len() > of && 5 * self.drawn(&missing) < 4 * self.parts.len() {
             return Err(TemplateError::UnknownMarkers {
                 missing,
                 of,
@@ -145,15 +155,16 @@ impl Template {
     }
 
     /// The built-in templates, by name, as TOML: Plug-in Gait (and CMU 41), Vicon's 53 markers, OpenCap's laboratory markers, the
-    /// suit and props of Li 2014, the joints of BVH skeletons and of a Kinect. Their files lie in the crate's `templates` folder, to be copied and
+    /// suit and props of Li 2014, the joints of BVH skeletons and of a Kinect, keypoints of pose estimators. Their files lie in the crate's `templates` folder, to be copied and
     /// changed.
-    pub const BUILT_IN: [(&str, &str); 6] = [
+    pub const BUILT_IN: [(&str, &str); 7] = [
         ("plug-in-gait", include_str!("../../templates/plug-in-gait.toml")),
         ("vicon-53", include_str!("../../templates/vicon-53.toml")),
         ("opencap", include_str!("../../templates/opencap.toml")),
         ("thesis", include_str!("../../templates/thesis.toml")),
         ("bvh", include_str!("../../templates/bvh.toml")),
         ("kinect", include_str!("../../templates/kinect.toml")),
+        ("keypoints", include_str!("../../templates/keypoints.toml")),
     ];
 
     /// The names of the built-in templates.

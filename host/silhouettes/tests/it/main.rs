@@ -4,6 +4,7 @@ mod background;
 mod bvh;
 mod damaged;
 mod readers;
+mod standing;
 
 /// Cases of a property: few in every test run, as many as asked for when fuzzing.
 fn cases(usual: u32) -> u32 {

@@ -284,7 +284,7 @@ fn seconds_per_frame(
     let sequences = folders
         .iter()
         .take(views)
-        .map(|folder| Ok(masks::read_all(folder)?.into_iter().map(|named| named.mask).collect()))
+        .map(|folder| Ok(masks::read_all(folder)?.pixels()))
         .collect::<Result<Vec<Vec<Mask>>>>()?;
     let frames: usize = sequences.iter().map(Vec::len).sum();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();

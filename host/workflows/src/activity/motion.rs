@@ -133,6 +133,8 @@ fn seen(recorded: &Recorded, cameras: usize, seed: u64) -> Vec<Clip> {
             let bodies = clip.frames.iter().map(|joints| dress(joints, layout)).collect();
             recorded::tracks(&Bodies::Capsules(bodies), recorded.rate_hz, cameras, seed, SCALING)
         }
+        // Seen from one side already: that is the one camera.
+        Joints::Points(recording, template) if recording.planar => markers::one_view(recording, template),
         Joints::Points(recording, template) => {
             let frames = (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
             let bodies = Bodies::Parts(frames, template.clone());

@@ -77,6 +77,9 @@ pub struct EverybodyFigures {
     pub window: usize,
     /// From a file to everybody's part of a streaming answer.
     pub seconds_per_frame: f64,
+    /// What a user should know about how the view was read.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// What one of them did.
@@ -132,6 +135,7 @@ pub struct MultiPersonTracker<'m> {
     annotated_video: Option<AnnotatedVideo>,
     count: usize,
     seconds: f64,
+    remarks: Vec<String>,
 }
 
 impl<'m> MultiPersonTracker<'m> {
@@ -153,8 +157,13 @@ impl<'m> MultiPersonTracker<'m> {
         if let Some(window) = settings.window {
             at_least("window", window, 1, "frames")?;
         }
+        let frames = Frames::open(&settings.view)?;
         Ok(Self {
-            frames: Frames::open(&settings.view)?,
+            remarks: super::views::remarks(
+                std::slice::from_ref(&settings.view),
+                std::slice::from_ref(&frames),
+            ),
+            frames,
             tracker: None,
             window: settings.window.unwrap_or(recogniser.typical_frames).max(1),
             among: settings.among.clone(),
@@ -172,6 +181,9 @@ impl<'m> MultiPersonTracker<'m> {
     /// Frames that cannot be read, [`crate::WorkflowError::Cancelled`].
     pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameOfPeople>> {
         context.cancel.check("recognising")?;
+        if self.count == 0 {
+            self.remarks.iter().for_each(|remark| context.progress.warn(remark));
+        }
         let start = Instant::now();
         let Some(moved) = self.frames.next_moving()? else { return Ok(None) };
         self.count += 1;
@@ -281,6 +293,7 @@ impl<'m> MultiPersonTracker<'m> {
             frames: self.count,
             window: self.window,
             seconds_per_frame: rounded(self.seconds / self.count.max(1) as f64, 6),
+            remarks: self.remarks,
         })
     }
 }

@@ -75,7 +75,7 @@ impl Model {
         let mut full_frames = true;
         for folder in clips {
             counter.check("reading clips")?;
-            let read: Vec<Mask> = masks::read_all(folder)?.into_iter().map(|named| named.mask).collect();
+            let read: Vec<Mask> = masks::read_all(folder)?.pixels();
             let full = are_full_frames(&read);
             if !tracks.is_empty() && full != full_frames {
                 let expected = "clips that are all full frames or all cut out at 100x100";
@@ -177,6 +177,9 @@ pub struct RecognitionFigures {
     pub segments: Vec<Part>,
     /// From a file to its part of a streaming answer.
     pub seconds_per_frame: f64,
+    /// What a user should know about how the views were read: grey levels of masks, a frame rate that varies.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
@@ -192,6 +195,7 @@ pub struct Recognition<'m> {
     frames: usize,
     flagged_frames: usize,
     seconds: f64,
+    remarks: Vec<String>,
 }
 
 impl<'m> Recognition<'m> {
@@ -218,6 +222,7 @@ impl<'m> Recognition<'m> {
             among: settings.among.clone(),
             annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
             tracks: vec![Vec::new(); views.len()],
+            remarks: super::views::remarks(&settings.views, &views),
             model,
             views,
             window,
@@ -233,6 +238,9 @@ impl<'m> Recognition<'m> {
     /// Frames that cannot be read or do not fit the model, [`WorkflowError::Cancelled`].
     pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameAnswer>> {
         context.cancel.check("recognising")?;
+        if self.frames == 0 {
+            self.remarks.iter().for_each(|remark| context.progress.warn(remark));
+        }
         let start = Instant::now();
         let moment: Option<Vec<Seen>> =
             self.views.iter_mut().map(Frames::next).collect::<Result<Option<Vec<Seen>>>>()?;
@@ -312,6 +320,7 @@ impl<'m> Recognition<'m> {
             windows: in_windows,
             segments: in_segments,
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
+            remarks: self.remarks,
         })
     }
 }

@@ -176,7 +176,7 @@ impl Samples {
             .par_iter()
             .map(|folder| {
                 counter.check("reading samples")?;
-                let described = described(folder);
+                let described = described(folder, context);
                 counter.one(Some(folders.len()));
                 described
             })
@@ -237,8 +237,12 @@ fn kinds(one: &Path, other: &Path, one_is_full: bool) -> SamplesError {
 }
 
 /// The track of a folder of masks, and whether they are full frames.
-fn described(folder: &Path) -> Result<(Track, bool)> {
-    let read: Vec<Mask> = masks::read_all(folder)?.into_iter().map(|named| named.mask).collect();
+fn described(folder: &Path, context: &Context<'_>) -> Result<(Track, bool)> {
+    let read = masks::read_all(folder)?;
+    if let Some(remark) = &read.remark {
+        context.progress.warn(&format!("{}: {remark}", folder.display()));
+    }
+    let read = read.pixels();
     let full = are_full_frames(&read);
     let track = Track::from_masks(&read, SCALING, full);
     if track.frames() == 0 {

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use farnear_files::{
-    masks::{self, MaskError},
+    masks::{
+        self, MaskError,
+        levels::{Histogram, Levels},
+    },
     video::{Pixels, Video, VideoFrame, pictures},
 };
 use farnear_silhouettes::mask::{
@@ -25,32 +28,33 @@ pub enum ViewKind {
 }
 
 impl ViewKind {
-    /// What a path most likely holds: masks are folders of pictures (or one picture) with hardly anything but black and white.
+    /// What a path most likely holds: masks are folders of pictures (or one picture) with hardly anything but two grey levels, or labels
+    /// of a background model.
     ///
     /// # Errors
     /// Folders without pictures, pictures that cannot be read.
     pub fn guess(path: &Path) -> Result<Self> {
-        let first = if path.is_dir() { pictures::list(path)?.swap_remove(0) } else { path.to_path_buf() };
-        let ending = first.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let files = if path.is_dir() { pictures::list(path)? } else { vec![path.to_path_buf()] };
+        let ending = files[0].extension().unwrap_or_default().to_string_lossy().to_lowercase();
         if !pictures::EXTENSIONS.contains(&ending.as_str()) {
             return Ok(Self::Video);
         }
-        let two_levels = match pictures::read(&first)? {
-            Pixels::Grey(levels) => nearly_two_levels(levels.iter().copied()),
-            Pixels::Rgb(rgb) => {
-                let grey = rgb.lanes(ndarray::Axis(2)).into_iter().all(|p| p[0] == p[1] && p[1] == p[2]);
-                grey && nearly_two_levels(rgb.iter().copied())
-            }
-        };
-        Ok(if two_levels { Self::Masks } else { Self::Video })
+        // The first picture alone first: a video must not be read twice to find out that it is none.
+        let mut first = Histogram::default();
+        match masks::grey(&files[0]) {
+            Ok(picture) => first.add(&picture),
+            Err(MaskError::Coloured { .. }) => return Ok(Self::Video),
+            Err(error) => return Err(error.into()),
+        }
+        if first.levels().is_none() {
+            return Ok(Self::Video);
+        }
+        match Levels::survey(&files) {
+            Ok(all) => Ok(if all.levels().is_some() { Self::Masks } else { Self::Video }),
+            Err(MaskError::Coloured { .. }) => Ok(Self::Video),
+            Err(error) => Err(error.into()),
+        }
     }
-}
-
-/// Whether a picture is black and white but for the ringing that JPEG leaves about edges: less than 2 % of it lies between.
-fn nearly_two_levels(levels: impl ExactSizeIterator<Item = u8>) -> bool {
-    let all = levels.len();
-    let between = levels.filter(|level| (40..=215).contains(level)).count();
-    50 * between <= all
 }
 
 /// A view: where it lies, and what it is.
@@ -71,10 +75,8 @@ impl View {
             return Ok(false);
         }
         let first = masks::listed(&self.path)?.into_iter().next();
-        Ok(first
-            .map(|file| masks::read(&file))
-            .transpose()?
-            .is_some_and(|mask| mask.dim() == (SIDE_PX, SIDE_PX)))
+        let first = first.map(|file| masks::grey(&file)).transpose()?;
+        Ok(first.is_some_and(|picture| picture.dim() == (SIDE_PX, SIDE_PX)))
     }
 }
 
@@ -105,7 +107,7 @@ pub(super) fn size(picture: &Pixels) -> (usize, usize) {
 
 /// The frames of a view, one by one.
 pub(super) enum Frames {
-    Masks { files: std::vec::IntoIter<PathBuf>, first: Option<First> },
+    Masks { files: std::vec::IntoIter<PathBuf>, levels: Levels, first: Option<First> },
     Video { video: Box<Video>, extractor: Option<Box<Extractor>> },
 }
 
@@ -119,15 +121,29 @@ pub(super) struct First {
 impl Frames {
     pub fn open(view: &View) -> Result<Self> {
         Ok(match view.kind {
-            ViewKind::Masks => Self::Masks { files: masks::listed(&view.path)?.into_iter(), first: None },
+            ViewKind::Masks => {
+                let files = masks::listed(&view.path)?;
+                let levels = masks::levels_of(&files)?;
+                Self::Masks { files: files.into_iter(), levels, first: None }
+            }
             ViewKind::Video => Self::Video { video: Box::new(Video::open(&view.path)?), extractor: None },
         })
+    }
+
+    /// What a user should know about how the view is read.
+    pub fn remark(&self) -> Option<&String> {
+        match self {
+            Self::Masks { levels, .. } => levels.remark.as_ref(),
+            Self::Video { video, .. } => video.remark.as_ref(),
+        }
     }
 
     /// The next frame; `None` at the end.
     pub fn next(&mut self) -> Result<Option<Seen>> {
         match self {
-            Self::Masks { files, first } => files.next().map(|file| seen_in_mask(&file, first)).transpose(),
+            Self::Masks { files, levels, first } => {
+                files.next().map(|file| seen_in_mask(&file, levels, first)).transpose()
+            }
             Self::Video { video, extractor } => {
                 video.next().transpose()?.map(|frame| seen_in_frame(frame, extractor)).transpose()
             }
@@ -139,10 +155,10 @@ impl Frames {
     /// The next frame's mask of everybody; `None` at the end.
     pub fn next_moving(&mut self) -> Result<Option<Moved>> {
         match self {
-            Self::Masks { files, first } => files
+            Self::Masks { files, levels, first } => files
                 .next()
                 .map(|file| {
-                    let (name, mask, _) = like_first(&file, first)?;
+                    let (name, mask, _) = like_first(&file, levels, first)?;
                     Ok(Moved { name, mask: Ok(mask), picture: None })
                 })
                 .transpose(),
@@ -158,9 +174,21 @@ impl Frames {
     }
 }
 
+/// What a user should know about how views are read, each with the view's path.
+pub(super) fn remarks(views: &[View], frames: &[Frames]) -> Vec<String> {
+    let remark = |(view, frames): (&View, &Frames)| {
+        frames.remark().map(|remark| format!("{}: {remark}", view.path.display()))
+    };
+    views.iter().zip(frames).filter_map(remark).collect()
+}
+
 /// A mask of the size of the view's first.
-fn like_first<'f>(file: &Path, first: &'f mut Option<First>) -> Result<(String, Mask, &'f mut First)> {
-    let mask = masks::read(file)?;
+fn like_first<'f>(
+    file: &Path,
+    levels: &Levels,
+    first: &'f mut Option<First>,
+) -> Result<(String, Mask, &'f mut First)> {
+    let mask = masks::read(file, levels)?;
     let (name, found) = (pictures::stem(file), mask.dim());
     let first = first.get_or_insert_with(|| First {
         name: name.clone(),
@@ -185,8 +213,8 @@ fn extractor_for<'e>(
     })
 }
 
-fn seen_in_mask(file: &Path, first: &mut Option<First>) -> Result<Seen> {
-    let (name, mask, first) = like_first(file, first)?;
+fn seen_in_mask(file: &Path, levels: &Levels, first: &mut Option<First>) -> Result<Seen> {
+    let (name, mask, first) = like_first(file, levels, first)?;
     let found = mask.dim();
     let mut flags = first.chooser.choose(mask.view()).flags;
     // Cut-out silhouettes fill their picture, so touching its edge says nothing.
@@ -198,4 +226,52 @@ fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> R
     let VideoFrame { name, pixels } = frame;
     let found = extractor_for(&pixels, extractor)?.extract(frame_of(&pixels))?.subject;
     Ok(Seen { name, mask: found.mask, flags: found.flags, picture: Some(pixels) })
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_files::masks::encoded;
+    use ndarray::Array2;
+
+    use super::*;
+
+    /// A folder of three masks (the first one empty) whose background, shadow and person have these levels.
+    fn folder([background, shadow, person]: [u8; 3]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a folder");
+        for number in 0..3 {
+            let levels = Array2::from_shape_fn((120, 90), |(row, column)| match (row, column) {
+                (20..100, 30..50) if number > 0 => person,
+                (95..100, 50..70) if number > 0 => shadow,
+                _ => background,
+            });
+            let png = encoded(&levels, |level| *level).expect("a picture");
+            std::fs::write(folder.path().join(format!("m{number}.png")), png).expect("written");
+        }
+        folder
+    }
+
+    #[test]
+    fn masks_of_any_two_levels_and_of_background_models_are_the_same_masks() {
+        for levels in [[0, 0, 255], [0, 0, 1], [0, 127, 255], [0, 50, 255], [10, 10, 90]] {
+            let folder = folder(levels);
+            let path = folder.path().to_path_buf();
+            assert_eq!(ViewKind::guess(&path).expect("a kind"), ViewKind::Masks, "{levels:?}");
+            let view = View { path, kind: ViewKind::Masks };
+            let mut frames = Frames::open(&view).expect("masks");
+            assert_eq!(frames.remark().is_some(), levels != [0, 0, 255], "{levels:?}");
+            let mut areas = Vec::new();
+            while let Some(seen) = frames.next().expect("a mask") {
+                areas.push(seen.mask.iter().filter(|set| **set).count());
+            }
+            assert_eq!(areas, [0, 1600, 1600], "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn dark_pictures_of_many_levels_are_a_video() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let dark = Array2::from_shape_fn((60, 80), |(row, column)| ((row * 7 + column * 3) % 30) as u8);
+        std::fs::write(folder.path().join("a.png"), encoded(&dark, |level| *level).expect("a picture")).expect("written");
+        assert_eq!(ViewKind::guess(folder.path()).expect("a kind"), ViewKind::Video);
+    }
 }

@@ -149,7 +149,10 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
             "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
         ));
     }
-    let all = masks::read_all(&settings.masks)?;
+    let masks::Masks { named: all, remark } = masks::read_all(&settings.masks)?;
+    if let Some(remark) = remark {
+        context.progress.warn(&format!("{}: {remark}", settings.masks.display()));
+    }
     let out = Staging::new_folder(&settings.out)?;
     let stages = settings.stages.as_deref().map(Stages::begin).transpose()?;
     let mut work = Work { settings, camera: &camera, chooser: None, stages, cut_seconds: 0.0 };

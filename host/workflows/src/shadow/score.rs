@@ -1,6 +1,6 @@
 //! How much shadow was taken off masks, and how much of the subject with it, against a ground truth.
 //!
-//! Truth pictures are grey: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 not judged. Masks are set from 128 on.
+//! Truth pictures are grey: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 not judged.
 
 use std::{
     collections::HashMap,
@@ -8,7 +8,7 @@ use std::{
 };
 
 use farnear_files::{
-    masks::{self, listed},
+    masks::{self, levels::Levels, listed},
     video::pictures,
 };
 use farnear_shadow::score::{ShadowScore, Truth};
@@ -129,6 +129,7 @@ pub fn score(settings: &ScoreSettings, context: &Context<'_>) -> Result<ScoreFig
 /// Masks to be found by the name of their truth.
 struct Partners {
     path: PathBuf,
+    levels: Levels,
     only: Option<PathBuf>,
     by_name: HashMap<String, PathBuf>,
     by_number: HashMap<u64, PathBuf>,
@@ -137,6 +138,7 @@ struct Partners {
 impl Partners {
     fn new(path: &Path, truths: usize) -> Result<Self> {
         let found = listed(path)?;
+        let levels = masks::levels_of(&found)?;
         let only = (found.len() == 1 && truths == 1).then(|| found[0].clone());
         let mut by_number = HashMap::new();
         for mask in &found {
@@ -146,7 +148,7 @@ impl Partners {
             }
         }
         let by_name = found.into_iter().map(|mask| (pictures::stem(&mask), mask)).collect();
-        Ok(Self { path: path.into(), only, by_name, by_number })
+        Ok(Self { path: path.into(), levels, only, by_name, by_number })
     }
 
     fn mask(&self, truth: &Path) -> Result<Array2<bool>> {
@@ -154,7 +156,7 @@ impl Partners {
         let by_number = || self.by_number.get(&trailing_number(&name)?);
         let found = self.only.as_ref().or_else(|| self.by_name.get(&name)).or_else(by_number);
         let none = || ScoreError::NoMask { masks: self.path.clone(), truth: truth.into() };
-        Ok(masks::read(found.ok_or_else(none)?)?)
+        Ok(masks::read(found.ok_or_else(none)?, &self.levels)?)
     }
 }
 

@@ -8,7 +8,7 @@ use farnear_files::{
     video::{Video, VideoError},
 };
 use farnear_shadow::{CameraFile, Method};
-use farnear_silhouettes::background;
+use farnear_silhouettes::{background, mask::extractor::Learning};
 use serde::Serialize;
 
 use super::removal::{self, LightSource, RemovalFigures, RemovalSettings};
@@ -78,6 +78,7 @@ pub fn remove_from_video(
         learn_first: true,
         learning_frames: 0,
         history_frames: background::Settings::default().history_frames,
+        learning: Learning::default(),
         shadow: ShadowTreatment::Keep,
         centred: false,
         labels: None,
@@ -100,7 +101,7 @@ pub fn remove_from_video(
 
 /// Names of masks with something in them.
 fn samples(folder: &std::path::Path) -> Result<Vec<String>> {
-    let masks = farnear_files::masks::read_all(folder)?;
+    let masks = farnear_files::masks::read_all(folder)?.named;
     let seen: Vec<&String> = masks
         .iter()
         .filter(|named| named.mask.iter().any(|person| *person))

@@ -13,21 +13,24 @@ use std::{
 };
 
 use farnear_files::staging::Staging;
+use farnear_recognition::clip::Track;
+use farnear_silhouettes::mask::Mask;
 use farnear_silhouettes::readers::{
     self,
     recording::{Choices, Recording},
 };
 use farnear_silhouettes::silhouette::{
     capsule::Point3,
-    parts::Fill,
+    parts::{self, Fill},
     template::Template,
-    view::{View, views_round},
+    view::{Canvas, View, views_round},
 };
 use serde::Serialize;
 
 use self::{drawing::Job, missing::MissingParts};
 use super::{MM_PER_PX, SilhouettesError, VIEWS, performances::samples_entry};
 use crate::{
+    activity::samples::SCALING,
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
@@ -90,7 +93,11 @@ impl MarkersSettings {
         at_least("step between frames", self.every, 1, "frames")
     }
 
-    fn views(&self) -> Vec<View> {
+    /// A recording from one side has one view, as its camera saw it.
+    fn views(&self, planar: bool) -> Vec<View> {
+        if planar {
+            return vec![View::default()];
+        }
         let mut views = views_round(self.views, self.elevation_deg);
         views.iter_mut().for_each(|view| view.gamma_deg += self.first_view_deg);
         views
@@ -173,8 +180,11 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         return Err(SilhouettesError::NothingVisible { path: settings.file.clone() }.into());
     }
     let missing = MissingParts::of(&template, &recording, &frames);
-    let views = settings.views();
-    let job = Job { settings, template: &template, frames: &frames, names: &names, context };
+    let views = settings.views(recording.planar);
+    if recording.planar {
+        context.info(&format!("{name}: one view is drawn, as the camera saw it"));
+    }
+    let job = Job { settings, views: views.len(), template: &template, frames: &frames, names: &names, context };
     let silhouettes = match settings.keep {
         Some(keep) => job.gallery(&views, keep, &out)?,
         None => job.sequences(&views, &out)?,
@@ -212,6 +222,25 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
         warnings: warnings.clone(),
     })
+}
+
+/// The only view of a recording from one side, described; nothing where it is too large for a picture.
+pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track> {
+    /// Coarse enough for any training, fine enough for hands.
+    const MM_PER_PX: f64 = 10.0;
+    const MARGIN_PX: usize = 2;
+    /// Gaps at joints that are closed.
+    const GAP_PX: usize = 4;
+    let frames: Vec<HashMap<&str, Point3>> = (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
+    let view = View::default();
+    let reach = parts::extent(&frames, template, &view);
+    let Some(canvas) = Canvas::fitting(&reach, MM_PER_PX, MARGIN_PX) else { return Vec::new() };
+    let mask = |frame: &HashMap<&str, Point3>| {
+        parts::close(&parts::draw(frame, template, &view, &canvas, Fill::Hull).mask, GAP_PX)
+    };
+    let masks: Vec<Mask> = frames.iter().map(mask).collect();
+    let track = Track::from_masks(&masks, SCALING, true);
+    if track.frames() == 0 { Vec::new() } else { vec![track] }
 }
 
 /// What was guessed about a recording, and what is strange about it.
@@ -260,14 +289,37 @@ pub(crate) fn template(name: &str) -> Result<Template> {
 }
 
 pub(crate) fn recording(path: &Path, choices: Choices) -> Result<Recording> {
-    let bytes = fs::read(path).map_err(WorkflowError::read("the recording", path))?;
-    let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let read = readers::read(&bytes, &ending, choices);
+    let read_file = |path: &Path| fs::read(path).map_err(WorkflowError::read("the recording", path));
+    let read = if path.is_dir() {
+        let files = keypoint_files(path)?;
+        let contents = files.iter().map(|file| read_file(file)).collect::<Result<Vec<Vec<u8>>>>()?;
+        readers::read_keypoint_files(contents.iter().map(Vec::as_slice), choices)
+    } else {
+        let ending = path.extension().unwrap_or_default().to_string_lossy();
+        readers::read(&read_file(path)?, &ending, choices)
+    };
     let recording = read.map_err(|source| SilhouettesError::Recording { path: path.into(), source })?;
     if recording.frames.is_empty() {
         return Err(SilhouettesError::NoFrames { path: path.into() }.into());
     }
     Ok(recording)
+}
+
+/// The JSON files of a folder (OpenPose writes one per frame), in the order of their numbers.
+fn keypoint_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder).map_err(WorkflowError::read("the recording", folder))?;
+    let mut files = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(WorkflowError::read("the recording", folder))?.path();
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
+            files.push(path);
+        }
+    }
+    farnear_files::order::sort(&mut files);
+    match files.is_empty() {
+        true => Err(SilhouettesError::NoFrames { path: folder.into() }.into()),
+        false => Ok(files),
+    }
 }
 
 /// The built-in template of which the recording has the largest share of markers; of equals the one that uses more of them.
@@ -278,7 +330,7 @@ pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Templa
     let mut ranked: Vec<(f64, usize, Template)> = Template::names()
         .filter_map(|name| Template::named(name).ok())
         .map(|template| {
-            let (present, of) = template.coverage(&recording.names);
+            let (present, of) = template.coverage(&recording.known_names());
             (present as f64 / of.max(1) as f64, present, template)
         })
         .collect();
@@ -286,7 +338,7 @@ pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Templa
     let Some((_, _, best)) = ranked.into_iter().next() else {
         return Err(SilhouettesError::NoFrames { path: path.into() }.into());
     };
-    best.check(&recording.names).map_err(|source| {
+    best.check(&recording.known_names()).map_err(|source| {
         WorkflowError::from(SilhouettesError::Unfit { path: path.into(), source, fits: None })
     })?;
     Ok(best)
@@ -294,7 +346,7 @@ pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Templa
 
 /// Refuses a template with other names than the recording's, and says which built-in one fits best.
 pub(crate) fn check_fit(template: &Template, recording: &Recording, path: &Path) -> Result<()> {
-    template.check(&recording.names).map_err(|source| {
+    template.check(&recording.known_names()).map_err(|source| {
         let best = best_template(recording, path).ok();
         let fits = best.and_then(|best| Template::names().find(|name| *name == best.name));
         SilhouettesError::Unfit { path: path.into(), source, fits }.into()

@@ -49,6 +49,10 @@ pub fn cut(settings: &PassagesSettings, context: &Context<'_>) -> Result<Passage
     let start = Instant::now();
     let out = Staging::new_folder(&settings.out)?;
     let files = masks::listed(&settings.masks)?;
+    let levels = masks::levels_of(&files)?;
+    if let Some(remark) = &levels.remark {
+        context.progress.warn(&format!("{}: {remark}", settings.masks.display()));
+    }
     let counter = Counter::new(context, "masks");
     let (mut passages, mut too_short) = (Vec::new(), 0);
     let mut passage: Vec<Kept> = Vec::new();
@@ -63,7 +67,7 @@ pub fn cut(settings: &PassagesSettings, context: &Context<'_>) -> Result<Passage
     };
     for file in &files {
         counter.check("cutting passages")?;
-        let mask = masks::read(file)?;
+        let mask = masks::read(file, &levels)?;
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (first, expected) = size.get_or_insert_with(|| (name.clone(), mask.dim()));
         if mask.dim() != *expected {

@@ -14,7 +14,7 @@ use farnear_shadow::detectors::{Detector, Images, Method};
 use farnear_silhouettes::background::Label;
 use farnear_silhouettes::mask::{
     Mask,
-    extractor::{Extracted, Extractor, ExtractorSettings},
+    extractor::{Extracted, Extractor, ExtractorSettings, Learning},
     subject::Flag,
 };
 use ndarray::{Array3, Axis};
@@ -41,6 +41,8 @@ pub struct VideoSettings {
     pub learning_frames: u32,
     /// Frames that the background model remembers.
     pub history_frames: u32,
+    /// Which frames and pixels teach the background.
+    pub learning: Learning,
     /// What becomes of the person's shadow.
     pub shadow: ShadowTreatment,
     /// Masks of 100x100 pixels with the person centred, instead of full frames.
@@ -78,9 +80,18 @@ pub struct VideoFigures {
     pub cut_by_edge: usize,
     /// Frames in which most of the picture changed.
     pub scene_changed: usize,
+    /// Frames whose person stands still.
+    pub stopped_moving: usize,
+    /// Frames whose person is in several pieces.
+    pub fragments: usize,
+    /// Times that the light of the whole scene changed suddenly.
+    pub changes_of_light: usize,
     pub seconds: f64,
     /// Frames over that time.
     pub frames_per_second: f64,
+    /// What a user should know about how the video was read.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 impl VideoFigures {
@@ -94,6 +105,8 @@ impl VideoFigures {
                 Flag::SeveralPeople { .. } => self.several_people += 1,
                 Flag::CutByEdge => self.cut_by_edge += 1,
                 Flag::SceneChanged { .. } => self.scene_changed += 1,
+                Flag::StoppedMoving => self.stopped_moving += 1,
+                Flag::Fragments { .. } => self.fragments += 1,
             }
         }
     }
@@ -122,6 +135,9 @@ pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoF
     let out = Staging::new_folder(&settings.out)?;
     let labels = settings.labels.as_deref().map(Staging::new_folder).transpose()?;
     let mut video = Video::open(&settings.video)?;
+    let remarks: Vec<String> =
+        video.remark.iter().map(|remark| format!("{}: {remark}", settings.video.display())).collect();
+    remarks.iter().for_each(|remark| context.progress.warn(remark));
     let none = || VideoError::NoFrames { path: settings.video.clone() };
     let first = prepared(video.next().ok_or_else(none)??, settings.grey);
     let mut work = Work::new(&first, settings)?;
@@ -132,7 +148,7 @@ pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoF
             work.extractor.learn(frame_of(&prepared(frame?, settings.grey).pixels))?;
         }
     }
-    let mut figures = VideoFigures::default();
+    let mut figures = VideoFigures { remarks, ..VideoFigures::default() };
     let mut index = Index::default();
     for frame in std::iter::once(Ok(first)).chain(video) {
         context.cancel.check(DURING)?;
@@ -144,6 +160,7 @@ pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoF
             context.progress.advance("frames", figures.frames, None);
         }
     }
+    figures.changes_of_light = work.extractor.changes_of_light();
     let seconds = start.elapsed().as_secs_f64();
     figures.seconds = rounded(seconds, 3);
     figures.frames_per_second = rounded(figures.frames as f64 / seconds, 1);
@@ -209,6 +226,7 @@ impl Work {
         let mut settings = ExtractorSettings::for_frame(frame);
         settings.learning_frames = asked.learning_frames;
         settings.background.history_frames = asked.history_frames;
+        settings.learning = asked.learning;
         if asked.shadow != ShadowTreatment::ByModel {
             settings.background.shadow = None;
         }

@@ -9,6 +9,7 @@ use std::{
 
 use farnear_recognition::classifier::Family;
 use farnear_recognition::frames::Mode;
+use farnear_silhouettes::mask::extractor::Learning;
 use farnear_workflows::{
     Cancel, Context, Progress, Result, Unattended, WorkflowError,
     activity::{
@@ -166,6 +167,7 @@ fn a_video_is_not_begun_after_the_wish_to_stop() {
         learn_first: false,
         learning_frames: 0,
         history_frames: 10,
+        learning: Learning::default(),
         shadow: ShadowTreatment::ByModel,
         centred: false,
         labels: Some(root.path().join("labels")),

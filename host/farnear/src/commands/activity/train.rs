@@ -85,7 +85,7 @@ struct MotionArguments {
 
 impl MotionArguments {
     fn settings(self) -> Option<MotionSettings> {
-        let choices = Choices { unit: self.units, up: self.up };
+        let choices = Choices { unit: self.units, up: self.up, person: None };
         let settings =
             MotionSettings { files: self.motion, template: self.template, choices, cameras: self.cameras };
         (!settings.files.is_empty()).then_some(settings)

@@ -10,7 +10,7 @@ use farnear_workflows::silhouettes::markers::{self, MarkersSettings, Performer};
 
 use crate::{report, terminal};
 
-/// Silhouettes of a motion-capture recording (C3D, TRC, CSV, BVH, NTU or Kinect joints) from views at equal steps round the subject.
+/// Silhouettes of a motion-capture recording (C3D, TRC, CSV, BVH, NTU or Kinect joints, keypoints) from views at equal steps round the subject.
 ///
 /// A template says which markers make which part of the body; parts are filled and the gaps between them closed. Every view
 /// gets a folder `view1`, `view2`, ... of masks, one PNG per frame, all on one canvas so that the subject moves in it as in a
@@ -20,10 +20,11 @@ use crate::{report, terminal};
     after_help = "Example: farnear silhouettes markers walk.c3d --template plug-in-gait --views 8 --out masks/"
 )]
 pub struct Arguments {
-    /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), or .csv with columns NAME_x,
-    /// NAME_y, NAME_z in mm.
+    /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), .csv with columns NAME_x,
+    /// NAME_y, NAME_z in mm, .npz with joint positions of an SMPL body, or 2-D keypoints: .json of OpenPose, COCO, HALPE or MediaPipe, or a folder
+    /// of such files, a frame each. Keypoints have one view.
     file: PathBuf,
-    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, or a TOML file of `[[part]] name, markers,
+    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, keypoints, or a TOML file of `[[part]] name, markers,
     /// thickness_mm` [default: the one of these that fits best, which is said].
     #[arg(long, value_name = "NAME|FILE")]
     template: Option<String>,
@@ -59,6 +60,9 @@ pub struct Arguments {
     /// wrong one.
     #[arg(long, value_name = "UNIT")]
     units: Option<Unit>,
+    /// Which of several people in the file, from 1 [default: the one who moves or is seen most].
+    #[arg(long, value_name = "NUMBER")]
+    person: Option<usize>,
     /// Write masks of 100x100 pixels with the subject centred, instead of full frames.
     #[arg(long)]
     centred: bool,
@@ -108,7 +112,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let settings = MarkersSettings {
         samples,
         file: arguments.file,
-        choices: Choices { unit: arguments.units, up },
+        choices: Choices { unit: arguments.units, up, person: arguments.person },
         template: arguments.template,
         out: arguments.out,
         views: arguments.views,

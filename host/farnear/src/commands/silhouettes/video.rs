@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use farnear_shadow::detectors::Method;
+use farnear_silhouettes::mask::extractor::Learning;
 use farnear_workflows::silhouettes::video::{self, ShadowTreatment, VideoSettings};
 
 use crate::{report, terminal};
@@ -12,7 +13,7 @@ use crate::{report, terminal};
 /// Masks of the person who moves in a video, one PNG per frame (255 = person).
 ///
 /// A background model learns what stands still; what moves is cleaned and the person chosen. Frames with nobody, with
-/// several people, of a changed scene or from before the background is known are flagged in `silhouettes.toml` beside
+/// several people, of a changed scene, with a person in pieces or standing still, or from before the background is known are flagged in `silhouettes.toml` beside
 /// the masks; where nobody can be told the mask is empty.
 #[derive(Args)]
 #[command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")]
@@ -31,6 +32,10 @@ pub struct Arguments {
     /// Frames that the background model remembers.
     #[arg(long, default_value_t = 500)]
     history_frames: u32,
+    /// Which frames and pixels teach the background: where-nobody-is (all frames, but not people), until:FRAMES (the same, then
+    /// nothing), always (who stands becomes background within seconds) or never (only --learn-first or --learning-frames).
+    #[arg(long, value_name = "WHEN", default_value = "where-nobody-is")]
+    learning: Learning,
     /// Count what is merely darker than the background as the person, not as shadow.
     #[arg(long)]
     keep_shadow: bool,
@@ -69,6 +74,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         learn_first: arguments.learn_first,
         learning_frames: arguments.learning_frames,
         history_frames: arguments.history_frames,
+        learning: arguments.learning,
         shadow,
         centred: arguments.centred,
         labels: arguments.labels,

@@ -33,6 +33,7 @@ pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Job>> {
         learn_first: fields.flag("learn_first")?,
         learning_frames: fields.or("learning_frames", 10)?,
         history_frames: fields.or("history_frames", 500)?,
+        learning: fields.optional("learning")?.unwrap_or_default(),
         shadow: match (detector, fields.flag("keep_shadow")?) {
             (Some(detector), true) => {
                 let reason = "keep_shadow says that nothing takes it off; name one of them";
@@ -59,7 +60,7 @@ pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let template = fields.name_or_file("template")?.ok_or(BatchError::MissingField { name: "template" })?;
     let settings = MarkersSettings {
         file: fields.path("file")?,
-        choices: Choices { unit: fields.optional("units")?, up: up(fields)? },
+        choices: Choices { unit: fields.optional("units")?, up: up(fields)?, person: fields.optional("person")? },
         template: Some(template.display().to_string()),
         out: fields.path("out")?,
         views: fields.or("views", 8)?,

@@ -34,6 +34,8 @@ const DURING: &str = "drawing silhouettes";
 /// What all views share.
 pub struct Job<'a> {
     pub settings: &'a MarkersSettings,
+    /// How many views are drawn.
+    pub views: usize,
     /// The body's parts.
     pub template: &'a Template,
     /// What is visible in each frame that is drawn.
@@ -65,7 +67,7 @@ impl Job<'_> {
             silhouettes += usize::from(mask.iter().any(|&set| set));
             let mask = if self.settings.centred { cut_out(&mask) } else { mask };
             out.write(&format!("{folder}/{name}.png"), &masks::png(&mask)?)?;
-            counter.one(Some(self.settings.views * self.frames.len()));
+            counter.one(Some(self.views * self.frames.len()));
         }
         Ok(silhouettes)
     }
@@ -95,7 +97,7 @@ impl Job<'_> {
             if let Some(mask) = centred(self.mask(frame, view, &canvas).view(), SIDE_PX) {
                 named.push((format!("{prefix}_{name}.png"), mask));
             }
-            counter.one(Some(self.settings.views * self.frames.len()));
+            counter.one(Some(self.views * self.frames.len()));
         }
         Ok(named)
     }

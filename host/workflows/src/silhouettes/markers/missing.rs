@@ -19,8 +19,8 @@ impl MissingParts {
     /// Compares a template with what was recorded and with what is visible in every frame.
     pub fn of(template: &Template, recording: &Recording, frames: &[HashMap<&str, Point3>]) -> Self {
         let short = |name: &str| name.rsplit_once(':').map_or(name, |(_, short)| short).to_owned();
-        let recorded =
-            |marker: &String| recording.names.iter().any(|name| name == marker || short(name) == *marker);
+        let names = recording.known_names();
+        let recorded = |marker: &String| names.iter().any(|name| name == marker || short(name) == *marker);
         let (drawn, never): (Vec<_>, Vec<_>) =
             template.parts.iter().partition(|part| part.markers.iter().any(recorded));
         let flags = |points: &HashMap<&str, Point3>| {

@@ -1,0 +1,193 @@
+//! Which grey level of a folder of masks is the person: 0 and 255, any two others (0 and 1, say), or a background model's labels
+//! (0, 127 and 255 of OpenCV; 0, 50, 85, 170 and 255 of ChangeDetection.net).
+
+use std::path::PathBuf;
+
+use ndarray::Array2;
+
+use super::{MaskError, grey};
+
+/// Levels that label more than a person: shadow, not judged, unknown.
+const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
+/// OpenCV's shadow: alone beside 0 it says nothing yet.
+const SHADOW: u8 = 127;
+/// Pictures of a folder that are looked at, as long as they hold more than one level.
+const SURVEYED: usize = 8;
+/// JPEG leaves ringing about edges: levels this share of the range from black or white count as those, and fewer than one
+/// pixel in so many may lie between.
+const RINGING: f64 = 0.157;
+const ONE_BETWEEN_IN: u64 = 50;
+/// Two levels that differ by less, with others between them, are a picture and not a mask.
+const LEAST_GAP: u8 = 40;
+
+/// From which grey level on a pixel of a mask is set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Levels {
+    pub set_from: u8,
+    /// What a user should know about the levels; `None` for black and white.
+    pub remark: Option<String>,
+}
+
+/// How often each grey level occurs in pictures.
+#[derive(Clone, Debug)]
+pub struct Histogram([u64; 256]);
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self([0; 256])
+    }
+}
+
+impl Histogram {
+    /// Adds a picture.
+    pub fn add(&mut self, picture: &Array2<u8>) {
+        for &level in picture {
+            self.0[usize::from(level)] += 1;
+        }
+    }
+
+    fn present(&self) -> Vec<u8> {
+        (0..=u8::MAX).filter(|&level| self.0[usize::from(level)] > 0).collect()
+    }
+
+    /// Whether other pictures of the folder may hold the level of the person.
+    fn undecided(&self) -> bool {
+        let present = self.present();
+        present.len() < 2 || present == [0, SHADOW]
+    }
+
+    /// The levels of masks; `None` where this is no histogram of masks.
+    #[must_use]
+    pub fn levels(&self) -> Option<Levels> {
+        match self.present().as_slice() {
+            [] | [_] | [0, 255] => Some(Levels::default()),
+            &[low, high] => Some(Levels {
+                set_from: high,
+                remark: Some(format!("two grey levels, {low} and {high}: {high} is taken as the person")),
+            }),
+            labels if labels.last() == Some(&255) && labels.iter().all(|level| LABELS.contains(level)) => {
+                Some(Levels {
+                    set_from: 255,
+                    remark: Some(format!(
+                        "grey levels {}: 255 is taken as the person, the levels between as shadow or unknown",
+                        listed(labels)
+                    )),
+                })
+            }
+            &[low, .., high] if high - low >= LEAST_GAP => self.two_clusters(low, high),
+            _ => None,
+        }
+    }
+
+    fn two_clusters(&self, low: u8, high: u8) -> Option<Levels> {
+        let margin = (RINGING * f64::from(high - low)) as u8;
+        let all: u64 = self.0.iter().sum();
+        let between: u64 =
+            (low + margin..=high - margin).map(|level| self.0[usize::from(level)]).sum();
+        if between * ONE_BETWEEN_IN > all {
+            return None;
+        }
+        let middle = low + (high - low).div_ceil(2);
+        if (96..=160).contains(&middle) {
+            return Some(Levels::default());
+        }
+        let remark = format!("grey levels near {low} and near {high}: set from {middle} on");
+        Some(Levels { set_from: middle, remark: Some(remark) })
+    }
+}
+
+fn listed(levels: &[u8]) -> String {
+    levels.iter().map(u8::to_string).collect::<Vec<_>>().join(", ")
+}
+
+impl Default for Levels {
+    /// Black and white.
+    fn default() -> Self {
+        Self { set_from: 128, remark: None }
+    }
+}
+
+impl Levels {
+    /// The levels of a histogram that the caller says is one of masks; `first` is for messages.
+    ///
+    /// # Errors
+    /// [`MaskError::Levels`] where nothing would be set although there are several levels.
+    pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
+        if let Some(levels) = histogram.levels() {
+            return Ok(levels);
+        }
+        let present = histogram.present();
+        if present.last().is_none_or(|&level| level < 128) {
+            return Err(MaskError::Levels { path: first.into(), levels: present });
+        }
+        let remark = format!("{} grey levels: set from 128 on", present.len());
+        Ok(Self { set_from: 128, remark: Some(remark) })
+    }
+
+    /// Looks at pictures all over a folder until the person's level is among them.
+    ///
+    /// # Errors
+    /// Pictures that cannot be read or are in colour.
+    pub fn survey(files: &[PathBuf]) -> Result<Histogram, MaskError> {
+        let mut histogram = Histogram::default();
+        let step = files.len().div_ceil(SURVEYED).max(1);
+        let spread: Vec<usize> = (0..files.len()).step_by(step).collect();
+        for &index in &spread {
+            histogram.add(&grey(&files[index])?);
+        }
+        for (index, file) in files.iter().enumerate() {
+            if !histogram.undecided() {
+                break;
+            }
+            if index % step != 0 {
+                histogram.add(&grey(file)?);
+            }
+        }
+        Ok(histogram)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn levels(counts: &[(u8, u64)]) -> Option<Levels> {
+        let mut histogram = Histogram::default();
+        for &(level, count) in counts {
+            histogram.0[usize::from(level)] = count;
+        }
+        histogram.levels()
+    }
+
+    #[test]
+    fn masks_of_two_levels_are_set_at_the_higher_one() {
+        for (low, high) in [(0, 1), (0, 100), (16, 235), (1, 2)] {
+            let found = levels(&[(low, 900), (high, 100)]).expect("masks");
+            assert_eq!(found.set_from, high);
+            assert!(found.remark.is_some_and(|text| text.contains(&format!("{low} and {high}"))));
+        }
+        assert_eq!(levels(&[(0, 900), (255, 100)]), Some(Levels::default()));
+        assert_eq!(levels(&[(0, 900)]), Some(Levels::default()));
+    }
+
+    #[test]
+    fn shadow_and_unknown_labels_are_not_the_person() {
+        for labels in [&[(0, 9), (127, 9), (255, 9)][..], &[(0, 9), (50, 9), (85, 9), (170, 9), (255, 9)]] {
+            let found = levels(labels).expect("masks");
+            assert_eq!(found.set_from, 255);
+            assert!(found.remark.is_some());
+        }
+    }
+
+    #[test]
+    fn jpeg_ringing_is_tolerated_and_pictures_are_no_masks() {
+        let ringing = [(0, 900), (3, 20), (250, 20), (255, 60)];
+        assert_eq!(levels(&ringing), Some(Levels::default()));
+        let dim = [(0, 900), (2, 20), (98, 20), (100, 60)];
+        assert_eq!(levels(&dim).map(|levels| levels.set_from), Some(50));
+        let picture: Vec<(u8, u64)> = (20..200).map(|level| (level, 5)).collect();
+        assert_eq!(levels(&picture), None);
+        let dark: Vec<(u8, u64)> = (0..30).map(|level| (level, 5)).collect();
+        assert_eq!(levels(&dark), None);
+    }
+}

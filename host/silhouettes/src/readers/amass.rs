@@ -1,0 +1,248 @@
+//! NPZ files of body motion (AMASS and others): joint positions where the file has them.
+//!
+//! AMASS itself stores pose parameters of the body models SMPL, SMPL-H and SMPL-X. Joint positions follow from them only with the body model's
+//! file, which its makers license and nobody may pass on; such files are refused by name of the model.
+
+use super::{
+    body,
+    reader::Reader,
+    recording::{Found, Known, RecordingError, Source, Unit, Up},
+    zip,
+};
+use crate::silhouette::capsule::Point3;
+
+/// The entry of [`super::READERS`].
+pub const READER: Reader = Reader {
+    name: "NPZ",
+    extensions: &["npz"],
+    about: "joint positions of SMPL bodies (array `joints`, frames x joints x 3), metres; AMASS pose parameters are refused",
+    read,
+};
+
+/// Names under which programs store joint positions.
+const POSITIONS: [&str; 8] =
+    ["joints", "Jtr", "jtr", "joints3d", "joints_3d", "keypoints3d", "joint_positions", "positions"];
+const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate"];
+/// The body joints of all SMPL models, in their order; hands and face follow.
+const SMPL: [&str; 22] = [
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
+    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder", "left_elbow",
+    "right_elbow", "left_wrist", "right_wrist",
+];
+const HEAD: usize = 15;
+const FEET: [usize; 2] = [10, 11];
+
+/// An array of an NPZ file.
+struct Array {
+    name: String,
+    shape: Vec<usize>,
+    /// Empty for text.
+    values: Vec<f64>,
+    text: String,
+}
+
+/// Reads joint positions.
+///
+/// # Errors
+/// [`RecordingError::BodyModel`] for pose parameters without positions, [`RecordingError::Kind`] for anything else.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    let arrays = zip::entries(bytes, |name| name.ends_with(".npy"))?
+        .iter()
+        .map(|(name, bytes)| array(name.trim_end_matches(".npy"), bytes))
+        .collect::<Result<Vec<Array>, RecordingError>>()?;
+    let named = |names: &[&str]| names.iter().find_map(|name| arrays.iter().find(|array| array.name == *name));
+    let positions = POSITIONS.iter().find_map(|name| {
+        arrays.iter().find(|array| {
+            array.name == *name && matches!(array.shape.as_slice(), [_, joints, 3] if *joints >= SMPL.len())
+        })
+    });
+    let Some(positions) = positions else { return Err(refused(&arrays)) };
+    let (count, joints) = (positions.shape[0], positions.shape[1]);
+    let frames: Vec<Vec<Option<Point3>>> = (0..count)
+        .map(|frame| {
+            let at = |joint: usize| -> Point3 {
+                std::array::from_fn(|k| positions.values.get((frame * joints + joint) * 3 + k).copied().unwrap_or(f64::NAN))
+            };
+            (0..SMPL.len()).map(|joint| Some(at(joint))).collect()
+        })
+        .collect();
+    let rate_hz = named(&RATES).and_then(|array| array.values.first().copied()).filter(|rate| *rate > 0.0);
+    let mut remarks = Vec::new();
+    if joints > SMPL.len() {
+        remarks.push(format!("{joints} joints are taken as those of an SMPL body, of which the first 22 are read"));
+    }
+    if rate_hz.is_none() {
+        remarks.push("nothing states the frame rate".into());
+    }
+    Ok(Found {
+        names: SMPL.iter().map(|name| (*name).to_owned()).collect(),
+        rate_hz: rate_hz.unwrap_or(0.0),
+        unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
+        up: body::upright(&frames, HEAD, &FEET, Up::Z),
+        frames,
+        others: Vec::new(),
+        planar: false,
+        remarks,
+    })
+}
+
+/// Why a file without positions is refused.
+fn refused(arrays: &[Array]) -> RecordingError {
+    let of = |name: &str| arrays.iter().find(|array| array.name == name);
+    let text = |name: &str| of(name).map(|array| array.text.to_lowercase()).filter(|text| !text.is_empty());
+    let Some(poses) = of("poses").or_else(|| of("pose_body")).or_else(|| of("body_pose")) else {
+        let all: Vec<&str> = arrays.iter().map(|array| array.name.as_str()).take(12).collect();
+        let reason = format!(
+            "it holds {} and no joint positions: expected an array `joints` of frames x 22 or more joints x 3",
+            if all.is_empty() { "no array".to_owned() } else { all.join(", ") }
+        );
+        return RecordingError::Kind { kind: "NPZ", reason };
+    };
+    let gender = text("gender").unwrap_or_else(|| "neutral".into());
+    let width = poses.shape.last().copied().unwrap_or(0);
+    let (model, file) = match (text("surface_model_type").as_deref(), width) {
+        (Some("smplx"), _) | (_, 162 | 165 | 63) => ("SMPL-X", "SMPLX"),
+        (Some("smplh"), _) | (_, 156) => ("SMPL-H", "SMPLH"),
+        _ => ("SMPL", "SMPL"),
+    };
+    RecordingError::BodyModel {
+        array: poses.name.clone(),
+        shape: poses.shape.iter().map(usize::to_string).collect::<Vec<_>>().join("x"),
+        model,
+        file: format!("{file}_{}.npz", gender.to_uppercase()),
+    }
+}
+
+/// An array in NumPy's format: floats, integers or text.
+fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
+    let bad = |reason: &str| RecordingError::Kind { kind: "NPZ", reason: format!("array `{name}`: {reason}") };
+    let version = *bytes.get(6).filter(|_| bytes.starts_with(b"\x93NUMPY")).ok_or_else(|| bad("it is no NPY file"))?;
+    let length = |range: std::ops::Range<usize>| -> Option<usize> {
+        Some(bytes.get(range)?.iter().rev().fold(0, |sum, &byte| sum * 256 + usize::from(byte)))
+    };
+    let (from, header) = if version == 1 { (10, length(8..10)) } else { (12, length(8..12)) };
+    let header_end = header.and_then(|length| length.checked_add(from));
+    let header = header_end.and_then(|end| bytes.get(from..end)).ok_or_else(|| bad("its header is cut short"))?;
+    let header = String::from_utf8_lossy(header);
+    let after = |key: &str| header.split_once(key).map(|(_, rest)| rest);
+    let kind = after("'descr':").and_then(|rest| rest.split('\'').nth(1)).unwrap_or_default().to_owned();
+    let shape: Vec<usize> = after("'shape':")
+        .and_then(|rest| rest.split_once('(')?.1.split_once(')'))
+        .map(|(inside, _)| inside.split(',').filter_map(|length| length.trim().parse().ok()).collect())
+        .ok_or_else(|| bad("its header has no shape"))?;
+    let fortran = after("'fortran_order':").is_some_and(|rest| rest.trim_start().starts_with("True"));
+    let data = bytes.get(header_end.unwrap_or(0)..).unwrap_or_default();
+    let (order, letter) = kind.split_at(kind.len().min(1));
+    let big = order == ">";
+    let number = |raw: &[u8]| -> f64 {
+        let mut raw: [u8; 8] = std::array::from_fn(|k| raw.get(k).copied().unwrap_or(0));
+        let size = letter[1..].parse::<usize>().unwrap_or(8).min(8);
+        if big {
+            raw[..size].reverse();
+        }
+        match letter {
+            "f4" => f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
+            "f8" => f64::from_le_bytes(raw),
+            "i4" => f64::from(i32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
+            _ => i64::from_le_bytes(raw) as f64,
+        }
+    };
+    let mut found = Array { name: name.into(), shape, values: Vec::new(), text: String::new() };
+    match letter {
+        "f4" | "i4" => found.values = data.chunks_exact(4).map(number).collect(),
+        "f8" | "i8" => found.values = data.chunks_exact(8).map(number).collect(),
+        _ if letter.starts_with('U') => {
+            found.text = data.chunks_exact(4).map(|c| char::from(c[0])).filter(|c| *c != '\0').collect();
+        }
+        _ if letter.starts_with('S') => {
+            found.text = data.iter().map(|&c| char::from(c)).filter(|c| *c != '\0').collect();
+        }
+        // Objects and the like are not needed.
+        _ => {}
+    }
+    let expected = found.shape.iter().fold(1_usize, |product, &length| product.saturating_mul(length));
+    if !found.values.is_empty() && found.values.len() < expected {
+        return Err(bad(&format!("{} of {expected} values are there: it was cut short", found.values.len())));
+    }
+    if fortran && found.shape.len() > 1 {
+        return Err(bad("it is in Fortran's order, expected C's"));
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::recording::Choices;
+    use super::*;
+
+    fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    /// An archive of entries that are not packed; checksums are not looked at.
+    fn npz(entries: &[(&str, Vec<u8>)]) -> Vec<u8> {
+        let (mut file, mut directory) = (Vec::new(), Vec::new());
+        for (name, data) in entries {
+            let name = format!("{name}.npy");
+            let at = file.len() as u32;
+            let sizes = [(data.len() as u32).to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+            let lengths = [(name.len() as u16).to_le_bytes(), [0, 0]].concat();
+            file.extend([b"PK\x03\x04".as_slice(), &[0; 14], &sizes, &lengths, name.as_bytes(), data].concat());
+            let entry = [b"PK\x01\x02".as_slice(), &[0; 16], &sizes, &lengths, &[0; 10], &at.to_le_bytes(), name.as_bytes()];
+            directory.extend(entry.concat());
+        }
+        let (at, count) = (file.len() as u32, entries.len() as u16);
+        let sizes = [(directory.len() as u32).to_le_bytes(), at.to_le_bytes()].concat();
+        let counts = [count.to_le_bytes(), count.to_le_bytes()].concat();
+        [file, directory, b"PK\x05\x06\0\0\0\0".to_vec(), counts, sizes, vec![0, 0]].concat()
+    }
+
+    fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+        values.into_iter().flat_map(f32::to_le_bytes).collect()
+    }
+
+    #[test]
+    fn joint_positions_are_read_with_rate_and_upward_axis() {
+        // A body along y: feet at 0, head at 1.6 m.
+        let joints = (0..3).flat_map(|_| {
+            (0..24).flat_map(|joint| [0.1, if joint == HEAD { 1.6 } else if FEET.contains(&joint) { 0.05 } else { 0.8 }, 0.3])
+        });
+        let file = npz(&[
+            ("joints", npy("<f4", "(3, 24, 3)", &floats(joints))),
+            ("mocap_framerate", npy("<f8", "()", &120.0_f64.to_le_bytes())),
+        ]);
+        let found = super::super::read(&file, "npz", Choices::default()).expect("a recording");
+        assert_eq!((found.frames.len(), found.rate_hz, found.up.value), (3, 120.0, Up::Y));
+        let head = found.by_name(1)["head"];
+        assert!((head[2] - 1600.0).abs() < 0.1 && (head[0] - 100.0).abs() < 0.1, "{head:?}");
+        assert!(found.by_name(0).contains_key("LeftUpLeg"), "matched by alias");
+    }
+
+    #[test]
+    fn pose_parameters_are_refused_with_the_body_model_that_is_needed() {
+        let gender: Vec<u8> = "female".chars().flat_map(|c| (c as u32).to_le_bytes()).collect();
+        let file = npz(&[
+            ("poses", npy("<f4", "(2, 156)", &floats(vec![0.0; 312]))),
+            ("gender", npy("<U6", "()", &gender)),
+        ]);
+        let error = super::super::read(&file, "npz", Choices::default()).expect_err("no positions").to_string();
+        assert!(error.contains("2x156") && error.contains("SMPLH_FEMALE.npz") && error.contains("joints"), "{error}");
+        let other = npz(&[("betas", npy("<f4", "(16,)", &floats(vec![0.0; 16])))]);
+        let error = super::super::read(&other, "npz", Choices::default()).expect_err("no positions").to_string();
+        assert!(error.contains("betas") && error.contains("joints"), "{error}");
+    }
+
+    #[test]
+    fn archives_cut_anywhere_are_errors() {
+        let file = npz(&[("joints", npy("<f4", "(1, 22, 3)", &floats(vec![0.5; 66])))]);
+        assert!(read(&file).is_ok());
+        for end in 0..file.len() - 2 {
+            assert!(read(&file[..end]).is_err(), "{end} bytes");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. They are seen from one camera: x to the right
+//! and y down in its picture, so that their recordings have one view.
+//!
+//! Estimators that give people no numbers are followed from frame to frame by place. Lengths are guessed from the body: the trunk and
+//! the legs, at their longest in a frame, are those of an adult.
+
+mod document;
+mod layouts;
+mod people;
+
+use super::{
+    reader::Reader,
+    recording::{Found, Known, RecordingError, Source, Unit, Up},
+};
+use crate::silhouette::capsule::Point3;
+use document::{Document, LEAST_CONFIDENCE};
+use layouts::NAMES;
+
+/// The entry of [`super::READERS`].
+pub const READER: Reader = Reader {
+    name: "keypoints",
+    extensions: &["json"],
+    about: "2-D keypoints of OpenPose (a folder of files), COCO, HALPE, MMPose and MediaPipe; one view, one person of several",
+    read,
+};
+
+/// Lengths of an adult, millimetres: the ends as places among [`NAMES`].
+const BONES_MM: [([usize; 2], f64); 4] = [([16, 18], 420.0), ([17, 19], 420.0), ([18, 20], 420.0), ([19, 21], 420.0)];
+const TRUNK_MM: f64 = 500.0;
+const NECK: usize = 6;
+const SHOULDERS: [usize; 2] = [8, 9];
+const HIPS: [usize; 2] = [16, 17];
+/// Coordinates up to this are parts of the picture's sides, not pixels; points may lie outside of it.
+const NORMALISED: f64 = 3.0;
+/// The picture's shape where the file does not state it.
+const USUAL_ASPECT: f64 = 16.0 / 9.0;
+
+/// Reads a JSON file.
+///
+/// # Errors
+/// [`RecordingError`] for JSON that is damaged or holds nobody's points.
+pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+    found(vec![Document::parse(bytes)?])
+}
+
+/// Reads a folder of JSON files, a frame each, in their order.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_files<'a>(files: impl IntoIterator<Item = &'a [u8]>) -> Result<Found, RecordingError> {
+    found(files.into_iter().map(Document::parse).collect::<Result<Vec<Document>, RecordingError>>()?)
+}
+
+fn found(documents: Vec<Document>) -> Result<Found, RecordingError> {
+    let layout = documents.iter().find_map(|document| document.layout).ok_or_else(|| RecordingError::Kind {
+        kind: "keypoint JSON",
+        reason: format!(
+            "it holds nobody's points: expected `people`, `annotations`, `keypoints` or `landmarks` of {} points",
+            layouts::LAYOUTS.iter().map(|layout| layout.count.to_string()).collect::<Vec<_>>().join(", ")
+        ),
+    })?;
+    let size = documents.iter().find_map(|document| document.size);
+    let unsure: usize = documents.iter().map(|document| document.unsure).sum();
+    let mut remarks = vec![format!("{} keypoints of the layout {}, seen from one side", layout.count, layout.name)];
+    if unsure > 0 {
+        remarks.push(format!("{unsure} points below a confidence of {LEAST_CONFIDENCE} are treated as missing"));
+    }
+    let mut frames: Vec<Vec<document::Person>> = documents.into_iter().flat_map(|document| document.frames).collect();
+    let largest = frames
+        .iter()
+        .flatten()
+        .flat_map(|person| person.points.iter().flatten().flatten())
+        .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    if largest <= NORMALISED {
+        let aspect = size.map_or(USUAL_ASPECT, |[width, height]| width / height);
+        let known = if size.is_some() { "stated" } else { "a doubtful guess" };
+        remarks.push(format!("coordinates are parts of a picture of {aspect:.3} times its height ({known})"));
+        let points = frames.iter_mut().flatten().flat_map(|person| person.points.iter_mut().flatten());
+        points.for_each(|point| point[0] *= aspect);
+    }
+    let (mut tracks, count) = people::followed(&frames);
+    if count > 1 {
+        remarks.push(format!("{count} people: the one seen most is read (--person 2 reads the next)"));
+    }
+    tracks.iter_mut().flatten().for_each(|points| add_neck(points));
+    let unit = unit(tracks.first().map_or(&[][..], Vec::as_slice));
+    let mut all = tracks.into_iter().map(|track| track.into_iter().map(|points| in_space(&points)).collect());
+    Ok(Found {
+        names: NAMES.iter().map(|name| (*name).to_owned()).collect(),
+        rate_hz: 0.0,
+        frames: all.next().unwrap_or_default(),
+        others: all.collect(),
+        planar: true,
+        unit,
+        up: Known { value: Up::Z, source: Source::Format },
+        remarks,
+    })
+}
+
+/// The picture's plane is x to the right and z up.
+fn in_space(points: &[Option<[f64; 2]>]) -> Vec<Option<Point3>> {
+    // Not 0, 0, 0, which is a missing marker.
+    points.iter().map(|point| point.map(|[x, y]| [x, 1e-9, -y])).collect()
+}
+
+fn middle(points: &[Option<[f64; 2]>], [a, b]: [usize; 2]) -> Option<[f64; 2]> {
+    let (a, b) = ((*points.get(a)?)?, (*points.get(b)?)?);
+    Some([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])])
+}
+
+fn add_neck(points: &mut [Option<[f64; 2]>]) {
+    if !points.is_empty() && points[NECK].is_none() {
+        points[NECK] = middle(points, SHOULDERS);
+    }
+}
+
+/// Millimetres per unit of the file, so that trunk and legs are an adult's.
+fn unit(frames: &[Vec<Option<[f64; 2]>>]) -> Known<Unit> {
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let per_mm = |points: &Vec<Option<[f64; 2]>>| -> Option<f64> {
+        let trunk = middle(points, SHOULDERS).zip(middle(points, HIPS)).map(|(a, b)| distance(a, b) / TRUNK_MM);
+        let bones = BONES_MM.iter().filter_map(|([a, b], mm)| Some(distance((*points.get(*a)?)?, (*points.get(*b)?)?) / mm));
+        // What points towards the camera is shortened, never lengthened.
+        trunk.into_iter().chain(bones).max_by(f64::total_cmp).filter(|scale| *scale > 0.0)
+    };
+    let mut scales: Vec<f64> = frames.iter().filter_map(per_mm).collect();
+    scales.sort_by(f64::total_cmp);
+    let (mm, reason, sure) = match scales.get(scales.len() / 2) {
+        Some(scale) => {
+            let reason = format!("for trunk and legs are then an adult's ({TRUNK_MM} and 420 mm)");
+            (1.0 / scale, reason, true)
+        }
+        None => (5.0, "for neither trunk nor legs are seen".into(), false),
+    };
+    // Six digits say as much as can be known.
+    let mm = format!("{mm:.5e}").parse().unwrap_or(mm);
+    Known { value: Unit { mm }, source: Source::Guess { reason, sure } }
+}
+
+#[cfg(test)]
+mod tests;

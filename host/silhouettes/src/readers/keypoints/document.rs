@@ -1,0 +1,282 @@
+//! People in the JSON of pose estimators, whatever its nesting: a frame a file (OpenPose), a list of people with the picture they are in
+//! (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or frames by the pictures' names.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value};
+
+use super::layouts::{Layout, NAMES};
+use crate::readers::recording::RecordingError;
+
+/// Points less sure than this are treated as missing.
+pub const LEAST_CONFIDENCE: f64 = 0.1;
+
+/// A person in a frame: x to the right and y down, by [`NAMES`].
+#[derive(Clone, Debug)]
+pub struct Person {
+    pub points: Vec<Option<[f64; 2]>>,
+    /// Its number in the file's own tracking.
+    pub id: Option<i64>,
+}
+
+/// What a document holds.
+#[derive(Debug, Default)]
+pub struct Document {
+    pub frames: Vec<Vec<Person>>,
+    /// Width and height of the pictures, pixels.
+    pub size: Option<[f64; 2]>,
+    pub layout: Option<&'static Layout>,
+    /// Points below the least confidence.
+    pub unsure: usize,
+}
+
+/// Keys under which a frame keeps its people, and a document its frames.
+const PEOPLE: [&str; 8] =
+    ["people", "bodies", "instances", "persons", "poses", "predictions", "detections", "annotations"];
+const FRAMES: [&str; 6] = ["frames", "instance_info", "pose_frames", "results", "data", "root"];
+/// Keys under which a person keeps its points.
+const POINTS: [&str; 8] = [
+    "pose_keypoints_2d", "keypoints", "joints", "pose_landmarks", "poseLandmarks", "landmarks", "landmark", "pose",
+];
+const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
+
+impl Document {
+    /// Reads one JSON document.
+    ///
+    /// # Errors
+    /// JSON that is damaged or holds nobody's points.
+    pub fn parse(bytes: &[u8]) -> Result<Self, RecordingError> {
+        let value: Value = serde_json::from_slice(bytes).map_err(|error| RecordingError::Line {
+            line: error.line(),
+            reason: format!("not JSON: {error}"),
+        })?;
+        let mut document = Self { size: size(&value), ..Self::default() };
+        document.whole(&value);
+        Ok(document)
+    }
+
+    fn whole(&mut self, value: &Value) {
+        match value {
+            Value::Array(items) if items.iter().any(|item| picture_of(item).is_some()) => {
+                self.by_picture(items, &[]);
+            }
+            Value::Array(items) => self.frames_of(items),
+            Value::Object(map) => {
+                if let Some(items) = map.get("annotations").and_then(Value::as_array) {
+                    let pictures = map.get("images").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+                    return self.by_picture(items, pictures);
+                }
+                if let Some(items) = FRAMES.iter().find_map(|key| map.get(*key)?.as_array()) {
+                    return self.frames_of(items);
+                }
+                if is_frame(map) {
+                    let frame = self.frame(value);
+                    self.frames.push(frame);
+                    return;
+                }
+                // Frames by the names of their pictures.
+                let mut named: Vec<(&String, &Value)> =
+                    map.iter().filter(|(_, frame)| frame.as_object().is_some_and(is_frame) || frame.is_array()).collect();
+                named.sort_by(|a, b| order(a.0).cmp(&order(b.0)));
+                for (_, frame) in named {
+                    let frame = self.frame(frame);
+                    self.frames.push(frame);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn frames_of(&mut self, items: &[Value]) {
+        // The points of one person alone, or people of one frame.
+        let single = Value::Array(items.to_vec());
+        if let Some(person) = self.points(&single, None) {
+            self.frames.push(vec![Person { points: person, id: None }]);
+            return;
+        }
+        for item in items {
+            let frame = self.frame(item);
+            self.frames.push(frame);
+        }
+    }
+
+    /// People with the pictures that they are in; pictures without people between them are empty frames.
+    fn by_picture(&mut self, items: &[Value], pictures: &[Value]) {
+        let mut frames: BTreeMap<(String, u64, String), Vec<Person>> = BTreeMap::new();
+        let mut names: BTreeMap<String, String> = BTreeMap::new();
+        for picture in pictures {
+            if let (Some(id), Some(name)) = (picture.get("id"), picture.get("file_name").and_then(Value::as_str)) {
+                names.insert(id.to_string(), name.into());
+                frames.entry(order(name)).or_default();
+            }
+        }
+        for item in items {
+            let Some(picture) = picture_of(item) else { continue };
+            let key = order(names.get(&picture).unwrap_or(&picture));
+            let person = self.person(item);
+            frames.entry(key).or_default().extend(person);
+        }
+        /// Gaps are filled where they make the recording at most so many times as long.
+        const LONGEST: u64 = 10;
+        let numbers: Vec<u64> = frames.keys().map(|(_, number, _)| *number).collect();
+        let step = numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0).min();
+        let reach = numbers.last().zip(numbers.first()).map_or(0, |(last, first)| last.saturating_sub(*first));
+        let mut last: Option<u64> = None;
+        for ((_, number, _), people) in frames {
+            if let (Some(last), Some(step)) = (last, step)
+                && reach / step <= LONGEST * numbers.len() as u64
+            {
+                let missing = number.saturating_sub(last) / step;
+                (1..missing).for_each(|_| self.frames.push(Vec::new()));
+            }
+            last = Some(number);
+            self.frames.push(people);
+        }
+    }
+
+    /// The people of a frame.
+    fn frame(&mut self, value: &Value) -> Vec<Person> {
+        let people = match value {
+            Value::Object(map) => PEOPLE.iter().find_map(|key| map.get(*key)).unwrap_or(value),
+            other => other,
+        };
+        match people {
+            Value::Array(items) => match self.points(people, None) {
+                Some(points) => vec![Person { points, id: None }],
+                None => items.iter().filter_map(|item| self.person(item)).collect(),
+            },
+            Value::Object(map) => {
+                // Several people's landmarks in one list.
+                let several = POINTS.iter().find_map(|key| map.get(*key)?.as_array());
+                if let Some(items) = several
+                    && self.points(&Value::Array(items.clone()), None).is_none()
+                {
+                    return items.iter().filter_map(|item| self.person(item)).collect();
+                }
+                self.person(people).into_iter().collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn person(&mut self, value: &Value) -> Option<Person> {
+        let Value::Object(map) = value else {
+            return self.points(value, None).map(|points| Person { points, id: None });
+        };
+        let id = ["person_id", "idx", "track_id"].iter().find_map(|key| first_number(map.get(*key)?));
+        let confidences = CONFIDENCES.iter().find_map(|key| map.get(*key)?.as_array());
+        let found = POINTS.iter().find_map(|key| {
+            let value = map.get(*key)?;
+            // MediaPipe's Python objects keep a list within.
+            let value = value.get("landmark").unwrap_or(value);
+            self.points(value, confidences.map(Vec::as_slice))
+        })?;
+        Some(Person { points: found, id: id.filter(|id| *id >= 0.0).map(|id| id as i64) })
+    }
+
+    /// Points in any of the forms x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
+    fn points(&mut self, value: &Value, confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
+        let items = value.as_array()?;
+        let number = |value: &Value| value.as_f64().unwrap_or(0.0);
+        let flat = items.first()?.is_number();
+        let (layout, triples): (_, Vec<[f64; 3]>) = if flat {
+            // 33 points have depth as well; no two layouts share a length.
+            let (layout, width) = [3, 2, 4].iter().find_map(|width| {
+                let layout = Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
+                Some((layout, *width))
+            })?;
+            let of = |c: &[Value]| [number(&c[0]), number(&c[1]), confidence(c, layout)];
+            (layout, items.chunks_exact(width).map(of).collect())
+        } else {
+            let layout = Layout::of(items.len())?;
+            let of = |item: &Value| -> Option<[f64; 3]> {
+                match item {
+                    Value::Array(c) if c.len() >= 2 && c.len() <= 4 => {
+                        Some([number(&c[0]), number(&c[1]), confidence(c, layout)])
+                    }
+                    Value::Object(map) => {
+                        let get = |key: &str| map.get(key).and_then(Value::as_f64);
+                        let sure = ["visibility", "score", "confidence", "c"].iter().find_map(|key| get(key));
+                        Some([get("x")?, get("y")?, sure.unwrap_or(1.0)])
+                    }
+                    Value::Null => Some([0.0; 3]),
+                    _ => None,
+                }
+            };
+            (layout, items.iter().map(of).collect::<Option<Vec<_>>>()?)
+        };
+        self.layout = Some(layout);
+        let mut points = vec![None; NAMES.len()];
+        for (index, place) in layout.places().enumerate() {
+            let (Some(place), Some(&[x, y, mut sure])) = (place, triples.get(index)) else { continue };
+            if let Some(given) = confidences.and_then(|all| all.get(index)) {
+                sure = number(given);
+            }
+            let missing = (x == 0.0 && y == 0.0) || !x.is_finite() || !y.is_finite();
+            if !missing && sure < LEAST_CONFIDENCE {
+                self.unsure += 1;
+            }
+            points[place] = (!missing && sure >= LEAST_CONFIDENCE).then_some([x, y]);
+        }
+        Some(points)
+    }
+}
+
+/// The confidence after x and y; of MediaPipe the third number is a depth.
+fn confidence(numbers: &[Value], layout: &Layout) -> f64 {
+    let depth = layout.count == 33;
+    let sure = match numbers.len() {
+        3 if !depth => numbers.get(2),
+        4 => numbers.get(3),
+        _ => None,
+    };
+    sure.and_then(Value::as_f64).unwrap_or(1.0)
+}
+
+/// Whether a document's object is a frame itself.
+fn is_frame(map: &Map<String, Value>) -> bool {
+    PEOPLE.iter().chain(&POINTS).any(|key| map.contains_key(*key))
+}
+
+/// The picture that a person is in.
+fn picture_of(item: &Value) -> Option<String> {
+    match item.get("image_id").or_else(|| item.get("frame_id")).or_else(|| item.get("image_name"))? {
+        Value::String(name) => Some(name.clone()),
+        Value::Number(number) => Some(number.to_string()),
+        _ => None,
+    }
+    .filter(|_| item.get("instances").is_none())
+}
+
+/// Names in the order of their last number.
+fn order(name: &str) -> (String, u64, String) {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let end = stem.rfind(|c: char| c.is_ascii_digit()).map_or(0, |at| at + 1);
+    let begin = stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| {
+        at + stem[at..].chars().next().map_or(1, char::len_utf8)
+    });
+    (stem[..begin].into(), stem[begin..end].parse().unwrap_or(0), stem[end..].into())
+}
+
+fn first_number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Array(items) => first_number(items.first()?),
+        other => other.as_f64(),
+    }
+}
+
+/// The pictures' size where the document states it.
+fn size(value: &Value) -> Option<[f64; 2]> {
+    let map = value.as_object()?;
+    let of = |map: &Map<String, Value>| {
+        let get = |keys: &[&str]| keys.iter().find_map(|key| map.get(*key)?.as_f64()).filter(|v| *v > 0.0);
+        Some([get(&["width", "image_width", "img_width"])?, get(&["height", "image_height", "img_height"])?])
+    };
+    let pair = ["image_size", "img_size", "size"].iter().find_map(|key| {
+        let pair = map.get(*key)?.as_array()?;
+        Some([pair.first()?.as_f64()?, pair.get(1)?.as_f64()?])
+    });
+    let first = map.get("images").and_then(|images| images.get(0)?.as_object());
+    let about = ["info", "metadata", "meta", "meta_info"].iter().find_map(|key| map.get(*key)?.as_object());
+    of(map).or(pair).or_else(|| first.and_then(of)).or_else(|| about.and_then(of))
+}

@@ -1,0 +1,113 @@
+//! The orders in which pose estimators write their points: one table, a line per layout.
+
+/// A layout of points, told from the others by how many there are.
+#[derive(Debug, PartialEq)]
+pub struct Layout {
+    pub name: &'static str,
+    /// Points of a person in the file; those after `points` (face, hands) are not needed.
+    pub count: usize,
+    /// Short names, see [`full_name`]; empty for points that are not drawn.
+    pub points: &'static [&'static str],
+}
+
+pub const LAYOUTS: [Layout; 10] = [
+    Layout { name: "OpenPose MPI", count: 15, points: &MPI_15 },
+    Layout { name: "MPII", count: 16, points: &MPII_16 },
+    Layout { name: "COCO", count: 17, points: &COCO_17 },
+    Layout { name: "OpenPose COCO", count: 18, points: &OPENPOSE_18 },
+    Layout { name: "COCO with feet", count: 23, points: &COCO_23 },
+    Layout { name: "OpenPose BODY_25", count: 25, points: &BODY_25 },
+    Layout { name: "HALPE", count: 26, points: &HALPE_26 },
+    Layout { name: "MediaPipe", count: 33, points: &MEDIAPIPE_33 },
+    Layout { name: "COCO whole body", count: 133, points: &COCO_23 },
+    Layout { name: "HALPE whole body", count: 136, points: &HALPE_26 },
+];
+
+const MPI_15: [&str; 15] =
+    ["head top", "neck", "rs", "re", "rw", "ls", "le", "lw", "rh", "rk", "ra", "lh", "lk", "la", ""];
+const MPII_16: [&str; 16] = [
+    "ra", "rk", "rh", "lh", "lk", "la", "hip centre", "", "neck", "head top", "rw", "re", "rs", "ls", "le", "lw",
+];
+const COCO_17: [&str; 17] = [
+    "nose", "left eye", "right eye", "left ear", "right ear", "ls", "rs", "le", "re", "lw", "rw", "lh", "rh", "lk", "rk",
+    "la", "ra",
+];
+const OPENPOSE_18: [&str; 18] = [
+    "nose", "neck", "rs", "re", "rw", "ls", "le", "lw", "rh", "rk", "ra", "lh", "lk", "la", "right eye", "left eye",
+    "right ear", "left ear",
+];
+const COCO_23: [&str; 23] = [
+    "nose", "left eye", "right eye", "left ear", "right ear", "ls", "rs", "le", "re", "lw", "rw", "lh", "rh", "lk", "rk",
+    "la", "ra", "left big toe", "left small toe", "left heel", "right big toe", "right small toe", "right heel",
+];
+const BODY_25: [&str; 25] = [
+    "nose", "neck", "rs", "re", "rw", "ls", "le", "lw", "hip centre", "rh", "rk", "ra", "lh", "lk", "la", "right eye",
+    "left eye", "right ear", "left ear", "left big toe", "left small toe", "left heel", "right big toe",
+    "right small toe", "right heel",
+];
+const HALPE_26: [&str; 26] = [
+    "nose", "left eye", "right eye", "left ear", "right ear", "ls", "rs", "le", "re", "lw", "rw", "lh", "rh", "lk", "rk",
+    "la", "ra", "head top", "neck", "hip centre", "left big toe", "right big toe", "left small toe", "right small toe",
+    "left heel", "right heel",
+];
+const MEDIAPIPE_33: [&str; 33] = [
+    "nose", "", "left eye", "", "", "right eye", "", "left ear", "right ear", "", "", "ls", "rs", "le", "re", "lw", "rw",
+    "", "", "left hand", "right hand", "", "", "lh", "rh", "lk", "rk", "la", "ra", "left heel", "right heel",
+    "left big toe", "right big toe",
+];
+
+/// The names of the template `keypoints`, in the order in which readers give points.
+pub const NAMES: [&str; 28] = [
+    "nose", "left eye", "right eye", "left ear", "right ear", "head top", "neck", "hip centre", "left shoulder",
+    "right shoulder", "left elbow", "right elbow", "left wrist", "right wrist", "left hand", "right hand", "left hip",
+    "right hip", "left knee", "right knee", "left ankle", "right ankle", "left heel", "right heel", "left big toe",
+    "right big toe", "left small toe", "right small toe",
+];
+
+impl Layout {
+    /// The layout of so many points.
+    pub fn of(count: usize) -> Option<&'static Self> {
+        LAYOUTS.iter().find(|layout| layout.count == count)
+    }
+
+    /// Place of each point among [`NAMES`].
+    pub fn places(&self) -> impl Iterator<Item = Option<usize>> {
+        self.points.iter().map(|short| NAMES.iter().position(|name| *name == full_name(short)))
+    }
+}
+
+/// `ls` is `left shoulder` and so on.
+fn full_name(short: &str) -> String {
+    let mut letters = short.chars();
+    let (Some(side), Some(joint), None) = (letters.next(), letters.next(), letters.next()) else {
+        return short.into();
+    };
+    let side = if side == 'l' { "left" } else { "right" };
+    let joint = match joint {
+        's' => "shoulder",
+        'e' => "elbow",
+        'w' => "wrist",
+        'h' => "hip",
+        'k' => "knee",
+        _ => "ankle",
+    };
+    format!("{side} {joint}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_layout_has_the_limbs_of_both_sides_once() {
+        for layout in &LAYOUTS {
+            let places: Vec<usize> = layout.places().flatten().collect();
+            let named = layout.points.iter().filter(|point| !point.is_empty()).count();
+            assert_eq!(places.len(), named, "{}: an unknown name", layout.name);
+            for limb in 8..14 {
+                assert_eq!(places.iter().filter(|place| **place == limb).count(), 1, "{} {limb}", layout.name);
+            }
+            assert!(layout.points.len() <= layout.count);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! People followed through frames: by the file's own numbers, else by place.
+
+use std::collections::BTreeMap;
+
+use super::{document::Person, layouts::NAMES};
+
+/// A person's points in every frame.
+pub type Track = Vec<Vec<Option<[f64; 2]>>>;
+
+/// People who are kept: so many times the longest recording is all the memory that a crowd may ask for.
+const MOST: usize = 16;
+/// Frames without a person after which the next one there is somebody else.
+const FORGOTTEN_AFTER: usize = 30;
+/// Steps from frame to frame, as parts of the body's height.
+const WIDEST_STEP: f64 = 0.5;
+/// People seen for less than this part of the time of the one seen most are passers-by or false detections.
+const LEAST_SHARE: f64 = 0.1;
+
+struct Followed {
+    id: Option<i64>,
+    last: usize,
+    centre: [f64; 2],
+    height: f64,
+    heights: f64,
+    /// Frame and place in it.
+    seen: Vec<(usize, usize)>,
+}
+
+/// The people, the one seen most and largest first, and how many there are.
+pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
+    let mut all: Vec<Followed> = Vec::new();
+    let mut of_id: BTreeMap<i64, usize> = BTreeMap::new();
+    for (frame, people) in frames.iter().enumerate() {
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        let mut taken = vec![false; people.len()];
+        let mut used = vec![false; all.len()];
+        for (place, person) in people.iter().enumerate() {
+            let Some((centre, height)) = extent(person) else {
+                taken[place] = true;
+                continue;
+            };
+            if let Some(id) = person.id {
+                taken[place] = true;
+                let index = *of_id.entry(id).or_insert_with(|| {
+                    all.push(begun(Some(id), centre, height));
+                    used.push(false);
+                    all.len() - 1
+                });
+                add(&mut all[index], frame, place, centre, height);
+                continue;
+            }
+            for (index, track) in all.iter().enumerate() {
+                let recent = track.id.is_none() && frame - track.last <= FORGOTTEN_AFTER;
+                let step = (centre[0] - track.centre[0]).hypot(centre[1] - track.centre[1]);
+                let reach = WIDEST_STEP * height.max(track.height);
+                if recent && step <= reach {
+                    pairs.push((step, index, place));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, index, place) in pairs {
+            if !taken[place] && !used[index] {
+                (taken[place], used[index]) = (true, true);
+                if let Some((centre, height)) = extent(&people[place]) {
+                    add(&mut all[index], frame, place, centre, height);
+                }
+            }
+        }
+        for (place, person) in people.iter().enumerate().filter(|(place, _)| !taken[*place]) {
+            if let Some((centre, height)) = extent(person) {
+                let mut track = begun(None, centre, height);
+                add(&mut track, frame, place, centre, height);
+                all.push(track);
+            }
+        }
+    }
+    all.sort_by(|a, b| b.heights.total_cmp(&a.heights));
+    let longest = all.iter().map(|track| track.seen.len()).max().unwrap_or(0);
+    all.retain(|track| track.seen.len() as f64 >= LEAST_SHARE * longest as f64);
+    let count = all.len();
+    let points = |track: &Followed| {
+        let mut whole: Track = vec![Vec::new(); frames.len()];
+        for &(frame, place) in &track.seen {
+            whole[frame].clone_from(&frames[frame][place].points);
+        }
+        whole.iter_mut().filter(|points| points.is_empty()).for_each(|points| points.resize(NAMES.len(), None));
+        whole
+    };
+    (all.iter().take(MOST).map(points).collect(), count)
+}
+
+fn begun(id: Option<i64>, centre: [f64; 2], height: f64) -> Followed {
+    Followed { id, last: 0, centre, height, heights: 0.0, seen: Vec::new() }
+}
+
+fn add(track: &mut Followed, frame: usize, place: usize, centre: [f64; 2], height: f64) {
+    // One number twice in a frame: the first is kept.
+    if track.seen.last().is_some_and(|(last, _)| *last == frame) {
+        return;
+    }
+    (track.last, track.centre, track.height) = (frame, centre, height);
+    track.heights += height;
+    track.seen.push((frame, place));
+}
+
+/// The middle and the longer side of the box about a person's points; `None` with fewer than four.
+fn extent(person: &Person) -> Option<([f64; 2], f64)> {
+    let points: Vec<[f64; 2]> = person.points.iter().flatten().copied().collect();
+    let side = |k: usize| {
+        let values = || points.iter().map(|p| p[k]);
+        (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let [(left, right), (top, bottom)] = [side(0), side(1)];
+    let height = (right - left).max(bottom - top);
+    (points.len() >= 4 && height > 0.0).then_some(([0.5 * (left + right), 0.5 * (top + bottom)], height))
+}

@@ -1,0 +1,175 @@
+use super::super::{read, recording::Choices};
+use super::*;
+use layouts::{LAYOUTS, Layout};
+
+/// A person upright at x, 170 pixels tall, in a layout's order: 1 px is 10 mm.
+fn person(layout: &Layout, x: f64) -> Vec<[f64; 3]> {
+    let place = |name: &str| -> [f64; 2] {
+        let side = if name.starts_with("left") { 1.0 } else { -1.0 };
+        let own = name.trim_start_matches("left ").trim_start_matches("right ");
+        match own {
+            "nose" | "eye" | "ear" => [x + 3.0 * side, 30.0],
+            "head top" => [x, 20.0],
+            "neck" => [x, 48.0],
+            "shoulder" => [x + 18.0 * side, 50.0],
+            "elbow" => [x + 24.0 * side, 78.0],
+            "wrist" | "hand" => [x + 26.0 * side, 104.0],
+            "hip" => [x + 9.0 * side, 100.0],
+            "hip centre" => [x, 100.0],
+            "knee" => [x + 9.0 * side, 142.0],
+            "ankle" => [x + 9.0 * side, 184.0],
+            _ => [x + 11.0 * side, 190.0],
+        }
+    };
+    let mut points: Vec<[f64; 3]> = layout
+        .places()
+        .map(|name| name.map_or([1.0, 1.0, 0.9], |name| {
+            let [x, y] = place(NAMES[name]);
+            [x, y, 0.9]
+        }))
+        .collect();
+    points.resize(layout.count, [1.0, 1.0, 0.9]);
+    points
+}
+
+fn flat(points: &[[f64; 3]]) -> String {
+    let numbers: Vec<String> = points.iter().flatten().map(f64::to_string).collect();
+    format!("[{}]", numbers.join(","))
+}
+
+fn layout(count: usize) -> &'static Layout {
+    Layout::of(count).expect("a layout")
+}
+
+#[track_caller]
+fn upright(json: &str, frames: usize) -> super::super::recording::Recording {
+    let found = read(json.as_bytes(), "json", Choices::default()).unwrap_or_else(|error| panic!("{error}: {json}"));
+    assert_eq!(found.frames.len(), frames, "{json}");
+    let points = found.by_name(0);
+    let height = points["left shoulder"][2] - points["left ankle"][2];
+    assert!((height - 1340.0).abs() < 60.0, "{height} mm");
+    assert!(points["left shoulder"][0] > points["right shoulder"][0]);
+    assert!(found.planar && found.remarks()[0].contains("guess"), "{:?}", found.remarks());
+    found
+}
+
+#[test]
+fn openpose_files_of_all_layouts_are_one_frame_each() {
+    for layout in LAYOUTS.iter().filter(|layout| layout.count <= 26) {
+        let json = format!(
+            r#"{{"version":1.3,"people":[{{"person_id":[-1],"pose_keypoints_2d":{},"face_keypoints_2d":[]}}]}}"#,
+            flat(&person(layout, 100.0))
+        );
+        let found = upright(&json, 1);
+        assert!(found.remarks().iter().any(|remark| remark.contains(layout.name)), "{:?}", found.remarks());
+    }
+}
+
+#[test]
+fn a_folder_of_openpose_files_is_a_recording_with_empty_frames() {
+    let frame = |x: f64| format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(layout(25), x)));
+    let files = [frame(100.0), r#"{"people":[]}"#.into(), frame(104.0)];
+    let found = read_files(files.iter().map(String::as_bytes)).expect("keypoints").settled(Choices::default());
+    assert_eq!(found.frames.len(), 3);
+    assert!(found.by_name(1).is_empty());
+    let moved = found.by_name(2)["neck"][0] - found.by_name(0)["neck"][0];
+    assert!((moved - 40.0).abs() < 3.0, "{moved} mm");
+}
+
+#[test]
+fn coco_and_halpe_results_are_ordered_by_picture_and_gaps_are_empty() {
+    for count in [17, 26, 133, 136] {
+        let entry = |number: usize| {
+            format!(
+                r#"{{"image_id":"frame_{number}.jpg","category_id":1,"keypoints":{},"score":2.5,"idx":[[1.0]]}}"#,
+                flat(&person(layout(count), number as f64))
+            )
+        };
+        let json = format!("[{},{},{}]", entry(10), entry(9), entry(12));
+        let found = upright(&json, 4);
+        assert!(found.by_name(2).is_empty());
+        assert!(found.by_name(1)["left hip"][0] > found.by_name(0)["left hip"][0]);
+    }
+}
+
+#[test]
+fn coco_annotations_take_the_order_of_their_pictures() {
+    let json = format!(
+        r#"{{"images":[{{"id":7,"file_name":"b2.png","width":640,"height":480}},{{"id":3,"file_name":"b1.png"}}],
+            "annotations":[{{"image_id":7,"id":1,"keypoints":{},"num_keypoints":17}}]}}"#,
+        flat(&person(layout(17), 100.0))
+    );
+    let found = read(json.as_bytes(), "json", Choices::default()).expect("keypoints");
+    assert_eq!(found.frames.len(), 2);
+    assert!(found.by_name(0).is_empty() && !found.by_name(1).is_empty());
+}
+
+#[test]
+fn mediapipe_landmarks_are_parts_of_the_picture() {
+    let landmarks: Vec<String> = person(layout(33), 100.0)
+        .iter()
+        .map(|[x, y, _]| format!(r#"{{"x":{},"y":{},"z":-0.1,"visibility":0.98}}"#, x / 320.0, y / 200.0))
+        .collect();
+    let landmarks = landmarks.join(",");
+    for json in [
+        format!(r#"{{"width":320,"height":200,"frames":[{{"landmarks":[{landmarks}]}},{{"landmarks":[]}}]}}"#),
+        format!(r#"{{"width":320,"height":200,"frames":[{{"poseLandmarks":[[{landmarks}]]}},null]}}"#),
+        format!(r#"{{"width":320,"height":200,"frames":[{{"pose_landmarks":{{"landmark":[{landmarks}]}}}},{{}}]}}"#),
+    ] {
+        let found = upright(&json, 2);
+        assert!(found.remarks().iter().any(|remark| remark.contains("stated")), "{:?}", found.remarks());
+    }
+    // Without a size the shape is a guess, which is said.
+    let bare = format!("[[{landmarks}],[{landmarks}]]");
+    let found = read(bare.as_bytes(), "json", Choices::default()).expect("keypoints");
+    assert_eq!(found.frames.len(), 2);
+    assert!(found.remarks().iter().any(|remark| remark.contains("doubtful guess")), "{:?}", found.remarks());
+}
+
+#[test]
+fn mmpose_instances_with_scores_apart_are_read() {
+    let points: Vec<String> = person(layout(17), 50.0).iter().map(|[x, y, _]| format!("[{x},{y}]")).collect();
+    let mut scores = vec!["0.9"; 17];
+    scores[9] = "0.01";
+    let json = format!(
+        r#"{{"meta_info":{{}},"instance_info":[{{"frame_id":1,"instances":[{{"keypoints":[{}],"keypoint_scores":[{}]}}]}}]}}"#,
+        points.join(","), scores.join(",")
+    );
+    let found = upright(&json, 1);
+    assert!(!found.by_name(0).contains_key("left wrist"), "its score is 0.01");
+    assert!(found.remarks().iter().any(|remark| remark.contains("1 points below")), "{:?}", found.remarks());
+}
+
+#[test]
+fn several_people_are_followed_apart_and_counted() {
+    let of = |x: f64| format!(r#"{{"pose_keypoints_2d":{}}}"#, flat(&person(layout(25), x)));
+    // They stay apart while the file's order changes; the second comes later.
+    let frames: Vec<String> = (0..10)
+        .map(|n| {
+            let (a, b) = (of(100.0 + 2.0 * f64::from(n)), of(400.0 - 2.0 * f64::from(n)));
+            let people = if n < 3 { a } else if n % 2 == 0 { format!("{a},{b}") } else { format!("{b},{a}") };
+            format!(r#"{{"people":[{people}]}}"#)
+        })
+        .collect();
+    let json = format!(r#"{{"frames":[{}]}}"#, frames.join(","));
+    let found = upright(&json, 10);
+    assert!(found.remarks().iter().any(|remark| remark.starts_with("2 people")), "{:?}", found.remarks());
+    let x: Vec<f64> = (0..10).map(|n| found.by_name(n)["neck"][0]).collect();
+    assert!(x.windows(2).all(|pair| pair[1] > pair[0]), "{x:?}");
+    let choices = Choices { person: Some(2), ..Choices::default() };
+    let second = read(json.as_bytes(), "json", choices).expect("the second");
+    assert!(second.by_name(0).is_empty() && second.by_name(9)["neck"][0] < second.by_name(3)["neck"][0]);
+    let choices = Choices { person: Some(3), ..Choices::default() };
+    let error = read(json.as_bytes(), "json", choices).expect_err("two people").to_string();
+    assert!(error.contains('3') && error.contains('2'), "{error}");
+}
+
+#[test]
+fn other_json_is_refused_with_what_was_expected() {
+    for json in ["{}", "[]", "3", r#"{"people":[]}"#, r#"{"keypoints":[1,2,3]}"#, r#"{"a":{"b":[1]}}"#] {
+        let error = read(json.as_bytes(), "json", Choices::default()).expect_err(json).to_string();
+        assert!(error.contains("keypoints"), "{error}");
+    }
+    let error = read(b"{\n\"people\":", "json", Choices::default()).expect_err("cut short").to_string();
+    assert!(error.starts_with("line 2"), "{error}");
+}

@@ -1,0 +1,231 @@
+//! Other names of the points of built-in templates: programs name the same joints after the joint, the segment that begins there or
+//! the side first or last. A naming is one convention; where two conventions clash (`LeftShoulder` is the collar bone for one program and the
+//! shoulder joint for another), the one that explains more of a recording's names is used as a whole.
+
+use super::template::Template;
+
+/// A convention of names for the points of a template.
+struct Naming {
+    about: &'static str,
+    template: &'static str,
+    /// Simplified names and the template's; `#` is `left` or `right`, `@` is `l` or `r`.
+    names: &'static [(&'static str, &'static str)],
+}
+
+const NAMINGS: [Naming; 4] = [
+    Naming {
+        about: "joints named as Biovision and SMPL do",
+        template: "bvh",
+        names: &[
+            ("hips", "Hips"), ("pelvis", "Hips"), ("spine", "Spine"), ("chest", "Spine1"), ("chest2", "Spine2"),
+            ("chest3", "Spine3"), ("spine1", "Spine"), ("spine2", "Spine1"), ("spine3", "Spine2"),
+            ("neck", "Neck"), ("head", "Head"), ("headend", "Head_End"),
+            ("#hip", "#UpLeg"), ("@hip", "#UpLeg"), ("#knee", "#Leg"), ("@knee", "#Leg"), ("#ankle", "#Foot"),
+            ("@ankle", "#Foot"), ("#foot", "#ToeBase"), ("@foot", "#ToeBase"), ("#ankleend", "#ToeBase"),
+            ("#toe", "#ToeBase"), ("#toeend", "#ToeBase_End"), ("#footend", "#ToeBase_End"),
+            ("#shoulder", "#Arm"), ("@shoulder", "#Arm"), ("#elbow", "#ForeArm"), ("@elbow", "#ForeArm"),
+            ("#wrist", "#Hand"), ("@wrist", "#Hand"), ("#wristend", "#Hand_End"), ("#hand", "#Hand_End"),
+            ("@hand", "#Hand_End"), ("#handend", "#HandIndex1_End"),
+        ],
+    },
+    Naming {
+        about: "segments named as DAZ, 3ds Max, Unreal, Unity and Xsens do",
+        template: "bvh",
+        names: &[
+            ("hip", "Hips"), ("hips", "Hips"), ("pelvis", "Hips"), ("abdomen", "Spine"), ("abdomenlower", "Spine"),
+            ("abdomen2", "Spine1"), ("abdomenupper", "Spine1"), ("chest", "Spine2"), ("chestlower", "Spine2"),
+            ("chestupper", "Spine3"), ("upperchest", "Spine3"), ("spine", "Spine"), ("spine1", "Spine1"),
+            ("spine2", "Spine2"), ("spine3", "Spine3"), ("spine01", "Spine"), ("spine02", "Spine1"),
+            ("spine03", "Spine2"), ("l5", "Spine"), ("l3", "Spine1"), ("t12", "Spine2"), ("t8", "Spine3"),
+            ("neck", "Neck"), ("neck01", "Neck"), ("necklower", "Neck"), ("neckupper", "Neck1"), ("head", "Head"),
+            ("headend", "Head_End"), ("headnub", "Head_End"),
+            ("@shldr", "#Arm"), ("@shldrbend", "#Arm"), ("@upperarm", "#Arm"), ("upperarm@", "#Arm"),
+            ("#upperarm", "#Arm"), ("#arm", "#Arm"), ("@forearm", "#ForeArm"), ("@forearmbend", "#ForeArm"),
+            ("lowerarm@", "#ForeArm"), ("@lowerarm", "#ForeArm"), ("#lowerarm", "#ForeArm"),
+            ("#forearm", "#ForeArm"), ("@hand", "#Hand"), ("hand@", "#Hand"), ("#hand", "#Hand"),
+            ("@handend", "#Hand_End"), ("#handend", "#Hand_End"), ("@index1", "#HandIndex1"),
+            ("@mid1", "#HandMiddle1"), ("@thigh", "#UpLeg"), ("@thighbend", "#UpLeg"), ("thigh@", "#UpLeg"),
+            ("#thigh", "#UpLeg"), ("#upperleg", "#UpLeg"), ("#upleg", "#UpLeg"), ("@shin", "#Leg"),
+            ("#shin", "#Leg"), ("@calf", "#Leg"), ("calf@", "#Leg"), ("#lowerleg", "#Leg"), ("#leg", "#Leg"),
+            ("@foot", "#Foot"), ("foot@", "#Foot"), ("#foot", "#Foot"), ("@toe", "#ToeBase"),
+            ("@toe0", "#ToeBase"), ("ball@", "#ToeBase"), ("#toe", "#ToeBase"), ("#toes", "#ToeBase"),
+            ("#toebase", "#ToeBase"), ("@footend", "#ToeBase"), ("@toeend", "#ToeBase_End"),
+            ("#toeend", "#ToeBase_End"),
+        ],
+    },
+    Naming {
+        about: "keypoints named as OpenPose, HALPE and Pose2Sim do",
+        template: "keypoints",
+        names: &[
+            ("nose", "nose"), ("head", "head top"), ("headtop", "head top"), ("neck", "neck"), ("hip", "hip centre"),
+            ("midhip", "hip centre"), ("chip", "hip centre"), ("pelvis", "hip centre"), ("@eye", "# eye"),
+            ("#eye", "# eye"), ("@ear", "# ear"), ("#ear", "# ear"), ("@shoulder", "# shoulder"),
+            ("#shoulder", "# shoulder"), ("@elbow", "# elbow"), ("#elbow", "# elbow"), ("@wrist", "# wrist"),
+            ("#wrist", "# wrist"), ("@hip", "# hip"), ("#hip", "# hip"), ("@knee", "# knee"), ("#knee", "# knee"),
+            ("@ankle", "# ankle"), ("#ankle", "# ankle"), ("@heel", "# heel"), ("#heel", "# heel"),
+            ("@bigtoe", "# big toe"), ("#bigtoe", "# big toe"), ("#footindex", "# big toe"),
+            ("@smalltoe", "# small toe"), ("#smalltoe", "# small toe"), ("#index", "# hand"), ("@index", "# hand"),
+            ("@hand", "# hand"), ("#hand", "# hand"),
+        ],
+    },
+    Naming {
+        about: "laboratory markers named as OpenCap's augmenter does",
+        template: "opencap",
+        names: &[
+            ("@lelbow", "&_elbow_lat"), ("@melbow", "&_elbow_med"), ("@lwrist", "&_wrist_radius"),
+            ("@mwrist", "&_wrist_ulna"), ("@hjc", "&_HJC"),
+        ],
+    },
+];
+
+/// What programs put before or after the names of one body's points.
+const PREFIXES: [&str; 4] = ["mixamorig", "bip001", "bip01", "skeleton"];
+const SUFFIXES: [&str; 1] = ["study"];
+
+/// Names of a recording that are known under other names.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Aliases {
+    /// Place among the recording's names, and the name in the template.
+    pub names: Vec<(usize, String)>,
+    /// What was matched, for the user.
+    pub remark: String,
+}
+
+/// The points that built-in templates know under other names; nothing where a template fits as it is, or none does.
+pub fn find(names: &[String]) -> Option<Aliases> {
+    let templates = || Template::names().filter_map(|name| Template::named(name).ok());
+    if templates().any(|template| template.check(names).is_ok()) {
+        return None;
+    }
+    let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
+    let of = |template: &Template| -> Vec<Aliases> {
+        let table = |naming: Option<&Naming>| {
+            let found = matched(&simple, template, naming);
+            let (place, known) = found.first()?;
+            let about = naming.map_or("other spelling", |naming| naming.about);
+            let remark = format!(
+                "{} of {} names are matched by alias ({about}): `{}` is `{known}` of the template `{}`",
+                found.len(), names.len(), names[*place], template.name
+            );
+            let all: Vec<String> = found.iter().map(|(_, name)| name.clone()).collect();
+            template.check(&all).ok()?;
+            Some(Aliases { names: found, remark })
+        };
+        let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
+        std::iter::once(None).chain(namings.map(Some)).filter_map(table).collect()
+    };
+    // Of equals the first.
+    let all: Vec<Aliases> = templates().flat_map(|template| of(&template)).collect();
+    all.into_iter().rev().max_by_key(|aliases| aliases.names.len())
+}
+
+/// Each point of the template once, with the first of the recording's names that means it.
+fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> Vec<(usize, String)> {
+    let mut found: Vec<(usize, String)> = Vec::new();
+    let markers: Vec<&String> = template.parts.iter().flat_map(|part| &part.markers).collect();
+    let mut add = |place: usize, name: &str| {
+        if markers.iter().any(|marker| *marker == name) && found.iter().all(|(at, known)| *at != place && known != name) {
+            found.push((place, name.to_owned()));
+        }
+    };
+    for (place, name) in simple.iter().enumerate() {
+        for (theirs, ours) in naming.into_iter().flat_map(|naming| naming.names) {
+            for [side, short] in [["left", "l"], ["right", "r"]] {
+                if *name == theirs.replace('#', side).replace('@', short) {
+                    let capital = if side == "left" { "Left" } else { "Right" };
+                    let side = if template.name == "bvh" { capital } else { side };
+                    add(place, &ours.replace('#', side).replace('&', &short.to_uppercase()));
+                }
+            }
+        }
+        if naming.is_none_or(|naming| naming.template == "opencap") {
+            if let Some(marker) = markers.iter().find(|marker| simplified(marker) == *name) {
+                add(place, marker);
+            }
+        }
+    }
+    found
+}
+
+/// Small letters and digits only, without a subject's name before it.
+fn simplified(name: &str) -> String {
+    let own = name.rsplit_once(':').map_or(name, |(_, own)| own);
+    let mut simple: String =
+        own.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+    for prefix in PREFIXES {
+        if let Some(rest) = simple.strip_prefix(prefix).filter(|rest| !rest.is_empty()) {
+            simple = rest.to_owned();
+        }
+    }
+    for suffix in SUFFIXES {
+        if let Some(rest) = simple.strip_suffix(suffix).filter(|rest| !rest.is_empty()) {
+            simple = rest.to_owned();
+        }
+    }
+    simple
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn template_of(names: &str) -> (String, usize) {
+        let names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
+        let found = find(&names).unwrap_or_else(|| panic!("no template for {names:?}"));
+        let template = found.remark.rsplit('`').nth(1).expect("a name").to_owned();
+        (template, found.names.len())
+    }
+
+    #[test]
+    fn classic_names_of_other_programs_are_matched() {
+        for (names, template, count) in [
+            (
+                "Hips LeftHip LeftKnee LeftAnkle LeftAnkle_End RightHip RightKnee RightAnkle RightAnkle_End Chest LeftCollar \
+                 LeftShoulder LeftElbow LeftWrist LeftWrist_End RightCollar RightShoulder RightElbow RightWrist \
+                 RightWrist_End Neck Head Head_End",
+                "bvh", 21,
+            ),
+            (
+                "hip abdomen chest neck head leftEye rightEye rCollar rShldr rForeArm rHand lCollar lShldr lForeArm lHand \
+                 rThigh rShin rFoot lThigh lShin lFoot",
+                "bvh", 17,
+            ),
+            (
+                "hip pelvis lThighBend lThighTwist lShin lFoot lToe rThighBend rShin rFoot rToe abdomenLower abdomenUpper \
+                 chestLower chestUpper neckLower neckUpper head lCollar lShldrBend lForearmBend lHand rCollar rShldrBend \
+                 rForearmBend rHand",
+                "bvh", 22,
+            ),
+            (
+                "pelvis spine_01 spine_02 spine_03 neck_01 head upperarm_l lowerarm_l hand_l upperarm_r lowerarm_r hand_r \
+                 thigh_l calf_l foot_l ball_l thigh_r calf_r foot_r ball_r",
+                "bvh", 20,
+            ),
+            (
+                "Hip RHip RKnee RAnkle RBigToe RSmallToe RHeel LHip LKnee LAnkle LBigToe LSmallToe LHeel Neck Head Nose \
+                 RShoulder RElbow RWrist LShoulder LElbow LWrist",
+                "keypoints", 22,
+            ),
+            (
+                "Neck RShoulder LShoulder RHip LHip midHip RKnee LKnee r.ASIS_study L.ASIS_study r.PSIS_study L.PSIS_study \
+                 r_knee_study L_knee_study r_mknee_study r_ankle_study L_ankle_study r_toe_study L_toe_study r_5meta_study \
+                 L_5meta_study r_calc_study L_calc_study C7_study r_shoulder_study L_shoulder_study r_thigh1_study \
+                 L_thigh1_study r_thigh2_study L_thigh2_study r_sh2_study L_sh2_study r_sh3_study L_sh3_study \
+                 RHJC_study LHJC_study r_lelbow_study L_lelbow_study r_melbow_study L_melbow_study r_lwrist_study \
+                 L_lwrist_study r_mwrist_study L_mwrist_study",
+                "opencap", 35,
+            ),
+        ] {
+            let (found, matched) = template_of(names);
+            assert_eq!(found, template, "{names}");
+            assert!(matched >= count, "{matched} of {count}: {names}");
+        }
+    }
+
+    #[test]
+    fn names_that_fit_as_they_are_and_strange_ones_have_no_aliases() {
+        let kinect: Vec<String> = super::super::super::readers::kinect::JOINTS_25.iter().map(|n| (*n).into()).collect();
+        assert_eq!(find(&kinect), None);
+        assert_eq!(find(&["A".into(), "B".into(), "Head".into()]), None);
+    }
+}

@@ -1,0 +1,131 @@
+//! A recording as a room's camera makes it: nobody for a while, somebody who comes in and stands, a light that is switched meanwhile.
+
+use farnear_silhouettes::background::Frame;
+use farnear_silhouettes::mask::{
+    Mask,
+    extractor::{Extractor, ExtractorSettings, Learning},
+    subject::Flag,
+};
+use ndarray::Array3;
+
+const SIZE: (usize, usize) = (120, 160);
+
+/// Reproducible noise of about two grey levels.
+fn noise(frame: usize, row: usize, column: usize) -> f32 {
+    let hash = (frame * 7919 + row * 104_729 + column * 1_299_709).wrapping_mul(2_654_435_761) >> 16;
+    (hash % 7) as f32 - 3.0
+}
+
+/// Where the person is: nobody at first, then somebody comes in from the left, stands in the middle, and leaves to the right.
+fn place(frame: usize) -> Option<usize> {
+    match frame {
+        0..150 => None,
+        150..190 => Some(2 * (frame - 150)),
+        190..490 => Some(80 + (frame / 40) % 2),
+        490..525 => Some(80 + 2 * (frame - 490)),
+        _ => None,
+    }
+}
+
+/// Head, trunk and legs.
+fn person(frame: usize) -> Mask {
+    Mask::from_shape_fn(SIZE, |(row, column)| {
+        let Some(middle) = place(frame) else { return false };
+        let aside = (column as i32 - middle as i32).unsigned_abs() as usize;
+        match row {
+            25..37 => aside <= 5,
+            37..70 => aside <= 10,
+            70..108 => (2..=8).contains(&aside),
+            _ => false,
+        }
+    })
+}
+
+/// The picture, its light dimmed to 60 % in frames 300 to 399.
+fn picture(frame: usize) -> Array3<u8> {
+    let person = person(frame);
+    let light = if (300..400).contains(&frame) { 0.6 } else { 1.0 };
+    Array3::from_shape_fn((SIZE.0, SIZE.1, 3), |(row, column, channel)| {
+        let wall = 110.0 + 40.0 * ((row / 12 + column / 16) % 2) as f32 + 10.0 * channel as f32;
+        let clothes = [150.0, 60.0, 50.0][channel] + 15.0 * ((row / 9) % 2) as f32;
+        let level = if person[[row, column]] { clothes } else { wall };
+        (light * level + noise(frame, row, column)).clamp(0.0, 255.0) as u8
+    })
+}
+
+fn iou(a: &Mask, b: &Mask) -> f64 {
+    let both = a.iter().zip(b).filter(|(a, b)| **a && **b).count();
+    let any = a.iter().zip(b).filter(|(a, b)| **a || **b).count();
+    both as f64 / any.max(1) as f64
+}
+
+struct Seen {
+    /// Person frames, and those of them with a mask of IoU 0.7 or better.
+    person: usize,
+    masked: usize,
+    /// Frames without a person that have a mask.
+    ghosts: usize,
+    stopped: usize,
+    changes_of_light: usize,
+}
+
+fn seen(learning: Learning) -> Seen {
+    let first = picture(0);
+    let first = Frame::Rgb(first.view());
+    let settings = ExtractorSettings { learning, ..ExtractorSettings::for_frame(first) };
+    let mut extractor = Extractor::like(first, settings).expect("settings hold");
+    let mut seen = Seen { person: 0, masked: 0, ghosts: 0, stopped: 0, changes_of_light: 0 };
+    for frame in 0..600 {
+        let subject = extractor.extract(Frame::Rgb(picture(frame).view())).expect("a frame").subject;
+        if place(frame).is_some() {
+            seen.person += 1;
+            seen.masked += usize::from(iou(&subject.mask, &person(frame)) >= 0.7);
+            seen.stopped += usize::from(subject.flags.contains(&Flag::StoppedMoving));
+        } else {
+            seen.ghosts += usize::from(subject.bounds.is_some());
+        }
+    }
+    seen.changes_of_light = extractor.changes_of_light();
+    seen
+}
+
+#[test]
+fn a_person_who_stands_stays_in_the_masks_while_the_light_is_switched() {
+    let seen = seen(Learning::WhereNobodyIs);
+    assert!(seen.masked * 10 >= seen.person * 9, "{} of {} person frames", seen.masked, seen.person);
+    assert!(seen.ghosts <= 5, "{} frames with nobody have a mask", seen.ghosts);
+    assert!(seen.stopped >= 200, "{} frames are flagged as standing", seen.stopped);
+    assert_eq!(seen.changes_of_light, 2);
+}
+
+#[test]
+fn learning_is_limited_or_stopped_where_asked_for() {
+    let always = seen(Learning::Always);
+    assert!(always.masked * 2 < always.person, "{} of {}: who stands is absorbed", always.masked, always.person);
+    for learning in [Learning::Until(100), Learning::Never] {
+        let seen = seen(learning);
+        assert!(seen.masked * 10 >= seen.person * 9, "{learning:?}: {} of {}", seen.masked, seen.person);
+    }
+    assert_eq!("until:300".parse(), Ok(Learning::Until(300)));
+    assert_eq!("always".parse(), Ok(Learning::Always));
+    assert!("sometimes".parse::<Learning>().is_err());
+}
+
+#[test]
+fn what_stands_there_without_having_come_is_learned() {
+    let first = picture(0);
+    let first = Frame::Rgb(first.view());
+    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let mut areas = Vec::new();
+    for frame in 0..250 {
+        let mut picture = picture(frame % 100);
+        if frame >= 80 {
+            // A cupboard, put in while nobody looked.
+            picture.slice_mut(ndarray::s![40..100, 60..90, ..]).fill(230);
+        }
+        let subject = extractor.extract(Frame::Rgb(picture.view())).expect("a frame").subject;
+        areas.push(subject.mask.iter().filter(|set| **set).count());
+    }
+    assert!(areas[85] > 1500, "{}", areas[85]);
+    assert_eq!(areas[249], 0);
+}
