@@ -12,6 +12,7 @@ pub mod motion;
 pub mod multi_person;
 pub mod recognition;
 pub mod samples;
+pub mod sets;
 pub mod shipped;
 pub mod streaming;
 pub mod training;

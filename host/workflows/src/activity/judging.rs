@@ -29,6 +29,8 @@ pub struct JudgingSettings {
     pub self_training: usize,
     /// All views of a clip together, in place of each by itself.
     pub fused: bool,
+    /// Why a blind set is opened; without it one is refused.
+    pub open_blind: Option<String>,
     /// A new folder for confusion.png, confusion.md and wrong.csv.
     pub out: Option<PathBuf>,
 }
@@ -63,12 +65,12 @@ pub struct JudgingFigures {
     pub confusion: Confusion,
 }
 
-struct Judged<'a> {
+pub(super) struct Judged<'a> {
     clip: &'a Clip,
     view: usize,
     /// In the model's words.
-    truth: String,
-    answer: Answer,
+    pub truth: String,
+    pub answer: Answer,
 }
 
 /// Lets a model answer for all clips.
@@ -77,7 +79,7 @@ struct Judged<'a> {
 /// Samples that cannot be read, of which the model knows no activity, or which do not fit it.
 pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -> Result<JudgingFigures> {
     let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
-    let samples = Samples::read(&settings.samples, context)?;
+    let samples = Samples::read_opened(&settings.samples, settings.open_blind.as_deref(), context)?;
     let activities = model.activities();
     let name = |activity: &str| {
         settings.same.iter().find(|(own, _)| own == activity).map_or(activity, |(_, known)| known).to_owned()
@@ -128,7 +130,8 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
     Ok(figures)
 }
 
-fn answers<'a>(
+/// The answers for all clips, each view by itself unless they are fused.
+pub(super) fn answers<'a>(
     recogniser: &Recogniser,
     clips: &'a [Clip],
     fused: bool,

@@ -159,10 +159,14 @@ impl<'m> MultiPersonTracker<'m> {
         }
         let frames = Frames::open(&settings.view)?;
         Ok(Self {
-            remarks: super::views::remarks(
-                std::slice::from_ref(&settings.view),
-                std::slice::from_ref(&frames),
-            ),
+            remarks: model
+                .expectation()
+                .into_iter()
+                .chain(super::views::remarks(
+                    std::slice::from_ref(&settings.view),
+                    std::slice::from_ref(&frames),
+                ))
+                .collect(),
             frames,
             tracker: None,
             window: settings.window.unwrap_or(recogniser.typical_frames).max(1),

@@ -55,6 +55,11 @@ impl Model {
         Ok(Self { path: path.into(), recogniser, cut_out: None })
     }
 
+    /// What to expect of the model on a new set; `None` for a model from a file.
+    pub fn expectation(&self) -> Option<String> {
+        Self::shipped(&self.path).map(Shipped::expectation)
+    }
+
     fn shipped(path: &Path) -> Option<&'static Shipped> {
         path.to_str().and_then(Shipped::named).filter(|_| !path.exists())
     }
@@ -205,6 +210,7 @@ impl<'m> Recognition<'m> {
     /// [`ViewsError`], views that cannot be opened.
     pub fn begin(model: &'m Model, settings: &RecognitionSettings) -> Result<Self> {
         let path = &model.path;
+        let expectation = model.expectation();
         model.check_known(&settings.among)?;
         let first = settings.views.first().map(View::is_cut_out).transpose()?;
         let model = model.recogniser(first != Some(true));
@@ -217,12 +223,13 @@ impl<'m> Recognition<'m> {
         }
         let views = settings.views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
         let window = settings.window.unwrap_or(model.typical_frames).max(1);
+        let remarks = expectation.into_iter().chain(super::views::remarks(&settings.views, &views)).collect();
         Ok(Self {
             live: Live::new(model, window, true),
             among: settings.among.clone(),
             annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
             tracks: vec![Vec::new(); views.len()],
-            remarks: super::views::remarks(&settings.views, &views),
+            remarks,
             model,
             views,
             window,

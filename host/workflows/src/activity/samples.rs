@@ -6,6 +6,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
     fs,
+    io::Write,
     path::{Path, PathBuf},
 };
 
@@ -28,6 +29,8 @@ pub const SCALING: Scaling = Scaling::KeepAspect;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    /// Why the set must not be looked at but for a release.
+    blind: Option<String>,
     #[serde(rename = "sample", default)]
     samples: Vec<Sample>,
 }
@@ -52,6 +55,13 @@ fn first() -> u32 {
 pub enum SamplesError {
     #[error("it has no [[sample]] (masks, subject, activity, view)")]
     None,
+    /// A set that is kept for releases.
+    #[error(
+        "{}: the set is blind ({why}); it is opened for a release only: farnear activity evaluate --open-blind-set REASON", samples.display()
+    )]
+    Blind { samples: PathBuf, why: String },
+    #[error("cannot record the opening of a blind set in {}: {source}", file.display())]
+    Record { file: PathBuf, source: std::io::Error },
     /// A sample without a person or without an activity.
     #[error("a sample has an empty subject or activity")]
     Nameless,
@@ -140,11 +150,25 @@ pub fn are_full_frames(masks: &[Mask]) -> bool {
     masks.first().is_some_and(|mask| mask.dim() != (SIDE_PX, SIDE_PX))
 }
 
+/// Adds a line to `openings.csv` in a folder: when, by which version, what and why.
+fn record_opening(folder: &Path, path: &Path, reason: &str) -> Result<()> {
+    const FILE: &str = "openings.csv";
+    let file = folder.join(FILE);
+    let failed = |source| SamplesError::Record { file: file.clone(), source };
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "'").replace(['\n', '\r'], " "));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let time = crate::clock::now_rfc3339().unwrap_or_default();
+    let line = format!("{time},{},{},{}\n", env!("CARGO_PKG_VERSION"), quoted(&name), quoted(reason));
+    let new = !file.exists();
+    let mut opened = fs::OpenOptions::new().create(true).append(true).open(&file).map_err(failed)?;
+    let head = if new { "time,version,samples,reason\n" } else { "" };
+    Ok(opened.write_all(format!("{head}{line}").as_bytes()).map_err(failed)?)
+}
+
 /// What a file of samples lists.
-fn listed(path: &Path) -> Result<Vec<Sample>> {
+fn listed(path: &Path) -> Result<File> {
     let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
-    let file: File = toml::from_str(&text).about(|| path.display().to_string())?;
-    Ok(file.samples)
+    toml::from_str(&text).about(|| path.display().to_string())
 }
 
 impl Samples {
@@ -154,7 +178,7 @@ impl Samples {
     /// A file that cannot be read or understood.
     pub fn folders(path: &Path) -> Result<Vec<PathBuf>> {
         let base = path.parent().unwrap_or(Path::new(""));
-        Ok(listed(path)?.iter().map(|sample| base.join(&sample.masks)).collect())
+        Ok(listed(path)?.samples.iter().map(|sample| base.join(&sample.masks)).collect())
     }
 
     /// Reads a file of samples and describes all of its masks.
@@ -162,8 +186,24 @@ impl Samples {
     /// # Errors
     /// Files, folders and masks that cannot be read or hold nothing, samples of which some are full frames and others are not.
     pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
+        Self::read_opened(path, None, context)
+    }
+
+    /// As [`Self::read`]; with a reason blind sets too, and the opening is written to `openings.csv` next to the file.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; [`SamplesError::Blind`] without a reason, a record that cannot be written.
+    pub fn read_opened(path: &Path, reason: Option<&str>, context: &Context<'_>) -> Result<Self> {
         let base = path.parent().unwrap_or(Path::new(""));
-        Self::described(listed(path)?, base, path, context).about(|| path.display().to_string())
+        let file = listed(path)?;
+        if let Some(why) = file.blind {
+            let Some(reason) = reason.filter(|reason| !reason.trim().is_empty()) else {
+                return Err(SamplesError::Blind { samples: path.into(), why }.into());
+            };
+            record_opening(base, path, reason)?;
+            context.progress.warn(&format!("{}: this set is blind; its opening is recorded", path.display()));
+        }
+        Self::described(file.samples, base, path, context).about(|| path.display().to_string())
     }
 
     fn described(samples: Vec<Sample>, base: &Path, path: &Path, context: &Context<'_>) -> Result<Self> {
@@ -306,4 +346,44 @@ fn first_folders(samples: &[Sample], folders: &[PathBuf], count: usize) -> Vec<P
         }
     }
     found.into_values().take(count).cloned().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_files::masks;
+    use farnear_silhouettes::mask::Mask;
+
+    use super::*;
+    use crate::{Cancel, Unattended};
+
+    struct Silent;
+
+    impl crate::Progress for Silent {
+        fn info(&self, _what: &str) {}
+    }
+
+    #[test]
+    fn a_blind_set_is_refused_and_its_openings_are_recorded() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let masks = folder.path().join("m");
+        fs::create_dir(&masks).expect("a folder");
+        let mask = Mask::from_shape_fn((40, 30), |(row, column)| (10..35).contains(&row) && column > 20);
+        fs::write(masks.join("a.png"), masks::png(&mask).expect("a picture")).expect("written");
+        let samples = folder.path().join("samples.toml");
+        let text = "blind = \"kept for releases\"\n[[sample]]\nmasks = \"m\"\nsubject = \"a\"\nactivity = \"walk\"\n";
+        fs::write(&samples, text).expect("written");
+        let context = Context::new(&Silent, &Unattended, Cancel::default());
+        let error = Samples::read(&samples, &context).map(|_| ()).expect_err("blind").to_string();
+        assert!(error.contains("kept for releases") && error.contains("--open-blind-set"), "{error}");
+        assert!(Samples::read_opened(&samples, Some(" "), &context).is_err());
+        let openings = folder.path().join("openings.csv");
+        assert!(!openings.exists());
+        for reason in ["release 1", "release \"2\""] {
+            assert_eq!(Samples::read_opened(&samples, Some(reason), &context).expect("opened").clips.len(), 1);
+        }
+        let record = fs::read_to_string(openings).expect("a record");
+        let lines: Vec<&str> = record.lines().collect();
+        assert_eq!((lines.len(), lines[0]), (3, "time,version,samples,reason"));
+        assert!(lines[1].ends_with("\"samples.toml\",\"release 1\"") && lines[2].ends_with("\"release '2'\""), "{record}");
+    }
 }

@@ -13,6 +13,7 @@ use farnear_workflows::activity::{
     judging::{self, JudgingSettings},
     method::{Adaptation, Method},
     recognition::Model,
+    sets::{self, SetsSettings},
 };
 
 use serde::Serialize;
@@ -30,11 +31,13 @@ use crate::{report, terminal};
 /// --open-set leaves out activities in place of subjects: half of the subjects teach the others, the other half does all.
 ///
 /// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
-/// from the fraction of right answers, how many known and unknown activities it calls unknown.
+/// from the fraction of right answers, how many known and unknown activities it calls unknown. With --leave-one-set-out it is judged on several
+/// sets: what is measured on a set that set nothing is what to expect of a new one.
 #[derive(Args)]
 #[command(
     after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json\n\
-         \x20        farnear activity evaluate samples.toml --model everyday --same 'clap hands=clap' --out judged/"
+         \x20        farnear activity evaluate samples.toml --model everyday --same 'clap hands=clap' --out judged/\n\
+         \x20        farnear activity evaluate one/samples.toml --model everyday --leave-one-set-out two/samples.toml three/samples.toml"
 )]
 pub struct Arguments {
     /// The samples, TOML (see farnear activity train --help).
@@ -48,6 +51,12 @@ pub struct Arguments {
     /// Judge this model: a file, or the name of one that comes with the program.
     #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["leave_one_subject_out", "train", "mode", "epl", "classifier", "no_search", "features"])]
     model: Option<PathBuf>,
+    /// Judge the model on these sets too, each with a limit for unknown activities that the other sets give.
+    #[arg(long, value_name = "SAMPLES", num_args = 1.., requires = "model", conflicts_with_all = ["open_set", "adapt", "views", "out"])]
+    leave_one_set_out: Vec<PathBuf>,
+    /// Open sets whose samples file says that they are blind, and why; every opening is recorded in openings.csv next to the file.
+    #[arg(long, value_name = "REASON", requires = "model")]
+    open_blind_set: Option<String>,
     /// An activity's name in the samples and in the model, where they differ; may be repeated.
     #[arg(long, value_name = "SAMPLES=MODEL", requires = "model", value_parser = same)]
     same: Vec<(String, String)>,
@@ -86,12 +95,20 @@ fn same(text: &str) -> Result<(String, String), String> {
 /// # Errors
 /// See [`evaluation::evaluate`] and [`judging::judge`]; nothing to learn from.
 pub fn run(arguments: Arguments) -> Result<()> {
+    if let Some(model) = arguments.model.as_ref().filter(|_| !arguments.leave_one_set_out.is_empty()) {
+        let sets = [vec![arguments.samples], arguments.leave_one_set_out].concat();
+        let settings = SetsSettings { sets, same: arguments.same, open_blind: arguments.open_blind_set };
+        let context = terminal::counting(arguments.json)?;
+        let figures = sets::leave_one_set_out(&Model::read(model)?, &settings, &context)?;
+        return report::print(&figures, arguments.json);
+    }
     if let Some(model) = &arguments.model {
         let settings = JudgingSettings {
             samples: arguments.samples,
             same: arguments.same,
             fused: arguments.views == Some(Views::Fused),
             self_training: if arguments.adapt { ROUNDS } else { 0 },
+            open_blind: arguments.open_blind_set,
             out: arguments.out,
         };
         let figures = judging::judge(&Model::read(model)?, &settings, &terminal::counting(arguments.json)?)?;

@@ -38,7 +38,7 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
         let fused = views == Some(Views::Fused);
         let same = fields.texts("same").iter().map(|text| same(text)).collect::<Result<_, BatchError>>()?;
         inputs.extend(Model::file(&model).map(Path::to_path_buf));
-        let settings = JudgingSettings { samples, same, self_training, fused, out: None };
+        let settings = JudgingSettings { samples, same, self_training, fused, open_blind: None, out: None };
         return Ok(Box::new(Call { inputs, settings: (model, settings), run: judged }));
     }
     let others = fields.flag("leave_one_subject_out")?;

@@ -1,0 +1,198 @@
+//! Leave one set out: how a finished model, and thresholds set on other sets, do on a whole set that set nothing.
+//!
+//! A set may be blind: its samples file says so (`blind = "why"`). It is opened for a release only, by name of the reason, and every opening
+//! is written to `openings.csv` next to it.
+
+use std::path::{Path, PathBuf};
+
+use farnear_recognition::evaluation::calibration::{Reliability, area_under_roc};
+use farnear_recognition::unknown::Limits;
+use serde::Serialize;
+
+use super::{
+    judging::{Judged, answers},
+    recognition::Model,
+    samples::{Samples, SamplesError},
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
+
+#[derive(Clone, PartialEq, Debug)]
+pub struct SetsSettings {
+    /// A file of samples for each set, at least two.
+    pub sets: Vec<PathBuf>,
+    /// Names of activities in the samples and in the model where they differ.
+    pub same: Vec<(String, String)>,
+    /// Why blind sets are opened; without it they are refused.
+    pub open_blind: Option<String>,
+}
+
+/// One set, which set nothing.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SetFigures {
+    pub set: String,
+    pub answers: usize,
+    /// Share of answers in one view that is right, whatever the model could answer.
+    pub accuracy: f64,
+    /// The same if only activities of the set can be.
+    pub accuracy_among: f64,
+    /// Expected calibration error among the set's activities.
+    pub calibration_error_among: f64,
+    /// Share of known clips that is called unknown by the model's own limits.
+    pub unknown_of_known: f64,
+    /// The same by a limit that keeps the promise on the other sets together.
+    pub unknown_of_known_by_other_sets: f64,
+    /// That limit: an outlier score.
+    pub limit_of_other_sets: f64,
+    pub strangers: usize,
+    /// Share of unknown activities that is called unknown by the limit of the other sets; `None` without any.
+    pub unknown_of_strangers_by_other_sets: Option<f64>,
+    /// Area under the ROC curve of the outlier score; `None` without unknown activities.
+    pub outlier_auroc: Option<f64>,
+}
+
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SetsFigures {
+    /// Share of known clips that limits promise to call unknown at most.
+    pub promised_unknown_of_known: f64,
+    /// The largest share measured on a left-out set: what to expect of a new one.
+    pub worst_unknown_of_known: f64,
+    /// The same by limits set on the other sets.
+    pub worst_unknown_of_known_by_other_sets: f64,
+    pub sets: Vec<SetFigures>,
+}
+
+struct Measured {
+    name: String,
+    known: Vec<(f32, bool)>,
+    strange: Vec<f32>,
+    right: usize,
+    right_among: usize,
+    reliability: Reliability,
+}
+
+/// Judges a model on every set, with a limit for unknown activities from the other sets.
+///
+/// # Errors
+/// Fewer than two sets, blind ones without a reason, samples that cannot be read or of which the model knows no activity.
+pub fn leave_one_set_out(model: &Model, settings: &SetsSettings, context: &Context<'_>) -> Result<SetsFigures> {
+    if settings.sets.len() < 2 {
+        return Err(WorkflowError::parameter("sets", settings.sets.len(), "at least 2, each a file of samples"));
+    }
+    let measured = settings
+        .sets
+        .iter()
+        .map(|path| measured(model, path, settings, context))
+        .collect::<Result<Vec<Measured>>>()?;
+    let sets: Vec<SetFigures> = (0..measured.len()).map(|left_out| figures(&measured, left_out)).collect();
+    let worst = |of: fn(&SetFigures) -> f64| sets.iter().map(of).fold(0.0, f64::max);
+    Ok(SetsFigures {
+        promised_unknown_of_known: rounded(f64::from(Limits::FALSE_ALARMS), 4),
+        worst_unknown_of_known: worst(|set| set.unknown_of_known),
+        worst_unknown_of_known_by_other_sets: worst(|set| set.unknown_of_known_by_other_sets),
+        sets,
+    })
+}
+
+fn measured(model: &Model, path: &Path, settings: &SetsSettings, context: &Context<'_>) -> Result<Measured> {
+    let samples = Samples::read_opened(path, settings.open_blind.as_deref(), context)?;
+    let name = |activity: &str| {
+        settings.same.iter().find(|(own, _)| own == activity).map_or(activity, |(_, known)| known).to_owned()
+    };
+    let recogniser = model.recogniser(samples.full_frames);
+    let judged = answers(recogniser, &samples.clips, false, &name, context)?;
+    let (known, strange): (Vec<Judged>, Vec<Judged>) =
+        judged.into_iter().partition(|judged| model.activities().contains(&judged.truth));
+    if known.is_empty() {
+        let mut found: Vec<String> = strange.iter().map(|judged| judged.truth.clone()).collect();
+        found.sort();
+        found.dedup();
+        let known = model.activities().to_vec();
+        return Err(SamplesError::NothingInCommon { samples: path.into(), found, known }.into());
+    }
+    let mut among: Vec<String> = known.iter().map(|judged| judged.truth.clone()).collect();
+    among.sort();
+    among.dedup();
+    let mut measured = Measured {
+        name: path.parent().and_then(Path::file_name).unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+        known: Vec::new(),
+        strange: strange.iter().map(|judged| judged.answer.outlier_score).collect(),
+        right: 0,
+        right_among: 0,
+        reliability: Reliability::default(),
+    };
+    for judged in &known {
+        let answer = judged.answer.among(&among);
+        let right = judged.answer.best() == Some(&judged.truth);
+        let right_among = answer.best() == Some(&judged.truth);
+        measured.right += usize::from(right);
+        measured.right_among += usize::from(right_among);
+        measured.reliability.count(answer.confidence, right_among);
+        measured.known.push((judged.answer.outlier_score, right_among));
+    }
+    Ok(measured)
+}
+
+fn figures(measured: &[Measured], left_out: usize) -> SetFigures {
+    let set = &measured[left_out];
+    // Each set counts as much as any other, however many clips it has.
+    let others: Vec<&Measured> =
+        measured.iter().enumerate().filter(|(index, _)| *index != left_out).map(|(_, set)| set).collect();
+    let largest = others.iter().map(|set| set.known.len()).max().unwrap_or(1);
+    let scored: Vec<(usize, f32)> = others
+        .iter()
+        .flat_map(|set| set.known.iter().map(|(score, _)| (0, *score)).cycle().take(largest))
+        .collect();
+    let limit = Limits::conformal(&scored, 1, Limits::FALSE_ALARMS).distances[0];
+    let share = |count: usize, of: usize| rounded(count as f64 / of.max(1) as f64, 4);
+    let beyond = |scores: &[f32], limit: f32| scores.iter().filter(|score| **score > limit).count();
+    let known: Vec<f32> = set.known.iter().map(|(score, _)| *score).collect();
+    let any = !set.strange.is_empty();
+    SetFigures {
+        set: set.name.clone(),
+        answers: known.len(),
+        accuracy: share(set.right, known.len()),
+        accuracy_among: share(set.right_among, known.len()),
+        calibration_error_among: rounded(set.reliability.expected_error(), 4),
+        unknown_of_known: share(beyond(&known, 1.0), known.len()),
+        unknown_of_known_by_other_sets: share(beyond(&known, limit), known.len()),
+        limit_of_other_sets: rounded(f64::from(limit), 4),
+        strangers: set.strange.len(),
+        unknown_of_strangers_by_other_sets: any
+            .then(|| share(beyond(&set.strange, limit), set.strange.len())),
+        outlier_auroc: any.then(|| rounded(area_under_roc(&known, &set.strange), 4)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(name: &str, scores: impl Iterator<Item = f32>) -> Measured {
+        Measured {
+            name: name.into(),
+            known: scores.map(|score| (score, true)).collect(),
+            strange: vec![5.0, 6.0],
+            right: 10,
+            right_among: 20,
+            reliability: Reliability::default(),
+        }
+    }
+
+    #[test]
+    fn the_limit_comes_from_the_other_sets_alone() {
+        // The first set's scores are twice as high; the others promise 5 % among themselves.
+        let scores = |factor: f32| (0..100).map(move |n| factor * n as f32 / 100.0);
+        let sets = [set("far", scores(2.0)), set("a", scores(1.0)), set("b", scores(1.0))];
+        let far = figures(&sets, 0);
+        assert!((far.limit_of_other_sets - 0.95).abs() < 0.03, "{far:?}");
+        assert!((far.unknown_of_known_by_other_sets - 0.52).abs() < 0.03, "{far:?}");
+        assert!((far.unknown_of_known - 0.49).abs() < 0.02, "{far:?}");
+        assert_eq!((far.unknown_of_strangers_by_other_sets, far.outlier_auroc), (Some(1.0), Some(1.0)));
+        let near = figures(&sets, 1);
+        assert!(near.limit_of_other_sets > 1.5 && near.unknown_of_known_by_other_sets == 0.0, "{near:?}");
+    }
+}
