@@ -7,6 +7,7 @@
 
 mod kernel;
 pub mod light;
+pub mod shake;
 mod model;
 mod settings;
 

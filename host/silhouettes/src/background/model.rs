@@ -5,6 +5,7 @@ use pulp::Arch;
 
 use super::{
     kernel::{self, TILE, Update},
+    shake::{self, Shift},
     settings::{Settings, SettingsError},
 };
 
@@ -258,6 +259,39 @@ impl BackgroundModel {
             }
         }
         pairs
+    }
+
+    /// By how many whole pixels the frame is shifted against the background: 0 where no shift explains it clearly better.
+    #[must_use]
+    pub fn shift(&self, frame: Frame<'_>, step: usize) -> Shift {
+        let (height, width) = self.size;
+        let reach = shake::REACH_PX.min(height.min(width) as isize / 8);
+        let margin = reach as usize;
+        let channel = self.channels / 2;
+        let mut places = Vec::new();
+        for row in (margin..height.saturating_sub(margin)).step_by(step) {
+            for column in (margin..width.saturating_sub(margin)).step_by(step) {
+                places.push((row, column, f32::from(self.mean(row * width + column, channel))));
+            }
+        }
+        let off = |(down, right): Shift| -> f32 {
+            let of = |&(row, column, level): &(usize, usize, f32)| {
+                let (row, column) = (row.wrapping_add_signed(down), column.wrapping_add_signed(right));
+                let found = match frame {
+                    Frame::Grey(pixels) => pixels[[row, column]],
+                    Frame::Rgb(pixels) => pixels[[row, column, channel]],
+                };
+                (f32::from(found) - level).abs().min(shake::MOST)
+            };
+            places.iter().map(of).sum::<f32>() / places.len().max(1) as f32
+        };
+        let still = off((0, 0));
+        if still < shake::STILL {
+            return (0, 0);
+        }
+        let all = (-reach..=reach).flat_map(|down| (-reach..=reach).map(move |right| (down, right)));
+        let best = all.map(|shift| (off(shift), shift)).min_by(|a, b| a.0.total_cmp(&b.0));
+        best.filter(|(left, _)| *left <= shake::BETTER * still).map_or((0, 0), |(_, shift)| shift)
     }
 
     fn mean(&self, pixel: usize, channel: usize) -> u8 {

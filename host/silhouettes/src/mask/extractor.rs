@@ -5,7 +5,7 @@
 use ndarray::Array2;
 
 use super::{
-    Mask,
+    BoundingBox, Mask,
     cleaning::Cleaning,
     feedback::Feedback,
     people::{Person, people},
@@ -14,6 +14,7 @@ use super::{
 use crate::background::{
     BackgroundError, BackgroundModel, Frame, Label, Settings,
     light::{Light, STEP_PX},
+    shake::{self, Shift},
 };
 
 /// Which frames and pixels teach the background.
@@ -117,6 +118,8 @@ pub struct Extractor {
 struct Sighted {
     people: Result<(Mask, Vec<Person>), Flag>,
     labels: Array2<Label>,
+    /// By how much the frame was moved back.
+    shift: Shift,
 }
 
 /// Learning rate after the scene has changed.
@@ -157,7 +160,7 @@ impl Extractor {
     /// # Errors
     /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
-        let Sighted { people, labels } = self.sighted(frame)?;
+        let Sighted { people, labels, shift } = self.sighted(frame)?;
         let mut subject = match people {
             Ok((_, people)) => self.chooser.among(people, labels.dim()),
             Err(flag) => {
@@ -167,13 +170,25 @@ impl Extractor {
         if subject.bounds.is_some_and(|bounds| self.feedback.stopped(bounds)) {
             subject.flags.push(Flag::StoppedMoving);
         }
+        if shift != (0, 0) {
+            subject.mask = shake::moved_forth(&subject.mask, shift, false);
+            subject.bounds = subject.bounds.and_then(|_| BoundingBox::of(subject.mask.view()));
+            return Ok(Extracted { subject, labels: shake::moved_forth(&labels, shift, Label::Background) });
+        }
         Ok(Extracted { subject, labels })
     }
 
     /// As [`Self::extract`], for whoever wants all that moves and not one subject.
     pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
-        let Sighted { people, labels } = self.sighted(frame)?;
-        Ok(Moving { mask: people.map(|(mask, _)| mask), labels })
+        let Sighted { people, labels, shift } = self.sighted(frame)?;
+        let moving = Moving { mask: people.map(|(mask, _)| mask), labels };
+        if shift == (0, 0) {
+            return Ok(moving);
+        }
+        Ok(Moving {
+            mask: moving.mask.map(|mask| shake::moved_forth(&mask, shift, false)),
+            labels: shake::moved_forth(&moving.labels, shift, Label::Background),
+        })
     }
 
     /// How often the light of the whole scene has changed suddenly.
@@ -197,27 +212,37 @@ impl Extractor {
         let alone = self.settings.learning != Learning::Always;
         let known = self.model.frames_seen() >= self.settings.learning_frames.max(1);
         let same_kind = frame.size() == self.model.size() && frame.channels() == self.model.channels();
-        if alone && known && same_kind {
-            let pairs = self.model.compared(frame, STEP_PX);
-            if let Some(light) = self.light.changed(&pairs) {
-                self.light = light;
-                self.changes_of_light += 1;
-            }
+        if !(alone && known && same_kind) {
+            return self.sighted_in_place(frame, (0, 0));
         }
-        match if same_kind { self.light.relit(frame) } else { None } {
-            Some(relit) => self.sighted_in_old_light(relit.frame()),
-            None => self.sighted_in_old_light(frame),
+        let shift = self.model.shift(frame, STEP_PX);
+        if shift != (0, 0) {
+            let back = shake::moved_back(frame, shift);
+            return self.sighted_in_old_light(back.frame(), shift);
+        }
+        self.sighted_in_old_light(frame, shift)
+    }
+
+    fn sighted_in_old_light(&mut self, frame: Frame<'_>, shift: Shift) -> Result<Sighted, BackgroundError> {
+        let pairs = self.model.compared(frame, STEP_PX);
+        if let Some(light) = self.light.changed(&pairs) {
+            self.light = light;
+            self.changes_of_light += 1;
+        }
+        match self.light.relit(frame) {
+            Some(relit) => self.sighted_in_place(relit.frame(), shift),
+            None => self.sighted_in_place(frame, shift),
         }
     }
 
-    fn sighted_in_old_light(&mut self, frame: Frame<'_>) -> Result<Sighted, BackgroundError> {
+    fn sighted_in_place(&mut self, frame: Frame<'_>, shift: Shift) -> Result<Sighted, BackgroundError> {
         let alone = self.settings.learning != Learning::Always;
         let rate = self.rate();
         let held = if alone { self.feedback.held() } else { None };
         let labels = self.model.apply_outside(frame, rate, held)?;
         let moving = labels.mapv(|label| label == Label::Foreground);
         if self.model.frames_seen() <= self.settings.learning_frames {
-            return Ok(Sighted { people: Err(Flag::Learning), labels });
+            return Ok(Sighted { people: Err(Flag::Learning), labels, shift });
         }
         let share = super::area(moving.view()) as f64 / moving.len() as f64;
         if share >= self.settings.scene_change_share {
@@ -226,14 +251,14 @@ impl Extractor {
                 self.model.apply_at(frame, ANEW)?;
             }
             let flag = Flag::SceneChanged { moving_percent: (100.0 * share) as u8 };
-            return Ok(Sighted { people: Err(flag), labels });
+            return Ok(Sighted { people: Err(flag), labels, shift });
         }
         let mask = self.settings.cleaning.clean(moving.view());
         let people = people(mask.view(), &self.settings.subject);
         if alone {
             self.feedback.follow(&people, frame, || self.model.background());
         }
-        Ok(Sighted { people: Ok((mask, people)), labels })
+        Ok(Sighted { people: Ok((mask, people)), labels, shift })
     }
 
     /// The background model, for its picture of the empty scene.
@@ -246,7 +271,6 @@ impl Extractor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mask::BoundingBox;
     use ndarray::Array2;
 
     const SIZE: (usize, usize) = (120, 160);

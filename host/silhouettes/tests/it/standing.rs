@@ -129,3 +129,29 @@ fn what_stands_there_without_having_come_is_learned() {
     assert!(areas[85] > 1500, "{}", areas[85]);
     assert_eq!(areas[249], 0);
 }
+
+#[test]
+fn a_shaking_camera_is_registered() {
+    // The picture without its rim, moved by up to 3 pixels either way.
+    let shaken = |frame: usize| {
+        let (down, right) = if frame < 60 { (3, 3) } else { (frame * 5 % 7, frame * 3 % 7) };
+        let cut = ndarray::s![down..SIZE.0 - 6 + down, right..SIZE.1 - 6 + right, ..];
+        let mask = person(frame + 100);
+        let truth = mask.slice(ndarray::s![down..SIZE.0 - 6 + down, right..SIZE.1 - 6 + right]).to_owned();
+        (picture(frame + 100).slice(cut).to_owned(), truth)
+    };
+    let first = shaken(0).0;
+    let first = Frame::Rgb(first.view());
+    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    let (mut person, mut masked) = (0, 0);
+    for frame in 0..180 {
+        let (picture, truth) = shaken(frame);
+        let subject = extractor.extract(Frame::Rgb(picture.view())).expect("a frame").subject;
+        // Somebody comes in in frame 50.
+        if frame >= 65 {
+            person += 1;
+            masked += usize::from(iou(&subject.mask, &truth) >= 0.7);
+        }
+    }
+    assert!(masked * 10 >= person * 9, "{masked} of {person}");
+}

@@ -89,8 +89,7 @@ impl Document {
 
     fn frames_of(&mut self, items: &[Value]) {
         // The points of one person alone, or people of one frame.
-        let single = Value::Array(items.to_vec());
-        if let Some(person) = self.points(&single, None) {
+        if let Some(person) = self.points_of(items, None) {
             self.frames.push(vec![Person { points: person, id: None }]);
             return;
         }
@@ -149,7 +148,7 @@ impl Document {
                 // Several people's landmarks in one list.
                 let several = POINTS.iter().find_map(|key| map.get(*key)?.as_array());
                 if let Some(items) = several
-                    && self.points(&Value::Array(items.clone()), None).is_none()
+                    && self.points_of(items, None).is_none()
                 {
                     return items.iter().filter_map(|item| self.person(item)).collect();
                 }
@@ -174,9 +173,12 @@ impl Document {
         Some(Person { points: found, id: id.filter(|id| *id >= 0.0).map(|id| id as i64) })
     }
 
-    /// Points in any of the forms x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
     fn points(&mut self, value: &Value, confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
-        let items = value.as_array()?;
+        self.points_of(value.as_array()?, confidences)
+    }
+
+    /// Points in any of the forms x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
+    fn points_of(&mut self, items: &[Value], confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
         let number = |value: &Value| value.as_f64().unwrap_or(0.0);
         let flat = items.first()?.is_number();
         let (layout, triples): (_, Vec<[f64; 3]>) = if flat {

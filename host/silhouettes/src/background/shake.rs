@@ -1,0 +1,49 @@
+//! A camera that shakes: whole pixels by which a frame is shifted against the background.
+
+use ndarray::{Array, Array2, ArrayBase, Axis, Data, Dimension, Ix2, Ix3, RemoveAxis};
+
+use super::Frame;
+use super::light::Relit;
+
+/// Widest shift that is looked for, pixels.
+pub const REACH_PX: isize = 6;
+/// Mean difference below which a frame lies well on the background, grey levels.
+pub const STILL: f32 = 6.0;
+/// A shift must leave at most this part of the difference.
+pub const BETTER: f32 = 0.7;
+/// Differences count up to this, so that a person does not decide.
+pub const MOST: f32 = 40.0;
+
+/// Rows down and columns to the right.
+pub type Shift = (isize, isize);
+
+/// A frame moved back by its shift; its edge is repeated.
+pub fn moved_back(frame: Frame<'_>, shift: Shift) -> Relit {
+    match frame {
+        Frame::Grey(pixels) => Relit::Grey(moved::<_, Ix2>(&pixels, shift)),
+        Frame::Rgb(pixels) => Relit::Rgb(moved::<_, Ix3>(&pixels, shift)),
+    }
+}
+
+/// What stands at a place plus the shift, at every place.
+fn moved<S, D>(pixels: &ArrayBase<S, D>, (down, right): Shift) -> Array<u8, D>
+where
+    S: Data<Elem = u8>,
+    D: Dimension + RemoveAxis,
+{
+    let from = |size: usize, by: isize| -> Vec<usize> {
+        (0..size as isize).map(|at| (at + by).clamp(0, size as isize - 1) as usize).collect()
+    };
+    let rows = pixels.select(Axis(0), &from(pixels.shape()[0], down));
+    rows.select(Axis(1), &from(pixels.shape()[1], right))
+}
+
+/// A mask or labels in the frame's own place: what lies outside is `empty`.
+pub fn moved_forth<T: Copy>(mask: &Array2<T>, (down, right): Shift, empty: T) -> Array2<T> {
+    let (height, width) = mask.dim();
+    Array2::from_shape_fn((height, width), |(row, column)| {
+        let place = (row as isize - down, column as isize - right);
+        let inside = (0..height as isize).contains(&place.0) && (0..width as isize).contains(&place.1);
+        if inside { mask[[place.0 as usize, place.1 as usize]] } else { empty }
+    })
+}

@@ -1,0 +1,117 @@
+//! C3D files made here: recordings beyond 65,535 frames, trimmed headers, and units that nobody knows.
+
+use farnear_silhouettes::readers::{
+    self,
+    recording::{Choices, Recording, RecordingError, Unit},
+};
+
+/// A file of one marker that moves by 1 unit a frame.
+struct Made {
+    frames: usize,
+    /// First and last frame by the header.
+    header: (u16, u16),
+    /// `TRIAL:ACTUAL_START_FIELD` and `ACTUAL_END_FIELD`.
+    trial: Option<(u32, u32)>,
+    /// `POINT:FRAMES` as a real number.
+    point_frames: Option<f32>,
+    units: &'static str,
+}
+
+impl Default for Made {
+    fn default() -> Self {
+        Self { frames: 10, header: (1, 10), trial: None, point_frames: None, units: "mm" }
+    }
+}
+
+fn group(bytes: &mut Vec<u8>, name: &str, id: i8) {
+    bytes.extend([name.len() as u8, -id as u8]);
+    bytes.extend(name.as_bytes());
+    bytes.extend(3_u16.to_le_bytes());
+    bytes.push(0);
+}
+
+fn parameter(bytes: &mut Vec<u8>, name: &str, group: u8, element: i8, dimensions: &[u8], data: &[u8]) {
+    bytes.extend([name.len() as u8, group]);
+    bytes.extend(name.as_bytes());
+    bytes.extend((5 + dimensions.len() as u16 + data.len() as u16).to_le_bytes());
+    bytes.extend([element as u8, dimensions.len() as u8]);
+    bytes.extend(dimensions);
+    bytes.extend(data);
+    bytes.push(0);
+}
+
+impl Made {
+    fn bytes(&self) -> Vec<u8> {
+        let mut header = vec![0_u8; 512];
+        let mut word = |number: usize, value: u16| {
+            header[2 * (number - 1)..2 * number].copy_from_slice(&value.to_le_bytes());
+        };
+        (word(1, 0x5002), word(2, 1), word(3, 0));
+        (word(4, self.header.0), word(5, self.header.1), word(9, 4));
+        header[12..16].copy_from_slice(&(-1.0_f32).to_le_bytes());
+        header[20..24].copy_from_slice(&100.0_f32.to_le_bytes());
+        let mut section = vec![0, 0, 2, 84];
+        group(&mut section, "POINT", 1);
+        group(&mut section, "TRIAL", 2);
+        parameter(&mut section, "LABELS", 1, -1, &[4, 1], b"HEAD");
+        parameter(&mut section, "UNITS", 1, -1, &[self.units.len() as u8], self.units.as_bytes());
+        if let Some((first, last)) = self.trial {
+            for (name, value) in [("ACTUAL_START_FIELD", first), ("ACTUAL_END_FIELD", last)] {
+                parameter(&mut section, name, 2, 2, &[2], &value.to_le_bytes());
+            }
+        }
+        if let Some(frames) = self.point_frames {
+            parameter(&mut section, "FRAMES", 1, 4, &[], &frames.to_le_bytes());
+        }
+        section.resize(1024, 0);
+        let frame = |n: usize| [n as f32 + 1.0, 500.0, 1700.0, 0.0].map(f32::to_le_bytes).concat();
+        [header, section, (0..self.frames).flat_map(frame).collect()].concat()
+    }
+
+    fn read(&self, choices: Choices) -> Result<Recording, RecordingError> {
+        readers::read(&self.bytes(), "c3d", choices)
+    }
+}
+
+#[track_caller]
+fn whole(made: &Made) -> Vec<String> {
+    let found = made.read(Choices::default()).expect("a recording");
+    assert_eq!(found.frames.len(), made.frames);
+    let last = found.by_name(made.frames - 1)["HEAD"][0];
+    assert_eq!(last, made.frames as f64);
+    found.remarks()
+}
+
+#[test]
+fn recordings_beyond_the_sixteen_bits_of_the_header_are_read_whole() {
+    // The header wraps round, stops at its largest number, or counts what is left of 65,536.
+    for header in [(1, 4464), (1, 65_535), (1, 0)] {
+        for (trial, point_frames) in [(Some((1, 70_000)), None), (None, Some(70_000.0))] {
+            let made = Made { frames: 70_000, header, trial, point_frames, ..Made::default() };
+            let remarks = whole(&made);
+            assert!(remarks.iter().any(|remark| remark.contains("70000")), "{header:?}: {remarks:?}");
+        }
+    }
+    let without = Made { frames: 70_000, header: (1, 4464), ..Made::default() };
+    assert!(!whole(&without).is_empty(), "room for one turn of the header more");
+}
+
+#[test]
+fn a_trimmed_header_yields_to_the_parameters_and_what_is_left_over_is_reported() {
+    let trimmed = Made { frames: 500, header: (1, 1), trial: Some((101, 600)), ..Made::default() };
+    assert!(whole(&trimmed)[0].contains("the header counts 1 frames, 500"));
+    let more = Made { frames: 500, header: (1, 100), ..Made::default() };
+    let found = more.read(Choices::default()).expect("a recording");
+    assert_eq!(found.frames.len(), 100);
+    assert!(found.remarks()[0].contains("room for 500 frames, 100"), "{:?}", found.remarks());
+    assert!(whole(&Made::default()).is_empty());
+}
+
+#[test]
+fn the_callers_unit_wins_over_one_that_nobody_knows() {
+    let made = Made { units: "mete", ..Made::default() };
+    let error = made.read(Choices::default()).expect_err("an unknown unit").to_string();
+    assert!(error.contains("mete"), "{error}");
+    let choices = Choices { unit: Some(Unit { mm: 10.0 }), ..Choices::default() };
+    assert_eq!(made.read(choices).expect("a recording").by_name(0)["HEAD"], [10.0, 5000.0, 17_000.0]);
+}
