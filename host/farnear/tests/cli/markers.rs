@@ -302,7 +302,7 @@ fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
     assert!(!folder.path("none").exists());
 }
 
-/// A frame of OpenPose with somebody upright at x, 1 px to a centimetre, and whoever else is named.
+/// A frame of OpenPose with a person upright at every x, 1 px to a centimetre.
 fn openpose(people: &[f64]) -> String {
     let upright = [
         (0.0, 30.0), (0.0, 48.0), (-18.0, 50.0), (-24.0, 78.0), (-26.0, 104.0), (18.0, 50.0), (24.0, 78.0), (26.0, 104.0),
@@ -345,5 +345,5 @@ fn a_folder_of_openpose_files_gives_masks_of_its_view_and_samples() {
     let found = figures(farnear(&["silhouettes", "markers", &poses, "--person", "2", "--out"]).args([&second, "--json"]));
     assert_eq!(number(&found, "silhouettes"), 8.0);
     let third = ["silhouettes", "markers", &poses, "--person", "3", "--out", &folder.text("third")];
-    fails(&mut farnear(&third), 1, &["person 3", "2 are in the file"]);
+    fails(&mut farnear(&third), 1, &["no person 3", "2 are in the file"]);
 }

@@ -9,12 +9,12 @@ use super::{MaskError, grey};
 
 /// Levels that label more than a person: shadow, not judged, unknown.
 const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
-/// OpenCV's shadow: alone beside 0 it says nothing yet.
+/// OpenCV's shadow: with 0 alone it does not show the person's level.
 const SHADOW: u8 = 127;
-/// Pictures of a folder that are looked at, as long as they hold more than one level.
+/// Pictures of a folder that are surveyed; more of them while they hold one level only.
 const SURVEYED: usize = 8;
-/// JPEG leaves ringing about edges: levels this share of the range from black or white count as those, and fewer than one
-/// pixel in so many may lie between.
+/// JPEG leaves ringing about edges: levels within this share of the range from black or white count as those, and at most one
+/// pixel in [`ONE_BETWEEN_IN`] may lie between.
 const RINGING: f64 = 0.157;
 const ONE_BETWEEN_IN: u64 = 50;
 /// Two levels that differ by less, with others between them, are a picture and not a mask.
@@ -56,7 +56,7 @@ impl Histogram {
         present.len() < 2 || present == [0, SHADOW]
     }
 
-    /// The levels of masks; `None` where this is no histogram of masks.
+    /// The levels of masks; `None` for pictures that are not masks.
     #[must_use]
     pub fn levels(&self) -> Option<Levels> {
         match self.present().as_slice() {

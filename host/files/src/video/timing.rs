@@ -59,11 +59,11 @@ impl Timing {
         let measured = count as f64 / sum;
         let near = if regular { NEAR } else { ROUGHLY_NEAR };
         let off = |rate: &f64| (rate / measured - 1.0).abs();
-        // Nobody knows an irregular rate to a thousandth.
+        // An irregular rate is not known to a thousandth.
         let candidates = USUAL_HZ.into_iter().filter(|rate| regular || rate.fract() == 0.0);
         let nearest = candidates.min_by(|a, b| off(a).total_cmp(&off(b)));
         let seconds = intervals.iter().sum();
-        // Millisecond stamps of a short recording cannot be told from a usual rate any better.
+        // Millisecond stamps of a short recording resolve rates no better than this.
         let resolution = 0.001 / seconds;
         Some(Self {
             rate_hz: nearest.filter(|rate| off(rate) <= near.max(resolution)).unwrap_or(measured),

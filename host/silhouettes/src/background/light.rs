@@ -1,5 +1,5 @@
-//! A light that is switched, or a camera that sets its exposure anew: one gain and one offset per channel, from the background, so that the frame
-//! is seen in the old light and nobody is lost meanwhile.
+//! Sudden changes of the light or of the camera's exposure: one gain and one offset per channel, estimated from the background, bring the frame
+//! back to the old light.
 
 use ndarray::{Array2, Array3};
 
@@ -39,7 +39,7 @@ impl Relit {
 }
 
 impl Light {
-    /// The light as it was, for so many channels.
+    /// The light as it was, for `channels` channels.
     pub fn unchanged(channels: usize) -> Self {
         Self { tables: vec![std::array::from_fn(|level| level as u8); channels] }
     }
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn a_gain_and_an_offset_are_found_and_taken_back() {
         let before = Light::unchanged(1);
-        assert_eq!(before.changed(&pairs(|level| level + 3.0)), None, "noise is no change");
+        assert_eq!(before.changed(&pairs(|level| level + 3.0)), None, "noise");
         let dimmed = before.changed(&pairs(|level| 0.5 * level + 8.0)).expect("a change");
         for level in [80.0_f32, 140.0] {
             let now = (0.5 * level + 8.0) as u8;

@@ -25,7 +25,7 @@ pub fn moved_back(frame: Frame<'_>, shift: Shift) -> Relit {
     }
 }
 
-/// What stands at a place plus the shift, at every place.
+/// Every pixel takes the value at its place plus the shift.
 fn moved<S, D>(pixels: &ArrayBase<S, D>, (down, right): Shift) -> Array<u8, D>
 where
     S: Data<Elem = u8>,
@@ -38,7 +38,7 @@ where
     rows.select(Axis(1), &from(pixels.shape()[1], right))
 }
 
-/// A mask or labels in the frame's own place: what lies outside is `empty`.
+/// A mask or labels in the frame's own place; pixels from outside are `empty`.
 pub fn moved_forth<T: Copy>(mask: &Array2<T>, (down, right): Shift, empty: T) -> Array2<T> {
     let (height, width) = mask.dim();
     Array2::from_shape_fn((height, width), |(row, column)| {

@@ -22,10 +22,10 @@ use crate::background::{
 pub enum Learning {
     /// All frames, but not where people are.
     #[default]
-    WhereNobodyIs,
-    /// The same for so many frames; nothing is learned after them.
+    OutsidePeople,
+    /// The same for this many frames; nothing is learned after them.
     Until(u32),
-    /// All frames everywhere: who stands becomes background within seconds.
+    /// All frames everywhere: a person who stands becomes background within seconds.
     Always,
     /// Nothing after the frames that only teach the background.
     Never,
@@ -36,14 +36,14 @@ impl std::str::FromStr for Learning {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match text.trim() {
-            "where-nobody-is" => Ok(Self::WhereNobodyIs),
+            "outside-people" => Ok(Self::OutsidePeople),
             "always" => Ok(Self::Always),
             "never" => Ok(Self::Never),
             other => {
                 let frames = other.strip_prefix("until").map(|rest| rest.trim_start_matches([' ', ':', '=']).parse());
                 match frames {
                     Some(Ok(frames)) => Ok(Self::Until(frames)),
-                    _ => Err(format!("`{other}`: expected where-nobody-is, until:FRAMES, always or never")),
+                    _ => Err(format!("`{other}`: expected outside-people, until:FRAMES, always or never")),
                 }
             }
         }
@@ -114,7 +114,7 @@ pub struct Extractor {
     changes_of_light: usize,
 }
 
-/// A frame's people, or why nobody is looked for.
+/// A frame's people, or why there are none.
 struct Sighted {
     people: Result<(Mask, Vec<Person>), Flag>,
     labels: Array2<Label>,
@@ -148,7 +148,7 @@ impl Extractor {
     pub fn learn(&mut self, frame: Frame<'_>) -> Result<(), BackgroundError> {
         let usual = self.settings.learning;
         if usual != Learning::Always {
-            self.settings.learning = Learning::WhereNobodyIs;
+            self.settings.learning = Learning::OutsidePeople;
         }
         let learned = self.sighted(frame).map(|_| ());
         self.settings.learning = usual;
@@ -201,7 +201,7 @@ impl Extractor {
     fn rate(&self) -> f32 {
         let seen = self.model.frames_seen();
         let learns = match self.settings.learning {
-            Learning::WhereNobodyIs | Learning::Always => true,
+            Learning::OutsidePeople | Learning::Always => true,
             Learning::Until(frames) => seen < frames.max(self.settings.learning_frames),
             Learning::Never => seen < self.settings.learning_frames.max(1),
         };

@@ -1,8 +1,8 @@
-//! Where the background must not learn: on people. Somebody who stands for minutes would become background otherwise.
+//! Feedback from people to the background, which must not learn them: a person who stands still would become background within seconds.
 //!
-//! Whoever came in over the picture's edge or walked is a person for as long as the region stays. A region that appears in its place and never
-//! moves is furniture, a change of light, or the hole that somebody left who had been taken for background; those are learned. A hole
-//! is also told by its outline, which is sharper in the background than in the frame.
+//! A region that entered over the picture's edge or walked is a person for as long as it exists. A region that appears and never moves is furniture,
+//! a change of light, or a hole left by a person who was part of the background; those are learned. The outline of a hole is
+//! sharper in the background than in the frame.
 
 use ndarray::ArrayView3;
 
@@ -11,7 +11,7 @@ use crate::background::Frame;
 
 /// Steps from frame to frame that count as standing, as parts of the person's height.
 const STANDING: f64 = 0.02;
-/// Frames of standing after which somebody has stopped moving.
+/// Frames of standing after which a person has stopped moving.
 const STOPPED_FRAMES: u32 = 25;
 /// From one look at a standing region's outline to the next, frames.
 const OUTLINE_FRAMES: u32 = 50;
@@ -51,7 +51,7 @@ impl Feedback {
         Self { size, tracks: Vec::new(), held: None }
     }
 
-    /// Where the next frame teaches nothing; `None` where nobody is.
+    /// Pixels that the next frame must not teach; `None` without people.
     #[must_use]
     pub fn held(&self) -> Option<&Mask> {
         self.held.as_ref()
@@ -72,7 +72,7 @@ impl Feedback {
         })
     }
 
-    /// Takes the people of a frame; `background` gives the empty scene where an outline has to be looked at.
+    /// Takes the people of a frame; `background` gives the empty scene, for the comparison of outlines.
     pub fn follow(&mut self, people: &[Person], frame: Frame<'_>, background: impl Fn() -> ndarray::Array3<u8>) {
         let mut order: Vec<&Person> = people.iter().collect();
         order.sort_by_key(|person| std::cmp::Reverse(person.area));
@@ -107,7 +107,7 @@ impl Feedback {
             }
             tracks.push(track);
         }
-        // Whoever is not seen for a moment keeps the last place.
+        // People who are missed for a moment keep their last place.
         for mut track in self.tracks.drain(..) {
             track.unseen_frames += 1;
             if track.unseen_frames <= REMEMBERED_FRAMES && track.walked {

@@ -28,7 +28,7 @@ pub enum Flag {
     Fragments {
         count: usize,
     },
-    /// The subject has stood still for a second or longer: what is seen is a posture, not a movement.
+    /// The subject has stood still for a second or longer.
     StoppedMoving,
     /// The background is not known yet.
     Learning,

@@ -1,7 +1,7 @@
 //! NPZ files of body motion (AMASS and others): joint positions where the file has them.
 //!
 //! AMASS itself stores pose parameters of the body models SMPL, SMPL-H and SMPL-X. Joint positions follow from them only with the body model's
-//! file, which its makers license and nobody may pass on; such files are refused by name of the model.
+//! file, whose licence forbids passing it on; such files are refused with the name of the model.
 
 use super::{
     body,
@@ -116,7 +116,7 @@ fn refused(arrays: &[Array]) -> RecordingError {
 /// An array in NumPy's format: floats, integers or text.
 fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
     let bad = |reason: &str| RecordingError::Kind { kind: "NPZ", reason: format!("array `{name}`: {reason}") };
-    let version = *bytes.get(6).filter(|_| bytes.starts_with(b"\x93NUMPY")).ok_or_else(|| bad("it is no NPY file"))?;
+    let version = *bytes.get(6).filter(|_| bytes.starts_with(b"\x93NUMPY")).ok_or_else(|| bad("not an NPY file"))?;
     let length = |range: std::ops::Range<usize>| -> Option<usize> {
         Some(bytes.get(range)?.iter().rev().fold(0, |sum, &byte| sum * 256 + usize::from(byte)))
     };

@@ -65,7 +65,7 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
     Known { value: Unit { mm: best }, source: Source::Guess { reason, sure: off(best) < 0.7 } }
 }
 
-/// The axis along which the head lies above the feet on average; `usual` where it cannot be told.
+/// The axis along which the head lies above the feet on average; `usual` without a head or feet.
 pub fn upright(frames: &[Vec<Option<Point3>>], head: usize, feet: &[usize], usual: Up) -> Known<Up> {
     let mut upward = [0.0; 3];
     for frame in frames {

@@ -38,7 +38,7 @@ const USUAL_ASPECT: f64 = 16.0 / 9.0;
 /// Reads a JSON file.
 ///
 /// # Errors
-/// [`RecordingError`] for JSON that is damaged or holds nobody's points.
+/// [`RecordingError`] for JSON that is damaged or holds no person's points.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     found(vec![Document::parse(bytes)?])
 }
@@ -55,7 +55,7 @@ fn found(documents: Vec<Document>) -> Result<Found, RecordingError> {
     let layout = documents.iter().find_map(|document| document.layout).ok_or_else(|| RecordingError::Kind {
         kind: "keypoint JSON",
         reason: format!(
-            "it holds nobody's points: expected `people`, `annotations`, `keypoints` or `landmarks` of {} points",
+            "it holds no person's points: expected `people`, `annotations`, `keypoints` or `landmarks` of {} points",
             layouts::LAYOUTS.iter().map(|layout| layout.count.to_string()).collect::<Vec<_>>().join(", ")
         ),
     })?;

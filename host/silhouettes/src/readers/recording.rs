@@ -317,7 +317,7 @@ pub enum RecordingError {
          {file}; write the joints that it gives to an array `joints` of frames x joints x 3"
     )]
     BodyModel { array: String, shape: String, model: &'static str, file: String },
-    #[error("person {wanted} was asked for, {found} are in the file")]
+    #[error("no person {wanted}: {found} are in the file")]
     Person { wanted: usize, found: usize },
     /// A line that cannot be read.
     #[error("line {line}: {reason}")]

@@ -13,7 +13,7 @@ const SPARE_BYTES: usize = 1 << 20;
 /// Names and unpacked bytes of the entries that `wanted` accepts.
 ///
 /// # Errors
-/// [`RecordingError::Kind`] for a file that is no archive, [`RecordingError::Truncated`] for one that was cut short.
+/// [`RecordingError::Kind`] for other files, [`RecordingError::Truncated`] for one that was cut short.
 pub fn entries(
     bytes: &[u8],
     wanted: impl Fn(&str) -> bool,

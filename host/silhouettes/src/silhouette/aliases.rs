@@ -87,11 +87,11 @@ const SUFFIXES: [&str; 1] = ["study"];
 pub struct Aliases {
     /// Place among the recording's names, and the name in the template.
     pub names: Vec<(usize, String)>,
-    /// What was matched, for the user.
+    /// The match in words, for the user.
     pub remark: String,
 }
 
-/// The points that built-in templates know under other names; nothing where a template fits as it is, or none does.
+/// The points that built-in templates know under other names; nothing where a template fits without aliases, or none does.
 pub fn find(names: &[String]) -> Option<Aliases> {
     let templates = || Template::names().filter_map(|name| Template::named(name).ok());
     if templates().any(|template| template.check(names).is_ok()) {

@@ -1,4 +1,4 @@
-//! C3D files made here: recordings beyond 65,535 frames, trimmed headers, and units that nobody knows.
+//! C3D files made here: recordings beyond 65,535 frames, trimmed headers, and unknown units.
 
 use farnear_silhouettes::readers::{
     self,
@@ -84,7 +84,7 @@ fn whole(made: &Made) -> Vec<String> {
 
 #[test]
 fn recordings_beyond_the_sixteen_bits_of_the_header_are_read_whole() {
-    // The header wraps round, stops at its largest number, or counts what is left of 65,536.
+    // The header wraps round, stops at its largest number, or counts the rest of 65,536.
     for header in [(1, 4464), (1, 65_535), (1, 0)] {
         for (trial, point_frames) in [(Some((1, 70_000)), None), (None, Some(70_000.0))] {
             let made = Made { frames: 70_000, header, trial, point_frames, ..Made::default() };
@@ -108,7 +108,7 @@ fn a_trimmed_header_yields_to_the_parameters_and_what_is_left_over_is_reported()
 }
 
 #[test]
-fn the_callers_unit_wins_over_one_that_nobody_knows() {
+fn the_callers_unit_overrides_an_unknown_one() {
     let made = Made { units: "mete", ..Made::default() };
     let error = made.read(Choices::default()).expect_err("an unknown unit").to_string();
     assert!(error.contains("mete"), "{error}");

@@ -1,4 +1,4 @@
-//! A recording as a room's camera makes it: nobody for a while, somebody who comes in and stands, a light that is switched meanwhile.
+//! A recording of a room's camera: empty for a while, then a person enters and stands while a light is switched.
 
 use farnear_silhouettes::background::Frame;
 use farnear_silhouettes::mask::{
@@ -16,7 +16,7 @@ fn noise(frame: usize, row: usize, column: usize) -> f32 {
     (hash % 7) as f32 - 3.0
 }
 
-/// Where the person is: nobody at first, then somebody comes in from the left, stands in the middle, and leaves to the right.
+/// Where the person is: absent, entering from the left, standing in the middle, leaving to the right.
 fn place(frame: usize) -> Option<usize> {
     match frame {
         0..150 => None,
@@ -90,18 +90,18 @@ fn seen(learning: Learning) -> Seen {
 }
 
 #[test]
-fn a_person_who_stands_stays_in_the_masks_while_the_light_is_switched() {
-    let seen = seen(Learning::WhereNobodyIs);
+fn keeps_a_standing_person_while_the_light_is_switched() {
+    let seen = seen(Learning::OutsidePeople);
     assert!(seen.masked * 10 >= seen.person * 9, "{} of {} person frames", seen.masked, seen.person);
-    assert!(seen.ghosts <= 5, "{} frames with nobody have a mask", seen.ghosts);
+    assert!(seen.ghosts <= 5, "{} empty frames have a mask", seen.ghosts);
     assert!(seen.stopped >= 200, "{} frames are flagged as standing", seen.stopped);
     assert_eq!(seen.changes_of_light, 2);
 }
 
 #[test]
-fn learning_is_limited_or_stopped_where_asked_for() {
+fn learning_can_be_limited_or_stopped() {
     let always = seen(Learning::Always);
-    assert!(always.masked * 2 < always.person, "{} of {}: who stands is absorbed", always.masked, always.person);
+    assert!(always.masked * 2 < always.person, "{} of {} although all is learned", always.masked, always.person);
     for learning in [Learning::Until(100), Learning::Never] {
         let seen = seen(learning);
         assert!(seen.masked * 10 >= seen.person * 9, "{learning:?}: {} of {}", seen.masked, seen.person);
@@ -112,7 +112,7 @@ fn learning_is_limited_or_stopped_where_asked_for() {
 }
 
 #[test]
-fn what_stands_there_without_having_come_is_learned() {
+fn learns_an_object_that_appears_without_walking() {
     let first = picture(0);
     let first = Frame::Rgb(first.view());
     let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
@@ -120,7 +120,7 @@ fn what_stands_there_without_having_come_is_learned() {
     for frame in 0..250 {
         let mut picture = picture(frame % 100);
         if frame >= 80 {
-            // A cupboard, put in while nobody looked.
+            // A cupboard appears.
             picture.slice_mut(ndarray::s![40..100, 60..90, ..]).fill(230);
         }
         let subject = extractor.extract(Frame::Rgb(picture.view())).expect("a frame").subject;
@@ -147,7 +147,7 @@ fn a_shaking_camera_is_registered() {
     for frame in 0..180 {
         let (picture, truth) = shaken(frame);
         let subject = extractor.extract(Frame::Rgb(picture.view())).expect("a frame").subject;
-        // Somebody comes in in frame 50.
+        // The person enters in frame 50.
         if frame >= 65 {
             person += 1;
             masked += usize::from(iou(&subject.mask, &truth) >= 0.7);

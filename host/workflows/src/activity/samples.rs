@@ -29,7 +29,7 @@ pub const SCALING: Scaling = Scaling::KeepAspect;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    /// Why the set must not be looked at but for a release.
+    /// Marks a set that is opened for releases only, and why.
     blind: Option<String>,
     #[serde(rename = "sample", default)]
     samples: Vec<Sample>,

@@ -1,6 +1,6 @@
 //! Leave one set out: how a finished model, and thresholds set on other sets, do on a whole set that set nothing.
 //!
-//! A set may be blind: its samples file says so (`blind = "why"`). It is opened for a release only, by name of the reason, and every opening
+//! A samples file may mark its set as blind (`blind = "why"`). It is opened for a release only, with a reason, and every opening
 //! is written to `openings.csv` next to it.
 
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub struct SetsSettings {
 pub struct SetFigures {
     pub set: String,
     pub answers: usize,
-    /// Share of answers in one view that is right, whatever the model could answer.
+    /// Share of answers in one view that is right among all activities of the model.
     pub accuracy: f64,
     /// The same if only activities of the set can be.
     pub accuracy_among: f64,

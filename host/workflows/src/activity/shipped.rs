@@ -21,14 +21,14 @@ pub struct Shipped {
     pub name: &'static str,
     /// What it is, in a line.
     pub about: &'static str,
-    /// On a set that nobody had looked at; `None` where none was measured.
+    /// Figures of a blind set; `None` if none was measured.
     new_set: Option<NewSet>,
     bytes: &'static [u8],
     /// Its file for silhouettes that are cut out at 100x100, whose motion through the picture is gone.
     cut_out: &'static [u8],
 }
 
-/// What was measured on a set that nobody had looked at while the model was made, shares from 0 to 1.
+/// Figures of a set that had no part in making the model, shares from 0 to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct NewSet {
     /// Right, of all activities.
@@ -89,11 +89,11 @@ impl Shipped {
     pub fn expectation(&self) -> String {
         match self.new_set {
             Some(NewSet { accuracy, unknown_of_known, outlier_auroc, .. }) => format!(
-                "`{}` on a set that nobody had looked at: {:.0} % of answers right, {:.0} % of known activities called unknown, \
+                "`{}` on a new set: {:.0} % of answers right, {:.0} % of known activities called unknown, \
                  unknown ones told apart with an AUROC of {outlier_auroc} (0.5 is chance)",
                 self.name, 100.0 * accuracy, 100.0 * unknown_of_known
             ),
-            None => format!("`{}` was not measured on a set that nobody had looked at", self.name),
+            None => format!("`{}` was not measured on a new set", self.name),
         }
     }
 
@@ -117,9 +117,9 @@ pub struct ModelFigures {
     pub about: &'static str,
     /// Its size in the program.
     pub bytes: usize,
-    /// Share of what it knows that it calls unknown, on synthetic people like those it was made of. Real people: see `on_a_new_set`.
+    /// Share of known clips called unknown, on synthetic people like those it was made of. Real people: see `on_a_new_set`.
     pub false_alarms_on_synthetic_people: f64,
-    /// Measured on a set that nobody had looked at.
+    /// Figures of a blind set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_a_new_set: Option<NewSet>,
     pub activities: Vec<String>,

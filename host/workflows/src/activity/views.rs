@@ -39,7 +39,7 @@ impl ViewKind {
         if !pictures::EXTENSIONS.contains(&ending.as_str()) {
             return Ok(Self::Video);
         }
-        // The first picture alone first: a video must not be read twice to find out that it is none.
+        // The first picture alone first: videos need no survey.
         let mut first = Histogram::default();
         match masks::grey(&files[0]) {
             Ok(picture) => first.add(&picture),

@@ -80,7 +80,7 @@ pub struct VideoFigures {
     pub cut_by_edge: usize,
     /// Frames in which most of the picture changed.
     pub scene_changed: usize,
-    /// Frames whose person stands still.
+    /// Frames with a person who has stopped moving.
     pub stopped_moving: usize,
     /// Frames whose person is in several pieces.
     pub fragments: usize,

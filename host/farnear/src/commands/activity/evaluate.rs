@@ -32,7 +32,7 @@ use crate::{report, terminal};
 ///
 /// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
 /// from the fraction of right answers, how many known and unknown activities it calls unknown. With --leave-one-set-out it is judged on several
-/// sets: what is measured on a set that set nothing is what to expect of a new one.
+/// sets: expect of a new set the figures of the worst left-out one.
 #[derive(Args)]
 #[command(
     after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json\n\
@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Judge the model on these sets too, each with a limit for unknown activities that the other sets give.
     #[arg(long, value_name = "SAMPLES", num_args = 1.., requires = "model", conflicts_with_all = ["open_set", "adapt", "views", "out"])]
     leave_one_set_out: Vec<PathBuf>,
-    /// Open sets whose samples file says that they are blind, and why; every opening is recorded in openings.csv next to the file.
+    /// Open sets that their samples file marks as blind, for this reason; every opening is recorded in openings.csv next to the file.
     #[arg(long, value_name = "REASON", requires = "model")]
     open_blind_set: Option<String>,
     /// An activity's name in the samples and in the model, where they differ; may be repeated.

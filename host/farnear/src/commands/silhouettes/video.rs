@@ -32,9 +32,9 @@ pub struct Arguments {
     /// Frames that the background model remembers.
     #[arg(long, default_value_t = 500)]
     history_frames: u32,
-    /// Which frames and pixels teach the background: where-nobody-is (all frames, but not people), until:FRAMES (the same, then
+    /// Which frames and pixels teach the background: outside-people (all frames, but not people), until:FRAMES (the same, then
     /// nothing), always (who stands becomes background within seconds) or never (only --learn-first or --learning-frames).
-    #[arg(long, value_name = "WHEN", default_value = "where-nobody-is")]
+    #[arg(long, value_name = "WHEN", default_value = "outside-people")]
     learning: Learning,
     /// Count what is merely darker than the background as the person, not as shadow.
     #[arg(long)]

@@ -1,4 +1,4 @@
-//! People in the JSON of pose estimators, whatever its nesting: a frame a file (OpenPose), a list of people with the picture they are in
+//! People in the JSON of pose estimators, in all common nestings: a frame a file (OpenPose), a list of people with the picture they are in
 //! (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or frames by the pictures' names.
 
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ impl Document {
     /// Reads one JSON document.
     ///
     /// # Errors
-    /// JSON that is damaged or holds nobody's points.
+    /// JSON that is damaged or holds no person's points.
     pub fn parse(bytes: &[u8]) -> Result<Self, RecordingError> {
         let value: Value = serde_json::from_slice(bytes).map_err(|error| RecordingError::Line {
             line: error.line(),
@@ -115,7 +115,7 @@ impl Document {
             let person = self.person(item);
             frames.entry(key).or_default().extend(person);
         }
-        /// Gaps are filled where they make the recording at most so many times as long.
+        /// Gaps are filled where they lengthen the recording at most by this factor.
         const LONGEST: u64 = 10;
         let numbers: Vec<u64> = frames.keys().map(|(_, number, _)| *number).collect();
         let step = numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0).min();

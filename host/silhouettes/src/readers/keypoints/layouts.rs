@@ -1,6 +1,6 @@
 //! The orders in which pose estimators write their points: one table, a line per layout.
 
-/// A layout of points, told from the others by how many there are.
+/// A layout of points; their number identifies it.
 #[derive(Debug, PartialEq)]
 pub struct Layout {
     pub name: &'static str,
@@ -65,7 +65,7 @@ pub const NAMES: [&str; 28] = [
 ];
 
 impl Layout {
-    /// The layout of so many points.
+    /// The layout with this number of points.
     pub fn of(count: usize) -> Option<&'static Self> {
         LAYOUTS.iter().find(|layout| layout.count == count)
     }

@@ -7,9 +7,9 @@ use super::{document::Person, layouts::NAMES};
 /// A person's points in every frame.
 pub type Track = Vec<Vec<Option<[f64; 2]>>>;
 
-/// People who are kept: so many times the longest recording is all the memory that a crowd may ask for.
+/// People who are kept: bounds the memory for a crowd.
 const MOST: usize = 16;
-/// Frames without a person after which the next one there is somebody else.
+/// Frames without a person after which the next one in that place is another person.
 const FORGOTTEN_AFTER: usize = 30;
 /// Steps from frame to frame, as parts of the body's height.
 const WIDEST_STEP: f64 = 0.5;

@@ -119,7 +119,7 @@ fn mediapipe_landmarks_are_parts_of_the_picture() {
         let found = upright(&json, 2);
         assert!(found.remarks().iter().any(|remark| remark.contains("stated")), "{:?}", found.remarks());
     }
-    // Without a size the shape is a guess, which is said.
+    // Without a size the shape is a guess, which is reported.
     let bare = format!("[[{landmarks}],[{landmarks}]]");
     let found = read(bare.as_bytes(), "json", Choices::default()).expect("keypoints");
     assert_eq!(found.frames.len(), 2);
