@@ -47,10 +47,7 @@ pub enum MaskError {
     #[error(
         "{}: grey levels {levels:?} and none from 128 on; masks have two levels, or 0, 127 and 255", path.display()
     )]
-    Levels {
-        path: PathBuf,
-        levels: Vec<u8>,
-    },
+    Levels { path: PathBuf, levels: Vec<u8> },
     /// A mask of another size than the first.
     #[error(
         "{}: the mask is {}x{}, but `{first}` is {}x{}; the masks of a sequence must be alike",

@@ -275,7 +275,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("recorded.webm");
         let made = std::process::Command::new("ffmpeg")
-            .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=64x48:rate=30:duration=2", "-vf"])
+            .args([
+                "-nostdin",
+                "-v",
+                "error",
+                "-f",
+                "lavfi",
+                "-i",
+                "testsrc=size=64x48:rate=30:duration=2",
+                "-vf",
+            ])
             .args([filter, "-vsync", "passthrough", "-enc_time_base", "1/1000", "-c:v", "libvpx"])
             .arg(&file)
             .status();

@@ -7,9 +7,9 @@
 
 mod kernel;
 pub mod light;
-pub mod shake;
 mod model;
 mod settings;
+pub mod shake;
 
 pub use model::{BackgroundError, BackgroundModel, Frame, Label};
 pub use settings::{Settings, SettingsError, ShadowSettings};

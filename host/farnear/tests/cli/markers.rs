@@ -305,9 +305,30 @@ fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
 /// A frame of OpenPose with a person upright at every x, 1 px to a centimetre.
 fn openpose(people: &[f64]) -> String {
     let upright = [
-        (0.0, 30.0), (0.0, 48.0), (-18.0, 50.0), (-24.0, 78.0), (-26.0, 104.0), (18.0, 50.0), (24.0, 78.0), (26.0, 104.0),
-        (0.0, 100.0), (-9.0, 100.0), (-9.0, 142.0), (-9.0, 184.0), (9.0, 100.0), (9.0, 142.0), (9.0, 184.0), (-3.0, 28.0),
-        (3.0, 28.0), (-7.0, 30.0), (7.0, 30.0), (14.0, 190.0), (16.0, 188.0), (8.0, 188.0), (-14.0, 190.0), (-16.0, 188.0),
+        (0.0, 30.0),
+        (0.0, 48.0),
+        (-18.0, 50.0),
+        (-24.0, 78.0),
+        (-26.0, 104.0),
+        (18.0, 50.0),
+        (24.0, 78.0),
+        (26.0, 104.0),
+        (0.0, 100.0),
+        (-9.0, 100.0),
+        (-9.0, 142.0),
+        (-9.0, 184.0),
+        (9.0, 100.0),
+        (9.0, 142.0),
+        (9.0, 184.0),
+        (-3.0, 28.0),
+        (3.0, 28.0),
+        (-7.0, 30.0),
+        (7.0, 30.0),
+        (14.0, 190.0),
+        (16.0, 188.0),
+        (8.0, 188.0),
+        (-14.0, 190.0),
+        (-16.0, 188.0),
         (-8.0, 188.0),
     ];
     let person = |x: &f64| {
@@ -328,21 +349,44 @@ fn a_folder_of_openpose_files_gives_masks_of_its_view_and_samples() {
         folder.file(&name, openpose(if frame == 6 { &[] } else { &people }));
     }
     let (poses, out) = (folder.text("poses"), folder.text("masks"));
-    let arguments = ["silhouettes", "markers", &poses, "--mm-per-px", "10", "--samples", "walk", "--subject", "anna", "--out"];
+    let arguments = [
+        "silhouettes",
+        "markers",
+        &poses,
+        "--mm-per-px",
+        "10",
+        "--samples",
+        "walk",
+        "--subject",
+        "anna",
+        "--out",
+    ];
     let found = figures(farnear(&arguments).args([&out, "--json"]));
-    assert_eq!((number(&found, "views"), number(&found, "frames"), number(&found, "silhouettes")), (1.0, 12.0, 11.0));
+    assert_eq!(
+        (number(&found, "views"), number(&found, "frames"), number(&found, "silhouettes")),
+        (1.0, 12.0, 11.0)
+    );
     let warnings = found["warnings"].to_string();
-    assert!(warnings.contains("BODY_25") && warnings.contains("2 people") && warnings.contains("guess"), "{warnings}");
+    assert!(
+        warnings.contains("BODY_25") && warnings.contains("2 people") && warnings.contains("guess"),
+        "{warnings}"
+    );
     let mask = |frame: u32| {
         image::open(folder.path(&format!("masks/view1/frame_{frame:06}.png"))).expect("a mask").into_luma8()
     };
     let [top, left, bottom, right] = bounds(&mask(1));
-    assert!((160..200).contains(&(bottom - top)) && (50..75).contains(&(right - left)), "{:?}", bounds(&mask(1)));
+    assert!(
+        (160..200).contains(&(bottom - top)) && (50..75).contains(&(right - left)),
+        "{:?}",
+        bounds(&mask(1))
+    );
     assert!(bounds(&mask(12))[1].abs_diff(left + 55) <= 3, "{:?}", bounds(&mask(12)));
     let samples = fs::read_to_string(folder.path("masks/samples.toml")).expect("samples");
     assert!(samples.contains("anna") && samples.contains("walk"), "{samples}");
     let second = folder.text("second");
-    let found = figures(farnear(&["silhouettes", "markers", &poses, "--person", "2", "--out"]).args([&second, "--json"]));
+    let found = figures(
+        farnear(&["silhouettes", "markers", &poses, "--person", "2", "--out"]).args([&second, "--json"]),
+    );
     assert_eq!(number(&found, "silhouettes"), 8.0);
     let third = ["silhouettes", "markers", &poses, "--person", "3", "--out", &folder.text("third")];
     fails(&mut farnear(&third), 1, &["no person 3", "2 are in the file"]);

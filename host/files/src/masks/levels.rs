@@ -82,8 +82,7 @@ impl Histogram {
     fn two_clusters(&self, low: u8, high: u8) -> Option<Levels> {
         let margin = (RINGING * f64::from(high - low)) as u8;
         let all: u64 = self.0.iter().sum();
-        let between: u64 =
-            (low + margin..=high - margin).map(|level| self.0[usize::from(level)]).sum();
+        let between: u64 = (low + margin..=high - margin).map(|level| self.0[usize::from(level)]).sum();
         if between * ONE_BETWEEN_IN > all {
             return None;
         }

@@ -11,8 +11,21 @@ use std::{
 /// Intervals this far from the usual one, relative to it, are irregular. Millisecond time stamps of 60 frames/s are off by 6 %.
 const IRREGULAR: f64 = 0.25;
 /// Rates that cameras have, frames per second.
-const USUAL_HZ: [f64; 13] =
-    [5.0, 10.0, 12.5, 15.0, 20.0, 24_000.0 / 1001.0, 24.0, 25.0, 30_000.0 / 1001.0, 30.0, 50.0, 60_000.0 / 1001.0, 60.0];
+const USUAL_HZ: [f64; 13] = [
+    5.0,
+    10.0,
+    12.5,
+    15.0,
+    20.0,
+    24_000.0 / 1001.0,
+    24.0,
+    25.0,
+    30_000.0 / 1001.0,
+    30.0,
+    50.0,
+    60_000.0 / 1001.0,
+    60.0,
+];
 /// A measured rate this near to a usual one is that, relative.
 const NEAR: f64 = 0.0004;
 /// The same where stamps are irregular, so that the rate is an estimate.
@@ -53,8 +66,10 @@ impl Timing {
         sorted.sort_by(f64::total_cmp);
         let median = *sorted.get(sorted.len() / 2).filter(|median| **median > 0.0)?;
         let usual = |interval: &&f64| (**interval - median).abs() <= IRREGULAR * median;
-        let (count, sum) =
-            intervals.iter().filter(usual).fold((0_usize, 0.0), |(count, sum), interval| (count + 1, sum + interval));
+        let (count, sum) = intervals
+            .iter()
+            .filter(usual)
+            .fold((0_usize, 0.0), |(count, sum), interval| (count + 1, sum + interval));
         let regular = count == intervals.len();
         let measured = count as f64 / sum;
         let near = if regular { NEAR } else { ROUGHLY_NEAR };
@@ -129,7 +144,8 @@ mod tests {
 
     #[test]
     fn dropped_and_late_frames_leave_the_nominal_rate() {
-        let times = (0..90).filter(|n| n % 7 != 3).map(|n| f64::from(n) / 30.0 + f64::from(n % 3) * 0.003).collect();
+        let times =
+            (0..90).filter(|n| n % 7 != 3).map(|n| f64::from(n) / 30.0 + f64::from(n % 3) * 0.003).collect();
         let timing = Timing::of_times(times).expect("times");
         assert_eq!((timing.regular, timing.rate_hz), (false, 30.0));
         assert!(timing.remark().expect("a remark").contains("30.00 frames/s"));

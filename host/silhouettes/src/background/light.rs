@@ -94,7 +94,8 @@ impl Light {
 
 /// The table that takes levels of the frame to the background's: a line through the middles of the darker and of the lighter half.
 fn fitted(pairs: &[[u8; 2]]) -> Option<[u8; 256]> {
-    let mut sorted: Vec<[u8; 2]> = pairs.iter().copied().filter(|[_, level]| (3..=252).contains(level)).collect();
+    let mut sorted: Vec<[u8; 2]> =
+        pairs.iter().copied().filter(|[_, level]| (3..=252).contains(level)).collect();
     sorted.sort_unstable();
     let (dark, light) = sorted.split_at(sorted.len() / 2);
     let middle = |half: &[[u8; 2]]| -> Option<[f32; 2]> {

@@ -5,8 +5,8 @@ use pulp::Arch;
 
 use super::{
     kernel::{self, TILE, Update},
-    shake::{self, Shift},
     settings::{Settings, SettingsError},
+    shake::{self, Shift},
 };
 
 /// A video frame of 8-bit samples.
@@ -296,7 +296,8 @@ impl BackgroundModel {
 
     fn mean(&self, pixel: usize, channel: usize) -> u8 {
         let (tile, lane) = split(pixel);
-        self.state[tile * kernel::component_len(self.channels) + kernel::mean_offset(channel) + lane].round() as u8
+        self.state[tile * kernel::component_len(self.channels) + kernel::mean_offset(channel) + lane].round()
+            as u8
     }
 
     /// The mean of each pixel's heaviest component, shape (height, width, channels): the empty scene as far as it is

@@ -40,7 +40,8 @@ impl std::str::FromStr for Learning {
             "always" => Ok(Self::Always),
             "never" => Ok(Self::Never),
             other => {
-                let frames = other.strip_prefix("until").map(|rest| rest.trim_start_matches([' ', ':', '=']).parse());
+                let frames =
+                    other.strip_prefix("until").map(|rest| rest.trim_start_matches([' ', ':', '=']).parse());
                 match frames {
                     Some(Ok(frames)) => Ok(Self::Until(frames)),
                     _ => Err(format!("`{other}`: expected outside-people, until:FRAMES, always or never")),

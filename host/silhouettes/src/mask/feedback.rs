@@ -73,7 +73,12 @@ impl Feedback {
     }
 
     /// Takes the people of a frame; `background` gives the empty scene, for the comparison of outlines.
-    pub fn follow(&mut self, people: &[Person], frame: Frame<'_>, background: impl Fn() -> ndarray::Array3<u8>) {
+    pub fn follow(
+        &mut self,
+        people: &[Person],
+        frame: Frame<'_>,
+        background: impl Fn() -> ndarray::Array3<u8>,
+    ) {
         let mut order: Vec<&Person> = people.iter().collect();
         order.sort_by_key(|person| std::cmp::Reverse(person.area));
         let mut tracks = Vec::with_capacity(order.len());
@@ -90,11 +95,13 @@ impl Feedback {
             let middle = person.centroid();
             let height = person.bounds.height() as f64;
             let step = (middle.0 - track.middle.0).hypot(middle.1 - track.middle.1);
-            track.still_frames = if step <= STANDING * height { track.still_frames.saturating_add(1) } else { 0 };
+            track.still_frames =
+                if step <= STANDING * height { track.still_frames.saturating_add(1) } else { 0 };
             let way = (middle.0 - track.origin.0).hypot(middle.1 - track.origin.1);
             track.walked |= way >= WALKED * height || person.bounds.touches_edge(self.size);
             (track.bounds, track.middle, track.unseen_frames) = (person.bounds, middle, 0);
-            if track.walked && track.still_frames > 0 && track.still_frames % OUTLINE_FRAMES == STOPPED_FRAMES {
+            if track.walked && track.still_frames > 0 && track.still_frames % OUTLINE_FRAMES == STOPPED_FRAMES
+            {
                 let mask = person.mask(self.size);
                 let empty = background();
                 if sharpness(&mask, Frame::Rgb(empty.view())) > HOLE * sharpness(&mask, frame) {
@@ -149,7 +156,10 @@ fn sharpness(mask: &Mask, frame: Frame<'_>) -> f64 {
         for (down, right) in [(0, 1), (0, -1), (1, 0), (-1, 0)] {
             let at = |steps: isize| (row as isize + steps * down, column as isize + steps * right);
             let (next, outer, inner) = (at(1), at(ASIDE_PX), at(1 - ASIDE_PX));
-            if !inside(outer.0, outer.1) || !inside(inner.0, inner.1) || mask[[next.0 as usize, next.1 as usize]] {
+            if !inside(outer.0, outer.1)
+                || !inside(inner.0, inner.1)
+                || mask[[next.0 as usize, next.1 as usize]]
+            {
                 continue;
             }
             let of = |(row, column): (isize, isize)| level(row as usize, column as usize);

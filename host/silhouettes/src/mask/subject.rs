@@ -25,9 +25,7 @@ pub enum Flag {
     /// The subject reaches the picture's edge: part of it may be outside.
     CutByEdge,
     /// The subject is in several pieces: parts of it look like the background.
-    Fragments {
-        count: usize,
-    },
+    Fragments { count: usize },
     /// The subject has stood still for a second or longer.
     StoppedMoving,
     /// The background is not known yet.

@@ -25,9 +25,28 @@ const POSITIONS: [&str; 8] =
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate"];
 /// The body joints of all SMPL models, in their order; hands and face follow.
 const SMPL: [&str; 22] = [
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
-    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder", "left_elbow",
-    "right_elbow", "left_wrist", "right_wrist",
+    "pelvis",
+    "left_hip",
+    "right_hip",
+    "spine1",
+    "left_knee",
+    "right_knee",
+    "spine2",
+    "left_ankle",
+    "right_ankle",
+    "spine3",
+    "left_foot",
+    "right_foot",
+    "neck",
+    "left_collar",
+    "right_collar",
+    "head",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
 ];
 const HEAD: usize = 15;
 const FEET: [usize; 2] = [10, 11];
@@ -50,7 +69,8 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .iter()
         .map(|(name, bytes)| array(name.trim_end_matches(".npy"), bytes))
         .collect::<Result<Vec<Array>, RecordingError>>()?;
-    let named = |names: &[&str]| names.iter().find_map(|name| arrays.iter().find(|array| array.name == *name));
+    let named =
+        |names: &[&str]| names.iter().find_map(|name| arrays.iter().find(|array| array.name == *name));
     let positions = POSITIONS.iter().find_map(|name| {
         arrays.iter().find(|array| {
             array.name == *name && matches!(array.shape.as_slice(), [_, joints, 3] if *joints >= SMPL.len())
@@ -61,7 +81,9 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let frames: Vec<Vec<Option<Point3>>> = (0..count)
         .map(|frame| {
             let at = |joint: usize| -> Point3 {
-                std::array::from_fn(|k| positions.values.get((frame * joints + joint) * 3 + k).copied().unwrap_or(f64::NAN))
+                std::array::from_fn(|k| {
+                    positions.values.get((frame * joints + joint) * 3 + k).copied().unwrap_or(f64::NAN)
+                })
             };
             (0..SMPL.len()).map(|joint| Some(at(joint))).collect()
         })
@@ -69,7 +91,9 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let rate_hz = named(&RATES).and_then(|array| array.values.first().copied()).filter(|rate| *rate > 0.0);
     let mut remarks = Vec::new();
     if joints > SMPL.len() {
-        remarks.push(format!("{joints} joints are taken as those of an SMPL body, of which the first 22 are read"));
+        remarks.push(format!(
+            "{joints} joints are taken as those of an SMPL body, of which the first 22 are read"
+        ));
     }
     if rate_hz.is_none() {
         remarks.push("nothing states the frame rate".into());
@@ -115,14 +139,17 @@ fn refused(arrays: &[Array]) -> RecordingError {
 
 /// An array in NumPy's format: floats, integers or text.
 fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
-    let bad = |reason: &str| RecordingError::Kind { kind: "NPZ", reason: format!("array `{name}`: {reason}") };
-    let version = *bytes.get(6).filter(|_| bytes.starts_with(b"\x93NUMPY")).ok_or_else(|| bad("not an NPY file"))?;
+    let bad =
+        |reason: &str| RecordingError::Kind { kind: "NPZ", reason: format!("array `{name}`: {reason}") };
+    let version =
+        *bytes.get(6).filter(|_| bytes.starts_with(b"\x93NUMPY")).ok_or_else(|| bad("not an NPY file"))?;
     let length = |range: std::ops::Range<usize>| -> Option<usize> {
         Some(bytes.get(range)?.iter().rev().fold(0, |sum, &byte| sum * 256 + usize::from(byte)))
     };
     let (from, header) = if version == 1 { (10, length(8..10)) } else { (12, length(8..12)) };
     let header_end = header.and_then(|length| length.checked_add(from));
-    let header = header_end.and_then(|end| bytes.get(from..end)).ok_or_else(|| bad("its header is cut short"))?;
+    let header =
+        header_end.and_then(|end| bytes.get(from..end)).ok_or_else(|| bad("its header is cut short"))?;
     let header = String::from_utf8_lossy(header);
     let after = |key: &str| header.split_once(key).map(|(_, rest)| rest);
     let kind = after("'descr':").and_then(|rest| rest.split('\'').nth(1)).unwrap_or_default().to_owned();
@@ -192,8 +219,18 @@ mod tests {
             let at = file.len() as u32;
             let sizes = [(data.len() as u32).to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
             let lengths = [(name.len() as u16).to_le_bytes(), [0, 0]].concat();
-            file.extend([b"PK\x03\x04".as_slice(), &[0; 14], &sizes, &lengths, name.as_bytes(), data].concat());
-            let entry = [b"PK\x01\x02".as_slice(), &[0; 16], &sizes, &lengths, &[0; 10], &at.to_le_bytes(), name.as_bytes()];
+            file.extend(
+                [b"PK\x03\x04".as_slice(), &[0; 14], &sizes, &lengths, name.as_bytes(), data].concat(),
+            );
+            let entry = [
+                b"PK\x01\x02".as_slice(),
+                &[0; 16],
+                &sizes,
+                &lengths,
+                &[0; 10],
+                &at.to_le_bytes(),
+                name.as_bytes(),
+            ];
             directory.extend(entry.concat());
         }
         let (at, count) = (file.len() as u32, entries.len() as u16);
@@ -210,7 +247,19 @@ mod tests {
     fn joint_positions_are_read_with_rate_and_upward_axis() {
         // A body along y: feet at 0, head at 1.6 m.
         let joints = (0..3).flat_map(|_| {
-            (0..24).flat_map(|joint| [0.1, if joint == HEAD { 1.6 } else if FEET.contains(&joint) { 0.05 } else { 0.8 }, 0.3])
+            (0..24).flat_map(|joint| {
+                [
+                    0.1,
+                    if joint == HEAD {
+                        1.6
+                    } else if FEET.contains(&joint) {
+                        0.05
+                    } else {
+                        0.8
+                    },
+                    0.3,
+                ]
+            })
         });
         let file = npz(&[
             ("joints", npy("<f4", "(3, 24, 3)", &floats(joints))),
@@ -230,10 +279,15 @@ mod tests {
             ("poses", npy("<f4", "(2, 156)", &floats(vec![0.0; 312]))),
             ("gender", npy("<U6", "()", &gender)),
         ]);
-        let error = super::super::read(&file, "npz", Choices::default()).expect_err("no positions").to_string();
-        assert!(error.contains("2x156") && error.contains("SMPLH_FEMALE.npz") && error.contains("joints"), "{error}");
+        let error =
+            super::super::read(&file, "npz", Choices::default()).expect_err("no positions").to_string();
+        assert!(
+            error.contains("2x156") && error.contains("SMPLH_FEMALE.npz") && error.contains("joints"),
+            "{error}"
+        );
         let other = npz(&[("betas", npy("<f4", "(16,)", &floats(vec![0.0; 16])))]);
-        let error = super::super::read(&other, "npz", Choices::default()).expect_err("no positions").to_string();
+        let error =
+            super::super::read(&other, "npz", Choices::default()).expect_err("no positions").to_string();
         assert!(error.contains("betas") && error.contains("joints"), "{error}");
     }
 

@@ -69,8 +69,11 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
 pub fn upright(frames: &[Vec<Option<Point3>>], head: usize, feet: &[usize], usual: Up) -> Known<Up> {
     let mut upward = [0.0; 3];
     for frame in frames {
-        let at = |place: usize| frame.get(place).copied().flatten().filter(|p| p.iter().all(|v| v.is_finite()));
-        for (head, foot) in at(head).into_iter().flat_map(|head| feet.iter().filter_map(move |foot| Some((head, at(*foot)?)))) {
+        let at =
+            |place: usize| frame.get(place).copied().flatten().filter(|p| p.iter().all(|v| v.is_finite()));
+        for (head, foot) in
+            at(head).into_iter().flat_map(|head| feet.iter().filter_map(move |foot| Some((head, at(*foot)?))))
+        {
             (0..3).for_each(|k| upward[k] += head[k] - foot[k]);
         }
     }

@@ -25,7 +25,8 @@ pub const READER: Reader = Reader {
 };
 
 /// Lengths of an adult, millimetres: the ends as places among [`NAMES`].
-const BONES_MM: [([usize; 2], f64); 4] = [([16, 18], 420.0), ([17, 19], 420.0), ([18, 20], 420.0), ([19, 21], 420.0)];
+const BONES_MM: [([usize; 2], f64); 4] =
+    [([16, 18], 420.0), ([17, 19], 420.0), ([18, 20], 420.0), ([19, 21], 420.0)];
 const TRUNK_MM: f64 = 500.0;
 const NECK: usize = 6;
 const SHOULDERS: [usize; 2] = [8, 9];
@@ -61,11 +62,14 @@ fn found(documents: Vec<Document>) -> Result<Found, RecordingError> {
     })?;
     let size = documents.iter().find_map(|document| document.size);
     let unsure: usize = documents.iter().map(|document| document.unsure).sum();
-    let mut remarks = vec![format!("{} keypoints of the layout {}, seen from one side", layout.count, layout.name)];
+    let mut remarks =
+        vec![format!("{} keypoints of the layout {}, seen from one side", layout.count, layout.name)];
     if unsure > 0 {
-        remarks.push(format!("{unsure} points below a confidence of {LEAST_CONFIDENCE} are treated as missing"));
+        remarks
+            .push(format!("{unsure} points below a confidence of {LEAST_CONFIDENCE} are treated as missing"));
     }
-    let mut frames: Vec<Vec<document::Person>> = documents.into_iter().flat_map(|document| document.frames).collect();
+    let mut frames: Vec<Vec<document::Person>> =
+        documents.into_iter().flat_map(|document| document.frames).collect();
     let largest = frames
         .iter()
         .flatten()
@@ -118,8 +122,11 @@ fn add_neck(points: &mut [Option<[f64; 2]>]) {
 fn unit(frames: &[Vec<Option<[f64; 2]>>]) -> Known<Unit> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let per_mm = |points: &Vec<Option<[f64; 2]>>| -> Option<f64> {
-        let trunk = middle(points, SHOULDERS).zip(middle(points, HIPS)).map(|(a, b)| distance(a, b) / TRUNK_MM);
-        let bones = BONES_MM.iter().filter_map(|([a, b], mm)| Some(distance((*points.get(*a)?)?, (*points.get(*b)?)?) / mm));
+        let trunk =
+            middle(points, SHOULDERS).zip(middle(points, HIPS)).map(|(a, b)| distance(a, b) / TRUNK_MM);
+        let bones = BONES_MM
+            .iter()
+            .filter_map(|([a, b], mm)| Some(distance((*points.get(*a)?)?, (*points.get(*b)?)?) / mm));
         // What points towards the camera is shortened, never lengthened.
         trunk.into_iter().chain(bones).max_by(f64::total_cmp).filter(|scale| *scale > 0.0)
     };

@@ -49,7 +49,10 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     }
     let mut remarks = Vec::new();
     if bodies.len() > 1 {
-        remarks.push(format!("{} bodies in the file: the one that moves most is used (--person 2 reads the next)", bodies.len()));
+        remarks.push(format!(
+            "{} bodies in the file: the one that moves most is used (--person 2 reads the next)",
+            bodies.len()
+        ));
     }
     let longest = bodies.values().map(Vec::len).max().unwrap_or(0);
     let present =
@@ -168,7 +171,10 @@ mod tests {
         let head = settled.by_name(1)["head"];
         assert!(head.iter().zip([600.0, -3000.0, 120.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
         assert!(!settled.by_name(0).contains_key("left hand"));
-        assert_eq!(settled.remarks(), ["2 bodies in the file: the one that moves most is used (--person 2 reads the next)"]);
+        assert_eq!(
+            settled.remarks(),
+            ["2 bodies in the file: the one that moves most is used (--person 2 reads the next)"]
+        );
     }
 
     #[test]

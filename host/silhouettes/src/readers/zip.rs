@@ -32,8 +32,10 @@ pub fn entries(
         if bytes.get(at..at + 4) != Some(b"PK\x01\x02".as_slice()) {
             return Err(bad("its directory is damaged"));
         }
-        let (method, packed, header) = (u16_at(bytes, at + 10)?, u32_at(bytes, at + 20)?, u32_at(bytes, at + 42)?);
-        let (name, extra, comment) = (u16_at(bytes, at + 28)?, u16_at(bytes, at + 30)?, u16_at(bytes, at + 32)?);
+        let (method, packed, header) =
+            (u16_at(bytes, at + 10)?, u32_at(bytes, at + 20)?, u32_at(bytes, at + 42)?);
+        let (name, extra, comment) =
+            (u16_at(bytes, at + 28)?, u16_at(bytes, at + 30)?, u16_at(bytes, at + 32)?);
         let name_bytes = piece(bytes, at + 46, name)?;
         let name_text = String::from_utf8_lossy(name_bytes).into_owned();
         at += 46 + name + extra + comment;

@@ -27,7 +27,8 @@ fn kinect_file() -> String {
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n100\t100\t2\t2\tmm\t100\t1\t2\nFrame#\tTime\tA\t\t\tB\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0.0\t1\t2\t3\t4\t5\t6\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
 const CSV: &str = "frame,HEAD_x,HEAD_y,HEAD_z,HIP_x,HIP_y,HIP_z\n0,0,0,1700,0,0,900\n1,0,0,1690,0,0,890\n";
 fn keypoints() -> String {
-    let points = |x: usize| (0..17).map(|n| format!("{}, {}, 0.9", x + n, 10 * n)).collect::<Vec<_>>().join(", ");
+    let points =
+        |x: usize| (0..17).map(|n| format!("{}, {}, 0.9", x + n, 10 * n)).collect::<Vec<_>>().join(", ");
     let person = |image: usize| {
         format!("{{ \"image_id\" : {image} , \"idx\" : 1 , \"keypoints\" : [ {} ] }}", points(20 * image + 1))
     };

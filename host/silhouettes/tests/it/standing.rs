@@ -101,7 +101,12 @@ fn keeps_a_standing_person_while_the_light_is_switched() {
 #[test]
 fn learning_can_be_limited_or_stopped() {
     let always = seen(Learning::Always);
-    assert!(always.masked * 2 < always.person, "{} of {} although all is learned", always.masked, always.person);
+    assert!(
+        always.masked * 2 < always.person,
+        "{} of {} although all is learned",
+        always.masked,
+        always.person
+    );
     for learning in [Learning::Until(100), Learning::Never] {
         let seen = seen(learning);
         assert!(seen.masked * 10 >= seen.person * 9, "{learning:?}: {} of {}", seen.masked, seen.person);

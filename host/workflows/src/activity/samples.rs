@@ -379,11 +379,17 @@ mod tests {
         let openings = folder.path().join("openings.csv");
         assert!(!openings.exists());
         for reason in ["release 1", "release \"2\""] {
-            assert_eq!(Samples::read_opened(&samples, Some(reason), &context).expect("opened").clips.len(), 1);
+            assert_eq!(
+                Samples::read_opened(&samples, Some(reason), &context).expect("opened").clips.len(),
+                1
+            );
         }
         let record = fs::read_to_string(openings).expect("a record");
         let lines: Vec<&str> = record.lines().collect();
         assert_eq!((lines.len(), lines[0]), (3, "time,version,samples,reason"));
-        assert!(lines[1].ends_with("\"samples.toml\",\"release 1\"") && lines[2].ends_with("\"release '2'\""), "{record}");
+        assert!(
+            lines[1].ends_with("\"samples.toml\",\"release 1\"") && lines[2].ends_with("\"release '2'\""),
+            "{record}"
+        );
     }
 }

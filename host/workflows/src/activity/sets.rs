@@ -78,9 +78,17 @@ struct Measured {
 ///
 /// # Errors
 /// Fewer than two sets, blind ones without a reason, samples that cannot be read or of which the model knows no activity.
-pub fn leave_one_set_out(model: &Model, settings: &SetsSettings, context: &Context<'_>) -> Result<SetsFigures> {
+pub fn leave_one_set_out(
+    model: &Model,
+    settings: &SetsSettings,
+    context: &Context<'_>,
+) -> Result<SetsFigures> {
     if settings.sets.len() < 2 {
-        return Err(WorkflowError::parameter("sets", settings.sets.len(), "at least 2, each a file of samples"));
+        return Err(WorkflowError::parameter(
+            "sets",
+            settings.sets.len(),
+            "at least 2, each a file of samples",
+        ));
     }
     let measured = settings
         .sets
@@ -117,7 +125,12 @@ fn measured(model: &Model, path: &Path, settings: &SetsSettings, context: &Conte
     among.sort();
     among.dedup();
     let mut measured = Measured {
-        name: path.parent().and_then(Path::file_name).unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+        name: path
+            .parent()
+            .and_then(Path::file_name)
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy()
+            .into_owned(),
         known: Vec::new(),
         strange: strange.iter().map(|judged| judged.answer.outlier_score).collect(),
         right: 0,

@@ -91,7 +91,9 @@ impl Shipped {
             Some(NewSet { accuracy, unknown_of_known, outlier_auroc, .. }) => format!(
                 "`{}` on a new set: {:.0} % of answers right, {:.0} % of known activities called unknown, \
                  unknown ones told apart with an AUROC of {outlier_auroc} (0.5 is chance)",
-                self.name, 100.0 * accuracy, 100.0 * unknown_of_known
+                self.name,
+                100.0 * accuracy,
+                100.0 * unknown_of_known
             ),
             None => format!("`{}` was not measured on a new set", self.name),
         }

@@ -271,7 +271,8 @@ mod tests {
     fn dark_pictures_of_many_levels_are_a_video() {
         let folder = tempfile::tempdir().expect("a folder");
         let dark = Array2::from_shape_fn((60, 80), |(row, column)| ((row * 7 + column * 3) % 30) as u8);
-        std::fs::write(folder.path().join("a.png"), encoded(&dark, |level| *level).expect("a picture")).expect("written");
+        std::fs::write(folder.path().join("a.png"), encoded(&dark, |level| *level).expect("a picture"))
+            .expect("written");
         assert_eq!(ViewKind::guess(folder.path()).expect("a kind"), ViewKind::Video);
     }
 }

@@ -184,7 +184,8 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
     if recording.planar {
         context.info(&format!("{name}: one view is drawn, as the camera saw it"));
     }
-    let job = Job { settings, views: views.len(), template: &template, frames: &frames, names: &names, context };
+    let job =
+        Job { settings, views: views.len(), template: &template, frames: &frames, names: &names, context };
     let silhouettes = match settings.keep {
         Some(keep) => job.gallery(&views, keep, &out)?,
         None => job.sequences(&views, &out)?,
@@ -231,7 +232,8 @@ pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track>
     const MARGIN_PX: usize = 2;
     /// Gaps at joints that are closed.
     const GAP_PX: usize = 4;
-    let frames: Vec<HashMap<&str, Point3>> = (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
+    let frames: Vec<HashMap<&str, Point3>> =
+        (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
     let view = View::default();
     let reach = parts::extent(&frames, template, &view);
     let Some(canvas) = Canvas::fitting(&reach, MM_PER_PX, MARGIN_PX) else { return Vec::new() };

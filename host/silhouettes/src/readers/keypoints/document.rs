@@ -36,7 +36,14 @@ const PEOPLE: [&str; 8] =
 const FRAMES: [&str; 6] = ["frames", "instance_info", "pose_frames", "results", "data", "root"];
 /// Keys under which a person keeps its points.
 const POINTS: [&str; 8] = [
-    "pose_keypoints_2d", "keypoints", "joints", "pose_landmarks", "poseLandmarks", "landmarks", "landmark", "pose",
+    "pose_keypoints_2d",
+    "keypoints",
+    "joints",
+    "pose_landmarks",
+    "poseLandmarks",
+    "landmarks",
+    "landmark",
+    "pose",
 ];
 const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
 
@@ -75,8 +82,10 @@ impl Document {
                     return;
                 }
                 // Frames by the names of their pictures.
-                let mut named: Vec<(&String, &Value)> =
-                    map.iter().filter(|(_, frame)| frame.as_object().is_some_and(is_frame) || frame.is_array()).collect();
+                let mut named: Vec<(&String, &Value)> = map
+                    .iter()
+                    .filter(|(_, frame)| frame.as_object().is_some_and(is_frame) || frame.is_array())
+                    .collect();
                 named.sort_by(|a, b| order(a.0).cmp(&order(b.0)));
                 for (_, frame) in named {
                     let frame = self.frame(frame);
@@ -104,7 +113,9 @@ impl Document {
         let mut frames: BTreeMap<(String, u64, String), Vec<Person>> = BTreeMap::new();
         let mut names: BTreeMap<String, String> = BTreeMap::new();
         for picture in pictures {
-            if let (Some(id), Some(name)) = (picture.get("id"), picture.get("file_name").and_then(Value::as_str)) {
+            if let (Some(id), Some(name)) =
+                (picture.get("id"), picture.get("file_name").and_then(Value::as_str))
+            {
                 names.insert(id.to_string(), name.into());
                 frames.entry(order(name)).or_default();
             }
@@ -118,8 +129,10 @@ impl Document {
         /// Gaps are filled where they lengthen the recording at most by this factor.
         const LONGEST: u64 = 10;
         let numbers: Vec<u64> = frames.keys().map(|(_, number, _)| *number).collect();
-        let step = numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0).min();
-        let reach = numbers.last().zip(numbers.first()).map_or(0, |(last, first)| last.saturating_sub(*first));
+        let step =
+            numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0).min();
+        let reach =
+            numbers.last().zip(numbers.first()).map_or(0, |(last, first)| last.saturating_sub(*first));
         let mut last: Option<u64> = None;
         for ((_, number, _), people) in frames {
             if let (Some(last), Some(step)) = (last, step)
@@ -184,7 +197,8 @@ impl Document {
         let (layout, triples): (_, Vec<[f64; 3]>) = if flat {
             // 33 points have depth as well; no two layouts share a length.
             let (layout, width) = [3, 2, 4].iter().find_map(|width| {
-                let layout = Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
+                let layout =
+                    Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
                 Some((layout, *width))
             })?;
             let of = |c: &[Value]| [number(&c[0]), number(&c[1]), confidence(c, layout)];
@@ -254,9 +268,9 @@ fn picture_of(item: &Value) -> Option<String> {
 fn order(name: &str) -> (String, u64, String) {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let end = stem.rfind(|c: char| c.is_ascii_digit()).map_or(0, |at| at + 1);
-    let begin = stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| {
-        at + stem[at..].chars().next().map_or(1, char::len_utf8)
-    });
+    let begin = stem[..end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |at| at + stem[at..].chars().next().map_or(1, char::len_utf8));
     (stem[..begin].into(), stem[begin..end].parse().unwrap_or(0), stem[end..].into())
 }
 

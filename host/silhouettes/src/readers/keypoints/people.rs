@@ -84,7 +84,10 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
         for &(frame, place) in &track.seen {
             whole[frame].clone_from(&frames[frame][place].points);
         }
-        whole.iter_mut().filter(|points| points.is_empty()).for_each(|points| points.resize(NAMES.len(), None));
+        whole
+            .iter_mut()
+            .filter(|points| points.is_empty())
+            .for_each(|points| points.resize(NAMES.len(), None));
         whole
     };
     (all.iter().take(MOST).map(points).collect(), count)

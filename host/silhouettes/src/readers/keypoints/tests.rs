@@ -23,10 +23,12 @@ fn person(layout: &Layout, x: f64) -> Vec<[f64; 3]> {
     };
     let mut points: Vec<[f64; 3]> = layout
         .places()
-        .map(|name| name.map_or([1.0, 1.0, 0.9], |name| {
-            let [x, y] = place(NAMES[name]);
-            [x, y, 0.9]
-        }))
+        .map(|name| {
+            name.map_or([1.0, 1.0, 0.9], |name| {
+                let [x, y] = place(NAMES[name]);
+                [x, y, 0.9]
+            })
+        })
         .collect();
     points.resize(layout.count, [1.0, 1.0, 0.9]);
     points
@@ -43,7 +45,8 @@ fn layout(count: usize) -> &'static Layout {
 
 #[track_caller]
 fn upright(json: &str, frames: usize) -> super::super::recording::Recording {
-    let found = read(json.as_bytes(), "json", Choices::default()).unwrap_or_else(|error| panic!("{error}: {json}"));
+    let found =
+        read(json.as_bytes(), "json", Choices::default()).unwrap_or_else(|error| panic!("{error}: {json}"));
     assert_eq!(found.frames.len(), frames, "{json}");
     let points = found.by_name(0);
     let height = points["left shoulder"][2] - points["left ankle"][2];
@@ -67,9 +70,11 @@ fn openpose_files_of_all_layouts_are_one_frame_each() {
 
 #[test]
 fn a_folder_of_openpose_files_is_a_recording_with_empty_frames() {
-    let frame = |x: f64| format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(layout(25), x)));
+    let frame =
+        |x: f64| format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(layout(25), x)));
     let files = [frame(100.0), r#"{"people":[]}"#.into(), frame(104.0)];
-    let found = read_files(files.iter().map(String::as_bytes)).expect("keypoints").settled(Choices::default());
+    let found =
+        read_files(files.iter().map(String::as_bytes)).expect("keypoints").settled(Choices::default());
     assert_eq!(found.frames.len(), 3);
     assert!(found.by_name(1).is_empty());
     let moved = found.by_name(2)["neck"][0] - found.by_name(0)["neck"][0];
@@ -112,9 +117,13 @@ fn mediapipe_landmarks_are_parts_of_the_picture() {
         .collect();
     let landmarks = landmarks.join(",");
     for json in [
-        format!(r#"{{"width":320,"height":200,"frames":[{{"landmarks":[{landmarks}]}},{{"landmarks":[]}}]}}"#),
+        format!(
+            r#"{{"width":320,"height":200,"frames":[{{"landmarks":[{landmarks}]}},{{"landmarks":[]}}]}}"#
+        ),
         format!(r#"{{"width":320,"height":200,"frames":[{{"poseLandmarks":[[{landmarks}]]}},null]}}"#),
-        format!(r#"{{"width":320,"height":200,"frames":[{{"pose_landmarks":{{"landmark":[{landmarks}]}}}},{{}}]}}"#),
+        format!(
+            r#"{{"width":320,"height":200,"frames":[{{"pose_landmarks":{{"landmark":[{landmarks}]}}}},{{}}]}}"#
+        ),
     ] {
         let found = upright(&json, 2);
         assert!(found.remarks().iter().any(|remark| remark.contains("stated")), "{:?}", found.remarks());
@@ -133,7 +142,8 @@ fn mmpose_instances_with_scores_apart_are_read() {
     scores[9] = "0.01";
     let json = format!(
         r#"{{"meta_info":{{}},"instance_info":[{{"frame_id":1,"instances":[{{"keypoints":[{}],"keypoint_scores":[{}]}}]}}]}}"#,
-        points.join(","), scores.join(",")
+        points.join(","),
+        scores.join(",")
     );
     let found = upright(&json, 1);
     assert!(!found.by_name(0).contains_key("left wrist"), "its score is 0.01");
@@ -147,7 +157,13 @@ fn several_people_are_followed_apart_and_counted() {
     let frames: Vec<String> = (0..10)
         .map(|n| {
             let (a, b) = (of(100.0 + 2.0 * f64::from(n)), of(400.0 - 2.0 * f64::from(n)));
-            let people = if n < 3 { a } else if n % 2 == 0 { format!("{a},{b}") } else { format!("{b},{a}") };
+            let people = if n < 3 {
+                a
+            } else if n % 2 == 0 {
+                format!("{a},{b}")
+            } else {
+                format!("{b},{a}")
+            };
             format!(r#"{{"people":[{people}]}}"#)
         })
         .collect();

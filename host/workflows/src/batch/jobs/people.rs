@@ -60,7 +60,11 @@ pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let template = fields.name_or_file("template")?.ok_or(BatchError::MissingField { name: "template" })?;
     let settings = MarkersSettings {
         file: fields.path("file")?,
-        choices: Choices { unit: fields.optional("units")?, up: up(fields)?, person: fields.optional("person")? },
+        choices: Choices {
+            unit: fields.optional("units")?,
+            up: up(fields)?,
+            person: fields.optional("person")?,
+        },
         template: Some(template.display().to_string()),
         out: fields.path("out")?,
         views: fields.or("views", 8)?,
