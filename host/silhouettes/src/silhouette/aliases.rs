@@ -250,10 +250,10 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
                 }
             }
         }
-        if naming.is_none_or(|naming| naming.template == "opencap") {
-            if let Some(marker) = markers.iter().find(|marker| simplified(marker) == *name) {
-                add(place, marker);
-            }
+        if naming.is_none_or(|naming| naming.template == "opencap")
+            && let Some(marker) = markers.iter().find(|marker| simplified(marker) == *name)
+        {
+            add(place, marker);
         }
     }
     found

@@ -46,8 +46,9 @@ impl Made {
         let mut word = |number: usize, value: u16| {
             header[2 * (number - 1)..2 * number].copy_from_slice(&value.to_le_bytes());
         };
-        (word(1, 0x5002), word(2, 1), word(3, 0));
-        (word(4, self.header.0), word(5, self.header.1), word(9, 4));
+        for (number, value) in [(1, 0x5002), (2, 1), (4, self.header.0), (5, self.header.1), (9, 4)] {
+            word(number, value);
+        }
         header[12..16].copy_from_slice(&(-1.0_f32).to_le_bytes());
         header[20..24].copy_from_slice(&100.0_f32.to_le_bytes());
         let mut section = vec![0, 0, 2, 84];

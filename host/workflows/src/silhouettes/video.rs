@@ -156,7 +156,7 @@ pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoF
         let (found, mask) = work.mask(&frame)?;
         figures.count(&found.subject.flags);
         index.frame.push(keep(&frame.name, &found, &mask, settings.centred, &out, labels.as_ref())?);
-        if figures.frames % PROGRESS_FRAMES == 0 {
+        if figures.frames.is_multiple_of(PROGRESS_FRAMES) {
             context.progress.advance("frames", figures.frames, None);
         }
     }

@@ -86,7 +86,7 @@ impl Document {
                     .iter()
                     .filter(|(_, frame)| frame.as_object().is_some_and(is_frame) || frame.is_array())
                     .collect();
-                named.sort_by(|a, b| order(a.0).cmp(&order(b.0)));
+                named.sort_by_key(|frame| order(frame.0));
                 for (_, frame) in named {
                     let frame = self.frame(frame);
                     self.frames.push(frame);
