@@ -3,8 +3,8 @@
 use std::{collections::BTreeMap, path::PathBuf};
 
 use farnear_depth::{measure::Measurement, reason::Reason};
-use farnear_files::{image_file, map, npy, staging::Staging, view::view_png};
-use farnear_workflows::{MADE_BY, measure};
+use farnear_files::{image_file, map, npy, view::view_png};
+use farnear_workflows::{MADE_BY, measure, result_folder};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyBytes};
@@ -174,7 +174,7 @@ impl DepthMap {
     /// Write a folder as `DepthMap.load` and `farnear measure` read it: `depth.npy`, `confidence.npy`, `uncertainty.npy`,
     /// `reason.png`, `view.png` and `depth.toml`. The folder is complete or absent.
     fn save(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
-        let staged = Staging::into_folder(&folder).map_err(wrong)?;
+        let staged = result_folder::depth(&folder).map_err(wrong)?;
         let write = |name: &str, bytes: &[u8]| staged.write(name, bytes).map_err(wrong);
         for (name, array) in [
             ("depth.npy", &self.depth_mm),

@@ -1,6 +1,7 @@
 //! Files that are there whole or not at all: written aside, then renamed.
 
 use std::{
+    ffi::{OsStr, OsString},
     fs::{self, File},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
@@ -53,6 +54,10 @@ pub struct Staging {
     target: PathBuf,
     /// Whether the folder that files go into was made for them.
     made_target: bool,
+    /// Files of an earlier result, of which those that are not written again are removed.
+    replaced: Vec<&'static str>,
+    /// The file that describes the others: removed first and put in place last.
+    record: Option<&'static str>,
 }
 
 impl Staging {
@@ -82,6 +87,14 @@ impl Staging {
         Self::begin(target.join(partial_name("files")), target.into(), made_target)
     }
 
+    /// Replaces an earlier result in the folder: files with these names that are not written now are removed. `record`
+    /// describes the result: while files of two results are in the folder, it is absent.
+    pub fn replacing(mut self, record: &'static str, files: impl IntoIterator<Item = &'static str>) -> Self {
+        self.replaced.extend(files);
+        self.record = Some(record);
+        self
+    }
+
     fn begin(folder: PathBuf, target: PathBuf, made_target: bool) -> Result<Self, StagingError> {
         // A program that was killed may have left the name behind, and a container gives its number out again.
         let mut free = folder.clone();
@@ -94,7 +107,8 @@ impl Staging {
         sweep(folder.parent().unwrap_or(Path::new(".")));
         fs::create_dir(&free).map_err(StagingError::at(&target))?;
         let in_use = File::open(&free).ok().filter(|folder| folder.try_lock().is_ok());
-        Ok(Self { folder: free, _in_use: in_use, target, made_target })
+        let (replaced, record) = (Vec::new(), None);
+        Ok(Self { folder: free, _in_use: in_use, target, made_target, replaced, record })
     }
 
     /// Where a file is to be written for the time being.
@@ -143,10 +157,27 @@ impl Staging {
             }
             return fs::rename(&self.folder, &self.target).map_err(StagingError::at(&self.target));
         }
-        for entry in fs::read_dir(&self.folder).map_err(StagingError::at(&self.folder))? {
-            let entry = entry.map_err(StagingError::at(&self.folder))?;
-            let place = self.target.join(entry.file_name());
-            fs::rename(entry.path(), &place).map_err(StagingError::at(&place))?;
+        let entries = fs::read_dir(&self.folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+        let mut names: Vec<OsString> = entries
+            .map_err(StagingError::at(&self.folder))?
+            .into_iter()
+            .map(|entry| entry.file_name())
+            .collect();
+        let is_record = |name: &OsStr| self.record.is_some_and(|record| name == record);
+        names.sort_by_key(|name| is_record(name));
+        let stale = |name: &&str| !names.iter().any(|new| new == OsStr::new(name));
+        for name in self.record.iter().copied().chain(self.replaced.iter().copied().filter(stale)) {
+            let place = self.target.join(name);
+            match fs::remove_file(&place) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(StagingError::at(&place)(error));
+                }
+                _ => {}
+            }
+        }
+        for name in names {
+            let place = self.target.join(&name);
+            fs::rename(self.folder.join(&name), &place).map_err(StagingError::at(&place))?;
         }
         Ok(())
     }
@@ -296,6 +327,24 @@ mod tests {
         assert_eq!(fs::read(root.path().join("b")).unwrap(), b"1");
         write_file(&root.path().join("b"), b"2").unwrap();
         assert_eq!(names(root.path()), ["b", "old"]);
+    }
+
+    #[test]
+    fn replaces_an_earlier_result_and_leaves_other_files() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |names: &[&str]| {
+            let staged = Staging::into_folder(root.path()).unwrap().replacing("record", ["a", "b", "c"]);
+            names.iter().for_each(|name| staged.write(name, name.as_bytes()).unwrap());
+            staged
+        };
+        fs::write(root.path().join("notes"), "mine").unwrap();
+        write(&["a", "b", "record"]).finish().unwrap();
+        drop(write(&["c", "record"]));
+        assert_eq!(names(root.path()), ["a", "b", "notes", "record"]);
+        write(&["c", "record"]).finish().unwrap();
+        assert_eq!(names(root.path()), ["c", "notes", "record"]);
+        write(&["a"]).finish().unwrap();
+        assert_eq!(names(root.path()), ["a", "notes"], "the record of another result goes with it");
     }
 
     #[test]

@@ -26,6 +26,7 @@ use farnear_files::staging::write_file;
 use serde::Serialize;
 use serde_json::Value;
 
+pub(crate) use self::place::{RECORD, final_place};
 pub use self::{
     error::BatchError,
     generate::{Pattern, generate},

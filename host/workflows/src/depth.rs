@@ -282,7 +282,7 @@ pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFi
         context.progress.warn(warning);
     }
     let out = settings.out.clone().unwrap_or_else(|| pair::default_folder(&settings.far));
-    Results::new(settings, &inputs, &computed, &warnings)?.write(&out, context)?;
+    Results::new(settings, &inputs, &computed, &warnings, &out)?.write(&out, context)?;
     context.info(&format!("wrote {}", out.display()));
     let (height, width) = computed.map.depth_mm.dim();
     Ok(DepthFigures {

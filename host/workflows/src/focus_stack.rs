@@ -16,9 +16,7 @@ use farnear_depth::{
 };
 use farnear_files::{
     image_file::{self, Grey, ReadSettings},
-    npy, stack,
-    staging::Staging,
-    view,
+    npy, stack, view,
 };
 use ndarray::{Array2, ArrayView2};
 use schemars::JsonSchema;
@@ -32,7 +30,9 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    inputs::{HashedFile, hashed},
     request::{PathKind, Request},
+    result_folder::{self, STACK_RECORD},
 };
 
 /// Compute depth from a stack of images at different focus, and the image that is sharp everywhere.
@@ -111,7 +111,7 @@ pub struct FocusStackRequest {
     /// Remove depths with a lower reliability, 0 to 1; 0 keeps all.
     #[cfg_attr(feature = "clap", arg(long, value_name = "R", default_value_t = Self::default().min_reliability))]
     pub min_reliability: f32,
-    /// The new folder for the results.
+    /// Folder for the results: a new one, or that of an earlier focus stack, which is replaced.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
 }
@@ -260,6 +260,8 @@ struct Record<'a> {
     positions: &'a [f64],
     /// The distortion that was removed.
     distortion: Option<DistortionSection>,
+    /// The files that the map was made from.
+    input: Vec<HashedFile>,
 }
 
 /// Part of the pixels below which a stack shows too little.
@@ -272,8 +274,9 @@ const LITTLE: f64 = 0.5;
 /// [`WorkflowError::Cancelled`].
 pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result<FocusStackFigures> {
     request.check()?;
-    let staging = Staging::new_folder(&request.out)?;
+    let staging = result_folder::stack(&request.out, &request.stack)?;
     let mut listed = positions::of(request)?;
+    let inputs: Vec<PathBuf> = listed.images.iter().cloned().chain(listed.described_by.clone()).collect();
     let mut warnings = std::mem::take(&mut listed.remarks);
     let mut images = read(&listed.images, request, &mut warnings, context)?;
     let mut frames = if request.use_all && request.align.0.is_none() {
@@ -328,13 +331,14 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         left_out: &figures.left_out,
         positions: &listed.positions,
         distortion: listed.distortion.map(DistortionSection::from),
+        input: hashed(&inputs, &request.out)?,
     };
     staging.write("depth.npy", &npy::write(depth.view()))?;
     staging.write("confidence.npy", &npy::write(map.reliability.view()))?;
     let codes = map.all_in_focus.mapv(|v| (v.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16);
     staging.write("all-in-focus.png", &image_file::encode_png(codes.view(), 16)?)?;
     staging.write("view.png", &view::view_png_in(figures.unit, depth.view(), map.reliability.view())?)?;
-    staging.write("stack.toml", toml::to_string(&record)?.as_bytes())?;
+    staging.write(STACK_RECORD, toml::to_string(&record)?.as_bytes())?;
     staging.finish()?;
     context.info(&format!("wrote {}", request.out.display()));
     Ok(figures)

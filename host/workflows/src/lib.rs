@@ -14,6 +14,7 @@
 //! - [`target`]: a flat target to print; [`calibrate`]: learning the point spread function and corrections.
 //! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
 //!   [`sun`] stands; [`activity`]: what the person does.
+//! - [`inputs`], [`result_folder`]: hashes of what a result was made from; folders that hold the result of one run.
 //! - [`batch`]: a list of such jobs on all cores, to be gone on with after whatever stopped it.
 //! - [`doctor`]: whether this computer has what is needed.
 //! - [`context`], [`error`]: the way to the face and back.
@@ -74,6 +75,7 @@ pub mod doctor;
 pub mod error;
 pub mod figures;
 pub mod focus_stack;
+pub mod inputs;
 pub mod lens_table;
 pub mod measure;
 pub mod operator_cache;
@@ -85,6 +87,7 @@ pub mod picture;
 pub mod psf;
 pub mod report;
 pub mod request;
+pub mod result_folder;
 pub mod rig;
 pub mod sessions;
 pub mod shadow;

@@ -5,7 +5,7 @@ use std::fs;
 use farnear_files::{image_file, map};
 use ndarray::{Array2, s};
 
-use crate::common::{Folder, fails, farnear, figures, number};
+use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
 const IMAGES: usize = 9;
 /// Where the left and the right half are sharpest, counted from 0.
@@ -113,6 +113,31 @@ fn stage_positions_are_any_numbers_in_um() {
     let found = halves(&read(&out));
     assert!((found[0] + 1.0).abs() < 0.5 && (found[1] - 3.0).abs() < 1.0, "{found:?}");
     fails(&mut farnear(&["measure", "region", &out]), 2, &["depths in um", "--distances-mm"]);
+}
+
+#[test]
+fn a_result_is_replaced_by_its_kind_only() {
+    let folder = Folder::new();
+    let (stack, out) = (stack(&folder), folder.text("out"));
+    let run = ["focus-stack", &stack, "--out", &out];
+    succeeds(&mut farnear(&run));
+    let before = read(&out);
+    folder.file("out/notes.txt", "mine");
+    folder.file("out/batch.toml", "do = \"focus-stack\"\n");
+    succeeds(farnear(&run).args(["--positions-um", "0,2,4,6,8,10,12,14,16"]));
+    assert!(read(&out) != before);
+    let names: Vec<_> = folder.listing().into_iter().filter(|name| name.starts_with("out/")).collect();
+    let expected = ["all-in-focus.png", "confidence.npy", "depth.npy", "notes.txt", "stack.toml", "view.png"];
+    assert_eq!(names, expected.map(|name| format!("out/{name}")));
+    let record: toml::Table = fs::read_to_string(folder.path("out/stack.toml")).unwrap().parse().unwrap();
+    let files: Vec<_> =
+        record["input"].as_array().unwrap().iter().map(|file| file["file"].as_str()).collect();
+    assert_eq!((files.len(), files[0]), (IMAGES, Some("../stack/1.png")));
+
+    fails(&mut farnear(&["focus-stack", &stack, "--out", &stack]), 1, &["exists already"]);
+    let pair = [format!("{stack}/1.png"), format!("{stack}/9.png")];
+    let depth = ["depth", &pair[0], &pair[1], "--optics", rig_optics(), "--out", &out];
+    fails(&mut farnear(&depth), 2, &["the result of focus-stack"]);
 }
 
 #[test]

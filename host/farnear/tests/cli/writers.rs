@@ -52,6 +52,36 @@ fn a_map_is_written_as_asked() {
 }
 
 #[test]
+fn a_folder_holds_the_files_of_one_run_with_hashes_of_its_inputs() {
+    let folder = Folder::new();
+    render(&folder, "cone", "cone");
+    render(&folder, "slant", "slant");
+    let out = folder.text("out");
+    let depth = |pair: &str, more: &[&str]| {
+        let [far, near] = ["far.png", "near.png"].map(|name| folder.text(&format!("{pair}/{name}")));
+        succeeds(farnear(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out]).args(more));
+    };
+    depth("cone", &["--uncertainty", "--write", "npy,tiff,png,mesh,view,exr"]);
+    folder.file("out/notes.txt", "mine");
+    depth("slant", &["--write", "npy"]);
+    let left = ["confidence.npy", "depth.npy", "depth.toml", "notes.txt", "reason.png"];
+    assert_eq!(written(&folder, "out"), left);
+    let record: toml::Table =
+        std::fs::read_to_string(folder.path("out/depth.toml")).unwrap().parse().unwrap();
+    let input = record["input"].as_array().unwrap();
+    let names: Vec<_> = input.iter().map(|file| file["file"].as_str().unwrap()).collect();
+    assert_eq!(names[..2], ["../slant/far.png", "../slant/near.png"]);
+    assert!(names[2].ends_with("examples/rig.toml"), "{names:?}");
+    let bytes = std::fs::read(folder.path("slant/near.png")).unwrap();
+    assert_eq!(input[1]["bytes"].as_integer(), Some(bytes.len() as i64));
+    assert_eq!(input[1]["sha256"].as_str().unwrap().len(), 64);
+    assert_ne!(input[0]["sha256"], input[1]["sha256"]);
+    // A failed run leaves the earlier result whole.
+    fails(&mut farnear(&["depth", &out, &out, "--optics", rig_optics(), "--out", &out]), 1, &[]);
+    assert_eq!(written(&folder, "out"), left);
+}
+
+#[test]
 fn an_exr_holds_depth_confidence_deviation_and_what_made_them() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");

@@ -14,7 +14,16 @@ use super::{BatchError, provenance::Provenance};
 use crate::error::Result;
 
 /// The name of a folder's provenance, and what is added to a file's name for its own.
-const RECORD: &str = "batch.toml";
+pub(crate) const RECORD: &str = "batch.toml";
+/// Ends the name of the folder in which a result is made.
+const ASIDE: &str = ".batch-partial";
+
+/// The folder that a result will have, where `out` is a batch's place aside.
+pub(crate) fn final_place(out: &Path) -> PathBuf {
+    let aside = out.parent().filter(|parent| parent.to_string_lossy().ends_with(ASIDE));
+    let beside = aside.and_then(|aside| Some(aside.parent()?.join(out.file_name()?)));
+    beside.unwrap_or_else(|| out.into())
+}
 
 /// A result's place.
 pub(super) struct Place {
@@ -66,7 +75,7 @@ impl Place {
     /// away first.
     pub fn fill(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<Value>) -> Result<Value> {
         let name = self.target.file_name().unwrap_or_default();
-        let aside = self.beside(".", ".batch-partial");
+        let aside = self.beside(".", ASIDE);
         let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
         if let Some(parent) = aside.parent() {
             fs::create_dir_all(parent).map_err(unwritable)?;

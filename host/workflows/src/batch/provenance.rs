@@ -2,28 +2,25 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
-    io::{self, Read},
+    fs,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 
-use super::{BatchError, fields::Fields};
+use super::fields::Fields;
 use crate::{
     MADE_BY,
     cache::{FileVersion, LeastRecentlyUsed},
     error::Result,
+    inputs::{self, HashedFile},
 };
 
 /// Version of the record.
 const FORMAT: u32 = 1;
 /// Files that several jobs read (optics, corrections, models) are summed once; each job has a few of its own besides.
 const SUMS: usize = 64;
-/// Read at once while summing.
-const BUFFER_BYTES: usize = 1 << 16;
 
 /// What a job is made from, and what came of it.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -38,21 +35,13 @@ pub(super) struct Provenance {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     figures: String,
     #[serde(default)]
-    input: Vec<Summed>,
+    input: Vec<HashedFile>,
     #[serde(default)]
-    output: Vec<Summed>,
-}
-
-/// A file with its length and sum.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub(super) struct Summed {
-    file: String,
-    bytes: u64,
-    sha256: String,
+    output: Vec<HashedFile>,
 }
 
 /// Sums of files, of which those that many jobs read are kept.
-pub(super) struct Sums(LeastRecentlyUsed<FileVersion, Summed>);
+pub(super) struct Sums(LeastRecentlyUsed<FileVersion, HashedFile>);
 
 impl Default for Sums {
     fn default() -> Self {
@@ -62,20 +51,13 @@ impl Default for Sums {
 
 impl Sums {
     /// The files, and all files in folders among them, each with its sum.
-    pub fn of(&self, inputs: &[PathBuf], base: &Path) -> Result<Vec<Summed>> {
-        let mut files = Vec::new();
-        for input in inputs {
-            if input.is_dir() {
-                files.extend(files_below(input)?);
-            } else {
-                files.push(input.clone());
-            }
-        }
+    pub fn of(&self, paths: &[PathBuf], base: &Path) -> Result<Vec<HashedFile>> {
+        let files = inputs::files(paths)?;
         let sum = |file: &PathBuf| {
             // By the manifest's own word for it, so that the whole may be moved.
             let name = file.strip_prefix(base).unwrap_or(file).display().to_string();
-            let summed = self.0.get(FileVersion::of("the input", file)?, || Ok(sum(file, &name)?))?;
-            Ok(Summed { file: name, ..Summed::clone(&summed) })
+            let summed = self.0.get(FileVersion::of("the input", file)?, || inputs::hash(file, &name))?;
+            Ok(HashedFile { file: name, ..HashedFile::clone(&summed) })
         };
         files.iter().map(sum).collect()
     }
@@ -83,7 +65,7 @@ impl Sums {
 
 impl Provenance {
     /// Of a job with nothing done yet.
-    pub fn new(kind: &str, fields: &Fields, input: Vec<Summed>) -> Self {
+    pub fn new(kind: &str, fields: &Fields, input: Vec<HashedFile>) -> Self {
         Self {
             format: FORMAT,
             made_by: MADE_BY.into(),
@@ -111,15 +93,15 @@ impl Provenance {
 
     /// The same with what came of it: the file or the folder at `result`.
     pub fn with_output(mut self, result: &Path) -> Result<Self> {
-        let files = if result.is_dir() { files_below(result)? } else { vec![result.to_path_buf()] };
+        let files = if result.is_dir() { inputs::files_below(result)? } else { vec![result.to_path_buf()] };
         let root = if result.is_dir() { result } else { result.parent().unwrap_or(Path::new("")) };
         let summed = |file: &PathBuf| {
             let name = file.strip_prefix(root).unwrap_or(file);
             // One separator everywhere, so that a record says the same on every system.
             let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
-            sum(file, &parts.join("/"))
+            inputs::hash(file, &parts.join("/"))
         };
-        self.output = files.iter().map(summed).collect::<Result<_, BatchError>>()?;
+        self.output = files.iter().map(summed).collect::<Result<_>>()?;
         Ok(self)
     }
 
@@ -134,53 +116,15 @@ impl Provenance {
     pub fn fulfils(&self, wanted: &Self, root: &Path, verify: bool) -> bool {
         let made_alike = (&self.made_by, &self.kind, &self.settings, &self.input)
             == (&wanted.made_by, &wanted.kind, &wanted.settings, &wanted.input);
-        let whole = |output: &Summed| {
+        let whole = |output: &HashedFile| {
             let file = root.join(&output.file);
             match verify {
-                true => sum(&file, &output.file).is_ok_and(|found| found == *output),
+                true => inputs::hash(&file, &output.file).is_ok_and(|found| found == *output),
                 false => fs::metadata(&file).is_ok_and(|found| found.len() == output.bytes),
             }
         };
         made_alike && !self.output.is_empty() && self.output.iter().all(whole)
     }
-}
-
-/// All files below a folder, in the order of their names.
-fn files_below(folder: &Path) -> Result<Vec<PathBuf>, BatchError> {
-    let unreadable = |source| BatchError::Read { path: folder.into(), source };
-    let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
-    let mut entries: Vec<PathBuf> = entries.map_err(unreadable)?.iter().map(fs::DirEntry::path).collect();
-    entries.sort();
-    let mut files = Vec::new();
-    for entry in entries {
-        if entry.is_dir() {
-            files.extend(files_below(&entry)?);
-        } else {
-            files.push(entry);
-        }
-    }
-    Ok(files)
-}
-
-fn sum(file: &Path, name: &str) -> Result<Summed, BatchError> {
-    let unreadable = |source| BatchError::Read { path: file.into(), source };
-    let mut hasher = Sha256::new();
-    let mut opened = File::open(file).map_err(unreadable)?;
-    let mut buffer = vec![0; BUFFER_BYTES];
-    let mut bytes = 0;
-    loop {
-        match opened.read(&mut buffer) {
-            Ok(0) => break,
-            Ok(count) => {
-                hasher.update(&buffer[..count]);
-                bytes += count as u64;
-            }
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(unreadable(error)),
-        }
-    }
-    let sha256 = hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok(Summed { file: name.into(), bytes, sha256 })
 }
 
 #[cfg(test)]

@@ -14,15 +14,20 @@ use farnear_files::{
     image_file::{png_to, png8_to},
     map::{self, Scale},
     mesh::{self, Projection},
-    npy,
-    staging::Staging,
-    view,
+    npy, view,
 };
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
 use super::{Computed, DepthRequest, Inputs, record::record};
-use crate::{MADE_BY, context::Context, error::Result};
+use crate::{
+    MADE_BY,
+    context::Context,
+    error::Result,
+    inputs::hashed,
+    request::Request,
+    result_folder::{self, DEPTH_RECORD},
+};
 
 /// A file being written.
 type Sink = BufWriter<File>;
@@ -51,6 +56,11 @@ const OUTPUTS: &[Output] = &[
     Output { names: &["view"], file: "view.png", write: |results, to| results.view(to) },
     Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
+
+/// All files that a result can have beside its record.
+pub(crate) fn files() -> impl Iterator<Item = &'static str> {
+    OUTPUTS.iter().map(|output| output.file)
+}
 
 /// The one that needs the image beside the maps.
 const MESH: &str = "mesh";
@@ -135,9 +145,11 @@ impl<'a> Results<'a> {
         inputs: &'a Inputs,
         computed: &'a Computed,
         warnings: &[String],
+        out: &Path,
     ) -> Result<Self> {
+        let files = hashed(&Request::inputs(settings), out)?;
         let scale = settings.write.0.contains("png").then(|| map::scale(computed.map.depth_mm.view()));
-        let record = record(settings, inputs, computed, warnings, scale)?;
+        let record = record(settings, inputs, computed, warnings, scale, files)?;
         Ok(Self { settings, inputs, computed, scale, record })
     }
 
@@ -146,7 +158,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// Which file cannot be written; [`crate::WorkflowError::Cancelled`].
     pub(super) fn write(&self, out: &Path, context: &Context<'_>) -> Result<()> {
-        let staged = Staging::into_folder(out)?;
+        let staged = result_folder::depth(out)?;
         let there = |output: &&Output| output.file != UNCERTAINTY || self.deviation().is_some();
         let outputs: Vec<&Output> = self.settings.write.outputs().filter(there).collect();
         let cancel = &context.cancel;
@@ -154,7 +166,7 @@ impl<'a> Results<'a> {
             cancel.check("writing the results")?;
             Ok(staged.fill(output.file, |to| (output.write)(self, to))?)
         })?;
-        staged.write("depth.toml", self.record.as_bytes())?;
+        staged.write(DEPTH_RECORD, self.record.as_bytes())?;
         context.cancel.check("writing the results")?;
         Ok(staged.finish()?)
     }

@@ -7,7 +7,7 @@ use farnear_files::map::Scale;
 use serde::Serialize;
 
 use super::{Computed, DepthRequest, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part};
-use crate::{MADE_BY, error::Result};
+use crate::{MADE_BY, error::Result, inputs::HashedFile};
 
 /// Version of the record.
 const FORMAT: u32 = 1;
@@ -20,7 +20,7 @@ struct Record<'a> {
     near: String,
     units: &'static str,
     warnings: &'a [String],
-    /// Which outputs this record speaks of, where they are not the usual ones: others may lie there from before.
+    /// Which outputs were written, where they are not the usual ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     write: Option<String>,
     /// How depth.png's codes stand for mm; code 0 = no value.
@@ -50,6 +50,8 @@ struct Record<'a> {
     optics: Optics,
     #[serde(skip_serializing_if = "Option::is_none")]
     operators: Option<&'a Operators>,
+    /// The files that the map was made from.
+    input: Vec<HashedFile>,
 }
 
 /// The record as TOML. `png` is the scale of depth.png, where that is written.
@@ -59,6 +61,7 @@ pub fn record(
     computed: &Computed,
     warnings: &[String],
     png: Option<Scale>,
+    files: Vec<HashedFile>,
 ) -> Result<String> {
     let usual = settings.write == Outputs::default();
     Ok(toml::to_string(&Record {
@@ -85,5 +88,6 @@ pub fn record(
         uncertainty: computed.deviation.as_ref().map(|(_, found)| found),
         optics: inputs.optics,
         operators: inputs.method.operators(),
+        input: files,
     })?)
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use farnear_capture::record::{CaptureRecord, read_record};
+use farnear_capture::record::{CAPTURE_FILE, CaptureRecord, read_record};
 use farnear_depth::optics::{Distortion, Optics};
 use farnear_files::stack;
 use ndarray::Array2;
@@ -30,6 +30,8 @@ pub(super) struct Listed {
     pub axis: Axis,
     /// Where each is focused, on the axis.
     pub positions: Vec<f64>,
+    /// The files with the optics and the positions.
+    pub described_by: Vec<PathBuf>,
     /// What the lens bends, where that is known.
     pub distortion: Option<Distortion>,
     /// What a person should know of the stack.
@@ -76,7 +78,11 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
         ));
     }
     let (positions, images) = order.into_iter().unzip();
-    Ok(Listed { images, axis, positions, distortion, remarks: listed.remarks })
+    let described_by = optics::file_of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
+    let capture = record.map(|_| request.stack.join(CAPTURE_FILE));
+    let mut described_by: Vec<PathBuf> = described_by.into_iter().chain(capture).collect();
+    described_by.dedup();
+    Ok(Listed { images, axis, positions, described_by, distortion, remarks: listed.remarks })
 }
 
 /// The lens, if any file gives it; optics that are named or lie in the folder must be right.
@@ -183,6 +189,7 @@ mod tests {
             images: vec![PathBuf::new(); positions.len()],
             axis,
             positions,
+            described_by: vec![],
             distortion: None,
             remarks: vec![],
         }

@@ -38,7 +38,10 @@ impl Digest {
             "npy" | "tiff" => of_map(name, bytes),
             "png" | "jpg" => of_picture(bytes),
             "toml" | "svg" | "csv" | "json" | "txt" => {
-                let (numbers, rest) = numbers_and_rest(&String::from_utf8_lossy(bytes));
+                let text = String::from_utf8_lossy(bytes);
+                // Hashes of inputs that another kind of processor renders otherwise.
+                let same: Vec<&str> = text.lines().filter(|line| !line.starts_with("sha256 = ")).collect();
+                let (numbers, rest) = numbers_and_rest(&same.join("\n"));
                 (
                     format!("{} numbers in a text {:016x}", numbers.len(), hash(rest.as_bytes())),
                     some_of(&numbers),
