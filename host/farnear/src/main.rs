@@ -18,8 +18,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use farnear_workflows::{
-    WorkflowError, correct::CorrectRequest, depth::DepthRequest, focus_stack::FocusStackRequest,
-    operators::OperatorRequest, target::TargetRequest,
+    WorkflowError, compare::CompareRequest, correct::CorrectRequest, depth::DepthRequest,
+    focus_stack::FocusStackRequest, operators::OperatorRequest, optics::OpticsRequest, report::ReportRequest,
+    target::TargetRequest,
 };
 
 use run::Run;
@@ -41,14 +42,14 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Optics(commands::optics::Arguments),
+    Optics(Run<OpticsRequest>),
     Operators(Run<OperatorRequest>),
     Depth(Run<DepthRequest>),
     FocusStack(Run<FocusStackRequest>),
     Calibrate(commands::calibrate::Arguments),
     Camera(commands::camera::Arguments),
     Correct(Run<CorrectRequest>),
-    Compare(commands::compare::Arguments),
+    Compare(Run<CompareRequest>),
     Render(commands::render::Arguments),
     Rig(commands::rig::Arguments),
     Sun(commands::sun::Arguments),
@@ -58,7 +59,7 @@ enum Command {
     Batch(commands::batch::Arguments),
     Measure(commands::measure::Arguments),
     Target(Run<TargetRequest>),
-    Report(commands::report::Arguments),
+    Report(Run<ReportRequest>),
     Serve(commands::serve::Arguments),
     Doctor(commands::doctor::Arguments),
     Completions(commands::completions::Arguments),
@@ -67,14 +68,14 @@ enum Command {
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
-        Command::Optics(arguments) => commands::optics::run(arguments),
+        Command::Optics(task) => task.run(),
         Command::Operators(task) => task.run(),
         Command::Depth(task) => task.run(),
         Command::FocusStack(task) => task.run(),
         Command::Calibrate(arguments) => commands::calibrate::run(arguments),
         Command::Camera(arguments) => commands::camera::run(arguments),
         Command::Correct(task) => task.run(),
-        Command::Compare(arguments) => commands::compare::run(arguments),
+        Command::Compare(task) => task.run(),
         Command::Render(arguments) => commands::render::run(arguments),
         Command::Rig(arguments) => commands::rig::run(arguments),
         Command::Sun(arguments) => commands::sun::run(&arguments),
@@ -84,7 +85,7 @@ fn main() -> ExitCode {
         Command::Batch(arguments) => commands::batch::run(arguments),
         Command::Measure(arguments) => commands::measure::run(arguments),
         Command::Target(task) => task.run(),
-        Command::Report(arguments) => commands::report::run(arguments),
+        Command::Report(task) => task.run(),
         Command::Serve(arguments) => commands::serve::run(arguments),
         Command::Doctor(arguments) => commands::doctor::run(arguments),
         Command::Completions(arguments) => commands::completions::run::<Arguments>(arguments),

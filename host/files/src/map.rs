@@ -146,7 +146,7 @@ pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result
 }
 
 /// How the codes of a 16-bit depth image stand for mm: `mm = offset_mm + scale_mm * code`, 0 = no value.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Scale {
     /// Depth of code 0, which stands for "no value".
     pub offset_mm: f64,

@@ -2,7 +2,7 @@
 //!
 //! The aperture stands in the front focal plane, so the chief ray of an object point at distance z from the lens goes
 //! through the front focus: a pixel of pitch p sees p (z - F) / F of the object, wherever the sensor stands. x to the
-//! right, y up, z towards the viewer; all in mm.
+//! right, y up, z towards the viewer; all in the unit of the depths.
 
 use std::io::{self, Write};
 
@@ -36,22 +36,66 @@ impl Projection {
     }
 }
 
+/// Where pixels see the object beside the optical axis.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Lateral {
+    /// Along rays through the front focus of a lens; depths are in mm.
+    Lens(Projection),
+    /// Each pixel has this side at the object, in the unit of the depths.
+    Pixel(f64),
+    /// Not known: positions are in pixels.
+    Unknown,
+}
+
+impl Lateral {
+    /// Where a pixel of a map of size `dim` sees the object at depth `z`, to the right and up: in the unit of the depths, or in
+    /// pixels where it is not known.
+    pub fn beside_axis(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
+        let even = |side: f64| {
+            let (height, width) = dim;
+            let [x, y] = [width, height].map(|n| 0.5 * (n as f64 - 1.0));
+            [(column as f64 - x) * side, (y - row as f64) * side]
+        };
+        match self {
+            Self::Lens(projection) => projection.beside_axis_mm(dim, column, row, z),
+            Self::Pixel(side) => even(*side),
+            Self::Unknown => even(1.0),
+        }
+    }
+
+    /// The same for a map of which every `step`-th row and column is left.
+    #[must_use]
+    pub fn thinned(self, step: usize) -> Self {
+        let step = step as f64;
+        match self {
+            Self::Lens(lens) => Self::Lens(Projection {
+                pixel_um: lens.pixel_um * step,
+                axis_px: lens.axis_px.map(|axis| axis.map(|place| place / step)),
+                ..lens
+            }),
+            Self::Pixel(side) => Self::Pixel(side * step),
+            Self::Unknown => Self::Pixel(step),
+        }
+    }
+}
+
 /// Number of a place without a vertex.
 const NONE: u32 = u32::MAX;
 
-/// The mesh of `depth_mm`, coloured by `grey` (any scale), row by row into a file: 12 MP are half a gigabyte, which no memory
-/// is to hold.
+/// The mesh of `depth`, coloured by `grey` (any scale), row by row into a file: 12 MP are half a gigabyte, which no memory
+/// is to hold. The header names the unit.
 ///
 /// # Errors
 /// What the system says.
 pub fn write(
-    depth_mm: ArrayView2<f32>,
+    depth: ArrayView2<f32>,
     grey: ArrayView2<f32>,
-    projection: Projection,
+    lateral: Lateral,
+    unit: &str,
     to: &mut impl Write,
 ) -> io::Result<()> {
-    let (height, width) = depth_mm.dim();
-    let finite = || depth_mm.iter().copied().filter(|value| value.is_finite());
+    let (height, width) = depth.dim();
+    let finite = || depth.iter().copied().filter(|value| value.is_finite());
     let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
     let step = (high - low) * STEP;
     let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
@@ -59,16 +103,16 @@ pub fn write(
     let mut marks = vec![0; width];
     let (mut vertices, mut faces) = (0, 0);
     for row in 0..height {
-        vertices += depth_mm.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
+        vertices += depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
         if row > 0 {
-            mark_faces(depth_mm, row, step, &mut marks);
+            mark_faces(depth, row, step, &mut marks);
             faces +=
                 marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>() as usize;
         }
     }
     write!(
         to,
-        "ply\nformat binary_little_endian 1.0\ncomment depth map in mm\nelement vertex {vertices}\n\
+        "ply\nformat binary_little_endian 1.0\ncomment depth map in {unit}\nelement vertex {vertices}\n\
          property float x\nproperty float y\nproperty float z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
@@ -77,9 +121,9 @@ pub fn write(
     let mut bytes = Vec::with_capacity(2 * FACE_BYTES * width);
     for row in 0..height {
         bytes.clear();
-        let line = depth_mm.row(row).into_iter().zip(grey.row(row)).enumerate();
+        let line = depth.row(row).into_iter().zip(grey.row(row)).enumerate();
         for (column, (&z, grey)) in line.filter(|(_, (z, _))| z.is_finite()) {
-            let [x, y] = projection.beside_axis_mm((height, width), column, row, f64::from(z));
+            let [x, y] = lateral.beside_axis((height, width), column, row, f64::from(z));
             let shade = (255.0 * (grey / brightest).clamp(0.0, 1.0) + 0.5) as u8;
             let mut vertex = [shade; VERTEX_BYTES];
             for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
@@ -94,14 +138,14 @@ pub fn write(
     let mut numbers = [vec![NONE; width], vec![NONE; width]];
     for row in 0..height {
         numbers.swap(0, 1);
-        for (number, z) in numbers[1].iter_mut().zip(depth_mm.row(row)) {
+        for (number, z) in numbers[1].iter_mut().zip(depth.row(row)) {
             *number = if z.is_finite() { next } else { NONE };
             next += u32::from(z.is_finite());
         }
         if row == 0 {
             continue;
         }
-        mark_faces(depth_mm, row, step, &mut marks);
+        mark_faces(depth, row, step, &mut marks);
         bytes.clear();
         let [upper, lower] = &numbers;
         for ((mark, upper), lower) in marks.iter().zip(upper.windows(2)).zip(lower.windows(2)) {
@@ -131,9 +175,9 @@ fn face(corners: [u32; 3]) -> [u8; FACE_BYTES] {
 }
 
 /// The same as bytes, for what is thinned first.
-pub fn ply(depth_mm: ArrayView2<f32>, grey: ArrayView2<f32>, projection: Projection) -> Vec<u8> {
+pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
-    write(depth_mm, grey, projection, &mut bytes).unwrap_or_else(|_| unreachable!("memory takes all bytes"));
+    write(depth, grey, lateral, unit, &mut bytes).unwrap_or_else(|_| unreachable!("memory takes all bytes"));
     bytes
 }
 
@@ -162,7 +206,7 @@ mod tests {
     fn holes_have_no_vertices_and_steps_no_faces() {
         let depth = array![[900.0f32, 900.1, f32::NAN], [900.2, 900.1, 890.0]];
         let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
-        let bytes = ply(depth.view(), depth.view(), projection);
+        let bytes = ply(depth.view(), depth.view(), Lateral::Lens(projection), "mm");
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("element vertex 5\n"), "{text}");
         assert!(text.contains("element face 2\n"), "{text}");

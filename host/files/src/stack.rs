@@ -1,7 +1,7 @@
 //! Images at different focus: the files of a folder, or the pages of a TIFF with their positions.
 //!
 //! Positions come from the ImageJ description (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or
-//! Micro-Manager's page tag (`ZPositionUm`).
+//! Micro-Manager's page tag (`ZPositionUm`). The side of a pixel comes from OME-XML (`PhysicalSizeX`) or the resolution of an ImageJ file.
 
 mod positions;
 
@@ -23,6 +23,8 @@ pub struct Stack {
     pub images: Vec<PathBuf>,
     /// Where each is focused along the axis, um, from the file's metadata.
     pub positions_um: Option<Vec<f64>>,
+    /// Side of a pixel at the object, um, from the file's metadata.
+    pub object_pixel_um: Option<f64>,
     /// What a person should know of the order.
     pub remarks: Vec<String>,
 }
@@ -101,7 +103,7 @@ fn folder(path: &Path) -> Result<Stack, StackError> {
     let remarks = order::counter_started_again(&images).map(|[before, after]| {
         format!("the camera's counter started again: {} follows {}", name(after), name(before))
     });
-    Ok(Stack { remarks: remarks.into_iter().collect(), images, positions_um: None })
+    Ok(Stack { remarks: remarks.into_iter().collect(), images, ..Stack::default() })
 }
 
 fn file(path: &Path) -> Result<Stack, StackError> {
@@ -118,7 +120,12 @@ fn file(path: &Path) -> Result<Stack, StackError> {
         positions::of(&pages).map_err(|reason| StackError::Planes { path: path.into(), reason })?;
     let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
     let images = (1..=pages.len()).map(page).collect();
-    Ok(Stack { images, positions_um, remarks: Vec::new() })
+    Ok(Stack {
+        images,
+        positions_um,
+        object_pixel_um: positions::object_pixel_um(&pages),
+        remarks: Vec::new(),
+    })
 }
 
 /// Reads the images of a stack one after the other; `each` is called before each with its index and may stop the reading.

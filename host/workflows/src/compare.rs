@@ -4,43 +4,99 @@ use std::path::PathBuf;
 
 use farnear_depth::metrics::{self, CompareSettings, Comparison};
 use farnear_files::map;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::{
-    error::{Result, WorkflowError},
-    measure::unit_of,
+    context::Context,
+    error::Result,
+    measure::{Entries, Unit, read_map, shared_unit},
+    request::{PathKind, Request},
 };
 
-/// The files, and which pixels count.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct ComparisonSettings {
-    /// The depth map in mm, `.npy` or float TIFF.
+/// Compare a depth map with the true one: root-mean-square, mean, 95th percentile and bias of the error.
+///
+/// Both maps are in one unit (mm, um or numbers of images), which ends the names of the figures.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear compare depth.npy truth.npy --border 16 --away-from-edges 8 --json"
+    )
+)]
+#[serde(default)]
+pub struct CompareRequest {
+    /// The depth map: a result folder, .npy, float .tiff, or the depth.png of a result.
     pub depth: PathBuf,
-    /// The true depth in mm, `.npy` or float TIFF.
+    /// The true depth, likewise.
     pub truth: PathBuf,
-    /// A picture that is not black where pixels count.
+    /// Leave out a rim of this width.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = 0))]
+    pub border: usize,
+    /// Count only pixels where this image is not black.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub mask: Option<PathBuf>,
-    /// Rim and steps that do not count.
-    pub pixels: CompareSettings,
+    /// Leave out pixels that are not farther than this from a step of the true depth.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX"))]
+    pub away_from_edges: Option<usize>,
+}
+
+impl Request for CompareRequest {
+    const NAME: &'static str = "compare";
+    const REQUIRED: &'static [&'static str] = &["depth", "truth"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("depth", PathKind::Input), ("truth", PathKind::Input), ("mask", PathKind::Input)];
+    type Figures = ComparisonFigures;
+
+    fn run(&self, _: &Context<'_>) -> Result<ComparisonFigures> {
+        compare(self)
+    }
+}
+
+/// Errors of a depth map in its unit.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ComparisonFigures {
+    pub unit: Unit,
+    pub found: Comparison,
+}
+
+impl Serialize for ComparisonFigures {
+    fn serialize<S: Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
+        let found = &self.found;
+        let mut to = Entries::new(to.serialize_map(None)?, self.unit);
+        to.length("rmse", Some(found.rmse_mm))?;
+        to.length("mae", Some(found.mae_mm))?;
+        to.length("p95", Some(found.p95_mm))?;
+        to.length("bias", Some(found.bias_mm))?;
+        if self.unit == Unit::Mm {
+            to.field("rmse_percent_of_depth", &found.rmse_percent_of_depth)?;
+        }
+        to.field("pixels", &found.pixels)?;
+        to.field("missing_fraction", &found.missing_fraction)?;
+        to.field("pixels_without_truth", &found.pixels_without_truth)?;
+        to.end()
+    }
 }
 
 /// Compares a map with the truth.
 ///
 /// # Errors
-/// [`crate::WorkflowError::Map`], [`crate::WorkflowError::Image`] for the mask, [`crate::WorkflowError::Compare`].
-pub fn compare(settings: &ComparisonSettings) -> Result<Comparison> {
-    let unit = unit_of(&settings.depth)?;
-    if unit != "mm" {
-        return Err(WorkflowError::parameter(
-            "depth",
-            settings.depth.display(),
-            format!(
-                "a depth map in mm, not in {unit} as its stack.toml gives; measure the stack with --distances-mm"
-            ),
-        ));
+/// Maps and mask that cannot be read; [`crate::WorkflowError::Parameter`] for maps in different units;
+/// [`crate::WorkflowError::Compare`].
+pub fn compare(request: &CompareRequest) -> Result<ComparisonFigures> {
+    let (mut depth, mut truth) = (read_map(&request.depth)?, read_map(&request.truth)?);
+    let unit = shared_unit("truth", &depth, &truth)?;
+    if unit == Unit::Um {
+        // Positions of any sign: the errors stay the same above 0.
+        let lowest = depth.depth.iter().chain(&truth.depth).copied().fold(0.0, f32::min);
+        for map in [&mut depth.depth, &mut truth.depth] {
+            map.mapv_inplace(|z| z - lowest + 1.0);
+        }
     }
-    let depth = map::read(&settings.depth)?;
-    let truth = map::read(&settings.truth)?;
-    let mask = settings.mask.as_deref().map(map::read_mask).transpose()?;
+    let mask = request.mask.as_deref().map(map::read_mask).transpose()?;
     let mask = mask.as_ref().map(|mask| mask.view());
-    Ok(metrics::compare(depth.view(), truth.view(), mask, &settings.pixels)?)
+    let pixels = CompareSettings { border_px: request.border, away_from_edges_px: request.away_from_edges };
+    let found = metrics::compare(depth.depth.view(), truth.depth.view(), mask, &pixels)?;
+    Ok(ComparisonFigures { unit, found })
 }

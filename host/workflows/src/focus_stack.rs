@@ -11,7 +11,7 @@ use std::{
 
 use farnear_depth::{
     focus_stack::{self, Sharpness, StackMap, StackSettings},
-    optics::{Distortion, DistortionSection},
+    optics::{Distortion, DistortionSection, Optics},
     prepare::{align::Model, straightened},
 };
 use farnear_files::{
@@ -260,6 +260,9 @@ struct Record<'a> {
     positions: &'a [f64],
     /// The distortion that was removed.
     distortion: Option<DistortionSection>,
+    /// Side of a pixel at the object, from the metadata of the stack.
+    object_pixel_um: Option<f64>,
+    optics: Option<Optics>,
     /// The files that the map was made from.
     input: Vec<HashedFile>,
 }
@@ -298,7 +301,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         frames.warps.remove(*index);
     }
     listed.without(&indices);
-    let unseen = listed.distortion.map(|distortion| straighten(&mut images, &distortion));
+    let unseen = listed.distortion().map(|distortion| straighten(&mut images, &distortion));
     let moved_px = if request.align.0.is_some() { frames::moved(&mut images, &frames.warps) } else { 0.0 };
     context.cancel.check("measuring the stack")?;
     context.info(&format!("measuring {} images by {}", images.len(), request.measure));
@@ -330,7 +333,9 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         images: &names,
         left_out: &figures.left_out,
         positions: &listed.positions,
-        distortion: listed.distortion.map(DistortionSection::from),
+        distortion: listed.distortion().map(DistortionSection::from),
+        object_pixel_um: listed.object_pixel_um,
+        optics: listed.optics,
         input: hashed(&inputs, &request.out)?,
     };
     staging.write("depth.npy", &npy::write(depth.view()))?;

@@ -1,80 +1,50 @@
 //! Figures of a depth map: a region with the plane through it, a profile, the difference of two maps, over time.
 //!
-//! A pixel of pitch p sees p (z - F) / F of the object at distance z (telecentric lens, see `farnear_files::mesh`), which gives
-//! positions beside the optical axis in mm.
+//! A map has its own unit: mm, um (positions of a stage), or the number of the image in a stack. A pixel of pitch p sees
+//! p (z - F) / F of the object at distance z (telecentric lens, see `farnear_files::mesh`), which gives positions beside the optical
+//! axis in mm; a stack gives the side of a pixel at the object if its metadata hold it. Otherwise positions are in pixels.
 
 mod difference;
+mod map_file;
 mod mesh;
 mod plane;
 mod profile;
 mod region;
+mod requests;
+mod unit;
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use farnear_depth::{metrics::is_depth, optics::Optics};
-use farnear_files::{map, mesh::Projection};
+use farnear_depth::optics::Optics;
+use farnear_files::mesh::{Lateral, Projection};
 use ndarray::{Array2, Array3, ArrayView2, s};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use difference::shared_unit;
 pub use difference::{DifferenceFigures, difference};
+pub(crate) use map_file::{MapFile, read_map};
 pub use mesh::mesh;
-pub use plane::{Plane, fit};
+pub use plane::{Plane, PlaneFigures, fit};
 pub use profile::{ProfileFigures, ProfilePoint, profile};
 pub use region::{RegionFigures, region};
-
-use crate::{
-    depth::part::Part,
-    error::{Result, WorkflowError},
-    optics,
+pub use requests::{
+    MeasureDifferenceRequest, MeasurePlaneRequest, MeasureProfileRequest, MeasureRegionRequest, Pixel,
 };
+pub(crate) use unit::Entries;
+pub use unit::Unit;
 
-/// A depth map with its standard deviation, where that was computed, and where its rays go.
+use crate::error::{Result, WorkflowError};
+
+/// A depth map with its standard deviation, where that was computed, and where its pixels see the object.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Depths in mm, (height, width); NaN = no value.
-    pub depth_mm: Array2<f32>,
-    /// Standard deviation of each depth, mm.
-    pub deviation_mm: Option<Array2<f32>>,
-    /// Where a pixel's ray goes.
-    pub projection: Projection,
-}
-
-/// What of the record beside a map is needed here.
-#[derive(Deserialize)]
-struct Record {
-    optics: Optics,
-    part: Option<Part>,
-}
-
-/// Unit of a depth map by the stack.toml next to it: `mm`, `um` or `image`; `mm` without one.
-///
-/// # Errors
-/// A stack.toml that cannot be read.
-pub fn unit_of(map: &Path) -> Result<String> {
-    #[derive(Deserialize)]
-    struct Stack {
-        unit: String,
-    }
-    let record = map.parent().unwrap_or(Path::new(".")).join("stack.toml");
-    if !record.exists() {
-        return Ok("mm".into());
-    }
-    let text = fs::read_to_string(&record).map_err(WorkflowError::read("the stack's record", &record))?;
-    let Stack { unit } =
-        toml::from_str(&text).map_err(WorkflowError::file(&record, "a record of a focus stack"))?;
-    Ok(unit)
-}
-
-/// The optics that made the map of a folder: its record's, else the pair's; and which part of the images it is of.
-fn optics_of(folder: &Path) -> Result<(Optics, Option<Part>)> {
-    let record = folder.join("depth.toml");
-    if !record.exists() {
-        return Ok((optics::of_pair(None, &folder.join("far.png"))?.0, None));
-    }
-    let text = fs::read_to_string(&record).map_err(WorkflowError::read("the map's record", &record))?;
-    let Record { optics, part } =
-        toml::from_str(&text).map_err(WorkflowError::file(&record, "a record of a depth map"))?;
-    Ok((optics, part))
+    /// Depths, (height, width); NaN = no value.
+    pub depth: Array2<f32>,
+    /// Standard deviation of each depth.
+    pub deviation: Option<Array2<f32>>,
+    /// Unit of both.
+    pub unit: Unit,
+    pub lateral: Lateral,
 }
 
 /// A rectangle of pixels.
@@ -110,49 +80,29 @@ impl std::str::FromStr for Rectangle {
 }
 
 impl Measured {
-    /// Reads what [`crate::depth::compute`] wrote: a folder, or a map in it.
+    /// Reads the map of a result folder, or a map file: `.npy`, float TIFF, or the `depth.png` of a result.
     ///
     /// # Errors
-    /// [`WorkflowError::Map`] where there is no `depth.npy`, [`WorkflowError::NoOptics`]; [`WorkflowError::File`] for a
-    /// deviation of another size.
-    pub fn read(capture: &Path) -> Result<Self> {
-        let file = if capture.is_dir() { capture.join("depth.npy") } else { capture.to_owned() };
-        let folder = file.parent().unwrap_or(Path::new("."));
-        let unit = unit_of(&file)?;
-        if unit != "mm" {
-            return Err(WorkflowError::parameter(
-                "depth.npy",
-                format!("depths in {unit}"),
-                "a map in mm: measure the stack with --distances-mm or --sensor-mm, for figures are in mm",
-            ));
-        }
-        // 0, negative values and infinity are holes in maps of many sources.
-        let depth_mm = map::read(&file)?.mapv(|z| if is_depth(z) { z } else { f32::NAN });
-        let path = folder.join("uncertainty.npy");
-        let deviation_mm = path.exists().then(|| map::read(&path)).transpose()?;
-        if let Some(deviation) = deviation_mm.as_ref().filter(|map| map.dim() != depth_mm.dim()) {
-            let reason =
-                format!("{:?} rows and columns, depth.npy has {:?}", deviation.dim(), depth_mm.dim());
-            return Err(WorkflowError::file(&path, "a map of the depth's size")(reason));
-        }
-        let (optics, part) = optics_of(folder)?;
-        let projection = Projection {
-            focal_length_mm: optics.focal_length_mm(),
-            pixel_um: optics.pixel_um(),
-            axis_px: part.map(|part| part.axis_px()),
-        };
-        Ok(Self { depth_mm, deviation_mm, projection })
+    /// [`WorkflowError::Map`] without a map; records that cannot be read; [`WorkflowError::File`] for a deviation of another size.
+    pub fn read(path: &Path) -> Result<Self> {
+        map_file::read(path)
     }
 
-    /// Where the pixel sees the object, mm: to the right, up, away from the lens. `None` where there is no depth.
-    pub fn point_mm(&self, column: usize, row: usize) -> Option<[f64; 3]> {
-        let z = f64::from(*self.depth_mm.get((row, column))?);
-        let [x, y] = self.projection.beside_axis_mm(self.depth_mm.dim(), column, row, z);
+    /// Where the pixel sees the object: to the right, up, away from the lens. `None` where there is no depth.
+    pub fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
+        let z = f64::from(*self.depth.get((row, column))?);
+        let [x, y] = self.lateral.beside_axis(self.depth.dim(), column, row, z);
         z.is_finite().then_some([x, y, z])
     }
 
     fn check(&self, at: &Rectangle) -> Result<()> {
-        at.check_within(self.depth_mm.dim())
+        at.check_within(self.depth.dim())
+    }
+
+    /// The whole map.
+    pub fn all(&self) -> Rectangle {
+        let (height, width) = self.depth.dim();
+        Rectangle { x: 0, y: 0, width, height }
     }
 }
 

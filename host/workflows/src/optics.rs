@@ -1,5 +1,8 @@
 //! The optics of a rig or of a pair, from `optics.toml` or a capture's record.
 
+mod expected;
+mod task;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -10,6 +13,9 @@ use farnear_depth::{
     optics::{Optics, OpticsFile},
     psf::Psf,
 };
+
+pub use expected::{ExpectedError, expected_error};
+pub use task::{OpticsFigures, OpticsRequest};
 
 use crate::error::{About, Result, WorkflowError};
 

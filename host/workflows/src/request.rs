@@ -158,6 +158,13 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::calibrate::psf::CalibratePsfRequest>(),
     Task::of::<crate::calibrate::correction::CalibrateCorrectionRequest>(),
     Task::of::<crate::calibrate::stack::CalibrateStackRequest>(),
+    Task::of::<crate::measure::MeasureRegionRequest>(),
+    Task::of::<crate::measure::MeasurePlaneRequest>(),
+    Task::of::<crate::measure::MeasureProfileRequest>(),
+    Task::of::<crate::measure::MeasureDifferenceRequest>(),
+    Task::of::<crate::compare::CompareRequest>(),
+    Task::of::<crate::report::ReportRequest>(),
+    Task::of::<crate::optics::OpticsRequest>(),
 ];
 
 /// Reads a job from its fields; paths are relative to the folder.

@@ -92,7 +92,7 @@ fn maps_that_are_none_are_named() {
         (&head, ["head.npy", "is not a map"]),
         (&integers, ["far.png", "8-bit integers, not mm"]),
         (&folder.text("absent.npy"), ["absent.npy", "No such file"]),
-        (&folder.text("pair"), ["pair", "Is a directory"]),
+        (&folder.text("pair"), ["pair/depth.npy", "No such file"]),
     ] {
         fails(&mut farnear(&["compare", map, &truth]), 1, &phrases);
         fails(&mut farnear(&["compare", &truth, map]), 1, &phrases);

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use farnear_files::{image_file::encode_png, npy};
 use ndarray::Array2;
 
-use crate::common::{Folder, farnear, figures, number, succeeds};
+use crate::common::{Folder, fails, farnear, figures, number, render, rig_optics, succeeds};
 
 const RECORD: &str = include_str!("../../../workflows/src/sessions/capture.toml");
 
@@ -40,6 +40,42 @@ fn a_slant_is_measured_from_the_command_line() {
     assert!((number(&difference, "mean_mm") - 2.0).abs() < 1e-3, "{difference}");
     farnear(&["measure", "region", &first, "--region", "50,0,11,1"]).assert().code(2);
     farnear(&["measure", "profile", &first, "--from", "1", "--to", "2,2"]).assert().code(2);
+}
+
+#[test]
+fn maps_of_every_kind_are_measured() {
+    let folder = Folder::new();
+    // A map of another program: no record, no optics, 0 for holes.
+    let depth = Array2::from_shape_fn((40, 60), |(y, _)| if y == 0 { 0.0 } else { 500.0_f32 });
+    let bare = folder.file("bare.npy", npy::write(depth.view()));
+    let tiff = folder.file("bare.tiff", farnear_files::map::tiff(depth.view()).unwrap());
+    for map in [&bare, &tiff] {
+        let region = figures(&mut farnear(&["measure", "region", map, "--json"]));
+        assert_eq!((number(&region, "mean_mm"), number(&region, "fill_rate")), (500.0, 0.975));
+        assert!(region["plane"]["slope_y_mm_per_px"].is_number(), "{region}");
+    }
+    let farther = folder.file("farther.npy", npy::write(depth.mapv(|z| z + 2.0).view()));
+    let difference = figures(&mut farnear(&["measure", "difference", &bare, &farther, "--json"]));
+    assert_eq!((number(&difference, "pixels"), number(&difference, "mean_mm")), (2340.0, 2.0));
+    // A result of which only the picture with codes, or the TIFF, was kept.
+    render(&folder, "slant", "pair");
+    let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
+    let mut means = Vec::new();
+    for write in ["npy", "tiff", "png"] {
+        let out = folder.text(write);
+        let depth = ["depth", &far, &near, "--optics", rig_optics(), "--out", &out, "--write", write];
+        succeeds(&mut farnear(&depth));
+        let region = figures(&mut farnear(&["measure", "region", &out, "--json"]));
+        means.push(number(&region, "mean_mm"));
+        let page = folder.text(&format!("{write}.html"));
+        succeeds(&mut farnear(&["report", &out, "--out", &page]));
+    }
+    assert!((means[0] - means[1]).abs() < 1e-9 && (means[0] - means[2]).abs() < 1e-3, "{means:?}");
+    fails(
+        &mut farnear(&["report", &folder.text("pair/.."), "--out", &folder.text("x.html")]),
+        2,
+        &["record"],
+    );
 }
 
 #[test]

@@ -112,7 +112,22 @@ fn stage_positions_are_any_numbers_in_um() {
     assert_eq!(figures(&mut farnear(&arguments))["unit"], "um");
     let found = halves(&read(&out));
     assert!((found[0] + 1.0).abs() < 0.5 && (found[1] - 3.0).abs() < 1.0, "{found:?}");
-    fails(&mut farnear(&["measure", "region", &out]), 2, &["depths in um", "--distances-mm"]);
+    let region = figures(&mut farnear(&["measure", "region", &out, "--region", "8,8,24,40", "--json"]));
+    assert!((number(&region, "mean_um") + 1.0).abs() < 0.5 && region["unit"] == "um", "{region}");
+    assert!(region["plane"]["tilt_deg"].is_null() && region["mean_mm"].is_null(), "{region}");
+    let (said, _) = succeeds(&mut farnear(&["measure", "profile", &out, "--from", "8,9", "--to", "70,9"]));
+    assert!(said.contains("depth_um = ") && !said.contains("_mm"), "{said}");
+    // A truth of the same unit, and one in millimetres.
+    let same = figures(&mut farnear(&["compare", &out, &format!("{out}/depth.npy"), "--json"]));
+    assert_eq!((number(&same, "rmse_um"), number(&same, "missing_fraction")), (0.0, 0.0));
+    let page = folder.text("page.html");
+    succeeds(&mut farnear(&["report", &out, "--out", &page]));
+    assert!(fs::read_to_string(page).expect("a page").contains(" um</td>"));
+    let numbered = folder.text("numbered");
+    succeeds(&mut farnear(&["focus-stack", &stack, "--out", &numbered]));
+    fails(&mut farnear(&["measure", "difference", &out, &numbered]), 2, &["a map in image", "in um"]);
+    let plane = figures(&mut farnear(&["measure", "plane", &numbered, "--json"]));
+    assert!(plane["z_images"].is_number() && plane["slope_x_images_per_px"].is_number(), "{plane}");
 }
 
 #[test]

@@ -20,6 +20,7 @@ mod emulated_rig;
 mod emulated_work;
 mod focus_stack;
 mod half_mirror;
+mod lens_choice;
 mod maps;
 mod markers;
 mod outputs;

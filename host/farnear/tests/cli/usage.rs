@@ -117,7 +117,7 @@ fn bad_usage_ends_with_2() {
         (vec![], vec!["Usage: farnear"]),
         (vec!["rig"], vec!["Usage: farnear rig"]),
         (vec!["dept"], vec!["dept", "depth"]),
-        (vec!["optics"], vec!["--optics <FILE>"]),
+        (vec!["optics"], vec!["an optics file, or --distance-mm"]),
         (vec!["depth", "a.png", "--optics", optics], vec!["<NEAR>"]),
         (
             vec!["depth", "a.png", "b.png", "--optics", optics, "--window", "4"],

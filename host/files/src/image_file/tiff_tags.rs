@@ -29,6 +29,8 @@ pub(crate) struct Directory {
     pub compression: u64,
     pub strip_offset: u64,
     pub strips: u64,
+    /// Tag 282: pixels per unit along a row.
+    pub x_resolution: Option<f64>,
     /// Tag 281.
     pub max_sample_value: Option<u64>,
     /// Tag 338 of the first extra sample: 1 or 2 = alpha.
@@ -161,6 +163,10 @@ impl<'a> File<'a> {
             274 => directory.orientation = first(),
             277 => directory.samples_per_pixel = first(),
             281 => directory.max_sample_value = value(0),
+            282 => {
+                let [above, below] = [0, 4].map(|skip| self.number(place.saturating_add(skip), 4));
+                directory.x_resolution = above.zip(below).map(|(above, below)| above as f64 / below as f64);
+            }
             305 => directory.software = text(),
             306 => directory.date_time = text(),
             330 if with_sub_images => {

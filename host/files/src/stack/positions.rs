@@ -20,6 +20,21 @@ pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     Ok(of_pages.collect::<Option<Vec<f64>>>().filter(|all| all.len() > 1 && distinct(all)))
 }
 
+/// Side of a pixel at the object, um; `None` where the file says nothing of it.
+pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
+    let directory = &pages.first()?.directory;
+    let description = directory.description.as_deref()?;
+    let side = if description.starts_with("ImageJ=") {
+        let unit = description.lines().find_map(|line| line.strip_prefix("unit="))?;
+        unit_um(unit)? / directory.x_resolution?
+    } else {
+        let pixels = element(description, "Pixels")?;
+        let unit = attribute(pixels, "PhysicalSizeXUnit").map_or(Some(1.0), unit_um)?;
+        attribute(pixels, "PhysicalSizeX")?.parse::<f64>().ok()? * unit
+    };
+    (side.is_finite() && side > 0.0).then_some(side)
+}
+
 fn distinct(positions: &[f64]) -> bool {
     positions.windows(2).all(|two| two[0] != two[1])
 }
@@ -162,6 +177,17 @@ mod tests {
         assert!(of(&pages(1, even)).unwrap_err().contains("3 planes"));
         let times = even.replace("SizeT=\"1\"", "SizeT=\"3\"").replace("SizeZ=\"3\"", "SizeZ=\"1\"");
         assert!(of(&pages(3, &times)).unwrap_err().contains("3 times"));
+    }
+
+    #[test]
+    fn the_side_of_a_pixel_comes_from_ome_and_image_j() {
+        let ome = "<OME><Pixels SizeX=\"8\" PhysicalSizeX=\"650\" PhysicalSizeXUnit=\"nm\"></Pixels></OME>";
+        assert_eq!(object_pixel_um(&pages(2, ome)), Some(0.65));
+        assert_eq!(object_pixel_um(&pages(2, &ome.replace("650", "0"))), None);
+        let mut image_j = pages(2, "ImageJ=1.54f\nimages=2\nunit=micron\n");
+        assert_eq!(object_pixel_um(&image_j), None);
+        image_j[0].directory.x_resolution = Some(4.0);
+        assert_eq!(object_pixel_um(&image_j), Some(0.25));
     }
 
     #[test]

@@ -6,9 +6,9 @@ use axum::{
     http::{HeaderMap, StatusCode},
     response::{IntoResponse, Response},
 };
-use farnear_files::{map, npy};
+use farnear_files::npy;
 use farnear_workflows::{
-    Context, WorkflowError,
+    Context,
     depth::DepthRequest,
     measure::{self, Measured, Rectangle},
     request::{self, Paths, Request},
@@ -199,10 +199,10 @@ async fn profile(
     Ok(Json(Figures { figures }))
 }
 
-/// The depth maps of two captures, to be compared.
+/// The folders of two captures, to be compared.
 fn both(app: &App, names: [&str; 2]) -> Result<[std::path::PathBuf; 2], Failure> {
     let [first, second] = names.map(|name| sessions::existing(&app.session, name));
-    Ok([first?.join("depth.npy"), second?.join("depth.npy")])
+    Ok([first?, second?])
 }
 
 async fn difference(
@@ -210,12 +210,7 @@ async fn difference(
     Path((name, other)): Path<(String, String)>,
 ) -> Result<Json<Figures>, Failure> {
     let [first, second] = both(&app, [&name, &other])?;
-    let figures = aside(move || {
-        let maps = [first, second].map(|path| map::read(&path).map_err(WorkflowError::from));
-        let [first, second] = maps;
-        Ok(figures(measure::difference(&first?, &second?)?.1)?)
-    })
-    .await?;
+    let figures = aside(move || Ok(figures(measure::difference(&first, &second)?.1)?)).await?;
     Ok(Json(Figures { figures }))
 }
 
@@ -224,11 +219,7 @@ async fn difference_map(
     Path((name, other)): Path<(String, String)>,
 ) -> Result<Response, Failure> {
     let [first, second] = both(&app, [&name, &other])?;
-    let bytes = aside(move || {
-        let [first, second] = [first, second].map(|path| map::read(&path).map_err(WorkflowError::from));
-        Ok(npy::write(measure::difference(&first?, &second?)?.0.view()))
-    })
-    .await?;
+    let bytes = aside(move || Ok(npy::write(measure::difference(&first, &second)?.0.view()))).await?;
     Ok(bytes.into_response())
 }
 

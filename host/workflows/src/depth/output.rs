@@ -13,7 +13,7 @@ use farnear_files::{
     exr,
     image_file::{png_to, png8_to},
     map::{self, Scale},
-    mesh::{self, Projection},
+    mesh::{self, Lateral, Projection},
     npy, view,
 };
 use ndarray::ArrayView2;
@@ -207,7 +207,7 @@ impl<'a> Results<'a> {
             pixel_um: optics.pixel_um(),
             axis_px: self.inputs.cut.map(|cut| cut.part().axis_px()),
         };
-        mesh::write(self.depth(), self.computed.image.view(), projection, to)
+        mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(projection), "mm", to)
     }
 
     /// Depth as compositors expect it, `Z`, here in mm; what made it stands in the header.

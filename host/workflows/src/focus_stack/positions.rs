@@ -32,8 +32,10 @@ pub(super) struct Listed {
     pub positions: Vec<f64>,
     /// The files with the optics and the positions.
     pub described_by: Vec<PathBuf>,
-    /// What the lens bends, where that is known.
-    pub distortion: Option<Distortion>,
+    /// The lens, where it is known.
+    pub optics: Option<Optics>,
+    /// Side of a pixel at the object, um, from the file's metadata.
+    pub object_pixel_um: Option<f64>,
     /// What a person should know of the stack.
     pub remarks: Vec<String>,
 }
@@ -60,7 +62,8 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
             None => (Axis::Number, (1..=images.len()).map(|number| number as f64).collect()),
         },
     };
-    let distortion = lens(request)?.and_then(|lens| lens.distortion());
+    let optics = lens(request)?;
+    let object_pixel_um = listed.object_pixel_um;
     if positions.len() != images.len() {
         let expected = format!("one for each of the {} images is needed", images.len());
         let name = if axis == Axis::StageUm { "positions-um" } else { "distances-mm" };
@@ -78,11 +81,12 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
         ));
     }
     let (positions, images) = order.into_iter().unzip();
-    let described_by = optics::file_of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
+    let described_by =
+        crate::optics::file_of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
     let capture = record.map(|_| request.stack.join(CAPTURE_FILE));
     let mut described_by: Vec<PathBuf> = described_by.into_iter().chain(capture).collect();
     described_by.dedup();
-    Ok(Listed { images, axis, positions, described_by, distortion, remarks: listed.remarks })
+    Ok(Listed { images, axis, positions, described_by, optics, object_pixel_um, remarks: listed.remarks })
 }
 
 /// The lens, if any file gives it; optics that are named or lie in the folder must be right.
@@ -134,6 +138,11 @@ impl Axis {
 }
 
 impl Listed {
+    /// How the lens bends lines, where that is known.
+    pub(super) fn distortion(&self) -> Option<Distortion> {
+        self.optics.and_then(|lens| lens.distortion())
+    }
+
     /// Positions in the coordinate that the tips are fitted over.
     pub(super) fn even_positions(&self) -> Vec<f64> {
         self.positions.iter().map(|position| self.axis.even(*position)).collect()
@@ -190,7 +199,8 @@ mod tests {
             axis,
             positions,
             described_by: vec![],
-            distortion: None,
+            optics: None,
+            object_pixel_um: None,
             remarks: vec![],
         }
     }

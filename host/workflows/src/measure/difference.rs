@@ -1,30 +1,64 @@
 //! What differs between two maps of one size.
 
+use std::path::Path;
+
 use ndarray::{Array2, Zip};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use crate::error::{Result, WorkflowError};
+use super::{Entries, MapFile, Unit, read_map};
+use crate::error::WorkflowError;
 
-/// Figures of a difference.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+/// Figures of a difference, in the unit of the maps.
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DifferenceFigures {
+    pub unit: Unit,
     /// Pixels with a depth in both maps.
     pub pixels: usize,
     /// Mean of second minus first; none where no pixel has both, as the next two.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_mm: Option<f64>,
+    pub mean: Option<f64>,
     /// Standard deviation of the differences.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub standard_deviation_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_mm: Option<f64>,
+    pub standard_deviation: Option<f64>,
+    pub rms: Option<f64>,
 }
 
-/// The second map minus the first, NaN where one has no value, with its figures.
+impl Serialize for DifferenceFigures {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let mut to = Entries::new(to.serialize_map(None)?, self.unit);
+        to.field("unit", &self.unit)?;
+        to.field("pixels", &self.pixels)?;
+        to.length("mean", self.mean)?;
+        to.length("standard_deviation", self.standard_deviation)?;
+        to.length("rms", self.rms)?;
+        to.end()
+    }
+}
+
+/// The second map minus the first, NaN where one has no value, with its figures. Both are result folders or map files.
 ///
 /// # Errors
-/// [`WorkflowError::Parameter`] for maps of different size.
-pub fn difference(first: &Array2<f32>, second: &Array2<f32>) -> Result<(Array2<f32>, DifferenceFigures)> {
+/// Maps that cannot be read; [`WorkflowError::Parameter`] for maps of different size or unit.
+pub fn difference(first: &Path, second: &Path) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
+    let [first, second] = [read_map(first)?, read_map(second)?];
+    let unit = shared_unit("difference", &first, &second)?;
+    of_maps(&first.depth, &second.depth, unit)
+}
+
+/// The unit of two maps; a map without a record has that of the other.
+pub(crate) fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile) -> crate::Result<Unit> {
+    match (first.unit, second.unit) {
+        (Some(a), Some(b)) if a != b => {
+            let expected = format!("two maps in one unit: the first is in {a}");
+            Err(WorkflowError::parameter(name, format!("a map in {b}"), expected))
+        }
+        (a, b) => Ok(a.or(b).unwrap_or_default()),
+    }
+}
+
+fn of_maps(
+    first: &Array2<f32>,
+    second: &Array2<f32>,
+    unit: Unit,
+) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     if first.dim() != second.dim() {
         let ((rows, columns), (other_rows, other_columns)) = (first.dim(), second.dim());
         let expected = format!("expected {columns}x{rows} pixels as the first map has");
@@ -41,10 +75,11 @@ pub fn difference(first: &Array2<f32>, second: &Array2<f32>) -> Result<(Array2<f
     let mean_square = values().map(|value| value * value).sum::<f64>() / count as f64;
     let some = count > 0;
     let figures = DifferenceFigures {
+        unit,
         pixels: count,
-        mean_mm: some.then_some(mean),
-        standard_deviation_mm: some.then(|| (mean_square - mean * mean).max(0.0).sqrt()),
-        rms_mm: some.then(|| mean_square.sqrt()),
+        mean: some.then_some(mean),
+        standard_deviation: some.then(|| (mean_square - mean * mean).max(0.0).sqrt()),
+        rms: some.then(|| mean_square.sqrt()),
     };
     Ok((map, figures))
 }
@@ -57,11 +92,12 @@ mod tests {
 
     #[test]
     fn values_that_one_lacks_do_not_count() {
-        let (map, found) = difference(&array![[1.0, f32::NAN, 3.0]], &array![[2.0, 5.0, 6.0]]).unwrap();
+        let (map, found) =
+            of_maps(&array![[1.0, f32::NAN, 3.0]], &array![[2.0, 5.0, 6.0]], Unit::Mm).unwrap();
         assert!(map[[0, 1]].is_nan());
-        assert_eq!((found.pixels, found.mean_mm, found.standard_deviation_mm), (2, Some(2.0), Some(1.0)));
-        let (_, none) = difference(&array![[f32::NAN]], &array![[1.0]]).unwrap();
-        assert_eq!((none.pixels, none.rms_mm), (0, None));
-        assert!(difference(&array![[1.0]], &array![[1.0, 2.0]]).unwrap_err().is_usage());
+        assert_eq!((found.pixels, found.mean, found.standard_deviation), (2, Some(2.0), Some(1.0)));
+        let (_, none) = of_maps(&array![[f32::NAN]], &array![[1.0]], Unit::Mm).unwrap();
+        assert_eq!((none.pixels, none.rms), (0, None));
+        assert!(of_maps(&array![[1.0]], &array![[1.0, 2.0]], Unit::Mm).unwrap_err().is_usage());
     }
 }

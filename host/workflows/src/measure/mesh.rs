@@ -2,34 +2,30 @@
 
 use std::path::Path;
 
-use farnear_files::{
-    image_file::read_grey,
-    mesh::{Projection, ply},
-};
+use farnear_files::{image_file::read_grey, mesh::ply};
 use ndarray::s;
 
 use super::Measured;
 use crate::error::{Result, WorkflowError};
 
-/// A PLY of at most `points` points: every second, third, ... row and column of the map, coloured by the far image.
+/// A PLY of at most `points` points: every second, third, ... row and column of the map, coloured by the far image or the image of a
+/// stack that is sharp everywhere. Positions are in the map's unit.
 ///
 /// # Errors
 /// [`crate::WorkflowError::Map`], [`crate::WorkflowError::Image`] where map or image are not there.
 pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
-    let Measured { depth_mm, projection, .. } = Measured::read(folder)?;
-    let grey = read_grey(&folder.join("far.png"))?.pixels;
-    if grey.dim() != depth_mm.dim() {
-        let value = format!("{:?} rows and columns", depth_mm.dim());
-        return Err(WorkflowError::parameter("depth.npy", value, "a map of the whole of far.png"));
+    let Measured { depth, lateral, unit, .. } = Measured::read(folder)?;
+    let image = ["far.png", "all-in-focus.png"].map(|name| folder.join(name));
+    let image = image.iter().find(|image| image.exists()).unwrap_or(&image[0]);
+    let grey = read_grey(image)?.pixels;
+    if grey.dim() != depth.dim() {
+        let value = format!("{:?} rows and columns", depth.dim());
+        let expected = format!("a map of the whole of {}", image.display());
+        return Err(WorkflowError::parameter("depth.npy", value, expected));
     }
-    let step = step(depth_mm.len(), points);
-    let pitch = Projection {
-        pixel_um: projection.pixel_um * step as f64,
-        axis_px: projection.axis_px.map(|axis| axis.map(|place| place / step as f64)),
-        ..projection
-    };
+    let step = step(depth.len(), points);
     let window = s![..;step, ..;step];
-    Ok(ply(depth_mm.slice(window), grey.slice(window), pitch))
+    Ok(ply(depth.slice(window), grey.slice(window), lateral.thinned(step), &unit.to_string()))
 }
 
 /// The smallest step that leaves at most so many of `pixels`.

@@ -1,9 +1,12 @@
 //! The plane through points, by least squares along the optical axis: z = z0 + a x + b y.
 
-use serde::Serialize;
+use farnear_files::mesh::Lateral;
+use serde::{Serialize, Serializer};
+
+use super::{Entries, Measured, Unit};
 
 /// A plane, and how well the points keep to it.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Plane {
     /// Distance in the points' middle.
     pub z_mm: f64,
@@ -16,6 +19,41 @@ pub struct Plane {
     pub rms_mm: f64,
     /// Largest minus smallest of them: the flatness.
     pub peak_to_valley_mm: f64,
+}
+
+/// A plane through a map of any unit: the lengths of [`Plane`] are in it. Where the size of a pixel is not known, slopes are per
+/// pixel and there is no tilt.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlaneFigures {
+    pub unit: Unit,
+    pub per_pixel: bool,
+    pub plane: Plane,
+}
+
+impl PlaneFigures {
+    pub(super) fn of(points: &[[f64; 3]], map: &Measured) -> Option<Self> {
+        let per_pixel = map.lateral == Lateral::Unknown;
+        fit(points).map(|plane| Self { unit: map.unit, per_pixel, plane })
+    }
+}
+
+impl Serialize for PlaneFigures {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let Plane { z_mm, slope_x, slope_y, tilt_deg, rms_mm, peak_to_valley_mm } = self.plane;
+        let mut to = Entries::new(to.serialize_map(None)?, self.unit);
+        to.length("z", Some(z_mm))?;
+        if self.per_pixel {
+            to.per_pixel("slope_x", Some(slope_x))?;
+            to.per_pixel("slope_y", Some(slope_y))?;
+        } else {
+            to.field("slope_x", &slope_x)?;
+            to.field("slope_y", &slope_y)?;
+            to.field("tilt_deg", &tilt_deg)?;
+        }
+        to.length("rms", Some(rms_mm))?;
+        to.length("peak_to_valley", Some(peak_to_valley_mm))?;
+        to.end()
+    }
 }
 
 /// Fits a plane; `None` with fewer than three points or all of them in a line. Three passes.

@@ -1,77 +1,92 @@
 //! Figures of a part of a map.
 
 use ndarray::{ArrayView2, s};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::{Measured, Plane, Rectangle, fit};
-use crate::error::Result;
+use super::{Entries, Measured, PlaneFigures, Rectangle, Unit};
 
 /// Side of the blocks whose means count as independent, px: wider than usual windows.
 const BLOCK_PX: usize = 24;
 
-#[derive(Clone, PartialEq, Debug, Serialize)]
+/// Figures of a region, in the map's unit.
+#[derive(Clone, PartialEq, Debug)]
 pub struct RegionFigures {
+    pub unit: Unit,
     pub region: Rectangle,
     pub pixels: usize,
     /// Their part of all pixels of the region.
     pub fill_rate: f64,
     /// Mean depth; none where there is no depth at all, as the next five.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_mm: Option<f64>,
+    pub mean: Option<f64>,
     /// Standard error of the mean, from the means of blocks that are wider than a window, because neighbouring depths share
     /// windows; none with fewer than four blocks.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub standard_error_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub median_mm: Option<f64>,
+    pub standard_error: Option<f64>,
+    pub median: Option<f64>,
     /// Standard deviation of the depths.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub standard_deviation_mm: Option<f64>,
+    pub standard_deviation: Option<f64>,
     /// Smallest and largest.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub range_mm: Option<[f64; 2]>,
+    pub range: Option<[f64; 2]>,
     /// Root mean square of the deviations predicted for each pixel.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub predicted_deviation_mm: Option<f64>,
+    pub predicted_deviation: Option<f64>,
     /// The plane through the region.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub plane: Option<Plane>,
+    pub plane: Option<PlaneFigures>,
+}
+
+impl Serialize for RegionFigures {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let mut to = Entries::new(to.serialize_map(None)?, self.unit);
+        to.field("unit", &self.unit)?;
+        to.field("region", &self.region)?;
+        to.field("pixels", &self.pixels)?;
+        to.field("fill_rate", &self.fill_rate)?;
+        to.length("mean", self.mean)?;
+        to.length("standard_error", self.standard_error)?;
+        to.length("median", self.median)?;
+        to.length("standard_deviation", self.standard_deviation)?;
+        to.length("range", self.range)?;
+        to.length("predicted_deviation", self.predicted_deviation)?;
+        if let Some(plane) = &self.plane {
+            to.field("plane", plane)?;
+        }
+        to.end()
+    }
 }
 
 /// Looks at a region.
 ///
 /// # Errors
 /// [`crate::WorkflowError::Parameter`] outside the map.
-pub fn region(map: &Measured, at: Rectangle) -> Result<RegionFigures> {
+pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
     map.check(&at)?;
     let Rectangle { x, y, width, height } = at;
     let window = s![y..y + height, x..x + width];
     let mut depths: Vec<f64> =
-        map.depth_mm.slice(window).iter().filter(|z| z.is_finite()).map(|z| f64::from(*z)).collect();
+        map.depth.slice(window).iter().filter(|z| z.is_finite()).map(|z| f64::from(*z)).collect();
     let count = depths.len() as f64;
     let some = !depths.is_empty();
     let mean = depths.iter().sum::<f64>() / count;
     let variance = depths.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / count;
-    let predicted = map.deviation_mm.as_ref().and_then(|deviation| {
+    let predicted = map.deviation.as_ref().and_then(|deviation| {
         let squares: Vec<f64> =
             deviation.slice(window).iter().filter(|d| d.is_finite()).map(|d| f64::from(*d).powi(2)).collect();
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     });
     let points: Vec<_> = (y..y + height)
-        .flat_map(|row| (x..x + width).filter_map(move |column| map.point_mm(column, row)))
+        .flat_map(|row| (x..x + width).filter_map(move |column| map.point(column, row)))
         .collect();
     Ok(RegionFigures {
+        unit: map.unit,
         region: at,
         pixels: depths.len(),
         fill_rate: count / (width * height) as f64,
-        mean_mm: some.then_some(mean),
-        standard_error_mm: standard_error(map.depth_mm.slice(window)),
-        median_mm: median(&mut depths),
-        standard_deviation_mm: some.then(|| variance.sqrt()),
-        range_mm: some
+        mean: some.then_some(mean),
+        standard_error: standard_error(map.depth.slice(window)),
+        median: median(&mut depths),
+        standard_deviation: some.then(|| variance.sqrt()),
+        range: some
             .then(|| depths.iter().fold([f64::MAX, f64::MIN], |[low, high], z| [low.min(*z), high.max(*z)])),
-        predicted_deviation_mm: predicted,
-        plane: fit(&points),
+        predicted_deviation: predicted,
+        plane: PlaneFigures::of(&points, map),
     })
 }
 
@@ -95,7 +110,7 @@ fn standard_error(depths: ArrayView2<f32>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use farnear_files::mesh::Projection;
+    use farnear_files::mesh::{Lateral, Projection};
     use ndarray::Array2;
 
     use super::*;
@@ -104,7 +119,12 @@ mod tests {
         let mut depth_mm = Array2::from_shape_fn((40, 60), |(y, x)| 900.0 + 0.05 * x as f32 + 0.0 * y as f32);
         depth_mm[[0, 0]] = f32::NAN;
         let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
-        Measured { deviation_mm: Some(Array2::from_elem((40, 60), 0.5)), depth_mm, projection }
+        Measured {
+            deviation: Some(Array2::from_elem((40, 60), 0.5)),
+            depth: depth_mm,
+            unit: Unit::Mm,
+            lateral: Lateral::Lens(projection),
+        }
     }
 
     #[test]
@@ -112,21 +132,37 @@ mod tests {
         let found = region(&slanted(), Rectangle { x: 0, y: 0, width: 60, height: 40 }).unwrap();
         assert_eq!(found.pixels, 2399);
         assert!((found.fill_rate - 2399.0 / 2400.0).abs() < 1e-12);
-        assert_eq!(found.predicted_deviation_mm, Some(0.5));
+        assert_eq!(found.predicted_deviation, Some(0.5));
         // Two blocks of 24 pixels fit: too few for a standard error.
-        assert_eq!(found.standard_error_mm, None);
-        assert!((found.median_mm.unwrap() - 901.5).abs() < 0.06, "{found:?}");
+        assert_eq!(found.standard_error, None);
+        assert!((found.median.unwrap() - 901.5).abs() < 0.06, "{found:?}");
         // A pixel sees 7.4 um * 17 = 0.126 mm at 900 mm, so 0.05 mm per pixel is a slope of 0.397.
-        let plane = found.plane.unwrap();
+        let plane = found.plane.unwrap().plane;
         assert!((plane.slope_x - 0.397).abs() < 0.002, "{plane:?}");
         assert!(plane.rms_mm < 0.01, "{plane:?}");
+    }
+
+    #[test]
+    fn figures_have_the_unit_of_the_map_in_their_names() {
+        let map = |unit, lateral| Measured { unit, lateral, deviation: None, ..slanted() };
+        let at = Rectangle { x: 1, y: 0, width: 59, height: 40 };
+        let found = |map: &Measured| serde_json::to_value(region(map, at).unwrap()).unwrap();
+        let stage = found(&map(Unit::Um, Lateral::Pixel(0.1)));
+        assert!(stage["mean_um"].is_number() && stage["unit"] == "um", "{stage}");
+        assert!((stage["plane"]["slope_x"].as_f64().unwrap() - 0.5).abs() < 1e-3, "{stage}");
+        let images = found(&map(Unit::Image, Lateral::Unknown));
+        assert!(images["median_images"].is_number() && images["plane"]["tilt_deg"].is_null(), "{images}");
+        let slope = images["plane"]["slope_x_images_per_px"].as_f64().unwrap();
+        assert!((slope - 0.05).abs() < 1e-4, "{images}");
+        let text = images.to_string() + &stage.to_string();
+        assert!(!text.contains("_mm"), "{text}");
     }
 
     #[test]
     fn a_region_without_depth_has_no_figures_and_one_outside_is_refused() {
         let map = slanted();
         let found = region(&map, Rectangle { x: 0, y: 0, width: 1, height: 1 }).unwrap();
-        assert_eq!((found.pixels, found.mean_mm, found.plane), (0, None, None));
+        assert_eq!((found.pixels, found.mean, found.plane), (0, None, None));
         for (x, width) in [(59, 2), (0, 0), (usize::MAX, 2)] {
             assert!(region(&map, Rectangle { x, y: 0, width, height: 1 }).unwrap_err().is_usage());
         }

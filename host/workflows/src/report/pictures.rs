@@ -40,13 +40,13 @@ pub fn colours(map: ArrayView2<f32>, [low, high]: [f32; 2]) -> Result<Vec<u8>> {
 }
 
 /// How often which depth occurs, between the outermost half percents, as SVG.
-pub fn histogram(depth_mm: ArrayView2<f32>) -> String {
-    let (Some(low), Some(high)) = (quantile(depth_mm, 0.005), quantile(depth_mm, 0.995)) else {
+pub fn histogram(depth: ArrayView2<f32>, unit: &str) -> String {
+    let (Some(low), Some(high)) = (quantile(depth, 0.005), quantile(depth, 0.995)) else {
         return "<p>no depth</p>".into();
     };
     let span = (high - low).max(1e-3);
     let mut counts = [0u32; BINS];
-    for value in depth_mm.iter().copied().filter(|value| (low..=high).contains(value)) {
+    for value in depth.iter().copied().filter(|value| (low..=high).contains(value)) {
         let bin = ((value - low) / span * BINS as f32) as usize;
         counts[bin.min(BINS - 1)] += 1;
     }
@@ -59,7 +59,7 @@ pub fn histogram(depth_mm: ArrayView2<f32>) -> String {
         let _ = write!(svg, "<rect x={x} y={y:.1} width=9 height={height:.1} fill=\"#31688e\"/>");
     }
     for (x, anchor, value) in [(0, "start", low), (480, "middle", low + 0.5 * span), (960, "end", high)] {
-        let _ = write!(svg, "<text x={x} y=170 font-size=14 text-anchor={anchor}>{value:.1} mm</text>");
+        let _ = write!(svg, "<text x={x} y=170 font-size=14 text-anchor={anchor}>{value:.1} {unit}</text>");
     }
     svg.push_str("</svg>");
     svg

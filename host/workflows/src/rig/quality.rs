@@ -11,7 +11,10 @@ use farnear_depth::{
     pipeline::{Settings, depth_from_pair},
     uncertainty::{Noise, standard_deviation_mm},
 };
-use farnear_files::{mesh::Projection, staging::write_file};
+use farnear_files::{
+    mesh::{Lateral, Projection},
+    staging::write_file,
+};
 use ndarray::{Array2, s};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +24,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
-    measure::{Measured, fit},
+    measure::{Measured, Unit, fit},
     operators,
     optics::GivenOptics,
 };
@@ -157,9 +160,10 @@ fn figures(
             noise.push(deviation);
         }
     }
-    let map = Measured { depth_mm: mean, deviation_mm: None, projection };
+    let lateral = Lateral::Lens(projection);
+    let map = Measured { depth: mean, deviation: None, unit: Unit::Mm, lateral };
     let points: Vec<_> = (0..height)
-        .flat_map(|row| (0..width).filter_map(|column| map.point_mm(column, row)).collect::<Vec<_>>())
+        .flat_map(|row| (0..width).filter_map(|column| map.point(column, row)).collect::<Vec<_>>())
         .collect();
     let plane = fit(&points).ok_or_else(|| {
         WorkflowError::parameter(

@@ -39,9 +39,10 @@ impl Digest {
             "png" | "jpg" => of_picture(bytes),
             "toml" | "svg" | "csv" | "json" | "txt" => {
                 let text = String::from_utf8_lossy(bytes);
-                // Hashes of inputs that another kind of processor renders otherwise.
-                let same: Vec<&str> = text.lines().filter(|line| !line.starts_with("sha256 = ")).collect();
-                let (numbers, rest) = numbers_and_rest(&same.join("\n"));
+                // Inputs that another kind of processor renders otherwise.
+                let of_input = |line: &str| line.starts_with("sha256 = ") || line.starts_with("bytes = ");
+                let same: String = text.split_inclusive('\n').filter(|line| !of_input(line)).collect();
+                let (numbers, rest) = numbers_and_rest(&same);
                 (
                     format!("{} numbers in a text {:016x}", numbers.len(), hash(rest.as_bytes())),
                     some_of(&numbers),

@@ -1,0 +1,154 @@
+//! Depth maps in files, with the unit that the record next to them gives.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use farnear_depth::optics::Optics;
+use farnear_files::{
+    image_file,
+    map::{self, Scale},
+    mesh::{Lateral, Projection},
+};
+use ndarray::Array2;
+use serde::Deserialize;
+
+use super::{Measured, Unit};
+use crate::{
+    depth::part::Part,
+    error::{Result, WorkflowError},
+    optics,
+    result_folder::{DEPTH_RECORD, STACK_RECORD},
+};
+
+/// What is read of `depth.toml`.
+#[derive(Deserialize)]
+struct DepthRecord {
+    optics: Optics,
+    part: Option<Part>,
+    png: Option<Scale>,
+}
+
+/// What is read of `stack.toml`.
+#[derive(Deserialize)]
+struct StackRecord {
+    unit: Unit,
+    optics: Option<Optics>,
+    /// Side of a pixel at the object.
+    object_pixel_um: Option<f64>,
+}
+
+enum Record {
+    Depth(Box<DepthRecord>),
+    Stack(Box<StackRecord>),
+}
+
+/// A map as its file holds it; holes are NaN.
+pub(crate) struct MapFile {
+    pub depth: Array2<f32>,
+    /// `None` without a record next to the file.
+    pub unit: Option<Unit>,
+}
+
+/// Reads a map file, or the map of a result folder.
+pub(crate) fn read_map(path: &Path) -> Result<MapFile> {
+    let (file, folder) = file_and_folder(path);
+    let record = record_of(&folder)?;
+    depth_of(&file, record.as_ref())
+}
+
+pub(super) fn read(path: &Path) -> Result<Measured> {
+    let (file, folder) = file_and_folder(path);
+    let record = record_of(&folder)?;
+    let MapFile { depth, unit } = depth_of(&file, record.as_ref())?;
+    let deviation = deviation_of(&file, &folder, depth.dim())?;
+    let lateral = match &record {
+        Some(Record::Depth(record)) => lens(&record.optics, record.part),
+        Some(Record::Stack(record)) => match (record.unit, &record.optics, record.object_pixel_um) {
+            (Unit::Mm, Some(optics), _) => lens(optics, None),
+            (Unit::Um, _, Some(side)) => Lateral::Pixel(side),
+            _ => Lateral::Unknown,
+        },
+        None => match optics::of_pair(None, &folder.join("far.png")) {
+            Ok((optics, _)) => lens(&optics, None),
+            Err(WorkflowError::NoOptics { .. }) => Lateral::Unknown,
+            Err(error) => return Err(error),
+        },
+    };
+    Ok(Measured { depth, deviation, unit: unit.unwrap_or_default(), lateral })
+}
+
+fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
+    Lateral::Lens(Projection {
+        focal_length_mm: optics.focal_length_mm(),
+        pixel_um: optics.pixel_um(),
+        axis_px: part.map(|part| part.axis_px()),
+    })
+}
+
+/// The map's file and its folder; a folder's map is the first of depth.npy, depth.tiff and depth.png.
+fn file_and_folder(path: &Path) -> (PathBuf, PathBuf) {
+    if !path.is_dir() {
+        return (path.into(), path.parent().unwrap_or(Path::new("")).into());
+    }
+    let maps = ["depth.npy", "depth.tiff", "depth.png"].map(|name| path.join(name));
+    let found = maps.iter().find(|map| map.exists()).unwrap_or(&maps[0]);
+    (found.clone(), path.into())
+}
+
+fn record_of(folder: &Path) -> Result<Option<Record>> {
+    let text =
+        |record: &Path| fs::read_to_string(record).map_err(WorkflowError::read("the map's record", record));
+    let depth = folder.join(DEPTH_RECORD);
+    if depth.exists() {
+        let record = toml::from_str(&text(&depth)?);
+        return record
+            .map(|record| Some(Record::Depth(Box::new(record))))
+            .map_err(WorkflowError::file(&depth, "a record of a depth map"));
+    }
+    let stack = folder.join(STACK_RECORD);
+    if stack.exists() {
+        let record = toml::from_str(&text(&stack)?);
+        return record
+            .map(|record| Some(Record::Stack(Box::new(record))))
+            .map_err(WorkflowError::file(&stack, "a record of a focus stack"));
+    }
+    Ok(None)
+}
+
+fn depth_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
+    let unit = record.map(|record| match record {
+        Record::Depth(_) => Unit::Mm,
+        Record::Stack(stack) => stack.unit,
+    });
+    let codes = match record {
+        Some(Record::Depth(record)) if file.file_name() == Some("depth.png".as_ref()) => record.png,
+        _ => None,
+    };
+    if let Some(Scale { offset_mm, scale_mm }) = codes {
+        let codes = image_file::read_grey(file)?.pixels.mapv(|value| f64::from(value) * f64::from(u16::MAX));
+        let depth = |code: f64| (offset_mm + scale_mm * code.round()) as f32;
+        let depth = codes.mapv(|code| if code < 0.5 { f32::NAN } else { depth(code) });
+        return Ok(MapFile { depth, unit });
+    }
+    let is_depth = |value: f32| unit.unwrap_or_default().is_depth(value);
+    let depth = map::read(file)?.mapv(|value| if is_depth(value) { value } else { f32::NAN });
+    Ok(MapFile { depth, unit })
+}
+
+fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Option<Array2<f32>>> {
+    let path = folder.join("uncertainty.npy");
+    if !path.exists() {
+        return Ok(None);
+    }
+    let deviation = map::read(&path)?;
+    if deviation.dim() == dim {
+        return Ok(Some(deviation));
+    }
+    if file.file_stem() != Some("depth".as_ref()) {
+        return Ok(None); // another map in the folder
+    }
+    let reason = format!("{:?} rows and columns, the depth map has {dim:?}", deviation.dim());
+    Err(WorkflowError::file(&path, "a map of the depth's size")(reason))
+}

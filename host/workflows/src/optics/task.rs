@@ -1,0 +1,392 @@
+//! `farnear optics`: what a pair of given optics can measure, and optics for what is to be measured.
+
+use std::path::PathBuf;
+
+use farnear_depth::{
+    optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection, WorkingRange},
+    psf::Psf,
+    validity::LARGEST_ALPHA,
+};
+use farnear_files::staging::write_file;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{GivenOptics, expected::expected_error};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    request::{PathKind, Request},
+};
+
+/// Largest blur radius that the operators are made for, px, and what is aimed at.
+const USABLE_BLUR_PX: [f64; 2] = [2.0, 4.0];
+const BEST_BLUR_PX: f64 = 2.7;
+/// Focal lengths of common lenses, mm.
+const FOCAL_LENGTHS_MM: [f64; 14] =
+    [8.0, 12.0, 16.0, 25.0, 35.0, 50.0, 75.0, 85.0, 100.0, 135.0, 150.0, 180.0, 200.0, 300.0];
+/// Full stops that lenses have.
+const STOPS: [f64; 6] = [1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
+const BINNINGS: [usize; 4] = [1, 2, 4, 8];
+/// Lenses of the list focus down to some three focal lengths.
+const NEAREST_FOCUS: f64 = 3.0;
+/// Radius of the Airy disc per f-number at 550 nm, um.
+const AIRY_UM: f64 = 0.67;
+/// Most exposures that are averaged.
+const AVERAGED_MAX: f64 = 64.0;
+
+/// Print what a pair can measure: working range, blur, expected error, and what to change; or propose optics.
+///
+/// With --optics: the working range, the largest blur, the limits within which depths are accepted, and the error that noise causes.
+/// With --distance-mm, --range-mm and --error-mm: focal length, aperture, focus pair and pixel binning for what is to be measured;
+/// --out writes them as an optics file.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear optics --optics optics.toml --json\n\
+                          \x20        farnear optics --distance-mm 300 --range-mm 40 --error-mm 0.2 --out optics.toml")
+)]
+#[serde(default)]
+pub struct OpticsRequest {
+    /// The optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub optics: Option<PathBuf>,
+    /// Distance from the lens to the middle of what is to be measured, in mm, instead of an optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM", conflicts_with = "optics"))]
+    pub distance_mm: Option<f64>,
+    /// Depth range to be measured, in mm.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM", requires = "distance_mm"))]
+    pub range_mm: Option<f64>,
+    /// Largest accepted root-mean-square error, in mm.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM", requires = "distance_mm"))]
+    pub error_mm: Option<f64>,
+    /// Pixel pitch of the sensor, in um.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UM", default_value_t = Self::default().pixel_um))]
+    pub pixel_um: f64,
+    /// Focal length of the lens at hand, in mm [default: chosen].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM", requires = "distance_mm"))]
+    pub focal_length_mm: Option<f64>,
+    /// Standard deviation of the object's texture, as a part of its mean brightness.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "C", default_value_t = Self::default().contrast))]
+    pub contrast: f64,
+    /// Write the proposed optics to this file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", requires = "distance_mm"))]
+    pub out: Option<PathBuf>,
+}
+
+impl Default for OpticsRequest {
+    fn default() -> Self {
+        Self {
+            optics: None,
+            distance_mm: None,
+            range_mm: None,
+            error_mm: None,
+            pixel_um: 3.45,
+            focal_length_mm: None,
+            contrast: 0.2,
+            out: None,
+        }
+    }
+}
+
+impl Request for OpticsRequest {
+    const NAME: &'static str = "optics";
+    const REQUIRED: &'static [&'static str] = &[];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("optics", PathKind::Input), ("out", PathKind::OutputFile)];
+    type Figures = OpticsFigures;
+
+    fn check(&self) -> Result<()> {
+        let positive = [
+            ("distance-mm", self.distance_mm),
+            ("range-mm", self.range_mm),
+            ("error-mm", self.error_mm),
+            ("pixel-um", Some(self.pixel_um)),
+            ("focal-length-mm", self.focal_length_mm),
+            ("contrast", Some(self.contrast)),
+        ];
+        for (name, value) in positive {
+            if let Some(wrong) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(WorkflowError::parameter(name, wrong, "a number above 0"));
+            }
+        }
+        match (&self.optics, self.distance_mm, self.range_mm) {
+            (Some(_), None, _) => Ok(()),
+            (None, Some(distance), Some(range)) if range < distance => Ok(()),
+            (None, Some(distance), Some(range)) => {
+                let expected = format!("less than the distance of {distance} mm");
+                Err(WorkflowError::parameter("range-mm", range, expected))
+            }
+            (None, Some(_), None) => {
+                Err(WorkflowError::parameter("range-mm", "nothing", "the depth to be measured, in mm"))
+            }
+            (optics, ..) => {
+                let value = optics.as_ref().map_or("nothing".into(), |file| file.display().to_string());
+                let expected = "an optics file, or --distance-mm and --range-mm of what is to be measured";
+                Err(WorkflowError::parameter("optics", value, expected))
+            }
+        }
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<OpticsFigures> {
+        self.check()?;
+        if let Some(path) = &self.optics {
+            let (optics, doubts) = GivenOptics::read(path)?.with_doubts();
+            let mut found = figures(&optics, 1, self.contrast, None);
+            found.advice.extend(doubts);
+            return Ok(found);
+        }
+        let (optics, found) = propose(self)?;
+        if let Some(out) = &self.out {
+            write_file(out, toml::to_string(&OpticsFile::from(optics))?.as_bytes())?;
+            context.info(&format!("wrote {}", out.display()));
+        }
+        Ok(found)
+    }
+}
+
+/// What a pair of these optics can measure.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct OpticsFigures {
+    #[serde(flatten)]
+    pub range: WorkingRange,
+    pub focal_length_mm: f64,
+    pub f_number: f64,
+    /// Pitch of the image's pixels, with binning.
+    pub pixel_um: f64,
+    /// Pixels of the sensor along each side of one of the image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub binning: Option<usize>,
+    /// Exposures to average for the accepted error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub averaged_exposures: Option<usize>,
+    /// Largest blur radius in the range.
+    pub max_blur_px: f64,
+    /// Depths beyond these are not given.
+    pub farthest_usable_mm: f64,
+    pub nearest_usable_mm: f64,
+    /// Side of a pixel at the object in the middle of the range.
+    pub pixel_at_object_mm: f64,
+    /// What to change, in words.
+    pub advice: Vec<String>,
+    /// Root mean square of the error from noise, with `--method ro`.
+    pub expected_error_ro_mm: f64,
+    /// The same with `--method whitened`, on smooth surfaces.
+    pub expected_error_whitened_mm: f64,
+}
+
+fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f64>) -> OpticsFigures {
+    let range = optics.working_range();
+    let error = expected_error(optics, contrast, binning);
+    let mut advice = advice(optics);
+    let averaged = accepted_mm.map(|accepted| (error.whitened_mm / accepted).powi(2).ceil().max(1.0));
+    if let Some(needed) = averaged.filter(|needed| *needed > 1.0) {
+        advice.push(format!(
+            "the error with one exposure per focus is {:.3} mm: average {needed} exposures, measure a smaller range, or give the object \
+             more texture (a projected pattern)",
+            error.whitened_mm
+        ));
+    }
+    OpticsFigures {
+        range,
+        focal_length_mm: optics.focal_length_mm(),
+        f_number: rounded(optics.f_number(), 3),
+        pixel_um: optics.pixel_um(),
+        binning: accepted_mm.map(|_| binning),
+        averaged_exposures: averaged.map(|count| count as usize),
+        max_blur_px: rounded(optics.max_blur_px(), 3),
+        farthest_usable_mm: rounded(optics.depth_mm(-LARGEST_ALPHA), 3),
+        nearest_usable_mm: rounded(optics.depth_mm(LARGEST_ALPHA), 3),
+        pixel_at_object_mm: rounded(
+            optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0),
+            4,
+        ),
+        advice,
+        expected_error_ro_mm: rounded(error.ro_mm, 4),
+        expected_error_whitened_mm: rounded(error.whitened_mm, 4),
+    }
+}
+
+/// What to change about the blur.
+fn advice(optics: &Optics) -> Vec<String> {
+    let blur = optics.max_blur_px();
+    let [least, most] = USABLE_BLUR_PX;
+    let mut advice = Vec::new();
+    if blur > most {
+        let binning = (blur / BEST_BLUR_PX).round().max(2.0);
+        let f_number = optics.f_number() * blur / BEST_BLUR_PX;
+        let near = of_blur(optics, BEST_BLUR_PX).map_or(String::new(), |near| {
+            format!(
+                ", or focus the near image at {:.2} mm instead of {:.2} mm",
+                near,
+                optics.working_range().near_mm
+            )
+        });
+        let stop = if f_number <= 22.0 { format!(", stop down to f/{f_number:.1}") } else { String::new() };
+        advice.push(format!(
+            "the largest blur radius is {blur:.1} px, usable is {least} to {most} px: bin {binning} x {binning} pixels{stop}{near}"
+        ));
+    } else if blur < least {
+        let f_number = optics.f_number() * blur / BEST_BLUR_PX;
+        let near = of_blur(optics, BEST_BLUR_PX)
+            .map_or(String::new(), |near| format!(", or focus the near image at {near:.2} mm"));
+        let stop = if f_number >= 0.95 {
+            format!("open the aperture to f/{f_number:.1}")
+        } else {
+            "use a longer lens".into()
+        };
+        advice.push(format!(
+            "the largest blur radius is {blur:.2} px, usable is {least} to {most} px: {stop}{near}"
+        ));
+    }
+    let airy_px = AIRY_UM * optics.f_number() / optics.pixel_um();
+    if airy_px > 0.7 * blur {
+        advice.push(format!(
+            "diffraction blurs by {airy_px:.1} px, as much as defocus does: open the aperture or use larger pixels"
+        ));
+    }
+    advice
+}
+
+/// Distance of the near focus that gives a blur, with the rest of the optics unchanged.
+fn of_blur(optics: &Optics, blur_px: f64) -> Option<f64> {
+    let mut file = OpticsFile::from(*optics);
+    file.focus = FocusSection { max_blur_px: Some(blur_px), near_mm: None, ..file.focus };
+    file.check().ok().map(|optics| optics.working_range().near_mm)
+}
+
+/// Optics for what is to be measured.
+fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
+    let (distance, range) = (request.distance_mm.unwrap_or(f64::NAN), request.range_mm.unwrap_or(f64::NAN));
+    let accepted = request.error_mm.unwrap_or(f64::INFINITY);
+    let own = request.focal_length_mm.map(|own| vec![own]);
+    let lenses = own.clone().unwrap_or_else(|| FOCAL_LENGTHS_MM.to_vec());
+    let mut best: Option<([f64; 4], Optics, usize)> = None;
+    for focal_length_mm in lenses {
+        if own.is_none() && distance - range / 2.0 < NEAREST_FOCUS * focal_length_mm {
+            continue;
+        }
+        for (binning, f_number) in BINNINGS.iter().flat_map(|binning| STOPS.map(|stop| (*binning, stop))) {
+            let file = OpticsFile {
+                lens: LensSection {
+                    focal_length_mm,
+                    aperture_mm: None,
+                    f_number: Some(f_number),
+                    telecentric: None,
+                },
+                sensor: SensorSection { pixel_um: request.pixel_um * binning as f64 },
+                focus: FocusSection {
+                    far_mm: distance + range / 2.0,
+                    max_blur_px: None,
+                    near_mm: Some(distance - range / 2.0),
+                },
+                psf: Psf::default(),
+                distortion: None,
+                stage: None,
+            };
+            let Ok(optics) = file.check() else { continue };
+            let blur = optics.max_blur_px();
+            let airy_px = AIRY_UM * f_number / optics.pixel_um();
+            if !(USABLE_BLUR_PX[0]..=USABLE_BLUR_PX[1]).contains(&blur) || airy_px > 0.5 * blur {
+                continue;
+            }
+            let error = expected_error(&optics, request.contrast, binning).whitened_mm;
+            let averaged = (error / accepted).powi(2).ceil().max(1.0);
+            // One exposure before fine pixels, fine pixels before a usual aperture, that before the best blur.
+            let rank = [averaged, binning as f64, (f_number / 4.0).ln().abs(), (blur - BEST_BLUR_PX).abs()];
+            if best
+                .as_ref()
+                .is_none_or(|(found, ..)| rank.partial_cmp(found) == Some(std::cmp::Ordering::Less))
+            {
+                best = Some((rank, optics, binning));
+            }
+        }
+    }
+    let Some((rank, optics, binning)) = best else {
+        let expected = format!(
+            "no lens of {} with f/1.4 to f/8 and pixels of {} um gives a blur of {} to {} px over {range} mm: change the range, the distance or \
+             the pixels",
+            own.map_or("8 to 300 mm".into(), |own| format!("{} mm", own[0])),
+            request.pixel_um,
+            USABLE_BLUR_PX[0],
+            USABLE_BLUR_PX[1]
+        );
+        return Err(WorkflowError::parameter("distance-mm", distance, expected));
+    };
+    if rank[0] > AVERAGED_MAX {
+        let error = expected_error(&optics, request.contrast, binning).whitened_mm;
+        let expected = format!(
+            "noise alone causes {error:.3} mm over {range} mm at best; expected at least {:.4} mm (64 exposures averaged), or a smaller range",
+            error / AVERAGED_MAX.sqrt()
+        );
+        return Err(WorkflowError::parameter("error-mm", accepted, expected));
+    }
+    let found = figures(&optics, binning, request.contrast, Some(accepted));
+    Ok((optics, found))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rig(blur: f64) -> Optics {
+        let text = format!(
+            "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\n\
+             max_blur_px = {blur}\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n"
+        );
+        toml::from_str::<OpticsFile>(&text).unwrap().check().unwrap()
+    }
+
+    #[test]
+    fn the_expected_error_is_that_of_rendered_planes() {
+        // Independent renders of slants of contrast 0.2, 8 bit: 0.621 mm with a window of 7 on planes, 0.204 to 0.245 mm on planes and
+        // slants with adaptive ones.
+        let found = expected_error(&rig(2.703), 0.2, 1);
+        assert!((0.6..0.85).contains(&found.ro_mm), "{found:?}");
+        assert!((0.2..0.33).contains(&found.whitened_mm), "{found:?}");
+        let half = expected_error(&rig(2.703), 0.4, 1);
+        assert!((half.ro_mm / found.ro_mm - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn advice_brings_the_blur_into_the_usable_range() {
+        assert!(advice(&rig(2.703)).is_empty());
+        let text = advice(&rig(133.0)).join("; ");
+        assert!(
+            text.contains("133.0 px") && text.contains("bin 49 x 49") && text.contains("near image at"),
+            "{text}"
+        );
+        let wide = of_blur(&rig(133.0), BEST_BLUR_PX).unwrap();
+        assert!((wide - rig(BEST_BLUR_PX).working_range().near_mm).abs() < 1e-9);
+        assert!(advice(&rig(0.5)).join("; ").contains("open the aperture"));
+    }
+
+    #[test]
+    fn a_proposal_keeps_distance_range_blur_and_error() {
+        for (distance, range, error) in
+            [(300.0, 40.0, 0.2), (1000.0, 100.0, 0.5), (100.0, 5.0, 0.05), (2000.0, 400.0, 3.0)]
+        {
+            let request = OpticsRequest {
+                distance_mm: Some(distance),
+                range_mm: Some(range),
+                error_mm: Some(error),
+                ..OpticsRequest::default()
+            };
+            let (optics, found) = propose(&request).unwrap();
+            let of = optics.working_range();
+            assert!((of.far_mm - of.near_mm - range).abs() < 1e-6, "{found:?}");
+            assert!((2.0..=4.0).contains(&found.max_blur_px), "{found:?}");
+            let exposures = found.averaged_exposures.unwrap() as f64;
+            assert!(found.expected_error_whitened_mm / exposures.sqrt() <= 1.001 * error, "{found:?}");
+        }
+        let request = OpticsRequest {
+            distance_mm: Some(300.0),
+            range_mm: Some(40.0),
+            error_mm: Some(1e-4),
+            ..OpticsRequest::default()
+        };
+        assert!(propose(&request).unwrap_err().to_string().contains("noise alone"));
+        assert!(OpticsRequest::default().check().unwrap_err().is_usage());
+    }
+}
