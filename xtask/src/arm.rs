@@ -20,7 +20,7 @@ pub const QEMU: &str = "qemu-aarch64";
 /// The modules of host/depth whose tests reach the vectors.
 const MODULES: [&str; 4] = ["simd", "filter", "pipeline", "adaptive_window"];
 
-/// Runs the tests and adds them to the total, or says what is missing and counts them as skipped.
+/// Runs the tests and adds them to the total, or reports the missing tools and counts them as skipped.
 ///
 /// # Errors
 /// A cargo that cannot be started, though everything is there.
@@ -41,7 +41,7 @@ pub fn run(total: &mut Total) -> Result<()> {
 /// What there is not, and what brings it.
 pub fn missing() -> Option<&'static str> {
     if !has(QEMU) {
-        Some("there is no qemu-aarch64; Debian's package is qemu-user")
+        Some("qemu-aarch64 is missing; Debian's package is qemu-user")
     } else if !links() {
         Some("nothing links for it; Debian's packages are gcc-aarch64-linux-gnu and libc6-dev-arm64-cross")
     } else if !has_target(TARGET) {
@@ -76,7 +76,7 @@ fn tests_of(module: &str) -> Result<u32> {
     Ok(written(&file)? + if below.is_dir() { written(&below)? } else { 0 })
 }
 
-/// How many tests stand in a file, or in the files of a folder.
+/// Number of tests in a file, or in the files of a folder.
 fn written(place: &Path) -> Result<u32> {
     let seen = || format!("cannot read {}", place.display());
     if place.is_dir() {

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use crate::run::ROOT;
 
-/// A board that the firmware is built for: a folder `firmware/<name>` with a cargo workspace of its own, whose program is
+/// A board that the firmware is built for: a folder `firmware/<name>` with its own cargo workspace, whose program is
 /// called `farnear-<name>`.
 pub struct Board {
     /// Its name, as hello tells it.
     pub name: &'static str,
     pub flash_budget: u64,
-    /// Most bytes of variables; the stack has what is left of the RAM.
+    /// Largest size of variables, bytes; the rest of the RAM is the stack.
     pub ram_budget: u64,
 }
 

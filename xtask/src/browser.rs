@@ -12,7 +12,7 @@ use crate::{
     run::{ROOT, target_folder},
 };
 
-/// Where a Chromium may lie beside the one that `CHROMIUM` names.
+/// Places of a Chromium besides the one that `CHROMIUM` names.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
 #[derive(Default)]
@@ -24,7 +24,7 @@ pub struct Counts {
     pub ended_well: bool,
 }
 
-/// Runs them with the programs that were built, or says what is missing and counts them as skipped.
+/// Runs them with the built programs, or reports the missing tools and counts them as skipped.
 ///
 /// # Errors
 /// A runner that cannot be started, though it is there.
@@ -57,20 +57,20 @@ fn missing(folder: &Path) -> Option<&'static str> {
     let browser = BROWSERS.into_iter().map(PathBuf::from).chain(named).any(|path| path.is_file());
     let node = Command::new("node").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !node.is_ok_and(|status| status.success()) {
-        Some("there is no node; Debian's package is nodejs")
+        Some("node is missing; Debian's package is nodejs")
     } else if !["playwright-core", "typescript"]
         .iter()
         .all(|name| folder.join("node_modules").join(name).is_dir())
     {
-        Some("`npm ci` in host/serve/tests-browser fetches what it needs")
+        Some("run `npm ci` in host/serve/tests-browser")
     } else if !browser {
-        Some("there is no Chromium; Debian's package is chromium, and CHROMIUM names another")
+        Some("Chromium is missing; Debian's package is chromium, and CHROMIUM names another")
     } else {
         None
     }
 }
 
-/// How many tests stand in the file; those in the loop over sizes and schemes count once.
+/// Number of tests in the file; those in the loop over sizes and schemes count once.
 fn written(text: &str) -> u32 {
     text.lines().filter(|line| line.trim_start().starts_with("test(")).count() as u32
 }

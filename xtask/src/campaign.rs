@@ -10,7 +10,7 @@ use crate::{
     run::{cargo, finish, step},
 };
 
-/// What `cargo xtask campaign` can be told.
+/// Options of `cargo xtask campaign`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// How many random scenarios, each a rig, a host and what happens to them: seeds 1, 2, 3 ...
@@ -50,7 +50,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = firmware::build()?;
-    // Where both go wrong the scenarios' table is seen all the same.
+    // If both fail the scenarios' table is still printed.
     let scenarios = scenarios(arguments, &elf);
     if arguments.shard.is_some() || arguments.scenarios_only {
         return scenarios;

@@ -7,10 +7,9 @@ use clap::Args;
 
 use crate::run::{ROOT, cargo, finish, step};
 
-/// What to measure.
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder with real pairs, focal stacks, skeletons and silhouettes; without it the folder beside the repository where tests look for them.
+    /// Folder with real pairs, focal stacks, skeletons and silhouettes; by default the folder next to the repository that tests use.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Only these parts, such as `planes` or `corrections`; printed, no page is written.
@@ -22,7 +21,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    step("render, measure, write docs/accuracy.md and the pages beside it");
+    step("render, measure, write docs/accuracy.md and related pages");
     let mut command = cargo(["run", "--release", "--locked", "--package", "farnear-evaluation", "--"]);
     command.arg("--docs").arg(ROOT.join("docs"));
     if let Some(data) = &arguments.data {

@@ -1,4 +1,4 @@
-//! Builds the firmware of every board and lays the ELFs beside the host programs, where `farnear-sim` looks for the one
+//! Builds the firmware of every board and copies the ELFs next to the host programs, where `farnear-sim` looks for the one
 //! that it emulates.
 
 use std::{fs, path::PathBuf};

@@ -1,6 +1,6 @@
 //! Property tests for longer: the same tests, more cases, seeds 1, 2, 3 ... until the time is over.
 //!
-//! A case that fails is kept by proptest in a `proptest-regressions` file beside its test; commit that file, and the
+//! A case that fails is stored by proptest in a `proptest-regressions` file next to its test; commit that file, and the
 //! case runs first in every later test run.
 
 use std::time::{Duration, Instant};

@@ -121,7 +121,7 @@ pub fn run(write: bool) -> Result<()> {
     }
     if !wrong.is_empty() {
         bail!(
-            "{PAGE} is not what was counted; `cargo xtask sizes --write` renews it\n  {}",
+            "{PAGE} differs from the count; `cargo xtask sizes --write` renews it\n  {}",
             wrong.join("\n  ")
         );
     }

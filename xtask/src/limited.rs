@@ -16,7 +16,7 @@ use anyhow::{Context, Result};
 
 use crate::run::describe;
 
-/// The longest takes seven minutes on two cores with as much again beside it.
+/// The longest takes seven minutes on two cores with as much again in parallel.
 const LIMIT: Duration = Duration::from_secs(20 * 60);
 /// How long the last of an output may take after a program's end.
 const LAST: Duration = Duration::from_secs(5);
@@ -54,7 +54,7 @@ fn run_for(command: &mut Command, limit: Duration) -> Result<Said> {
     }
     if let Some(stderr) = child.stderr.take() {
         ends.push(read(stderr, |part| {
-            let _ = io::stderr().write_all(part); // where nobody reads, nothing is to be shown
+            let _ = io::stderr().write_all(part); // a closed stderr needs no output
         }));
     }
     let well = ends_well(&mut child, limit).with_context(|| format!("cannot wait for {named}"))?;
@@ -83,7 +83,7 @@ fn ends_well(child: &mut Child, limit: Duration) -> io::Result<Option<bool>> {
     Ok(None)
 }
 
-/// Gives what comes to `take`; tells of the end.
+/// Passes the output to `take` and reports the end.
 fn read(mut from: impl Read + Send + 'static, mut take: impl FnMut(&[u8]) + Send + 'static) -> Receiver<()> {
     let (end, ended) = channel();
     thread::spawn(move || {
@@ -91,7 +91,7 @@ fn read(mut from: impl Read + Send + 'static, mut take: impl FnMut(&[u8]) + Send
         while let Ok(length @ 1..) = from.read(&mut part) {
             take(&part[..length]);
         }
-        let _ = end.send(()); // nobody may wait any more
+        let _ = end.send(()); // the receiver may be gone
     });
     ended
 }

@@ -1,6 +1,6 @@
 //! `cargo xtask`: set-up, demo, tests and measurements of this repository, with nothing but a Rust toolchain.
 //!
-//! One file per job. Every step says what it does before it does it, and every failure says what to type next.
+//! One file per job. Each step is announced, and each failure names the next command to type.
 
 mod arm;
 mod bench;
@@ -42,12 +42,12 @@ enum Job {
     Demo,
     /// Everything CI runs: format, lints, firmware build and budgets, host tests, tests on the emulated board.
     Test(test::Arguments),
-    /// Build the firmware and lay its ELF beside the host programs.
+    /// Build the firmware and copy its ELF next to the host programs.
     Firmware,
     /// The firmware's flash and static RAM against their budgets, and the instructions of its routines against
     /// docs/instructions.md.
     Sizes {
-        /// Write docs/instructions.md anew.
+        /// Renew docs/instructions.md.
         #[arg(long)]
         write: bool,
     },
@@ -60,7 +60,7 @@ enum Job {
         #[arg(long, default_value_t = 60)]
         seconds: u64,
     },
-    /// Times of the mathematics, with --peers beside the same chain on OpenCV.
+    /// Time the mathematics, with --peers compared with the same chain on OpenCV.
     Bench(bench::Arguments),
     /// Measure the accuracy on rendered (and, where present, real) scenes and write the accuracy pages.
     Evaluate(evaluate::Arguments),
@@ -68,7 +68,7 @@ enum Job {
     Site,
     /// What a release hands out, each file tried where nothing else is: programs for two processors, Debian packages, the wheel.
     Release(release::Arguments),
-    /// Install farnear and farnear-sim (with the firmware's ELF beside it) into cargo's bin folder.
+    /// Install farnear and farnear-sim (with the firmware's ELF) into cargo's bin folder.
     Install,
 }
 

@@ -1,5 +1,5 @@
 //! The tests of the Python package, where there is a Python with what they need: the module is built as everything else is, laid
-//! beside the package's own files, and looked at by pytest in an environment of its own.
+//! next to the package's own files, and run by pytest in a virtual environment.
 
 use std::{
     fs,
@@ -18,7 +18,7 @@ use crate::{
 
 /// The package that only those compile who have Python.
 pub const PACKAGE: &str = "farnear-python";
-/// What the tests need beside the package.
+/// Packages that the tests need.
 const NEEDS: [&str; 7] = [
     "numpy>=1.23",
     "matplotlib>=3.6",
@@ -28,10 +28,10 @@ const NEEDS: [&str; 7] = [
     "mcap-ros2-support>=0.5",
     "mypy>=1.10",
 ];
-/// Says whether a Python is new enough and can make environments.
+/// Tells whether a Python is new enough and can make environments.
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
 
-/// Runs them with the module that [`build`] made, or says what is missing and counts them as skipped.
+/// Runs them with the module from [`build`], or reports the missing tools and counts them as skipped.
 ///
 /// # Errors
 /// A Python that cannot be started though it is there.
@@ -50,7 +50,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
     let said = limited::run(
         Command::new(python)
             .args(["-m", "pytest", "-q", "-p", "farnear.pytest_plugin", "-p", "no:cacheprovider"])
-            // Where a test hangs is said.
+            // Report where a test hangs.
             .args(["-o", "faulthandler_timeout=300", "--rootdir"])
             .arg(&tests)
             .arg(&tests)
@@ -70,7 +70,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
     })
 }
 
-/// The Python of an environment with what is needed, made where it is not there; else what is missing.
+/// The Python of an environment with all packages, created if missing; otherwise the reason.
 pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     if !able() {
         return Err(
@@ -118,7 +118,7 @@ fn able() -> bool {
     succeeds(Command::new("python3").args(["-c", ABLE]))
 }
 
-/// The package as it is when it is installed.
+/// The installed package.
 fn lay_out(package: &Path, built: &Path) -> Result<()> {
     fs::create_dir_all(package).with_context(|| format!("cannot make {}", package.display()))?;
     for entry in fs::read_dir(ROOT.join("python/farnear")).context("the package is not there")? {
@@ -134,7 +134,7 @@ fn lay_out(package: &Path, built: &Path) -> Result<()> {
     Ok(())
 }
 
-/// How many tests stand in the files; one that runs for several values counts once.
+/// Number of tests in the files; one that runs for several values counts once.
 fn written(tests: &Path) -> Result<u32> {
     let mut count = 0;
     for entry in fs::read_dir(tests).context("the package's tests are not there")? {

@@ -26,10 +26,9 @@ use crate::{
     run::{ROOT, finish, output, step},
 };
 
-/// Where it goes.
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder for the files; made anew.
+    /// Folder for the files; replaced.
     #[arg(long, value_name = "DIR", default_value = "out/release")]
     out: PathBuf,
 }
@@ -49,7 +48,7 @@ struct Release {
 /// Makes and tries all of them.
 ///
 /// # Errors
-/// What cannot be built, and what does not run where it is installed. What this machine has no tool for is left out and named.
+/// Failed builds, and programs that do not run after installation. Files whose tools are missing are left out and named.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = ROOT.join(&arguments.out);
     let work = out.join("work");
@@ -68,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     if !git(&["status", "--porcelain"])?.is_empty() {
         eprintln!(
-            "note: there are changes that no commit holds; the files carry the last commit's time all the same"
+            "note: there are uncommitted changes; the files carry the last commit's time"
         );
     }
 
@@ -81,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         copy(elf, &release.out)?;
     }
 
-    step("what is in it");
+    step("contents");
     let notices = inventory::write(&release)?;
 
     let mut left_out = Vec::new();
@@ -119,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What goes beside the programs, whatever they run on.
+/// Files for every platform besides the programs.
 struct Extras {
     man: PathBuf,
     /// `farnear.bash`, `farnear.zsh`, `farnear.fish`.
@@ -152,7 +151,7 @@ fn copy(file: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies the programs and the boards' firmware, which the emulated board looks for beside itself, into a folder.
+/// Copies the programs and the boards' firmware, which the emulated board expects next to it, into a folder.
 fn lay_programs(programs: &Path, elves: &[PathBuf], folder: &Path) -> Result<()> {
     let built = crate::host::PROGRAMS.map(|name| programs.join(name));
     built.iter().chain(elves).try_for_each(|file| copy(file, folder))

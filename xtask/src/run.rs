@@ -49,7 +49,7 @@ fn host_rust_minor() -> Option<u32> {
     text.split_whitespace().nth(1)?.split('.').nth(1)?.parse().ok()
 }
 
-/// Says what is about to happen, and how long everything before it has taken.
+/// Announces a step and prints the time so far.
 pub fn step(what: &str) {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     let seconds = START.elapsed().as_secs();
@@ -65,7 +65,7 @@ pub fn finish(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a program to its end and gives what it printed; fails unless it succeeds.
+/// Runs a program to its end and returns its output; fails unless it succeeds.
 pub fn output(command: &mut Command) -> Result<String> {
     command.stderr(Stdio::inherit());
     let output = command.output().with_context(|| format!("cannot start {}", describe(command)))?;

@@ -1,5 +1,5 @@
 //! The documents as a site: pages, the root's files and every command's help, laid out by `docs/site/stage.py` and built by a generator
-//! that is fetched into an environment of its own.
+//! that is fetched into a virtual environment.
 
 use std::{fs, process::Command};
 

@@ -15,7 +15,7 @@ use crate::{
     thumb::Way,
 };
 
-/// What `cargo xtask test` can be told.
+/// Options of `cargo xtask test`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Run the test programs too that are unchanged since they passed.
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).env("RUSTDOCFLAGS", "--deny warnings"))?;
 
     step("compiling the tests on the host and on the emulated board");
-    // All of it before anything runs: a call of cargo beside the tests could replace what they are using.
+    // Everything is built before anything runs: a cargo call during the tests could replace their programs.
     let programs = Programs::build(&elf)?;
     python::build(&elf)?;
     step(

@@ -65,7 +65,7 @@ impl Programs {
         fs::create_dir_all(&passed).with_context(|| format!("cannot create {}", passed.display()))?;
         for test in &self.tests {
             let stamp = passed.join(test.executable.file_name().unwrap_or(test.name.as_ref()));
-            // Without git nobody knows which files there are: then every program runs.
+            // Without git the list of files is unknown: every program runs.
             let depends_on =
                 dependencies(test, &self.others, elf).ok().filter(|_| test.package != SEES_EVERYTHING);
             let before = fs::read_to_string(&stamp).ok().filter(|_| !all);
@@ -104,10 +104,10 @@ impl Programs {
         let text = output(command.arg("--message-format=json-render-diagnostics"))?;
         let (mut tests, mut others) = (Vec::new(), Vec::new());
         for line in text.lines() {
-            let message: Value = serde_json::from_str(line).context("cargo's message is no JSON")?;
+            let message: Value = serde_json::from_str(line).context("cargo's message is not JSON")?;
             if message["fresh"] == false {
                 bail!(
-                    "{} was compiled twice: has a file just changed, or does a build script watch what is missing?",
+                    "{} was compiled twice: has a file just changed, or does a build script watch a missing file?",
                     message["package_id"]
                 );
             }
@@ -227,7 +227,7 @@ pub fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>>
         total.count(counts);
         result = Some(counts.to_owned());
     }
-    // What was killed has counted nothing.
+    // A killed program has counted nothing.
     total.failed += u32::from(!said.well && result.is_none());
     total.well &= said.well;
     Ok(result.filter(|_| said.well))

@@ -42,7 +42,7 @@ impl fmt::Display for Way {
 }
 
 impl Way {
-    /// Finds the way, installing what is missing where that is possible.
+    /// Finds the way, installing missing parts if possible.
     pub fn find() -> Result<Self> {
         let way = Self::find_quietly()?;
         eprintln!("{TARGET}: {way}");

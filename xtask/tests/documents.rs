@@ -22,7 +22,7 @@ fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// What stands between two marks, again and again.
+/// All texts between two marks.
 fn between<'a>(text: &'a str, begin: &'a str, end: &'a str) -> impl Iterator<Item = &'a str> {
     text.split(begin).skip(1).filter_map(move |rest| rest.split_once(end).map(|(inside, _)| inside))
 }
@@ -41,7 +41,7 @@ fn links_lead_to_files() {
 }
 
 /// In the pages that lead through the code, a word in code type with a slash in it is a path from the repository's root;
-/// `FOO/` and `<name>` stand for what a reader adds.
+/// `FOO/` and `<name>` are placeholders.
 #[test]
 fn paths_in_the_signposts_exist() {
     let mut checked = 0;

@@ -45,7 +45,7 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         | WorkflowError::Capture(CaptureError::Board(error))
         | WorkflowError::Focus(FocusSearchError::Capture(CaptureError::Board(error))) => of_client(error),
         WorkflowError::Read { what: CAMERA_FILE, .. } => {
-            Some("`farnear shadow remove --help` shows what stands in it".into())
+            Some("`farnear shadow remove --help` shows its contents".into())
         }
         WorkflowError::Silhouettes(SilhouettesError::TooLarge { .. }) => {
             Some("--units names a recording's unit, a larger --mm-per-px makes the picture smaller".into())

@@ -11,7 +11,6 @@ use serde::Serialize;
 
 use crate::scene::SceneArgument;
 
-/// What is rendered, and where it goes.
 pub struct RenderSettings {
     /// What stands before the camera.
     pub scene: SceneArgument,

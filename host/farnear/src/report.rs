@@ -5,7 +5,7 @@ use std::io::Write;
 use anyhow::{Context, Result};
 use serde::Serialize;
 
-/// What was asked for contradicts itself: exit code 2, like what the argument parser refuses.
+/// Contradictory options: exit code 2, as for the argument parser.
 #[derive(Debug)]
 pub struct Usage(pub String);
 

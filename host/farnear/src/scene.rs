@@ -56,7 +56,7 @@ impl SceneArgument {
     }
 }
 
-/// What the emulated rig has to be given of a scene, beside its name: a scene file with its maps, checked.
+/// Data of a scene that the emulated rig needs besides its name: a scene file with its maps, checked.
 ///
 /// # Errors
 /// As [`SceneArgument::read`].
@@ -85,7 +85,7 @@ fn read(path: &Path) -> Result<PackedScene> {
             let picture = folder.join(name);
             if !picture.is_file() {
                 bail!(
-                    "texture = \"{name}\" is neither sand nor fractal, and there is no file {}",
+                    "texture = \"{name}\" is neither sand nor fractal, and not a file: {}",
                     picture.display()
                 );
             }

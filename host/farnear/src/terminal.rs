@@ -1,4 +1,4 @@
-//! The terminal as the face of a workflow: what it says on stderr, its questions with the answers that are typed, and
+//! The terminal as the face of a workflow: messages on stderr, questions and typed answers, and
 //! Ctrl-C.
 
 use std::{
@@ -43,7 +43,7 @@ static LEFT_S: AtomicU64 = AtomicU64::new(u64::MAX);
 /// Whether the cursor stands behind a count that may still rise.
 static COUNTING_LINE: AtomicBool = AtomicBool::new(false);
 
-/// Ends the line of a count, so that what follows has one of its own.
+/// Ends the line of a count, so that further text begins on a new line.
 pub fn end_count() {
     if COUNTING_LINE.swap(false, Ordering::Relaxed) {
         eprintln!();
@@ -155,12 +155,12 @@ impl Questions for Terminal {
         eprint!("{question}");
         let unanswered = || WorkflowError::Unanswered { question: question.trim().into() };
         std::io::stderr().flush().map_err(|_| unanswered())?;
-        // A read is not ended by Ctrl-C; so it waits in a thread of its own, which ends with the program at the latest.
+        // Ctrl-C does not end a read; so it waits in its own thread, which ends with the program at the latest.
         let (sender, typed) = channel();
         std::thread::spawn(move || {
             let mut line = String::new();
             let read = std::io::stdin().lock().read_line(&mut line).map(|count| (count, line));
-            let _ = sender.send(read); // nobody listens after an interruption
+            let _ = sender.send(read); // the receiver is closed after an interruption
         });
         loop {
             match typed.recv_timeout(LOOK) {

@@ -1,5 +1,5 @@
-//! What a batch costs beside the bare loop over the same workflow: processor time per pair, blocks of both in turn, and the most
-//! memory. `cargo run --release --example batch_speed -- [PAIRS] [FOLDER]`; docs/batch.md has what it printed.
+//! Cost of a batch compared with a plain loop over the same workflow: processor time per pair, blocks of both in turn, and the most
+//! memory. `cargo run --release --example batch_speed -- [PAIRS] [FOLDER]`; docs/batch.md has its figures.
 //!
 //! The loop does what a program that uses the library does: one thread, shared operators, the same files, no sums, no
 //! `batch.toml`, no line a job.
@@ -68,7 +68,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A texture, and what is left of it out of focus.
+/// A texture, and the texture out of focus.
 fn pair(root: &Path, number: usize) -> Result<()> {
     let texture = |y: usize, x: usize| 40 + (y * 31 + x * 17 + number * 5) * (y + 7) * 7919 % 151;
     for (name, spread) in [("far", 1), ("near", 2)] {

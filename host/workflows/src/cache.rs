@@ -125,7 +125,7 @@ pub(crate) struct FileVersion {
 
 impl FileVersion {
     /// # Errors
-    /// [`WorkflowError::Read`] if there is no such file.
+    /// [`WorkflowError::Read`] if the file does not exist.
     pub fn of(what: &'static str, path: &Path) -> Result<Self> {
         let found = fs::metadata(path).map_err(WorkflowError::read(what, path))?;
         Ok(Self { path: path.into(), bytes: found.len(), modified: found.modified().ok() })

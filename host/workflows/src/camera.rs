@@ -101,16 +101,16 @@ fn genicam() -> Vec<Found> {
     Vec::new()
 }
 
-/// A camera, and what is set before it is used.
+/// A camera with its initial settings.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CameraChoice {
     pub address: CameraAddress,
-    /// What is set, in this order.
+    /// Controls to set, in this order.
     pub settings: Vec<Setting>,
 }
 
 impl CameraChoice {
-    /// Opens it and sets what is to be set.
+    /// Opens it and applies the settings.
     ///
     /// # Errors
     /// [`WorkflowError::Parameter`] for the emulated rig's camera, which needs the rig; [`WorkflowError::Camera`].
@@ -131,7 +131,7 @@ impl CameraChoice {
 pub struct ControlFigures {
     pub name: String,
     pub value: String,
-    /// What it may be; `fixed` where it can only be read.
+    /// Allowed values; `fixed` if read-only.
     pub range: String,
 }
 
@@ -143,7 +143,7 @@ pub struct ShowFigures {
     pub controls: Vec<ControlFigures>,
 }
 
-/// Shows a camera's controls, after what is to be set has been set.
+/// Lists a camera's controls after the settings were applied.
 pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
     let mut camera = choice.open()?;
     Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })

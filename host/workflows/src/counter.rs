@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::{context::Context, error::Result};
 
-/// Counts parts of a work over threads, so that whoever watches sees the count rise by one each time.
+/// Counts parts of a work over threads, so that a reader sees the count rise by one each time.
 pub(crate) struct Counter<'a> {
     context: &'a Context<'a>,
     unit: &'static str,
@@ -17,9 +17,9 @@ impl<'a> Counter<'a> {
         Self { context, unit, done: Mutex::new(0) }
     }
 
-    /// One part is done, of so many where that is known.
+    /// Counts one part, of the total if known.
     pub fn one(&self, total: Option<usize>) {
-        // Held while it is told, or another thread's higher count might be told first. A count cannot be half-changed.
+        // Held during the report, so that counts are reported in order. A count cannot be half-changed.
         let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
         *done += 1;
         self.context.progress.advance(self.unit, *done, total);

@@ -135,7 +135,7 @@ mod tests {
         let [entry] = entries(folder.path()).try_into().unwrap();
         let written = fs::metadata(&entry).unwrap().modified().unwrap();
         assert_eq!(cached(folder.path(), "a", &request).unwrap(), designed);
-        assert_eq!(fs::metadata(&entry).unwrap().modified().unwrap(), written, "it was designed anew");
+        assert_eq!(fs::metadata(&entry).unwrap().modified().unwrap(), written, "it was designed again");
     }
 
     #[test]

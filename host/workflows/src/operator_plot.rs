@@ -146,7 +146,7 @@ fn frequencies() -> impl Iterator<Item = f64> {
     (0..=STEPS).map(|i| PI * i as f64 / STEPS as f64)
 }
 
-/// The corner where a legend of so many lines covers the fewest of the points, whose coordinates run from 0 to 1 over the
+/// The corner where a legend of this many lines covers the fewest of the points, whose coordinates run from 0 to 1 over the
 /// chart; the lower right one if that is as good as any.
 fn free_corner(points: Vec<[f64; 2]>, lines: usize) -> SeriesLabelPosition {
     // A little more than the legend takes of a chart.

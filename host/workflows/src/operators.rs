@@ -154,12 +154,12 @@ pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<Opera
 /// `gro`, or a file saved by `farnear operators`), else the default ones.
 ///
 /// # Errors
-/// What is wrong with the name or the file, or why no operators can be designed.
+/// An unknown name, an unreadable file, or why operators cannot be designed.
 pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
     let default = operators::Request::for_optics(optics);
     let Some(asked) = asked else { return Ok(cache::operators(&default)?) };
     match named(asked) {
-        // A file is a file, whatever it is called.
+        // A file has priority over a name.
         Some(name) if !asked.exists() => {
             let (family, design) = name.about(|| format!("operators {}", asked.display()))?;
             let request = operators::Request { family, design, ..default };

@@ -5,7 +5,7 @@ use std::{fmt::Display, ops::RangeInclusive};
 use crate::error::{Result, WorkflowError};
 
 /// # Errors
-/// [`WorkflowError::Parameter`] for a value outside the range (NaN always is); `unit` is what stands after the numbers, if anything.
+/// [`WorkflowError::Parameter`] for a value outside the range (NaN always is); `unit` is the text after the numbers, if anything.
 pub(crate) fn within<T: PartialOrd + Display>(
     name: &'static str,
     value: T,
@@ -21,7 +21,7 @@ pub(crate) fn within<T: PartialOrd + Display>(
 }
 
 /// # Errors
-/// [`WorkflowError::Parameter`] for a value below the least; `unit` is what stands after the number.
+/// [`WorkflowError::Parameter`] for a value below the least; `unit` is the text after the number.
 pub(crate) fn at_least(name: &'static str, value: usize, least: usize, unit: &str) -> Result<()> {
     match value >= least {
         true => Ok(()),

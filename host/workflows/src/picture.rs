@@ -1,4 +1,4 @@
-//! Figures of one image while it is looked at: brightness, saturation, texture, focus.
+//! Figures of one image: brightness, saturation, texture, focus.
 
 use farnear_capture::camera::Image;
 use farnear_depth::focus_measure::FocusMeasure;
@@ -35,7 +35,7 @@ pub struct PictureFigures {
     pub warnings: Vec<String>,
 }
 
-/// Looks at an image. One pass for the brightness; the focus measure costs what it says.
+/// Measures an image. One pass for the brightness, one for the focus measure.
 pub fn figures(image: &Image, measure: FocusMeasure) -> PictureFigures {
     let (height, width) = image.pixels.dim();
     let counts = image.counts();

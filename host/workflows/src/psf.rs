@@ -10,7 +10,7 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Part of an image's energy that is not round from which it is said.
+/// Part of an image's energy that is not round, above which a warning is given.
 const NOT_ROUND: f64 = 0.1;
 
 #[derive(Clone, PartialEq, Debug)]
@@ -66,11 +66,11 @@ impl std::fmt::Display for PsfSource {
 }
 
 impl PsfSource {
-    /// The point spread function. What is not round in an image is averaged over the circle, with a warning where that is
+    /// The point spread function. Parts of an image that are not round are averaged over the circle, with a warning where that is
     /// much.
     ///
     /// # Errors
-    /// Images; [`WorkflowError::Parameter`] for one that is no point spread function.
+    /// Images; [`WorkflowError::Parameter`] for one that is not a point spread function.
     pub fn read(&self, context: &Context<'_>) -> Result<Psf> {
         let (file, radius_px) = match self {
             Self::Named(psf) => return Ok(*psf),

@@ -1,7 +1,7 @@
-//! A rig, real or emulated: connecting to it, and what it can be made to do. One file per job.
+//! A rig, real or emulated: connection and tasks. One file per task.
 //!
 //! - [`info`], [`motion`], [`alarms`], [`settings`], [`board`], [`log`]: what the board is asked and told.
-//! - [`camera`]: a rig with its camera; [`pair`], [`half_mirror`], [`sequence`], [`focus`], [`targets`]: what is done with both.
+//! - [`camera`]: a rig with its camera; [`pair`], [`half_mirror`], [`sequence`], [`focus`], [`targets`]: tasks with both.
 //! - [`mechanics`], [`correction_fit`], [`correct`], [`sun`]: what the board measures and calculates.
 //! - [`check`]: the bring-up checklist.
 //! - [`open`]: a rig that is held open between jobs; [`live`], [`live_depth`]: images and depth as they come; [`series`]: pair after pair; [`continuous`]: at a pace that
@@ -52,15 +52,15 @@ pub enum RigAddress {
     Port(String),
     /// Emulated: `farnear-sim` is started for it, and ends with it.
     Emulated(Scenery),
-    /// Connected already, by whoever holds it open.
+    /// An open connection.
     Open(OpenRig),
 }
 
 impl RigAddress {
-    /// The board that is plugged in, where nobody names its port.
+    /// The only board that is plugged in, without a named port.
     ///
     /// # Errors
-    /// [`WorkflowError::Client`] where there is none, or more than one.
+    /// [`WorkflowError::Client`] if there is none, or more than one.
     pub fn found() -> Result<Self> {
         Ok(Self::Port(find::board_port().map_err(ClientError::Port)?))
     }
@@ -73,15 +73,15 @@ impl RigAddress {
     /// The emulated rig before another scene.
     ///
     /// # Errors
-    /// [`WorkflowError::Parameter`] for a real rig, whose world nobody can exchange.
+    /// [`WorkflowError::Parameter`] for a real rig, whose scene cannot be set.
     pub fn with_scene(&self, scene: String) -> Result<Self> {
         match self {
             Self::Emulated(scenery) => Ok(Self::Emulated(scenery.with_scene(scene))),
             Self::Port(port) => {
-                Err(WorkflowError::parameter("scene", scene, format!("{port} has a world of its own")))
+                Err(WorkflowError::parameter("scene", scene, format!("the scene of {port} cannot be set")))
             }
             Self::Open(open) => {
-                let reason = format!("{} runs already, before a scene of its own", open.name());
+                let reason = format!("{} is already running with another scene", open.name());
                 Err(WorkflowError::parameter("scene", scene, reason))
             }
         }
@@ -92,12 +92,12 @@ impl RigAddress {
 pub struct Rig {
     /// The way to the board.
     pub client: Client,
-    /// The emulated rig that was started for this, and what it was asked to be.
+    /// The emulated rig that was started for this task, with its options.
     pub emulation: Option<(Arc<Simulator>, Scenery)>,
 }
 
 impl Rig {
-    /// Connects. Cancelling stops what moves. The emulated rig's lens is that of `optics`, where they are given.
+    /// Connects. Cancelling stops all motion. The emulated rig's lens is that of `optics`, where they are given.
     ///
     /// # Errors
     /// [`WorkflowError::Simulator`], [`WorkflowError::Client`], [`WorkflowError::Cancelled`] while the emulated rig starts.

@@ -1,6 +1,6 @@
-//! Captures that were kept: the folders of a session, what is in them, and what a person noted.
+//! Stored captures: the folders of a session, their contents, and notes.
 //!
-//! A capture is a folder with `capture.toml` ([`farnear_capture::record`]); a note lies beside it in `note.toml`.
+//! A capture is a folder with `capture.toml` ([`farnear_capture::record`]); a note is next to it in `note.toml`.
 
 use std::{
     fs,
@@ -178,7 +178,7 @@ pub fn free_names(session: &Path, kind: &str, count: usize) -> Result<Vec<PathBu
 /// none.
 ///
 /// # Errors
-/// [`WorkflowError::Read`] for a session's folder that cannot be looked into. A broken capture is listed with what is wrong.
+/// [`WorkflowError::Read`] for a session's folder that cannot be read. A broken capture is listed with its error.
 pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
     let entries = match fs::read_dir(session) {
         Ok(entries) => entries,
@@ -193,7 +193,7 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
         if name.starts_with('.') || !is_dir || fs::symlink_metadata(path.join(CAPTURE_FILE)).is_err() {
             continue;
         }
-        // Somebody may take the folder away while it is read: that is a broken capture, not a broken list.
+        // The folder may disappear while it is read: that is a broken capture, not a broken list.
         let capture = read(&path).unwrap_or_else(|error| broken(&name, &error));
         if capture.broken.is_some() && search.trim().is_empty()
             || capture.broken.is_none() && matches(&path, &capture, search)
@@ -208,7 +208,7 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
 /// Reads one capture.
 ///
 /// # Errors
-/// [`WorkflowError::Record`], [`WorkflowError::Read`] where it is none.
+/// [`WorkflowError::Record`], [`WorkflowError::Read`] if the folder is not a capture.
 pub fn read(folder: &Path) -> Result<Capture> {
     let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
     check_regular(folder)?;
@@ -295,7 +295,7 @@ fn broken(name: &str, error: &WorkflowError) -> Capture {
     }
 }
 
-/// Whether name, record and note hold all words, whatever their case.
+/// Whether name, record and note contain all words, ignoring case.
 fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
     if search.trim().is_empty() {
         return true;
@@ -306,10 +306,10 @@ fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
     search.to_lowercase().split_whitespace().all(|word| all.contains(word))
 }
 
-/// What was noted; nothing where nobody did.
+/// The note; empty if there is none.
 ///
 /// # Errors
-/// [`WorkflowError::Parse`] for a note that is no TOML.
+/// [`WorkflowError::Parse`] for a note that is not TOML.
 pub fn read_note(folder: &Path) -> Result<Note> {
     let path = folder.join(NOTE_FILE);
     match fs::read_to_string(&path) {
@@ -379,7 +379,7 @@ mod tests {
         let found = |search: &str| list(session.path(), search).unwrap().len();
         assert_eq!([found("sandpaper LAMP"), found("staircase"), found("sandpaper cone")], [1, 2, 0]);
         assert!(write_note(&folder, &Note { rating: 6, ..note.clone() }).unwrap_err().is_usage());
-        assert!(write_note(&session.path().join("other"), &note).is_err(), "it is no capture");
+        assert!(write_note(&session.path().join("other"), &note).is_err(), "it is not a capture");
         assert!(!session.path().join("other").join(NOTE_FILE).exists());
     }
 

@@ -22,7 +22,7 @@ use farnear_silhouettes::silhouette::template::TemplateError;
 
 /// Views round a subject.
 pub(crate) const VIEWS: RangeInclusive<usize> = 1..=72;
-/// What a pixel may stand for, millimetres.
+/// Scale, mm per px.
 pub(crate) const MM_PER_PX: RangeInclusive<f64> = 0.1..=1000.0;
 
 /// Why no silhouettes could be made.
@@ -64,15 +64,15 @@ pub enum SilhouettesError {
         /// Millimetres per pixel asked for.
         mm_per_px: f64,
     },
-    /// Nobody stays in the picture for long enough.
-    #[error("{}: nobody is seen in {least} frames in a row", path.display())]
+    /// No person stays in the picture for long enough.
+    #[error("{}: no person in {least} successive frames", path.display())]
     NoPassage {
         path: PathBuf,
         /// Frames that a passage has at least.
         least: usize,
     },
     /// No performance was chosen.
-    #[error("there is no performance to draw")]
+    #[error("no performance to draw")]
     NoPerformance,
     /// A detector that compares colours.
     #[error("the shadow detector {} compares colours, but the video is grey", method.name())]

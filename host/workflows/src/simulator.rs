@@ -1,4 +1,4 @@
-//! Starting `farnear-sim` beside this program, and ending it again.
+//! Starts `farnear-sim` as a child process and ends it.
 
 use std::{
     io::{BufRead, BufReader, ErrorKind, Read, Write},
@@ -21,7 +21,7 @@ use crate::{
 };
 
 const PROGRAM: &str = "farnear-sim";
-/// Name of the firmware beside it.
+/// Name of the firmware next to it.
 pub(crate) const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
 /// Time to end by itself before it is killed.
 const FAREWELL: Duration = Duration::from_secs(3);
@@ -34,7 +34,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The lens that the emulated rig has without optics: that of the thesis' 50 mm lens.
 pub const USUAL_PSF: Psf = Psf::Gaussian { k: 0.4578 };
 
-/// What the emulated rig is made of; what is left open has the simulator's own defaults. The texts are checked by the
+/// Options of the emulated rig; unset ones have the simulator's defaults. The texts are checked by the
 /// simulator.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Scenery {
@@ -49,7 +49,7 @@ pub struct Scenery {
     pub noise: Option<String>,
     /// Decides everything random.
     pub seed: Option<u64>,
-    /// The firmware; without it the one that lies beside farnear-sim.
+    /// The firmware; by default the one next to farnear-sim.
     pub firmware: Option<PathBuf>,
     /// Faults of the emulated line, a TOML file.
     pub faults: Option<PathBuf>,
@@ -64,7 +64,7 @@ pub struct Scenery {
 /// The simulator could not be started.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatorError {
-    /// There is no such program.
+    /// The program does not exist.
     #[error("{program} is neither next to this program nor on the PATH")]
     Missing { program: &'static str },
     #[error("cannot start {}: {source}", program.display())]
@@ -80,7 +80,6 @@ pub enum SimulatorError {
     #[error("{PROGRAM} printed no address but {line:?}: {reason}")]
     Address {
         line: String,
-        /// What is wrong with it.
         reason: String,
     },
     /// It did not say where it listens.
@@ -100,7 +99,7 @@ impl Scenery {
         Self { scene: Some(scene), packed_scene: None, ..self.clone() }
     }
 
-    /// Everything that was left open, decided; as it stands in a capture's record.
+    /// All options with their values, as in a capture's record.
     pub fn decided(&self, psf: Psf) -> SimulationRecord {
         SimulationRecord {
             scene: self.scene.clone().unwrap_or_else(|| "staircase".into()),
@@ -128,7 +127,7 @@ struct Address {
 }
 
 impl Simulator {
-    /// Starts the simulator and says so. Without optics it has those of a 50 mm lens.
+    /// Starts the simulator and reports it. Without optics it has those of a 50 mm lens.
     ///
     /// # Errors
     /// [`SimulatorError`], [`crate::WorkflowError::Cancelled`].
@@ -156,7 +155,7 @@ impl Simulator {
         if scenery.paced {
             command.arg("--paced");
         }
-        // In a group of its own: Ctrl-C reaches this program, which stops what moves and ends the simulator then.
+        // In its own process group: Ctrl-C reaches this program, which stops all motion and then ends the simulator.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command
@@ -216,7 +215,7 @@ impl Drop for Simulator {
     }
 }
 
-/// The first line of the simulator's output; empty where there is none.
+/// The first line of the simulator's output; empty if there is none.
 fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<String> {
     let (sender, line) = channel();
     std::thread::spawn(move || {

@@ -1,4 +1,4 @@
-//! Instructions per pixel of the run time on 64-bit ARM, beside those on x86-64: counted by qemu, which writes down each one.
+//! Instructions per pixel of the run time on 64-bit ARM, compared with x86-64: counted by qemu, which lists each one.
 //!
 //! Times cannot be had from an emulator; instructions can, and they tell whether the vectors are used.
 
@@ -22,7 +22,7 @@ use crate::{
 const HEADING: &str = "## On 64-bit ARM\n";
 /// Pixels of the pair in `one_chain`.
 const PIXELS: u64 = 96 * 128;
-/// The first chain makes its buffers; what is counted is the difference to this many.
+/// The first chain allocates its buffers; the figure is the difference to this many.
 const TIMES: u64 = 2;
 
 /// Counts, prints, and puts the section at the end of the page where that is wanted.
@@ -37,7 +37,7 @@ pub fn renew(write: bool) -> Result<()> {
     Ok(())
 }
 
-/// The section as it stands at the end of the page, for those who renew the rest; empty where there is none.
+/// The section at the end of the present page; empty if there is none.
 pub fn kept() -> Result<String> {
     let page = page()?;
     Ok(page.find(HEADING).map_or(String::new(), |start| page[start..].to_owned()))

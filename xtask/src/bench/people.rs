@@ -1,4 +1,4 @@
-//! Times of host/recognition: from video and masks to embedded points, beside Isomap and the RBF map of scikit-learn.
+//! Times of host/recognition: from video and masks to embedded points, compared with Isomap and the RBF map of scikit-learn.
 //!
 //! The peer runs on the same 1500 descriptors, which our bench writes, once before and once after our benches.
 
@@ -16,7 +16,7 @@ use crate::run::{ROOT, cargo, finish, output, step, target_folder};
 
 /// The project's own peer.
 const PEER_SCRIPT: &str = "host/recognition/benches/peer_isomap.py";
-/// What a peer is compared in: the name of our figure and of its own.
+/// Names of a compared figure: ours and the peer's.
 const COMPARED: [(&str, &str); 3] = [
     ("isomap_1500", "isomap_ms"),
     ("rbf_training_1500", "rbf_training_ms"),
@@ -107,7 +107,7 @@ fn better(a: Peer, b: Peer) -> Peer {
 }
 
 /// Takes too long for a bench: the processor time of `farnear activity evaluate`, as the shell's `time` gave it.
-const NESTED_SEARCH: &str = "A whole nested search (`farnear activity evaluate --leave-one-subject-out`, everything chosen anew for each left-out subject) on 287 synthetic clips in four views, 5 subjects, 11 activities, 54,192 frames, takes 69 s of processor time order-free and 91 s ordered with views fused, 130 s ordered with every view by itself, 39 s by the thesis' method (November 2026, measured on the side, not with this table).";
+const NESTED_SEARCH: &str = "A whole nested search (`farnear activity evaluate --leave-one-subject-out`, everything chosen again for each left-out subject) on 287 synthetic clips in four views, 5 subjects, 11 activities, 54,192 frames, takes 69 s of processor time order-free and 91 s ordered with views fused, 130 s ordered with every view by itself, 39 s by the thesis' method (November 2026, measured on the side, not with this table).";
 
 /// The section of the page: our times, the peers', the ratios.
 fn section(rows: &[Row], peers: &[Peer]) -> String {

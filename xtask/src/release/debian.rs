@@ -18,10 +18,10 @@ use super::{
 };
 use crate::run::{ROOT, cargo, finish, has, output, step, target_folder};
 
-/// Where the programs lie; `/usr/bin` points there, since the emulated board looks for its firmware beside itself.
+/// Where the programs lie; `/usr/bin` points there, since the emulated board expects its firmware next to it.
 const PROGRAMS: &str = "usr/lib/farnear";
 
-/// Writes the package; gives its path, or what is missing.
+/// Writes the package; returns its path, or the missing tool.
 pub fn write(
     release: &Release,
     target: &Target,

@@ -1,6 +1,6 @@
-//! What is in a release: a list for machines (CycloneDX) and the licences of everything, as cargo's metadata tell them.
+//! Contents of a release: a bill of materials (CycloneDX) and all licences, from cargo's metadata.
 //!
-//! A licence that nobody has looked at yet stops the release: [`ACCEPTED`] is what the project's own licence may be joined with.
+//! An unknown licence stops the release: [`ACCEPTED`] is what the project's own licence may be joined with.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -59,7 +59,7 @@ pub fn write(release: &Release) -> Result<PathBuf> {
     }
     let refused: Vec<_> = parts.values().filter(|part| !accepted(&part.licence)).map(described).collect();
     if !refused.is_empty() {
-        bail!("licences that nobody has accepted: {} (see ACCEPTED)", refused.join(", "));
+        bail!("licences that are not accepted: {} (see ACCEPTED)", refused.join(", "));
     }
     let components: Vec<_> = parts
         .values()
@@ -119,7 +119,7 @@ fn parts_of(workspace: &Path, roots: &[&str], parts: &mut BTreeMap<(String, Stri
             }
         }
         let package = packages.get(id).with_context(|| format!("cargo metadata lacks {id}"))?;
-        // What has no source is the project's own.
+        // A package without a source is the project's own.
         if package["source"].is_null() {
             continue;
         }

@@ -28,7 +28,7 @@ impl Target {
         self.processor == std::env::consts::ARCH
     }
 
-    /// The command with which this machine runs its programs, or what is missing.
+    /// The command with which this machine runs its programs, or the missing tool.
     pub fn runner(&self) -> Result<Option<String>, String> {
         if self.runs_here() {
             return Ok(None);
@@ -40,7 +40,7 @@ impl Target {
     }
 }
 
-/// Builds both programs; gives their folder, or what is missing.
+/// Builds both programs; returns their folder, or the missing tool.
 pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, String>> {
     step(&format!("programs for {}", target.triple));
     if !(has_target(target.triple) || rustup_adds(target.triple)) {

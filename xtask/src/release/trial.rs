@@ -19,7 +19,7 @@ const MOST_OFF_MM: f64 = 0.8;
 /// The optics of the tried pair.
 const OPTICS: &str = "examples/rig.toml";
 
-/// Unpacks an archive into an empty root and runs what is in it there.
+/// Unpacks an archive into an empty root and runs its programs there.
 pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) -> Result<()> {
     let runner = match target.runner() {
         Ok(runner) => runner,
@@ -45,7 +45,7 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
             let optics = PathBuf::from("/optics.toml");
             fs::copy(ROOT.join(OPTICS), root.join("optics.toml")).context("cannot copy the optics")?;
             depth(&|| inside("farnear"), &optics, Path::new("/pair"))?;
-            // Says what is missing, which is everything, and must not stumble over that.
+            // `doctor` reports everything as missing and must not fail for that reason.
             finish(inside("farnear").arg("doctor"))?;
             return finish(inside("farnear-sim").arg("--help"));
         }
@@ -61,14 +61,14 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
     depth(&emulated, &ROOT.join(OPTICS), &root.join("pair"))
 }
 
-/// Installs a Debian package into an empty root and runs what is in it.
+/// Installs a Debian package into an empty root and runs its programs.
 pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mut Vec<String>) -> Result<()> {
     step(&format!("{}, installed into an empty root", package.display()));
     let root = empty(release, &format!("deb-root-{}", target.debian))?;
     let database = root.join("var/lib/dpkg");
     fs::create_dir_all(database.join("info")).context("cannot create dpkg's folder")?;
     fs::write(database.join("status"), "").context("cannot write dpkg's status")?;
-    // What it depends on is the system's own; whether that is there, the run says.
+    // Its dependencies are the system's; the run shows whether they are present.
     let mut install = Command::new("dpkg");
     install
         .arg(format!("--root={}", root.display()))
@@ -136,7 +136,7 @@ fn depth(farnear: &dyn Fn() -> Command, optics: &Path, pair: &Path) -> Result<()
     Ok(())
 }
 
-/// A pair by the emulated rig, which runs the firmware beside the programs.
+/// A pair by the emulated rig with the packaged firmware.
 fn captures(programs: &Path, out: &Path) -> Result<()> {
     let mut capture = Command::new(programs.join("farnear"));
     capture.args(["rig", "capture", "--port", "sim", "--scene", "staircase", "--json", "--optics"]);

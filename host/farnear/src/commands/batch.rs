@@ -28,9 +28,9 @@ use crate::{report, terminal};
 /// shadow-remove (masks, camera, lat, lon, time, out, ...), recognise (views, model, out, as, window).
 ///
 /// Each job prints a JSON line when it ends: "done", "already" (its result was made before from the same inputs and settings by
-/// the same version, as batch.toml beside it says) or "failed", with its message. One that fails does not stop the others; failures
-/// stand in MANIFEST.failures.jsonl too, and the exit code is 1. After Ctrl-C, a kill or a loss of power the same command goes on
-/// where that ended.
+/// the same version, as batch.toml next to it records) or "failed", with its message. One that fails does not stop the others; failures
+/// are also written to MANIFEST.failures.jsonl, and the exit code is 1. After Ctrl-C, a kill or a loss of power the same command
+/// continues.
 #[derive(Args)]
 #[command(
     verbatim_doc_comment,

@@ -106,7 +106,7 @@ struct GrabArguments {
 struct LiveArguments {
     #[command(flatten)]
     choice: Choice,
-    /// What is largest when the picture is sharpest: fft-sum, tenengrad or modified-laplacian.
+    /// Focus value: fft-sum, tenengrad or modified-laplacian.
     #[arg(long, default_value = "tenengrad")]
     measure: FocusMeasure,
     /// From one line to the next, in milliseconds.

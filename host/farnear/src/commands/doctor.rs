@@ -8,7 +8,7 @@ use farnear_workflows::doctor::{self, DoctorSettings, Finding, Health};
 
 use crate::{report, terminal};
 
-/// Look whether this computer has what farnear needs, and say what to do about what it has not.
+/// Check that this computer has everything farnear needs, and suggest remedies.
 ///
 /// Processor, folders, emulated rig, serial ports and the right to open them, cameras, ffmpeg and, with --port, the board's firmware.
 /// Nothing moves; no port is opened but the one that is named. Each line is ok, optional (only some need it) or missing; the exit code is 1
@@ -19,7 +19,7 @@ pub struct Arguments {
     /// Ask the board behind this serial port for its firmware's version.
     #[arg(long, value_name = "PORT")]
     port: Option<String>,
-    /// Folders that results are to go to, beside the current one.
+    /// Folders for results to check, besides the current one.
     #[arg(value_name = "DIR")]
     folders: Vec<PathBuf>,
     /// Print one JSON object.
@@ -42,8 +42,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
     }
     match figures.missing() {
         0 => Ok(()),
-        1 => bail!("one thing is missing; its line says what to do"),
-        several => bail!("{several} things are missing; their lines say what to do"),
+        1 => bail!("one thing is missing; its line has the remedy"),
+        several => bail!("{several} things are missing; their lines have the remedies"),
     }
 }
 

@@ -11,7 +11,7 @@ use farnear_files::staging::Staging;
 #[derive(Args)]
 #[command(after_help = "Example: farnear man --out ~/.local/share/man/man1")]
 pub struct Arguments {
-    /// Folder where the pages go, beside what is there.
+    /// Folder for the pages; other files in it stay.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

@@ -26,7 +26,7 @@ A scene of your own is a TOML file; the files it names lie beside it:
 Example: farnear render --scene bust.toml --optics optics.toml --out bust/"
 )]
 pub struct Arguments {
-    /// What stands before the camera: plane:MM, staircase, slant, cone, sphere, or a scene file (see below).
+    /// The scene: plane:MM, staircase, slant, cone, sphere, or a scene file (see below).
     ///
     /// A name takes options, such as cone,texture=fractal,contrast=0.3.
     #[arg(long, value_name = "NAME|FILE", default_value = "staircase")]

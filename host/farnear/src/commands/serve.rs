@@ -104,7 +104,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     };
     let session = match arguments.session {
         Some(folder) => folder,
-        // Not the current folder: nobody asked for files there.
+        // Not the current folder: the user did not ask for files there.
         None => data_folder()
             .ok_or_else(|| {
                 Usage("this user has no data folder; name a folder for captures with --session".into())
@@ -134,7 +134,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let context = terminal::context()?;
     serve(settings, &context, |address| {
         println!("{address}");
-        eprintln!("the page is at {address}; Ctrl-C ends it and stops what moves");
+        eprintln!("the page is at {address}; Ctrl-C ends it and stops all motion");
         if arguments.open
             && let Err(error) = open::that_detached(address)
         {

@@ -1,4 +1,4 @@
-//! `farnear sun`: where the sun stands for a place and a time.
+//! `farnear sun`: the sun's position at a place and time.
 
 use anyhow::Result;
 use chrono::{DateTime, Utc};
@@ -65,5 +65,5 @@ pub fn longitude(text: &str) -> Result<f64, String> {
 }
 
 fn number(text: &str) -> Result<f64, String> {
-    text.parse().map_err(|_| format!("`{text}` is no number of degrees"))
+    text.parse().map_err(|_| format!("`{text}` is not a number of degrees"))
 }

@@ -32,7 +32,6 @@ pub(super) struct AnnotatedVideo {
 pub(super) struct Shown {
     /// First row, first column, one past the last row and column.
     pub spans: [usize; 4],
-    /// What is written above.
     pub text: String,
     /// Whether the answer is an activity.
     pub known: bool,
@@ -43,7 +42,7 @@ impl AnnotatedVideo {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)?, frames: 0 })
     }
 
-    /// Draws a frame: the picture (the mask where there is none), the person's outline, and the answer so far with the next
+    /// Draws a frame: the picture (the mask if there is no picture), the person's outline, and the answer so far with the next
     /// most probable ones.
     pub fn draw(&mut self, picture: Option<&Pixels>, mask: &Mask, answer: &Answer) -> Result<()> {
         let seen = with_outline(picture, mask);

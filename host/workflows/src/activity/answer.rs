@@ -1,4 +1,4 @@
-//! What is said of a recording or of one of the people in it, in the form in which all faces give it.
+//! Answer for a recording or for one of the people in it, as all faces give it.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ pub struct AnswerSummary {
     pub activity: Option<String>,
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
+    /// Outlier score; above 1 the activity is unknown. `None` without a person.
     pub outlier_score: Option<f64>,
     /// Why the activity is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,8 +55,8 @@ impl AnswerSummary {
     }
 }
 
-/// Stretches of what was seen as stretches of the recording, whose `frames` frames have been counted from 1; `numbers` are those
-/// with somebody in them.
+/// Ranges of visible frames as ranges of the recording, whose `frames` frames have been counted from 1; `numbers` are those
+/// of the frames with a person.
 pub(super) fn parts<'a>(
     stretches: impl IntoIterator<Item = (usize, usize, &'a Option<String>, f32)>,
     numbers: &[usize],
@@ -71,10 +71,10 @@ pub(super) fn parts<'a>(
     stretches.into_iter().map(part).collect()
 }
 
-/// Frames without anybody after which what follows is a part of its own: somebody may have left and another have come.
+/// Frames without a person after which a new part begins: another person may have come.
 const GAP_FRAMES: usize = 15;
 
-/// Ranges of a recording's frames with somebody in them, without gaps of more than [`GAP_FRAMES`]. `seen` is true where anybody is.
+/// Ranges of a recording's frames with a person, without gaps of more than [`GAP_FRAMES`]. `seen` is true where anybody is.
 pub(super) fn passages(seen: &[bool]) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for (frame, _) in (0..).zip(seen).filter(|(_, seen)| **seen) {
@@ -118,7 +118,7 @@ fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
         Some(best) if score.is_finite() => {
             format!("most like `{best}`, but {score:.2} times as far from it as what the model knows")
         }
-        _ => format!("nobody is seen in any of the {frames} frames"),
+        _ => format!("no person in any of the {frames} frames"),
     })
 }
 

@@ -1,4 +1,4 @@
-//! A confusion matrix as a picture: rows are what was done, columns what was answered, per cent of the row.
+//! A confusion matrix as a picture: rows are true activities, columns answers, per cent of the row.
 
 use std::io::Cursor;
 

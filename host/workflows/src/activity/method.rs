@@ -1,4 +1,4 @@
-//! How activities are told apart: what training and evaluation share.
+//! How activities are classified: options that training and evaluation share.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use farnear_recognition::space::SpaceSettings;
 use super::shipped::{self, Shipped};
 use crate::error::Result;
 
-/// What is done for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled.
+/// Adaptation to unlabelled clips from another camera, sensor or laboratory.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Adaptation {
     /// What of their frames is brought to the training clips'.
@@ -28,7 +28,7 @@ pub struct Method {
     pub search: bool,
 }
 
-/// What clips are turned into, and by what they are told apart.
+/// Features and classifier.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Pattern {
     /// Soft assignments to a codebook.
@@ -50,7 +50,7 @@ pub enum Pattern {
 }
 
 impl Method {
-    /// What is tried and chosen from, for full frames or cut-out silhouettes.
+    /// Candidates of the search, for full frames or cropped silhouettes.
     pub fn experiment(&self, full_frames: bool) -> Result<Experiment> {
         let experiment = match (self.pattern, self.search) {
             (Pattern::Features { model, classifier }, _) => {

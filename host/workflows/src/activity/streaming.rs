@@ -40,9 +40,9 @@ pub struct RunningAnswer {
     pub activity: Option<String>,
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// What it is most likely, the likeliest first.
+    /// The likeliest activities, the best first.
     pub best: Vec<Probability>,
-    /// What is doubtful about the frame's mask.
+    /// Doubts about the frame's mask.
     pub flags: Vec<String>,
 }
 
@@ -60,7 +60,7 @@ pub struct RunningFigures {
     pub activity: Option<String>,
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// What it is most likely, the likeliest first.
+    /// The likeliest activities, the best first.
     pub best: Vec<Probability>,
     pub frames: usize,
     pub empty_frames: usize,
@@ -165,7 +165,7 @@ pub fn camera(
     live::watch(settings, context, |_, image| {
         let pixels = Pixels::Grey(eight_bits(&image));
         let (mask, answer) = watcher.take(&pixels)?;
-        // Nobody ends by himself what is watched live: memory must not grow with it.
+        // A live recording has no end: memory must not grow with it.
         watcher.tracks.clear();
         on_moment(&Moment { picture: &grey(pixels), mask: &mask, answer: &answer })
     })

@@ -25,18 +25,16 @@ use crate::{
 /// Fewest frames of a window that shows something.
 const WINDOW_MIN: usize = 5;
 
-/// What is trained on, how, and where the model goes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TrainingSettings {
     pub samples: Option<PathBuf>,
-    /// Motion files to learn from, too or instead; every view is a clip of its own then.
+    /// Motion files to learn from, too or instead; every view is then a separate clip.
     pub motion: Option<MotionSettings>,
     pub out: PathBuf,
-    /// How activities are told apart.
     pub method: Method,
-    /// Cut clips into windows of so many frames first, at least 5: for recordings that nobody cut.
+    /// Cut clips into windows of this many frames first, at least 5: for un-segmented recordings.
     pub window: Option<usize>,
-    /// Take every view as a clip of its own, so that the model recognises from one view, whichever it is.
+    /// Use every view as a separate clip, so that the model recognises from any single view.
     pub any_view: bool,
 }
 
@@ -110,7 +108,6 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
     })
 }
 
-/// What is learned from.
 struct Learned {
     clips: Vec<Clip>,
     frames: usize,

@@ -32,11 +32,11 @@ impl Watch for Training<'_> {
     }
 }
 
-/// Counts the folds of an evaluation, and says how much longer it will take.
+/// Counts the folds of an evaluation, and estimates the remaining time.
 pub(super) struct Folds<'a> {
     context: &'a Context<'a>,
     begun: Instant,
-    /// Held while it is told, or another thread's higher count might be told first.
+    /// Held during the report, so that counts are reported in order.
     state: Mutex<State>,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Folds<'a> {
 struct State {
     folds: usize,
     folds_done: usize,
-    /// About so many spaces a fold, and how many were tried in all.
+    /// Estimated spaces per fold, and the number tried so far.
     spaces: usize,
     spaces_tried: usize,
 }

@@ -32,7 +32,7 @@ pub enum BatchError {
     #[error("{0}")]
     Pattern(String),
     /// A job of a kind that is not known.
-    #[error("there is no job `{name}`; expected {known}")]
+    #[error("unknown job `{name}`; expected {known}")]
     UnknownKind {
         name: String,
         /// Those that there are.
@@ -41,8 +41,8 @@ pub enum BatchError {
     /// A field that has to be there.
     #[error("the field `{name}` is missing")]
     MissingField { name: &'static str },
-    /// A field that nobody knows.
-    #[error("there is no field `{name}`; expected some of {known}")]
+    /// An unknown field.
+    #[error("unknown field `{name}`; expected some of {known}")]
     UnknownField {
         name: String,
         /// Those that this kind of job has.
@@ -57,7 +57,7 @@ pub enum BatchError {
     )]
     Foreign { path: PathBuf },
     /// Two jobs for one result.
-    #[error("another job of this run has written {}: give each job an `out` of its own", path.display())]
+    #[error("another job of this run has written {}: give each job another `out`", path.display())]
     SharedOut { path: PathBuf },
     /// Two programs at one result.
     #[error("{} is being made by another program", path.display())]

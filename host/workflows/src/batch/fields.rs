@@ -46,7 +46,6 @@ impl Fields {
         Ok(fields)
     }
 
-    /// What is not given here and is there.
     pub fn with_defaults(mut self, defaults: &Self) -> Self {
         for (name, values) in &defaults.values {
             self.values.entry(name.clone()).or_insert_with(|| values.clone());
@@ -159,7 +158,7 @@ impl Fields {
         }
     }
 
-    /// Refuses fields that nobody took: a typing error must not be a setting that is silently the usual one.
+    /// Refuses unknown fields: a typing error must not silently select a default.
     pub fn all_taken(&self) -> Result<(), BatchError> {
         match self.values.keys().find(|name| !self.taken.contains(name.as_str())) {
             None => Ok(()),

@@ -11,7 +11,7 @@ use farnear_files::staging::write_file;
 use super::{BatchError, jobs, manifest::KIND};
 use crate::error::Result;
 
-/// A field and its value, in which each `*` stands for what the same `*` of the first pattern matched.
+/// A field and its value, in which each `*` is the text that the same `*` of the first pattern matched.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pattern {
     name: String,
@@ -27,7 +27,7 @@ impl FromStr for Pattern {
                 Ok(Self { name: name.trim().into(), value: value.trim().into() })
             }
             _ => Err(BatchError::Pattern(format!(
-                "`{text}` is no field; expected NAME=VALUE, such as far=*/far.png"
+                "`{text}`: expected NAME=VALUE, such as far=*/far.png"
             ))),
         }
     }
@@ -131,7 +131,7 @@ fn search(folder: &Path, parts: &[&str], captured: &mut Vec<String>, found: &mut
     }
 }
 
-/// What each `*` of a pattern stands for in a name, the first ones as short as possible.
+/// The texts that the `*` of a pattern match in a name, the first ones as short as possible.
 fn matched(pattern: &str, name: &str) -> Option<Vec<String>> {
     let Some((before, after)) = pattern.split_once('*') else { return (pattern == name).then(Vec::new) };
     let rest = name.strip_prefix(before)?;

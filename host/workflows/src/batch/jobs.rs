@@ -23,7 +23,6 @@ pub(super) struct Kind {
     pub name: &'static str,
     /// Whether its result is one file and not a folder.
     pub makes_file: bool,
-    /// What is to be done, by the fields.
     pub work: fn(&mut Fields) -> Result<Box<dyn Job>>,
 }
 
@@ -71,7 +70,7 @@ pub(super) fn names() -> Vec<&'static str> {
     KINDS.iter().map(|kind| kind.name).collect()
 }
 
-/// A workflow that is told by its settings, its inputs and how it is called.
+/// A workflow described by its settings and inputs.
 struct Call<S> {
     settings: S,
     inputs: Vec<PathBuf>,

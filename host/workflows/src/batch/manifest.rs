@@ -12,19 +12,19 @@ use std::{
 
 use super::{BatchError, fields::Fields};
 
-/// A job of more text than this is none: memory must not depend on what is in the file.
+/// A longer job is refused: memory must not depend on the file's contents.
 const JOB_BYTES_MAX: u64 = 1 << 20;
 /// The line that begins a job in TOML.
 const JOB: &str = "[[job]]";
-/// The field that says what a job does.
+/// The field that names the task.
 pub(super) const KIND: &str = "do";
 
-/// A job as it stands in the manifest.
+/// A job of the manifest.
 pub(super) struct Entry {
     pub number: usize,
     /// The line that it begins on.
     pub line: usize,
-    /// What is to be done, and the fields without that; or why they cannot be read.
+    /// Task and remaining fields, or why they cannot be read.
     pub job: Result<(String, Fields), BatchError>,
 }
 
@@ -42,7 +42,7 @@ enum Source {
 }
 
 impl Manifest {
-    /// Opens a manifest and reads what stands before its first job.
+    /// Opens a manifest and reads the part before its first job.
     pub fn open(path: &Path) -> Result<Self, BatchError> {
         let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -135,7 +135,7 @@ impl Manifest {
     }
 }
 
-/// Takes what is to be done out of the fields.
+/// Takes the task's name out of the fields.
 fn split(mut fields: Fields) -> Result<(String, Fields), BatchError> {
     let kind = fields.text(KIND)?;
     fields.remove(KIND);
@@ -248,7 +248,7 @@ fn wrong_csv(path: &Path, error: &csv::Error) -> BatchError {
 mod tests {
     use super::*;
 
-    /// A job's line, and its kind and fields or what is wrong with them.
+    /// A job's line with its task and fields, or its error.
     type Found = (usize, Result<(String, Fields), String>);
 
     fn all(name: &str, text: &str) -> Vec<Found> {

@@ -1,4 +1,4 @@
-//! What has become of the jobs so far: told one at a time, failures kept apart, the time that is left.
+//! State of the jobs: reported one at a time, failures recorded separately, remaining time.
 
 use std::{
     fs::{self, File},
@@ -28,7 +28,7 @@ struct Inner {
     figures: BatchFigures,
     /// The file of failures, made with the first of them.
     file: Option<File>,
-    /// When the first job began that had to be worked at; what is done already takes no time.
+    /// Start of the first job that was not already finished.
     working_since: Option<Instant>,
 }
 
@@ -53,9 +53,9 @@ impl<'a> Tally<'a> {
     /// A job has ended.
     ///
     /// # Errors
-    /// Where nobody listens any more, or the failure cannot be written.
+    /// If the receiver is closed, or the failure cannot be written.
     pub fn tell(&self, report: &JobReport) -> Result<()> {
-        // Held while it is told, so that lines do not mix and counts rise.
+        // Held during the report, so that lines do not mix and counts rise.
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         inner.figures.jobs += 1;
         match report.state {

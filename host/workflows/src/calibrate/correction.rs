@@ -83,7 +83,6 @@ impl Request for CalibrateCorrectionRequest {
 /// What there is to say of a correction that was learned.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CorrectionFigures {
-    /// Which kind.
     pub method: String,
     /// How many targets taught it.
     pub patterns: usize,
@@ -93,7 +92,6 @@ pub struct CorrectionFigures {
     pub near_mm: f64,
     /// Root mean square error of the patterns themselves, as measured.
     pub rmse_before_mm: f64,
-    /// The same corrected.
     pub rmse_after_mm: f64,
 }
 

@@ -109,7 +109,6 @@ impl CalibratePsfRequest {
     }
 }
 
-/// What was found.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PsfFigures {
     /// The point spread function by name.

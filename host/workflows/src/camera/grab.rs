@@ -32,7 +32,6 @@ pub enum PictureFormat {
     Tiff,
 }
 
-/// What is grabbed, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct GrabSettings {
     pub camera: CameraChoice,
@@ -59,7 +58,7 @@ pub struct GrabFigures {
     pub passed_over: Option<u64>,
 }
 
-/// The record beside the pictures.
+/// The record next to the images.
 #[derive(Serialize)]
 struct GrabRecord {
     made_by: &'static str,

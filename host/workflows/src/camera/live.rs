@@ -17,11 +17,10 @@ use crate::{
 /// Longest single wait, so that an interruption is seen soon.
 const SLICE: Duration = Duration::from_millis(100);
 
-/// What is looked at, and for how long.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveSettings {
     pub camera: CameraChoice,
-    /// What is largest when the picture is sharpest.
+    /// Focus value, largest in focus.
     pub measure: FocusMeasure,
     /// From one line to the next.
     pub every: Duration,
@@ -32,7 +31,7 @@ pub struct LiveSettings {
 /// The last picture of a while.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LiveFigures {
-    /// Pictures in a second that arrived and were looked at.
+    /// Images per second that arrived and were measured.
     pub frames_per_s: f64,
     /// Focus measure; nothing of a picture that is dark or smaller than 8x8 px.
     #[serde(skip_serializing_if = "Option::is_none")]

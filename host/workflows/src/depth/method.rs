@@ -16,7 +16,7 @@ pub enum Method {
     RationalOperators,
     /// `whitened`: operators with a white residual.
     Whitened,
-    /// Somebody else's.
+    /// Published by others.
     Baseline(baselines::Method),
 }
 
@@ -51,12 +51,12 @@ impl fmt::Display for Method {
     }
 }
 
-/// A method with what it needs.
+/// A method with its data.
 pub enum Prepared {
     RationalOperators(Arc<Operators>),
     /// Designs its kernels for the optics.
     Whitened,
-    /// Learns what it needs by itself.
+    /// Learns its data.
     Baseline(baselines::Method),
 }
 
@@ -64,7 +64,7 @@ impl Prepared {
     /// Finds the operators, or refuses those that `method` has no use for.
     ///
     /// # Errors
-    /// [`WorkflowError::Parameter`]; why there are no such operators.
+    /// [`WorkflowError::Parameter`]; why the operators cannot be designed.
     pub fn new(method: Method, asked: Option<&Path>, optics: &Optics, cache: &Cache) -> Result<Self> {
         match (method, asked) {
             (Method::RationalOperators, asked) => {

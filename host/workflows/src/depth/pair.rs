@@ -23,7 +23,7 @@ impl Pair {
     /// own. Where a camera of fewer bits saturates below the full scale, its white becomes 1.
     ///
     /// # Errors
-    /// [`WorkflowError::Image`]; [`WorkflowError::Pair`] for integers beside float and for one image given twice.
+    /// [`WorkflowError::Image`]; [`WorkflowError::Pair`] for integers with float and for one image given twice.
     pub fn read(far: &Path, near: &Path) -> Result<Self> {
         // Side by side: unpacking is what reading takes.
         let (far_image, near_image) = rayon::join(|| read_grey(far), || read_grey(near));
@@ -79,7 +79,7 @@ pub fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Where results go that were given no place: a capture's own folder, or `depth` beside the far image.
+/// Default result folder: the capture's folder, or `depth` next to the far image.
 pub fn default_folder(far: &Path) -> PathBuf {
     let folder = far.parent().unwrap_or(Path::new(""));
     if folder.join(CAPTURE_FILE).exists() { folder.to_path_buf() } else { folder.join("depth") }
@@ -96,7 +96,7 @@ mod tests {
         assert!(swapped("Breakfast_NEAR.tif", "breakfast_far.tif"));
         assert!(!swapped("far.png", "near.png"));
         assert!(!swapped("farnear_1.png", "farnear_2.png"));
-        assert!(!swapped("near/1.png", "far/2.png"), "folders are no names of images");
+        assert!(!swapped("near/1.png", "far/2.png"), "folder names are ignored");
         assert!(!swapped("near1.png", "near2.png"));
     }
 }

@@ -10,10 +10,10 @@ use crate::{
     measure::Rectangle,
 };
 
-/// What is looked at beside the part, px: windows of 21 and operators in a row reach less far.
+/// Margin around the part, px: windows of 21 and operators in a row reach less far.
 pub(super) const AROUND_PX: usize = 40;
 
-/// Where a map lies in the images it was made of; stands in `depth.toml`.
+/// Place of a map in the images it was computed from; recorded in `depth.toml`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Part {
     /// Leftmost column of the map in the images.
@@ -32,7 +32,7 @@ impl Part {
     }
 }
 
-/// What is cut out of the images, and what of it is wanted.
+/// The part to read, and the part of it to keep.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Cut {
     wanted: Rectangle,
@@ -80,7 +80,7 @@ impl Cut {
         parts.map_err(|error| WorkflowError::parameter("camera", "frames", error.to_string()))
     }
 
-    /// What was asked for of a map of what was seen.
+    /// The requested part of a map.
     pub fn wanted<T: Clone>(&self, map: &mut Array2<T>) {
         if !map.is_empty() {
             let Rectangle { x, y, width, height } = self.wanted;

@@ -25,14 +25,14 @@ pub(super) fn findings(named: &[PathBuf]) -> Vec<Finding> {
             // It is made when something is put there.
             let there = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(&folder).to_path_buf();
             let remedy =
-                "XDG_CACHE_HOME names another; without one operators are designed anew each time (some ms)";
+                "XDG_CACHE_HOME names another; without one operators are designed again each time (some ms)";
             writable("cache", &there, Health::Optional, remedy)
         }
         None => Finding::bad(
             Health::Optional,
             "cache",
             "neither XDG_CACHE_HOME nor HOME is set",
-            "without one operators are designed anew each time (some ms)",
+            "without one operators are designed again each time (some ms)",
         ),
     });
     findings

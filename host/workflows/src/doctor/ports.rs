@@ -4,7 +4,7 @@ use farnear_capture::transport::ports;
 
 use super::{Finding, Health};
 
-/// Each port, or that there is none.
+/// Each port, or a note that there are none.
 pub(super) fn findings() -> Vec<Finding> {
     let found = ports();
     if found.is_empty() {

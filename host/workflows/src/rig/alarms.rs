@@ -22,7 +22,7 @@ pub struct AlarmEntry {
     pub boot: u32,
     /// When, since that boot.
     pub time_s: f64,
-    /// What it is, with what to do.
+    /// Description and remedy.
     pub text: String,
 }
 

@@ -1,4 +1,4 @@
-//! The board itself: what it has counted, and starting it anew.
+//! The board itself: its counters, and restarting it.
 
 use farnear_capture::describe::{alarm_text, cause_name};
 use serde::Serialize;

@@ -26,7 +26,7 @@ pub enum CameraAddress {
     /// The emulated rig's own.
     #[default]
     Emulated,
-    /// That of a `farnear-sim` which somebody else started, HOST:PORT.
+    /// Camera of a running `farnear-sim`, HOST:PORT.
     Endpoint(String),
     /// A folder in which images appear.
     Folder(PathBuf),
@@ -87,7 +87,7 @@ fn open_v4l(device: &Path) -> Result<Box<dyn Camera>> {
 
 #[cfg(not(all(feature = "v4l2", target_os = "linux")))]
 fn open_v4l(device: &Path) -> Result<Box<dyn Camera>> {
-    farnear_capture::camera::v4l::check_path(device)?; // what is wrong with the device itself is said first
+    farnear_capture::camera::v4l::check_path(device)?; // errors of the device first
     Err(not_built("v4l", device.display(), "v4l2"))
 }
 
@@ -117,7 +117,7 @@ pub struct CameraSettings {
     pub exposure: Micros,
     /// Longest wait for an image.
     pub image_wait: Duration,
-    /// What is set on it before anything moves, in this order; never the exposure.
+    /// Controls to set before anything moves, in this order; never the exposure.
     pub settings: Vec<Setting>,
 }
 
@@ -128,7 +128,7 @@ pub struct EarlyCamera {
     settings: CameraSettings,
 }
 
-/// What is wrong with this camera at another rig.
+/// Why this camera cannot be used with another rig.
 const OF_THE_EMULATED_RIG: &str = "it belongs to the emulated rig";
 
 impl CameraSettings {
@@ -179,7 +179,7 @@ impl CameraSettings {
 }
 
 impl EarlyCamera {
-    /// Connects to the rig; without a camera of its own, to the emulated rig's.
+    /// Connects to the rig; without a named camera, to the emulated rig's.
     ///
     /// # Errors
     /// [`WorkflowError::Simulator`], [`WorkflowError::Client`], [`WorkflowError::Camera`].
@@ -202,7 +202,7 @@ impl EarlyCamera {
         Ok(equipped)
     }
 
-    /// The same with a second camera, behind a half mirror; without one of its own, the emulated rig's second.
+    /// The same with a second camera, behind a half mirror; without a named one, the emulated rig's second.
     pub(super) fn connect_both(
         self,
         second: Self,

@@ -32,7 +32,7 @@ pub use figures::ContinuousFigures;
 /// Fastest and slowest pace, exposures a second: beyond it the request's 32-bit microseconds, and any camera, end.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=10_000.0;
 
-/// What is exposed again and again.
+/// Repeated exposures.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Cycle {
     /// Far and near focus of these optics.
@@ -47,15 +47,14 @@ pub enum Cycle {
 /// When it is enough; the user may end it at any time.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Enough {
-    /// When the user says so.
+    /// On request of the user.
     Never,
-    /// After so many exposures.
+    /// After this many exposures.
     Exposures(u32),
-    /// After so many seconds of the board's time, from the first exposure.
+    /// After this many seconds of the board's time, from the first exposure.
     Seconds(f64),
 }
 
-/// What is captured, how fast, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ContinuousSettings {
     pub rig: RigAddress,
@@ -101,7 +100,7 @@ struct Ready {
     pair: Option<(GivenOptics, SensorPair, Reach)>,
 }
 
-/// Captures until it is enough. Whoever cancels it ends it in order: the figures are those of what was taken until then.
+/// Captures until the end condition. Cancelling ends it in order: the figures cover the exposures until then.
 ///
 /// # Errors
 /// Parameters, program or optics, folder, camera, rig: in this order, so that nothing moves in vain.

@@ -16,7 +16,6 @@ use crate::{
     figures::rounded,
 };
 
-/// What is corrected, with what, and where it goes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct BoardCorrectSettings {
     pub rig: RigAddress,

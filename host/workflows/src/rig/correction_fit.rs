@@ -15,7 +15,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// What is fitted to what.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FitSettings {
     pub rig: RigAddress,
@@ -23,7 +22,7 @@ pub struct FitSettings {
     pub patterns: PathBuf,
     /// Which correction; the board knows [`Method::board_names`].
     pub method: Method,
-    /// Every so many pixels of every so many rows are taken.
+    /// Step in columns and rows between the pixels used.
     pub step: u16,
     /// Whether the board keeps the correction in its memory, if its bits are right.
     pub store: bool,

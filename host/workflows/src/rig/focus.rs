@@ -34,7 +34,7 @@ pub struct FocusSettings {
     /// How far the focus may be from the start.
     pub range_mm: f64,
     pub measure: FocusMeasure,
-    /// Part of the image that is looked at: column, row, width, height in pixels. All of it where none.
+    /// Part of the image to measure: column, row, width, height, px. All of it by default.
     pub region: Option<[usize; 4]>,
 }
 
@@ -58,7 +58,7 @@ pub struct FocusFigures {
     pub fine_um: f64,
     /// The board's time for the search.
     pub board_ms: f64,
-    /// Places of the stepper that were looked at.
+    /// Stepper positions that were measured.
     pub places: usize,
     /// Images that were taken.
     pub exposures: usize,
@@ -67,7 +67,7 @@ pub struct FocusFigures {
 /// Finds the best focus of the target before the rig and leaves the sensor there.
 ///
 /// # Errors
-/// Optics, parameters, camera, rig; [`WorkflowError::Focus`] where there is none.
+/// Optics, parameters, camera, rig; [`WorkflowError::Focus`] if no focus is found.
 pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFigures> {
     let given = GivenOptics::read(&settings.optics)?;
     let optics = &given.optics;
@@ -92,7 +92,7 @@ pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFig
     figures(given.optics, &found)
 }
 
-/// Homes what is not homed; gives whether nothing had to be.
+/// Homes axes that are not homed; returns whether all were.
 fn ensure_ready(client: &Client, context: &Context<'_>) -> Result<bool> {
     let before = client.status()?.coarse.state;
     ensure_homed(client, &mut |what| context.info(what))?;

@@ -33,7 +33,6 @@ pub struct GotoSettings {
 /// Where the sensor has come to.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GotoFigures {
-    /// Sensor distance that was asked for.
     pub sensor_mm: f64,
     /// Where the coarse stage's encoder says it is.
     pub coarse_um: f64,
@@ -52,7 +51,7 @@ pub fn goto(settings: &GotoSettings, context: &Context<'_>) -> Result<GotoFigure
     let rig = Rig::connect(&settings.rig, Some(optics.for_emulation()), context)?;
     let client = &rig.client;
     let limits = client.hello().limits;
-    // What the stage cannot reach is said before anything moves.
+    // Refuse unreachable distances before anything moves.
     coarse_for(&pair, base_when_homed_nm(client, &client.status()?), &limits)?;
     ensure_homed(client, &mut |what| context.info(what))?;
     let base = base_nm(client, &client.status()?);

@@ -24,10 +24,9 @@ use crate::{
 
 /// Least and largest distance of both sensors along the light, um: a thousandth of what a piezo moves, and far more than any lens asks for.
 const FURTHER_UM: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
-/// The distance may differ by this share from what the optics ask for before it is said: depth is off by about as much of the working range.
+/// Relative difference from the distance of the optics above which a warning is given: depth is off by about as much of the working range.
 const UNLIKE: f64 = 0.005;
 
-/// What is captured with, and where to.
 #[derive(Clone, Debug)]
 pub struct HalfMirrorSettings {
     /// Rig, first camera (which takes the far image), optics, folder. The camera's exposure, wait and settings are both cameras'.

@@ -53,7 +53,7 @@ pub struct InfoFigures {
 /// Where an axis stands.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AxisFigures {
-    /// What is known of its position: unknown, homed, lost.
+    /// Position state: unknown, homed, lost.
     pub state: &'static str,
     /// Where it was last sent.
     pub asked_um: f64,

@@ -1,4 +1,4 @@
-//! The live image: a program that is repeated where the piezo stands, frame after frame, until somebody wishes it to end.
+//! Live image: repeats a program at the current piezo position, frame after frame, until it is cancelled.
 //!
 //! Nothing moves but the piezo, which is held where it is. A program takes as many exposures as come within a quarter of a second, so
 //! that a fast camera costs little on the line, and a slow one has no queue of old images when something else is wanted.

@@ -1,4 +1,4 @@
-//! Live depth: pair after pair by the piezo, each with its map, until somebody wishes it to end.
+//! Live depth: pair after pair by the piezo, each with its map, until it is cancelled.
 
 use std::{
     path::PathBuf,
@@ -20,7 +20,6 @@ use crate::{context::Context, error::Result, operators, optics::GivenOptics};
 /// So long pairs may be passed over for newer ones.
 const PASSED_OVER: Duration = Duration::from_millis(100);
 
-/// What is looked at, and how depth is computed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveDepthSettings {
     pub rig: RigAddress,

@@ -17,7 +17,7 @@ use crate::{
 
 /// Longest single wait, so that an interruption is seen soon.
 const SLICE: Duration = Duration::from_millis(100);
-/// From one question to the next where the board's time stands still unless it is asked something.
+/// Interval between requests if the board's time stops without them.
 const NUDGE: Duration = Duration::from_millis(20);
 /// What the ELF file is expected to hold.
 const TEXTS: &str = "the texts of the firmware's log";
@@ -49,7 +49,7 @@ impl<F: FnMut(&str) -> io::Result<()>> LogSink for F {
     }
 }
 
-/// Follows the log until time is up or it is cancelled, which is no error. Gives the number of lines.
+/// Follows the log until the time is up or it is cancelled, which is not an error. Returns the number of lines.
 ///
 /// # Errors
 /// [`WorkflowError::Parameter`], [`WorkflowError::File`] for another ELF file, the rig, [`WorkflowError::Sink`].
@@ -109,7 +109,7 @@ impl<'a> Reader<'a> {
     fn take(&mut self, part: &LogPart) -> Result<()> {
         if part.missing > 0 {
             self.context.info(&format!("{} pieces of the log are missing", part.missing));
-            // What has come of a frame is of no use without its rest.
+            // An incomplete frame is useless.
             self.decoder = self.table.map(Table::new_stream_decoder);
         }
         let Some(decoder) = &mut self.decoder else {

@@ -36,9 +36,9 @@ pub enum MechanicsFigures {
     },
     /// The strain gauge against stage A's encoder.
     Gauge {
-        /// Position for what it says, 1 = as its data sheet has it.
+        /// True position per gauge reading, 1 = as in its data sheet.
         gauge_gain: f64,
-        /// What it says where the piezo is relaxed.
+        /// Gauge reading of the relaxed piezo.
         gauge_offset_um: f64,
     },
 }

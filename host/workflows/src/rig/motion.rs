@@ -29,7 +29,7 @@ pub struct MoveSettings {
     pub rig: RigAddress,
     /// Each axis with its position in micrometres; they move at the same time.
     pub targets: Vec<(Axis, f64)>,
-    /// Whether to home first what is not homed.
+    /// Whether to home axes first that are not homed.
     pub home: bool,
 }
 
@@ -86,7 +86,7 @@ pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<Ho
 /// Moves axes to absolute positions.
 ///
 /// # Errors
-/// [`WorkflowError::Parameter`] for what is no position, [`WorkflowError::Client`] also for one outside the limits.
+/// [`WorkflowError::Parameter`] for an invalid position, [`WorkflowError::Client`] also for one outside the limits.
 pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFigures> {
     let targets: Vec<_> = settings
         .targets

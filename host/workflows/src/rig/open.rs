@@ -1,6 +1,6 @@
 //! A rig that is held open between jobs, for a face that stays: status, stop and job share one port.
 //!
-//! [`RigAddress::Open`] stands for it wherever a workflow takes a rig. Requests of several threads come one after the other at
+//! [`RigAddress::Open`] represents it where a workflow takes a rig. Requests of several threads come one after the other at
 //! the port's owner, so a stop does not wait for a job that is under way.
 
 use std::{
@@ -83,7 +83,7 @@ impl OpenRig {
         Rig { client, emulation: self.0.emulation.clone() }
     }
 
-    /// Stops all motion along the ramps and ends a running program, now, whatever job is under way.
+    /// Stops all motion along the ramps and ends a running program immediately, during any job.
     pub fn stop(&self) -> Result<()> {
         let client = self.client().clone(); // the lock is not held while the board answers
         Ok(client.stop()?)
@@ -95,7 +95,7 @@ impl OpenRig {
         Ok(client.halt()?)
     }
 
-    /// Goes on with a board that was reset or unplugged: it may have lost its position.
+    /// Continues with a board that was reset or unplugged: it may have lost its position.
     ///
     /// # Errors
     /// [`crate::WorkflowError::Client`] where it is not there (yet); it may be tried again.

@@ -18,7 +18,6 @@ use super::{
 };
 use crate::{camera_frames, context::Context, error::Result, optics::GivenOptics, parameters::within};
 
-/// What is captured with, and where to.
 #[derive(Clone, Debug)]
 pub struct PairSettings {
     pub rig: RigAddress,
@@ -42,7 +41,7 @@ pub struct PairFigures {
     pub pair_ms: f64,
     /// From the start of the far move until it was settled.
     pub far_settle_ms: f64,
-    /// The same of the near move; 0 behind a half mirror, where there is none.
+    /// The same of the near move; 0 behind a half mirror, which has no such move.
     pub near_settle_ms: f64,
     /// Sensor distance by encoder and gauge at the far exposure.
     pub sensor_far_mm: f64,
@@ -77,7 +76,7 @@ pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFig
     capture_seen(settings, context, |_| ())
 }
 
-/// The same; `on_pair` sees the pair as soon as it is there, before anything is written.
+/// The same; `on_pair` receives the pair before anything is written.
 pub fn capture_seen(
     settings: &PairSettings,
     context: &Context<'_>,
@@ -117,7 +116,7 @@ fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
     Ok(Image { pixels, bits: 16 })
 }
 
-/// Captures a pair with what is open already.
+/// Captures a pair with an open rig and camera.
 pub fn take(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,
@@ -127,7 +126,7 @@ pub fn take(
     take_averaged(equipped, optics, settings, 1, context)
 }
 
-/// As [`take`], with each image the mean of so many exposures.
+/// As [`take`], with each image the mean of this many exposures.
 fn take_averaged(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,
@@ -150,7 +149,7 @@ fn take_averaged(
     Ok((pair, record))
 }
 
-/// The record of a pair, with what was set.
+/// The record of a pair, with its settings.
 pub(super) fn noted(
     pair: &Pair,
     equipped: &EquippedRig,

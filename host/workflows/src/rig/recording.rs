@@ -1,4 +1,4 @@
-//! Recorded live depth: the pairs as they came, with their times and the optics, in one file. Played back, depth is computed anew, at the
+//! Recorded live depth: the pairs as they came, with their times and the optics, in one file. Played back, depth is computed again, at the
 //! pace of the record or as fast as this computer can.
 //!
 //! The file, all numbers little-endian:
@@ -68,7 +68,7 @@ pub struct PlayFigures {
 /// A recording under way. The file has its name when it is finished; one that is not goes with this value.
 pub struct Recorder {
     file: File,
-    /// Bytes of what is whole: the head and pairs.
+    /// Bytes of complete content: the head and pairs.
     whole_bytes: u64,
     partial: PathBuf,
     target: PathBuf,
@@ -118,7 +118,7 @@ impl Recorder {
     /// Adds a pair; gives whether there is room for more.
     ///
     /// # Errors
-    /// A disk that is full: what was added before stays. Images of more than 65,535 pixels along a side.
+    /// A full disk: pairs that were added before stay. Images of more than 65,535 pixels along a side.
     pub fn add(&mut self, far: &Image, near: &Image) -> Result<bool> {
         let (height, width) = far.pixels.dim();
         let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
@@ -148,7 +148,7 @@ impl Recorder {
         Ok(self.pairs < PAIRS_MAX)
     }
 
-    /// Puts the file in its place.
+    /// Moves the file to its final name.
     ///
     /// # Errors
     /// A folder that has gone.
@@ -255,7 +255,7 @@ struct Ready {
     near: Array2<f32>,
 }
 
-/// Reads ahead, by at most [`AHEAD`] pairs, until the end, an error, or nobody wants more.
+/// Reads ahead, by at most [`AHEAD`] pairs, until the end, an error, or until the receiver is closed.
 fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
     loop {
         let ready = match recording.next_pair() {
@@ -287,7 +287,7 @@ pub fn play(
     let mut processor = Processor::new(&designed, &optics, computation)?;
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
     thread::scope(|scope| {
-        // Whoever reads ends when the receiver goes, which is at the end of this closure.
+        // The reader ends when the receiver is dropped, at the end of this closure.
         let (to, pairs) = mpsc::sync_channel(AHEAD);
         scope.spawn(move || read_ahead(recording, &to));
         for ready in pairs {
@@ -392,7 +392,7 @@ mod tests {
         };
         assert!(error.contains("cannot write"), "{error}");
         assert!(whole > 1, "{whole}");
-        assert_eq!(recorder.finish().expect("what was whole").pairs, whole);
+        assert_eq!(recorder.finish().expect("complete pairs").pairs, whole);
         let mut recording = Recording::open(&path).expect("pairs");
         for _ in 0..whole {
             assert_eq!(recording.next_pair().expect("whole").expect("there").near, large);

@@ -39,7 +39,6 @@ pub enum Program {
     },
 }
 
-/// What is exposed, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SequenceSettings {
     pub rig: RigAddress,

@@ -1,4 +1,4 @@
-//! Pair after pair, each in a folder of its own: for the noise over time, and for what changes.
+//! Pair after pair, each in its own folder: for noise over time, and for changes.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,6 @@ use crate::{
 /// Most pairs of a series: more belong into several.
 const MOST: usize = 1000;
 
-/// What is captured, and where to.
 #[derive(Clone, Debug)]
 pub struct SeriesSettings {
     pub rig: RigAddress,

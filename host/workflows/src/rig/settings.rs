@@ -14,7 +14,7 @@ use crate::{
 pub struct SettingFigures {
     pub key: &'static str,
     pub value: i32,
-    /// What it is on a new board.
+    /// Default value.
     pub default: i32,
     /// Smallest value allowed.
     pub min: i32,
@@ -42,7 +42,7 @@ pub struct AllSettings {
 pub fn key(name: &str) -> Result<SettingKey> {
     SettingKey::ALL.into_iter().find(|key| key.name() == name).ok_or_else(|| {
         let names = SettingKey::ALL.map(SettingKey::name).join(", ");
-        WorkflowError::parameter("setting", name, format!("there is none of this name, there are {names}"))
+        WorkflowError::parameter("setting", name, format!("unknown; expected one of {names}"))
     })
 }
 

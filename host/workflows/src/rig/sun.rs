@@ -20,7 +20,6 @@ pub struct SunSettings {
     /// Longitude in degrees, east positive.
     pub longitude_deg: f64,
     pub time: DateTime<Utc>,
-    /// The person whose shadow is asked for.
     pub shadow: Option<Person>,
 }
 
@@ -50,7 +49,7 @@ pub struct BoardSunFigures {
     pub host_elevation_deg: f32,
     /// This computer's.
     pub host_azimuth_deg: f32,
-    /// How far the shadow's angle can be relied upon, or why there is none.
+    /// Reliability of the shadow's angle, or why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow: Option<&'static str>,
     /// Angle of the shadow in the image.

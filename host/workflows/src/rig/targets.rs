@@ -39,9 +39,9 @@ pub struct TargetSettings {
     pub rig: RigAddress,
     pub camera: CameraSettings,
     pub optics: PathBuf,
-    /// Distances of the target from the lens; where there are none, 24 through the working range.
+    /// Distances of the target from the lens; by default 24 through the working range.
     pub distances_mm: Vec<f64>,
-    /// Whether somebody places the target and is asked to; else it moves by itself.
+    /// Whether a person places the target and is prompted; otherwise it moves automatically.
     pub ask: bool,
     /// Folder of the series.
     pub out: PathBuf,
@@ -76,7 +76,7 @@ struct Entry {
 /// before each target.
 ///
 /// # Errors
-/// Optics, distances, camera, folder, rig, in this order; [`WorkflowError::Unanswered`] where nobody places the target.
+/// Optics, distances, camera, folder, rig, in this order; [`WorkflowError::Unanswered`] if the prompt is not answered.
 pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let operators = operators::find(None, &optics.optics)?;
@@ -147,7 +147,7 @@ impl Series<'_> {
         self.context.questions.ask(&question, &self.context.cancel).map(|_| ())
     }
 
-    /// Captures a pair and computes its depth, mm, into a folder of its own.
+    /// Captures a pair and computes its depth, mm, into its own folder.
     fn capture(&self, rig: &mut EquippedRig, name: &str) -> Result<Array2<f32>> {
         let folder = begin_folder(&self.settings.out.join(name))?;
         let (pair, record) = pair::take(rig, self.optics, &self.settings.camera, self.context)?;

@@ -30,10 +30,10 @@ const GAP_PX: u32 = 8;
 /// A stage is enlarged by whole numbers until it is this high; its caption wants some width.
 const LEAST_HEIGHT_PX: usize = 240;
 const LEAST_WIDTH_PX: u32 = 210;
-/// What is shown about silhouette and expected shadow, pixels.
+/// Margin around silhouette and expected shadow, px.
 const MARGIN_PX: usize = 12;
 
-/// A mask and what is known of its cut.
+/// A mask and the data of its cut.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
     pub mask: &'a Mask,
@@ -42,7 +42,7 @@ pub(super) struct Stage<'a> {
     pub light: Light,
     pub method: Method,
     pub report: &'a CutReport,
-    /// How sure the angle is; `None` where nobody has said it.
+    /// SD of the angle; `None` if unknown.
     pub sure: Option<&'a Uncertainty>,
 }
 
@@ -62,11 +62,11 @@ impl Stages {
         Ok(self.out.finish()?)
     }
 
-    /// A mask in which there is nobody whose shadow could be cut.
+    /// A mask without a person.
     pub fn nobody(&mut self, file: &str, mask: &Mask) -> Result<()> {
         let frame = Frame::of([0, 0, mask.nrows(), mask.ncols()]);
         let panel = frame.panel(|y, x| if mask[[y, x]] { SEEN } else { DARK });
-        self.write(file, &[(vec!["mask: nobody".into()], panel)])
+        self.write(file, &[(vec!["mask: no person".into()], panel)])
     }
 
     /// All stages of one cut, side by side.

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::{MM_PER_PX, SilhouettesError, VIEWS, markers::Performer};
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::within};
 
-/// What is under way where the work is cancelled.
+/// The activity that is cancelled.
 const DURING: &str = "drawing performances";
 /// Pixels kept free round a body.
 const MARGIN_PX: usize = 2;
@@ -27,7 +27,7 @@ const MARGIN_PX: usize = 2;
 pub struct Drawing {
     /// Views at equal steps round the subject, 1 to 72.
     pub views: usize,
-    /// What a pixel stands for, 0.1 to 1000 mm.
+    /// Scale, mm per px, 0.1 to 1000.
     pub mm_per_px: f64,
     /// The new folder of masks and samples.toml.
     pub out: PathBuf,

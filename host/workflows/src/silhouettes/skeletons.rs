@@ -15,7 +15,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// What is drawn, how, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SkeletonsSettings {
     /// The joints, a MATLAB 5 file of cells.

@@ -17,7 +17,7 @@ const FIRST_VIEW_DEG: f64 = 45.0;
 pub struct SyntheticSettings {
     /// People, each with a build and habits of their own, 1 to 1000.
     pub subjects: usize,
-    /// Names of the activities; all where there is none.
+    /// Names of the activities; all by default.
     pub activities: Vec<String>,
     /// Frames per second, 1 to 240.
     pub rate_hz: f64,

@@ -1,4 +1,4 @@
-//! How activities are told apart: the flags that training and evaluation share.
+//! How activities are classified: the flags that training and evaluation share.
 
 use std::io::IsTerminal;
 
@@ -26,7 +26,7 @@ pub struct MethodArguments {
     #[arg(long, default_value = "svc", value_parser = classifiers())]
     classifier: Family,
     /// Tell activities apart by what the network of a model that comes with the program makes of clips: where samples are few, or come from
-    /// another camera than what is recognised. The model says whether the order of frames counts.
+    /// another camera. The model decides whether the order of frames counts.
     #[arg(long, value_name = "MODEL", conflicts_with_all = ["mode", "epl"], value_parser = shipped())]
     features: Option<&'static Shipped>,
     /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).

@@ -15,8 +15,8 @@ use crate::{report, terminal};
 /// Recognises what a person does, frame by frame.
 ///
 /// For every frame one JSON line: the answer for the frames so far (at most `--window` of them), its confidence from 0 to 1, and its
-/// outlier_score, the distance from all training data over what is known (above 1 the activity is null: unknown). The last line
-/// answers for the whole, window by window, and for a recording that nobody cut in `segments`: where one activity ends and the next begins.
+/// outlier_score (above 1 the activity is null: unknown). The last line
+/// answers for the whole, window by window, and for an un-segmented recording in `segments`: where one activity ends and the next begins.
 /// With `--json` only that object is printed.
 #[derive(Args)]
 #[command(after_help = "Example: farnear activity recognise masks/ --model everyday\n\
@@ -31,13 +31,13 @@ pub struct Arguments {
     /// The model: a file, or the name of one that comes with the program (farnear activity models).
     #[arg(long, value_name = "FILE|NAME")]
     model: PathBuf,
-    /// The only activities that can be, separated by commas: whoever knows some of what is not done gets better answers.
+    /// Restrict answers to these activities (comma separated); fewer candidates give better answers.
     #[arg(long, value_name = "ACTIVITIES", value_delimiter = ',')]
     among: Vec<String>,
     /// Frames of the streaming answer and of windows over a long recording [default: as many as a training clip had].
     #[arg(long, value_name = "FRAMES")]
     window: Option<usize>,
-    /// Folders of masks of other clips from where these come from, a clip in one view each, which nobody has to name: the model learns on from its
+    /// Folders of masks of other, unlabelled clips from the same source, one view each: the model adapts to its
     /// surest answers for them first. Some dozens, of most of the activities.
     #[arg(long, value_name = "MASKS", num_args = 1..)]
     adapt_to: Vec<PathBuf>,
@@ -116,7 +116,7 @@ fn everybody(model: &Model, settings: &MultiPersonSettings, json: bool) -> Resul
     report::print(&work.finish()?, true)
 }
 
-/// What a view is; a guess is said.
+/// Kind of a view; a guess is reported.
 fn kind(path: &Path, named: Option<Kind>) -> Result<ViewKind> {
     let kind = match named {
         Some(Kind::Masks) => return Ok(ViewKind::Masks),

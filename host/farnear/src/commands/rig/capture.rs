@@ -29,7 +29,7 @@ pub struct Arguments {
     /// The optics file.
     #[arg(long, value_name = "FILE")]
     optics: PathBuf,
-    /// Take each image as the mean of so many exposures (1 to 256): noise falls with the root of their number.
+    /// Average this many exposures per image (1 to 256): noise falls with the root of their number.
     #[arg(long, value_name = "N", default_value_t = 1)]
     average: u16,
     /// Take the camera's own dark and flat frames off both images: a folder of `farnear calibrate camera`. Do not give it to
@@ -46,7 +46,7 @@ pub struct Arguments {
     /// How many micrometres further from the lens the second camera's sensor stands [default: what the optics ask for].
     #[arg(long, value_name = "UM", requires = "half_mirror")]
     second_further_um: Option<f64>,
-    /// Turn the second camera's picture round, left to right: it stands in the reflected path, and does not do so itself (ReverseX).
+    /// Mirror the second camera's image, for a camera in the reflected path that does not mirror it itself (ReverseX).
     #[arg(long, requires = "half_mirror")]
     second_mirrored: bool,
     /// The new capture folder.

@@ -12,7 +12,7 @@ use crate::{report, terminal};
 /// Capture far, near, far, near ... (or any cycle of shots) until it is enough or Ctrl-C ends it: homes where needed, brings the
 /// stage near, and lets the board hold the pace.
 ///
-/// Prints how many exposures were taken a second, what was dropped and why, and how exactly the pace was held. With --out each pair is
+/// Prints exposures per second, dropped frames with reasons, and the accuracy of the rate. With --out each pair is
 /// kept as a capture folder (pair-00000, pair-00001, ...) that `farnear depth` takes; frames.csv has a row for each frame.
 #[derive(Args)]
 #[command(
@@ -32,10 +32,10 @@ pub struct Arguments {
     /// Exposures a second, each at its microsecond [default: as fast as position and camera allow, about 50].
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// End after so many seconds of the board's time.
+    /// End after this many seconds of the board's time.
     #[arg(long = "for", value_name = "S", conflicts_with = "frames")]
     seconds: Option<f64>,
-    /// End after so many exposures.
+    /// End after this many exposures.
     #[arg(long, value_name = "N")]
     frames: Option<u32>,
     /// Keep the images in this new folder.

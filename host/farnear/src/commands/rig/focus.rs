@@ -1,4 +1,4 @@
-//! `farnear rig focus`: finds m1, the sensor distance of the best focus, and says what working range follows from it.
+//! `farnear rig focus`: finds m1, the sensor distance of the best focus, and the working range that follows from it.
 
 use std::path::PathBuf;
 

@@ -38,7 +38,7 @@ pub struct MoveArguments {
     /// The position in micrometres, positive = sensor and lens away from each other; 0 = home switch, or relaxed piezo.
     #[arg(long, value_name = "UM", allow_negative_numbers = true, required = true)]
     to_um: Vec<f64>,
-    /// Home first what is not homed.
+    /// Home axes first that are not homed.
     #[arg(long)]
     home: bool,
     /// Print one JSON object.

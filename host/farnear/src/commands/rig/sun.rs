@@ -11,7 +11,7 @@ use crate::{
     terminal,
 };
 
-/// Ask the board where the sun is and how a person's shadow lies, and hold its answer beside this computer's.
+/// Ask the board for the sun's position and a person's shadow, and compare the answer with this computer's.
 #[derive(Args)]
 #[command(
     after_help = "Example: farnear rig sun --port sim --lat 52.38 --lon -1.56 --time 2012-07-17T12:00:00Z --azimuth 135"
@@ -28,7 +28,7 @@ pub struct Arguments {
     /// The moment, RFC 3339.
     #[arg(long, value_name = "RFC3339")]
     time: String,
-    /// Camera azimuth, ANTICLOCKWISE from north: with it a shadow is asked for.
+    /// Camera azimuth, ANTICLOCKWISE from north; needed for a shadow.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth: Option<f64>,
     /// Height of the lens above the ground.

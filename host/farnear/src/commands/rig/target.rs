@@ -18,7 +18,6 @@ use crate::{
     scene::{SceneArgument, packed},
 };
 
-/// Which rig.
 #[derive(Args, Clone)]
 pub struct Target {
     /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig. Without it the only NUCLEO that is
@@ -46,7 +45,7 @@ struct SceneryArguments {
     /// Decides everything random [default: 1].
     #[arg(long)]
     seed: Option<u64>,
-    /// The firmware; without it the one that lies beside farnear-sim.
+    /// The firmware [default: the one next to farnear-sim].
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
     /// Faults of the emulated line, a TOML file.
@@ -115,7 +114,7 @@ impl Target {
     fn without_scenery(&self, rig: &str) -> Result<()> {
         match self.scenery.given() {
             Some(flag) => {
-                bail!(Usage(format!("{flag} goes with --port sim only; {rig} has a world of its own")))
+                bail!(Usage(format!("{flag} goes with --port sim only; the scene of {rig} cannot be set")))
             }
             None => Ok(()),
         }

@@ -20,7 +20,7 @@ use crate::{
 
 /// Takes a person's shadow off masks: where it falls tell the camera's place and the sun's, or a lamp's, or it was measured in the picture.
 ///
-/// The camera file says how the camera stands:
+/// The camera file has the camera's pose:
 ///
 ///     [camera]
 ///     height_m = 0.8              # lens above the ground
@@ -31,8 +31,8 @@ use crate::{
 ///     width_px = 640
 ///     height_px = 480
 ///
-/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17; distance_m where it is known) and `standard_deviations`, what differs from the usual. Frames whose cut is doubtful (nobody or several people in it, the shadow behind the person or cut off by the picture's
-/// lower edge, much removed, an angle too unsure) are flagged in `shadow.toml` beside the masks.
+/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17; optionally distance_m) and `standard_deviations`, values other than the defaults. Frames whose cut is doubtful (no person or several, the shadow behind the person or cut off by the picture's
+/// lower edge, much removed, an angle too unsure) are flagged in `shadow.toml` next to the masks.
 #[derive(Args)]
 #[command(
     verbatim_doc_comment,

@@ -20,7 +20,7 @@ pub struct Arguments {
     /// The truth: a picture or a folder.
     truth: PathBuf,
     /// Masks before the removal. Then only pixels that were in them count as removed; without, all shadow that is not in
-    /// the masks does. Where the truth holds no shadow at all, what these masks have beside the person counts as shadow.
+    /// the masks does. If the truth has no shadow, everything in these masks except the person counts as shadow.
     #[arg(long, value_name = "MASKS")]
     before: Option<PathBuf>,
     /// Print figures as JSON.

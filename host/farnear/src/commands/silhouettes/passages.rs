@@ -1,4 +1,4 @@
-//! `farnear silhouettes passages`: a folder of masks cut into one folder for every time that somebody comes through the picture.
+//! `farnear silhouettes passages`: a folder of masks cut into one folder per passage of a person.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use farnear_workflows::silhouettes::{
 
 use crate::{report, terminal};
 
-/// Cuts a folder of masks into passages: where the numbers in their names leap, and where nobody is seen.
+/// Cuts a folder of masks into passages: at gaps in the numbers of their names, and at frames without a person.
 ///
 /// Writes a folder of masks for every passage and `samples.toml` for `farnear activity`.
 #[derive(Args)]
@@ -21,10 +21,10 @@ use crate::{report, terminal};
 pub struct Arguments {
     /// The folder of masks: pictures of black and white, JPEG too.
     masks: PathBuf,
-    /// What is done in all of them.
+    /// Activity in all of them.
     #[arg(long)]
     activity: String,
-    /// Who does it.
+    /// Name of the person.
     #[arg(long)]
     subject: String,
     /// Folder for the passages and samples.toml; must not exist or be empty.
@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Shorter passages are left out, frames.
     #[arg(long, default_value_t = 20)]
     least_frames: usize,
-    /// Fewer pixels are nobody.
+    /// Smallest person, px.
     #[arg(long, default_value_t = 200)]
     least_px: usize,
     /// Print figures as JSON.

@@ -107,7 +107,7 @@ fn an_unknown_answer_says_why() {
         "--json",
     ]));
     assert!(found["activity"].is_null());
-    assert_eq!(found["reason"], "nobody is seen in any of the 3 frames");
+    assert_eq!(found["reason"], "no person in any of the 3 frames");
 }
 
 /// Silhouettes of two people walking through the picture, eight times, as a background model cut them out of video.

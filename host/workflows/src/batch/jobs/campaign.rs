@@ -19,7 +19,7 @@ use crate::{
 /// From one look at the wish to stop to the next.
 const LOOK: Duration = Duration::from_millis(50);
 const PROGRAM: &str = "farnear-campaign";
-/// Name of the figures beside the scenarios that broke something.
+/// Name of the figures next to the scenarios that broke something.
 const FIGURES: &str = "campaign.json";
 
 struct Seeds {

@@ -11,14 +11,14 @@ use farnear_protocol::message::{Alarm, Status};
 use super::{Checkup, Found, failed, passed, passed_over};
 use crate::error::Result;
 
-/// How long somebody may take to press or turn something.
+/// Time for a person to press or turn something.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// From one look to the next.
 const LOOK: Duration = Duration::from_millis(20);
 /// A motor's shaft is turned at least so far: a tenth of a turn of a 0.5 mm screw.
 const TURNED_UM: f64 = 50.0;
 
-/// Waits until the status says so; `None` when nobody did it in time.
+/// Waits for a status; `None` after the time-out.
 fn wait_for(checkup: &Checkup<'_>, what: impl Fn(&Status) -> bool) -> Result<Option<Status>> {
     let until = Instant::now() + PATIENCE;
     loop {
@@ -46,7 +46,7 @@ pub(super) fn switches(checkup: &mut Checkup<'_>) -> Found {
         }
     }
     if !checkup.actuation {
-        return passed_over("nobody is there to press them; homing and the far end show the same");
+        return passed_over("without actuation they are not pressed; homing and the far end show the same");
     }
     for axis in &axes {
         for (which, name) in ["home", "far"].into_iter().enumerate() {
@@ -75,7 +75,7 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
     }
     if !checkup.actuation {
         return passed_over(
-            "the input is closed; nobody is there to press it (the halt below does the same)",
+            "the input is closed; without actuation it is not pressed (the halt below does the same)",
         );
     }
     checkup.info("press the emergency stop");
@@ -100,7 +100,7 @@ pub(super) fn emergency_stop(checkup: &mut Checkup<'_>) -> Found {
 pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
     if !checkup.actuation {
         return passed_over(
-            "nobody is there to turn the motors; the first homing would fail with the wrong sense",
+            "without actuation the motors are not turned; the first homing would fail with the wrong sense",
         );
     }
     checkup.ask("disconnect the motors from their drivers (supply off), leave the encoders connected")?;
@@ -131,7 +131,7 @@ pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
 
 pub(super) fn connect_motors(checkup: &mut Checkup<'_>) -> Found {
     if !checkup.actuation {
-        return passed("nobody is there; they are taken to be connected");
+        return passed("without actuation they are assumed to be connected");
     }
     checkup.ask("supply off, connect the motors, stages somewhere in the middle, hands off, supply on")?;
     let status = checkup.client().status()?;

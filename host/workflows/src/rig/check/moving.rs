@@ -1,4 +1,4 @@
-//! What moves: homing, full speed, halt, piezo, camera.
+//! Steps with motion: homing, full speed, halt, piezo, camera.
 
 use farnear_capture::{
     ClientError,
@@ -36,7 +36,7 @@ fn speed_key(axis: Axis) -> SettingKey {
     StepperKeys::of(axis).unwrap_or(StepperKeys::COARSE).speed
 }
 
-/// Homes at a twelfth of the speed, so that what is wired wrongly has time to be noticed.
+/// Homes at a twelfth of the speed, so that wiring errors can be noticed.
 pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
     let axes = steppers(&checkup.client().hello().capabilities);
     if checkup.actuation {
@@ -48,7 +48,7 @@ pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
         let usual = client.setting(speed_key(*axis))?;
         client.set_setting(speed_key(*axis), SLOW_NM_PER_S.clamp(usual.min, usual.max))?;
         let homed = client.home(*axis);
-        // Whatever happened: a rig that crawls for ever would be a riddle.
+        // In any case: the speed must not stay this low.
         let restored = client.set_setting(speed_key(*axis), usual.value);
         homed?;
         restored?;

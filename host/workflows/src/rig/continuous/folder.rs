@@ -29,7 +29,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Begins a new folder; one that holds something already is refused. What is whole stays, also where the capture ends early.
+    /// Begins a new folder; one that holds something already is refused. Complete captures stay, also if the run ends early.
     pub fn begin(path: &Path) -> Result<Self> {
         Staging::new_folder(path)
             .and_then(Staging::finish)
@@ -78,7 +78,7 @@ impl Folder {
         circumstances: &Circumstances,
     ) -> Result<()> {
         let both = cycle.into_iter().map(|frame| (frame.record, frame.image)).collect::<Vec<_>>();
-        let Ok(both) = both.try_into() else { return Ok(()) }; // a cycle of another length is no pair
+        let Ok(both) = both.try_into() else { return Ok(()) }; // a cycle of another length is not a pair
         let pair = pair_of(both, sensor, coarse, &client.hello().limits)?;
         let folder = begin_folder(&self.path.join(format!("pair-{:05}", self.pairs)))?;
         finish_folder(folder, &pair, &record_of(&pair, client, circumstances.clone()))?;

@@ -13,7 +13,7 @@ use crate::{
 
 /// Capture a flat target at known distances, compute the depth maps, and list them for `farnear calibrate correction`.
 ///
-/// Asks for the target to be placed at each distance. A series that was broken off goes on where it stood when it is
+/// Asks for the target to be placed at each distance. An interrupted series continues when it is
 /// started again with the same folder. On the emulated rig the target places itself.
 #[derive(Args)]
 #[command(
