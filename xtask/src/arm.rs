@@ -21,9 +21,6 @@ pub const QEMU: &str = "qemu-aarch64";
 const MODULES: [&str; 4] = ["simd", "filter", "pipeline", "adaptive_window"];
 
 /// Runs the tests and adds them to the total, or reports the missing tools and counts them as skipped.
-///
-/// # Errors
-/// A cargo that cannot be started, though everything is there.
 pub fn run(total: &mut Total) -> Result<()> {
     if let Some(missing) = missing() {
         eprintln!("skipped: the vectors of 64-bit ARM ({missing})");

@@ -25,9 +25,6 @@ pub struct Counts {
 }
 
 /// Runs them with the built programs, or reports the missing tools and counts them as skipped.
-///
-/// # Errors
-/// A runner that cannot be started, though it is there.
 pub fn run() -> Result<Counts> {
     let folder = &ROOT.join("host/serve/tests-browser");
     if let Some(missing) = missing(folder) {

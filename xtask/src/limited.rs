@@ -31,9 +31,6 @@ pub struct Said {
 }
 
 /// Runs a program; its errors are shown as they come, its output is printed when it has ended.
-///
-/// # Errors
-/// A program that cannot be started.
 pub fn run(command: &mut Command) -> Result<Said> {
     let said = run_for(command, LIMIT)?;
     print!("\n{}\n{}", describe(command), said.text);

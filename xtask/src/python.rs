@@ -32,9 +32,6 @@ const NEEDS: [&str; 7] = [
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
 
 /// Runs them with the module from [`build`], or reports the missing tools and counts them as skipped.
-///
-/// # Errors
-/// A Python that cannot be started though it is there.
 pub fn run(elf: &Path) -> Result<Counts> {
     let tests = ROOT.join("python/tests");
     let folder = target_folder().join("python-tests");
@@ -98,9 +95,6 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
 
 /// Builds the module and the programs that its tests run, in one call, so that all share what is compiled already; does nothing
 /// where no Python is able to run the tests.
-///
-/// # Errors
-/// What does not compile.
 pub fn build(elf: &Path) -> Result<()> {
     if !able() {
         return Ok(());

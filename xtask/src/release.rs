@@ -46,9 +46,6 @@ struct Release {
 }
 
 /// Makes and tries all of them.
-///
-/// # Errors
-/// Failed builds, and programs that do not run after installation. Files whose tools are missing are left out and named.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = ROOT.join(&arguments.out);
     let work = out.join("work");

@@ -14,9 +14,6 @@ use crate::{
 const NEEDS: [&str; 2] = ["zensical==0.0.73", "latex2mathml>=3.77"];
 
 /// Builds the site and prints where it is.
-///
-/// # Errors
-/// No Python, nothing to fetch from, or pages with links that lead nowhere.
 pub fn run() -> Result<()> {
     let built = host::build()?;
     step("the site");

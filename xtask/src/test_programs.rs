@@ -38,7 +38,6 @@ pub struct Total {
     pub well: bool,
 }
 
-/// A test program.
 struct Program {
     package: String,
     name: String,
@@ -56,9 +55,6 @@ pub struct Programs {
 
 impl Programs {
     /// Runs them, those that are unchanged since they passed only where `all` are wanted.
-    ///
-    /// # Errors
-    /// Programs that cannot be started, results that cannot be kept.
     pub fn run(&self, elf: &Path, all: bool) -> Result<Total> {
         let mut total = Total { well: true, ..Total::default() };
         let passed = target_folder().join("passed-tests");
@@ -93,9 +89,6 @@ impl Programs {
     }
 
     /// Compiles everything.
-    ///
-    /// # Errors
-    /// What does not compile.
     pub fn build(elf: &Path) -> Result<Self> {
         look_again()?;
         let mut command =

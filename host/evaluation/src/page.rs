@@ -39,7 +39,6 @@ impl Page {
         self.text.push_str(&format!("\n{}\n", markdown.trim_end()));
     }
 
-    /// A paragraph.
     pub fn paragraph(&mut self, text: &str) {
         self.text.push_str(&format!("\n{}\n", text.trim()));
     }

@@ -18,7 +18,6 @@ pub struct RenderSettings {
     pub elliptical_distortion: bool,
     /// Point spread function by name; without it the one of the optics file.
     pub psf: Option<String>,
-    /// The optics file.
     pub optics: PathBuf,
     /// Size and noise of the images.
     pub camera: Camera,

@@ -19,9 +19,6 @@ pub struct Run<R: Request + Args> {
 
 impl<R: Request + Args> Run<R> {
     /// Checks and runs the request.
-    ///
-    /// # Errors
-    /// Those of the task.
     pub fn run(self) -> Result<()> {
         self.request.check()?;
         report::print(&self.request.run(&terminal::counting(self.json)?)?, self.json)

@@ -23,7 +23,6 @@ use farnear_scene::{PackedScene, Scene, SceneError, SceneFile};
 pub enum SceneArgument {
     /// `cone`, `plane:900,contrast=0.3`, ...
     Named(Box<Scene>),
-    /// A scene file.
     File(PathBuf),
 }
 
@@ -43,9 +42,6 @@ impl FromStr for SceneArgument {
 
 impl SceneArgument {
     /// The scene, with its maps.
-    ///
-    /// # Errors
-    /// Which file cannot be read, or what in it makes no scene.
     pub fn read(self) -> Result<Scene> {
         match self {
             Self::Named(scene) => Ok(*scene),
@@ -57,9 +53,6 @@ impl SceneArgument {
 }
 
 /// Data of a scene that the emulated rig needs besides its name: a scene file with its maps, checked.
-///
-/// # Errors
-/// As [`SceneArgument::read`].
 pub fn packed(scene: Option<&str>) -> Result<Option<Arc<[u8]>>> {
     let Some(SceneArgument::File(path)) = scene.map(str::parse).transpose()? else { return Ok(None) };
     let packed = || {

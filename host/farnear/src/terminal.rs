@@ -17,7 +17,6 @@ use farnear_workflows::{Cancel, Context, Progress, Questions, WorkflowError};
 /// From one look at the interruption to the next.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// The terminal.
 pub struct Terminal {
     counts: Counts,
 }
@@ -25,7 +24,6 @@ pub struct Terminal {
 /// How counts are shown.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Counts {
-    /// Not at all.
     Hidden,
     /// On one line on which they rise.
     Rising,
@@ -53,9 +51,6 @@ pub fn end_count() {
 static PLAIN: Terminal = Terminal { counts: Counts::Hidden };
 
 /// The context of a workflow at the terminal. Ctrl-C cancels it.
-///
-/// # Errors
-/// Where the system does not let this program listen for Ctrl-C.
 pub fn context() -> Result<Context<'static>> {
     static CANCEL: OnceLock<Cancel> = OnceLock::new();
     // A program can listen only once.
@@ -70,9 +65,6 @@ pub fn context() -> Result<Context<'static>> {
 }
 
 /// The same with counts that rise on a line of their own, where stderr is a terminal and `json` is not asked for.
-///
-/// # Errors
-/// As [`context`].
 pub fn counting(json: bool) -> Result<Context<'static>> {
     static COUNTING: Terminal = Terminal { counts: Counts::Rising };
     let plain = context()?;
@@ -82,9 +74,6 @@ pub fn counting(json: bool) -> Result<Context<'static>> {
 
 /// The same for work of hours: counts with the time that is left, on a line of their own every ten seconds where no terminal can
 /// show them rise, or figures come between.
-///
-/// # Errors
-/// As [`context`].
 pub fn long_work() -> Result<Context<'static>> {
     static LINES: Terminal = Terminal { counts: Counts::Lines };
     static RISING: Terminal = Terminal { counts: Counts::Rising };

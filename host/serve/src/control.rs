@@ -50,9 +50,6 @@ pub enum HandOverError {
 impl ControlLock {
     /// Adds a client; it gets control if no client has it. `resumed` is the secret of the same page before it was reloaded: its
     /// control passes to the new client.
-    ///
-    /// # Errors
-    /// [`getrandom::Error`] if the system has no random numbers.
     pub fn join(&mut self, resumed: Option<&str>) -> Result<Client, getrandom::Error> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes)?;
@@ -127,9 +124,6 @@ impl ControlLock {
     }
 
     /// The holder grants or refuses the request of client `to`.
-    ///
-    /// # Errors
-    /// [`HandOverError`]; control does not change then.
     pub fn answer(&mut self, secret: &str, to: u32, give: bool) -> Result<(), HandOverError> {
         if !self.has_control(secret) {
             return Err(HandOverError::NotHolder);

@@ -130,9 +130,6 @@ impl Guard {
     }
 
     /// Checks where a request was sent to and where from.
-    ///
-    /// # Errors
-    /// [`Refused::Host`], [`Refused::Origin`].
     pub fn check_names(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
         if [header::HOST, header::ORIGIN].iter().any(|name| headers.get_all(name).iter().count() > 1) {
             return Err(Refused::Doubled);

@@ -68,9 +68,6 @@ impl Workers {
 
 impl JobQueue {
     /// Begins a job and gives its number.
-    ///
-    /// # Errors
-    /// What is under way, in words.
     pub fn begin(&self, task: Task, told: impl FnOnce(Job)) -> Result<u64, String> {
         let mut inner = lock(&self.inner);
         if let Some((title, _)) = &inner.running {
@@ -124,9 +121,6 @@ impl JobQueue {
 }
 
 /// Starts the thread of each queue. They end with the program.
-///
-/// # Errors
-/// Where the system starts no threads.
 pub fn start(app: &Arc<App>) -> io::Result<Workers> {
     let (on_rig, computing) = (app.rig_jobs.open(), app.computing.open());
     let (rig, computer) = (Arc::clone(app), Arc::clone(app));

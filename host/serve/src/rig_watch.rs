@@ -22,9 +22,6 @@ const SELDOM: Duration = Duration::from_secs(1);
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Starts the thread; it ends with the program.
-///
-/// # Errors
-/// Where the system starts no threads.
 pub fn start(app: &Arc<App>) -> io::Result<JoinHandle<()>> {
     let app = Arc::clone(app);
     Builder::new().name("rig watch".into()).spawn(move || run(&app))

@@ -192,9 +192,6 @@ fn plain(text: &str) -> String {
 }
 
 /// Refuses a client that does not have control.
-///
-/// # Errors
-/// A failure that says how to.
 pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     let secret = secret(headers);
     if app.with_control(|control| control.has_control(secret)) {
@@ -205,9 +202,6 @@ pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
 }
 
 /// Refuses a request without the secret of a connected client.
-///
-/// # Errors
-/// 403.
 pub fn require_client(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     match app.with_control(|control| control.id_of(secret(headers))) {
         Some(_) => Ok(()),
@@ -224,9 +218,6 @@ pub fn secret(headers: &HeaderMap) -> &str {
 }
 
 /// Does what takes a while, in a thread of its own.
-///
-/// # Errors
-/// What `work` gives.
 pub async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {

@@ -58,10 +58,6 @@ pub enum ServeError {
 
 /// Serves the page until `context` is cancelled; what moves is stopped then. `ready` is told the address as soon as it answers;
 /// the rig is connected to meanwhile.
-///
-/// # Errors
-/// [`ServeError`], before anything is served. A rig that cannot be connected to is shown on the page, where it can be tried
-/// again.
 pub fn serve(
     settings: ServeSettings,
     context: &Context<'_>,

@@ -35,9 +35,6 @@ impl Stops {
 
 impl Stop {
     /// Tells the board.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Client`] where it does not answer.
     pub fn tell(self) -> Result<(), WorkflowError> {
         self.rig.as_ref().map_or(Ok(()), OpenRig::stop)
     }

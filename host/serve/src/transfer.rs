@@ -138,9 +138,6 @@ impl Stream for ZipStream {
 }
 
 /// Opens a regular file; a link, FIFO or device is not found.
-///
-/// # Errors
-/// [`io::Error`] of the system.
 pub fn regular_file(path: &Path) -> io::Result<File> {
     match fs::symlink_metadata(path)?.is_file() {
         true => File::open(path),
@@ -149,9 +146,6 @@ pub fn regular_file(path: &Path) -> io::Result<File> {
 }
 
 /// Writes an uploaded body to `path`; nothing is left of an upload that fails.
-///
-/// # Errors
-/// 413 above `bytes_max`, 408 after a pause longer than `pause_max`, 500 for errors of the disk.
 pub async fn receive(body: Body, path: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
     let part =
         path.with_file_name(format!(".{}.part", path.file_name().unwrap_or_default().to_string_lossy()));

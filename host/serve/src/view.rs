@@ -6,20 +6,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Everything that changes, as it is now.
+/// The present state of everything that changes.
 #[derive(Clone, PartialEq, Debug, Serialize, JsonSchema)]
 pub struct State {
-    /// The rig.
+    /// State of the rig; absent without one.
     pub rig: RigState,
-    /// The job on the rig: the one under way, or the last.
+    /// The running or the last job of the rig.
     pub job: Option<Job>,
-    /// The computation under way, or the last.
+    /// The running or the last computation.
     pub computation: Option<Job>,
     /// Live image or depth.
     pub live: LiveState,
     /// Which browser has control.
     pub control: ControlState,
-    /// A question of a job to the browser that has control.
+    /// Prompt of a job for the browser that has control.
     pub question: Option<String>,
     /// Grows with every change of captures, notes or maps.
     pub captures: u64,
@@ -32,7 +32,7 @@ pub struct State {
 /// The rig.
 #[derive(Clone, PartialEq, Debug, Serialize, JsonSchema)]
 pub struct RigState {
-    /// How the connection is.
+    /// State of the connection.
     pub phase: Phase,
     /// Port, or "the emulated rig".
     pub name: Option<String>,
@@ -52,89 +52,89 @@ pub enum Phase {
     Absent,
     /// It is being connected to.
     Connecting,
-    /// It answers.
+    /// Whether the board answers.
     Ready,
     /// It does not answer.
     Lost,
 }
 
-/// A job.
+/// A job of the rig.
 #[derive(Clone, PartialEq, Debug, Serialize, JsonSchema)]
 pub struct Job {
-    /// Its number.
+    /// Number of the job, increasing.
     pub id: u64,
-    /// What kind: `home`, `move`, `pair`, `depth`, ...
+    /// Kind of job: `home`, `move`, `pair`, `depth`, ...
     pub kind: String,
-    /// In words.
+    /// Name of the job in words.
     pub title: String,
-    /// How it stands.
+    /// State of the job.
     pub phase: JobPhase,
-    /// What it said last.
+    /// Latest message.
     pub said: Option<String>,
-    /// What it warned of.
+    /// Warnings so far.
     pub warnings: Vec<String>,
-    /// How far it is: unit, done, total.
+    /// Progress: unit, done, total.
     pub progress: Option<JobProgress>,
-    /// Its figures, as the command of the same name prints them with `--json`.
+    /// Figures, as the command of the same name prints them with `--json`.
     pub result: Option<Value>,
-    /// Why it came to nothing.
+    /// Error message of a failed job.
     pub error: Option<String>,
-    /// What to do about that.
+    /// Remedy for the error.
     pub hint: Option<String>,
 }
 
-/// How a job stands.
+/// State of a job.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum JobPhase {
-    /// Under way.
+    /// The job is running.
     Running,
-    /// Came to its end.
+    /// The job has finished.
     Done,
-    /// Came to nothing.
+    /// The job has failed.
     Failed,
-    /// Somebody stopped it.
+    /// A user has stopped the job.
     Stopped,
 }
 
-/// How far a job is.
+/// Progress of a job.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 pub struct JobProgress {
-    /// What is counted.
+    /// Unit of the count.
     pub unit: String,
-    /// So many are done.
+    /// Number of finished units.
     pub done: usize,
-    /// Of so many.
+    /// Total of the count, if known.
     pub total: Option<usize>,
 }
 
 /// Live image or depth.
 #[derive(Clone, PartialEq, Debug, Serialize, JsonSchema)]
 pub struct LiveState {
-    /// What is wanted.
+    /// Selected live mode.
     pub mode: LiveMode,
-    /// Length of an exposure.
+    /// Exposure time, us.
     pub exposure_us: u32,
-    /// What the focus is measured by.
+    /// Focus measure.
     #[schemars(with = "String")]
     pub measure: FocusMeasure,
-    /// Why there is none though it is wanted.
+    /// Why the selected mode gives no image.
     pub error: Option<String>,
-    /// Name of the recording that live depth goes into.
+    /// Name of the running recording of live depth.
     pub recording: Option<String>,
-    /// Why the last recording ended by itself: the disk is full, or it has as many pairs as one may have.
+    /// Why the last recording ended automatically: the disk is full, or the largest number of pairs is reached.
     pub recording_ended: Option<String>,
-    /// Whether there is a camera though no rig: its image can be seen live, nothing else.
+    /// Whether a camera is connected without a rig: only its live image is available.
     pub camera_alone: bool,
 }
 
-/// What is looked at live.
+/// Live mode.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LiveMode {
-    /// Nothing.
+    /// No live image.
     Off,
-    /// The image where the sensor stands.
+    /// Image at the present sensor position.
     Image,
     /// Depth, pair after pair.
     Depth,
@@ -158,7 +158,7 @@ pub struct Hello {
     pub client: u32,
     /// Its secret, for the header `x-farnear-client`.
     pub secret: String,
-    /// This program.
+    /// Version of this program.
     pub version: String,
 }
 
@@ -168,9 +168,9 @@ pub struct Hello {
 pub enum AxisName {
     /// Stage A's stepper.
     Coarse,
-    /// Stage A's piezo.
+    /// Piezo of stage A.
     Fine,
-    /// The lens stage.
+    /// Stepper of stage B.
     Lens,
 }
 
@@ -187,11 +187,11 @@ impl From<AxisName> for Axis {
 /// That a job was begun.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 pub struct Begun {
-    /// Its number: its end is told by the state.
+    /// Number of the job; its end appears in the state.
     pub job: u64,
 }
 
-/// That something was done.
+/// The request was carried out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 pub struct Done {
     /// Always true.

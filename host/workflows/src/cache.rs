@@ -89,9 +89,6 @@ impl<K: PartialEq, V> LeastRecentlyUsed<K, V> {
     }
 
     /// The value of `key`, made if absent. Two threads may make it simultaneously.
-    ///
-    /// # Errors
-    /// Those of `make`; nothing is stored then.
     pub fn get(&self, key: K, make: impl FnOnce() -> Result<V>) -> Result<Arc<V>> {
         if let Some(found) = self.find(&key) {
             return Ok(found);
@@ -124,8 +121,6 @@ pub(crate) struct FileVersion {
 }
 
 impl FileVersion {
-    /// # Errors
-    /// [`WorkflowError::Read`] if the file does not exist.
     pub fn of(what: &'static str, path: &Path) -> Result<Self> {
         let found = fs::metadata(path).map_err(WorkflowError::read(what, path))?;
         Ok(Self { path: path.into(), bytes: found.len(), modified: found.modified().ok() })

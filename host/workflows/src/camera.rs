@@ -111,9 +111,6 @@ pub struct CameraChoice {
 
 impl CameraChoice {
     /// Opens it and applies the settings.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`] for the emulated rig's camera, which needs the rig; [`WorkflowError::Camera`].
     pub fn open(&self) -> Result<Box<dyn Camera>> {
         let Some(mut camera) = self.address.open()? else {
             let expected =
@@ -150,9 +147,6 @@ pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
 }
 
 /// The same of a camera that hangs on a rig.
-///
-/// # Errors
-/// As [`CameraSettings::connect`]; [`WorkflowError::Camera`].
 pub fn show_at_rig(
     settings: &CameraSettings,
     rig: &RigAddress,

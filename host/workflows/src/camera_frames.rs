@@ -45,9 +45,6 @@ pub struct CameraFigures {
 }
 
 /// Learns a camera's frames and writes them: all files or none.
-///
-/// # Errors
-/// Images; [`WorkflowError::CameraFrames`]; files.
 pub fn calibrate(settings: &CameraSettings, context: &Context<'_>) -> Result<CameraFigures> {
     let read = |files: &[PathBuf]| -> Result<Vec<Array2<f32>>> {
         files
@@ -78,9 +75,6 @@ pub fn calibrate(settings: &CameraSettings, context: &Context<'_>) -> Result<Cam
 }
 
 /// Reads a camera's frames from their folder.
-///
-/// # Errors
-/// Files that are missing or hold something else; [`WorkflowError::CameraFrames`] where they differ in size.
 pub fn read(folder: &Path) -> Result<CameraFrames> {
     if !folder.is_dir() {
         let none = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder");

@@ -35,9 +35,6 @@ pub trait Progress: Sync {
 
 pub trait Questions: Sync {
     /// Shows the question and returns the typed answer; it is empty if the person only confirmed.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Unanswered`] without a person, [`WorkflowError::Cancelled`] if the person cancelled.
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String>;
 }
 
@@ -56,8 +53,6 @@ impl Cancel {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// # Errors
-    /// [`WorkflowError::Cancelled`] once cancelled; `during` names the running step.
     pub fn check(&self, during: &str) -> Result<()> {
         match self.is_cancelled() {
             true => Err(WorkflowError::Cancelled { during: during.into() }),

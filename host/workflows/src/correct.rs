@@ -69,19 +69,12 @@ pub struct CorrectFigures {
 }
 
 /// The format of a map by the name of its file.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for another ending.
 pub fn format_of(out: &Path) -> Result<Format> {
     let expected = "depth maps are written as .npy or .tiff";
     Format::of(out).ok_or_else(|| WorkflowError::parameter("out", out.display(), expected))
 }
 
 /// Corrects a map.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a place with another ending; correction and map that cannot be read or do not belong
-/// together.
 pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<CorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;

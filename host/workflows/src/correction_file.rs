@@ -10,9 +10,6 @@ use crate::error::{Result, WorkflowError};
 pub const KIND: &str = "a saved correction";
 
 /// Reads and checks a correction.
-///
-/// # Errors
-/// [`WorkflowError::Read`], [`WorkflowError::File`].
 pub fn read(path: &Path) -> Result<Correction> {
     let text = fs::read_to_string(path).map_err(WorkflowError::read(KIND, path))?;
     toml::from_str(&text).map_err(WorkflowError::file(path, KIND))

@@ -25,8 +25,6 @@ impl<'a> Counter<'a> {
         self.context.progress.advance(self.unit, *done, total);
     }
 
-    /// # Errors
-    /// [`crate::WorkflowError::Cancelled`] where the work is to stop.
     pub fn check(&self, during: &str) -> Result<()> {
         self.context.cancel.check(during)
     }

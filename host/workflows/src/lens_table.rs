@@ -74,9 +74,6 @@ pub struct LensFigures {
 }
 
 /// Calculates all of it. No cost worth naming.
-///
-/// # Errors
-/// [`WorkflowError::Optics`] which value makes no optics; [`WorkflowError::Parameter`] for readings that make none.
 pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
     let mut file = file.clone();
     for (name, value) in [("m1", readings.far_mm), ("m2", readings.near_mm)] {

@@ -21,9 +21,6 @@ const LAYOUT: u32 = 1;
 const ENTRIES_MAX: usize = 64;
 
 /// Operators from the cache, else designed and put there.
-///
-/// # Errors
-/// Those of the design; none of the cache.
 pub fn operators(request: &Request) -> Result<Operators, DesignError> {
     let (Some(folder), Some(build)) = (folder(), build()) else { return operators::design(request) };
     cached(&folder.join("farnear").join("operators"), &build, request)

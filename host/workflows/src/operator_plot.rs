@@ -32,9 +32,6 @@ pub enum Format {
 
 impl Format {
     /// By the ending of a file's name.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`] for an ending that is neither `.svg` nor `.png`.
     pub fn of(file: &Path) -> Result<Self> {
         match file.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
             "svg" => Ok(Self::Svg),
@@ -70,7 +67,6 @@ pub fn plot(operators: &Operators, format: Format) -> Result<Vec<u8>> {
     }
 }
 
-/// A named curve.
 type Curve = (String, RGBColor, Vec<(f64, f64)>);
 
 fn draw<B: DrawingBackend>(

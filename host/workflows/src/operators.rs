@@ -110,9 +110,6 @@ pub struct OperatorFigures {
 }
 
 /// Designs operators, and saves and draws them where that is wanted.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a drawing of another kind; optics; [`WorkflowError::Design`]; files.
 pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<OperatorFigures> {
     let plot = match &settings.plot {
         Some(file) => Some((file, Format::of(file)?)),
@@ -152,9 +149,6 @@ pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<Opera
 
 /// Operators for some optics: those that `asked` names (`family:design` or a family alone, e.g. `gro:linear` or
 /// `gro`, or a file saved by `farnear operators`), else the default ones.
-///
-/// # Errors
-/// An unknown name, an unreadable file, or why operators cannot be designed.
 pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
     let default = operators::Request::for_optics(optics);
     let Some(asked) = asked else { return Ok(cache::operators(&default)?) };

@@ -4,8 +4,6 @@ use std::{fmt::Display, ops::RangeInclusive};
 
 use crate::error::{Result, WorkflowError};
 
-/// # Errors
-/// [`WorkflowError::Parameter`] for a value outside the range (NaN always is); `unit` is the text after the numbers, if anything.
 pub(crate) fn within<T: PartialOrd + Display>(
     name: &'static str,
     value: T,
@@ -20,8 +18,6 @@ pub(crate) fn within<T: PartialOrd + Display>(
     Err(WorkflowError::parameter(name, value, expected))
 }
 
-/// # Errors
-/// [`WorkflowError::Parameter`] for a value below the least; `unit` is the text after the number.
 pub(crate) fn at_least(name: &'static str, value: usize, least: usize, unit: &str) -> Result<()> {
     match value >= least {
         true => Ok(()),

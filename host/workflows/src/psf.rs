@@ -68,9 +68,6 @@ impl std::fmt::Display for PsfSource {
 impl PsfSource {
     /// The point spread function. Parts of an image that are not round are averaged over the circle, with a warning where that is
     /// much.
-    ///
-    /// # Errors
-    /// Images; [`WorkflowError::Parameter`] for one that is not a point spread function.
     pub fn read(&self, context: &Context<'_>) -> Result<Psf> {
         let (file, radius_px) = match self {
             Self::Named(psf) => return Ok(*psf),

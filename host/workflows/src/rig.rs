@@ -58,9 +58,6 @@ pub enum RigAddress {
 
 impl RigAddress {
     /// The only board that is plugged in, without a named port.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Client`] if there is none, or more than one.
     pub fn found() -> Result<Self> {
         Ok(Self::Port(find::board_port().map_err(ClientError::Port)?))
     }
@@ -71,9 +68,6 @@ impl RigAddress {
     }
 
     /// The emulated rig before another scene.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`] for a real rig, whose scene cannot be set.
     pub fn with_scene(&self, scene: String) -> Result<Self> {
         match self {
             Self::Emulated(scenery) => Ok(Self::Emulated(scenery.with_scene(scene))),
@@ -98,9 +92,6 @@ pub struct Rig {
 
 impl Rig {
     /// Connects. Cancelling stops all motion. The emulated rig's lens is that of `optics`, where they are given.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Simulator`], [`WorkflowError::Client`], [`WorkflowError::Cancelled`] while the emulated rig starts.
     pub fn connect(
         address: &RigAddress,
         optics: Option<(&Path, Psf)>,

@@ -79,9 +79,6 @@ pub struct Capture {
 }
 
 /// The folder of a capture in a session's folder.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a name that is not one folder's: it could lead anywhere.
 pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
     let mut parts = Path::new(name).components();
     let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
@@ -95,9 +92,6 @@ pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
 }
 
 /// The folder of a new capture.
-///
-/// # Errors
-/// As [`folder_of`], and for a name that is taken, reserved for other files of a session, or contains a dot.
 pub fn new_capture(session: &Path, name: &str) -> Result<PathBuf> {
     let folder = folder_of(session, name)?;
     let taken = if RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(name)) {
@@ -113,9 +107,6 @@ pub fn new_capture(session: &Path, name: &str) -> Result<PathBuf> {
 }
 
 /// The folder of a capture that exists. Links, FIFOs and devices are refused: they lead out of the session or never end.
-///
-/// # Errors
-/// As [`folder_of`]; [`WorkflowError::Read`] for a folder without a capture or with entries that are not regular.
 pub fn existing(session: &Path, name: &str) -> Result<PathBuf> {
     let folder = folder_of(session, name)?;
     check_regular(&folder)?;
@@ -148,9 +139,6 @@ fn check_regular(folder: &Path) -> Result<()> {
 }
 
 /// The folder of another map of a capture.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a name that is not of letters, digits and hyphens.
 pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
     let letters = variant.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
     if variant.is_empty() || !letters || variant.len() > 60 {
@@ -176,9 +164,6 @@ pub fn free_names(session: &Path, kind: &str, count: usize) -> Result<Vec<PathBu
 
 /// The captures of a session whose record, optics or note hold all words of `search`, by name. A folder that is not there has
 /// none.
-///
-/// # Errors
-/// [`WorkflowError::Read`] for a session's folder that cannot be read. A broken capture is listed with its error.
 pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
     let entries = match fs::read_dir(session) {
         Ok(entries) => entries,
@@ -206,9 +191,6 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
 }
 
 /// Reads one capture.
-///
-/// # Errors
-/// [`WorkflowError::Record`], [`WorkflowError::Read`] if the folder is not a capture.
 pub fn read(folder: &Path) -> Result<Capture> {
     let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
     check_regular(folder)?;
@@ -257,18 +239,12 @@ fn written(folder: &Path) -> u64 {
 }
 
 /// Deletes a capture with all of its files.
-///
-/// # Errors
-/// As [`existing`]; [`WorkflowError::Folder`] if the system refuses.
 pub fn delete(session: &Path, name: &str) -> Result<()> {
     let folder = existing(session, name)?;
     fs::remove_dir_all(&folder).map_err(|source| WorkflowError::Folder { folder, source })
 }
 
 /// Renames a capture.
-///
-/// # Errors
-/// As [`existing`] and [`new_capture`]; [`WorkflowError::Folder`] if the system refuses.
 pub fn rename(session: &Path, name: &str, to: &str) -> Result<()> {
     let (folder, target) = (existing(session, name)?, new_capture(session, to)?);
     fs::rename(&folder, &target).map_err(|source| WorkflowError::Folder { folder, source })
@@ -307,9 +283,6 @@ fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
 }
 
 /// The note; empty if there is none.
-///
-/// # Errors
-/// [`WorkflowError::Parse`] for a note that is not TOML.
 pub fn read_note(folder: &Path) -> Result<Note> {
     let path = folder.join(NOTE_FILE);
     match fs::read_to_string(&path) {
@@ -320,10 +293,6 @@ pub fn read_note(folder: &Path) -> Result<Note> {
 }
 
 /// Notes something about a capture.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a rating above 5 or a note of more than 64 KiB; [`WorkflowError::Read`] where there is no
-/// such capture; [`WorkflowError::Staging`].
 pub fn write_note(folder: &Path, note: &Note) -> Result<()> {
     if note.rating > BEST {
         return Err(WorkflowError::parameter("rating", note.rating, "expected 0 (not rated) to 5"));

@@ -128,9 +128,6 @@ struct Address {
 
 impl Simulator {
     /// Starts the simulator and reports it. Without optics it has those of a 50 mm lens.
-    ///
-    /// # Errors
-    /// [`SimulatorError`], [`crate::WorkflowError::Cancelled`].
     pub fn start(scenery: &Scenery, optics: Option<(&Path, Psf)>, context: &Context<'_>) -> Result<Self> {
         let program = find()?;
         context.info(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));

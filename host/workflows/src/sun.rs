@@ -18,9 +18,6 @@ pub struct Moment {
 
 impl Moment {
     /// A place in degrees and a time as RFC 3339 writes it, `2026-06-21T12:00:00+02:00`.
-    ///
-    /// # Errors
-    /// [`crate::WorkflowError::Sun`] for a place that is none, [`crate::WorkflowError::Parameter`] for a time that is none.
     pub fn new(latitude_deg: f64, longitude_deg: f64, time: &str) -> Result<Self> {
         let place = Place::new(latitude_deg, longitude_deg)?;
         let wrong = |_| {
@@ -65,9 +62,6 @@ pub struct SunFigures {
 }
 
 /// Computes where the sun stands, to a millionth of a degree.
-///
-/// # Errors
-/// [`crate::WorkflowError::Sun`] where SPA refuses the time.
 pub fn position(moment: &Moment, formula: Formula) -> Result<SunFigures> {
     let (elevation_deg, azimuth_deg) = match formula {
         Formula::Host(model) => {

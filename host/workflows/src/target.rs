@@ -189,10 +189,6 @@ impl Texture {
 }
 
 /// Writes a target as a PDF page.
-///
-/// # Errors
-/// Optics that cannot be read; [`WorkflowError::Parameter`] for a distance within the focal length, or dots so coarse that no texture is
-/// left; a file that cannot be written.
 pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFigures> {
     within("dpi", settings.dpi, &(150..=4800), "")?;
     let optics = GivenOptics::read(&settings.optics)?.optics;

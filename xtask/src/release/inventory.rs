@@ -48,9 +48,6 @@ struct Part {
 }
 
 /// Writes both; gives the licences' path.
-///
-/// # Errors
-/// A dependency under a licence that is not accepted, or without one.
 pub fn write(release: &Release) -> Result<PathBuf> {
     let mut parts = BTreeMap::new();
     parts_of(&ROOT, &crate::host::PROGRAMS, &mut parts)?;

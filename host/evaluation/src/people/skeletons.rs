@@ -10,17 +10,11 @@ use farnear_silhouettes::silhouette::{capsule::Capsule, view::views_round};
 use rayon::prelude::*;
 
 /// The clips of UTKinect-Action3D (a MAT-file's bytes) in `views` views.
-///
-/// # Errors
-/// A file that is not one.
 pub fn utkinect(bytes: &[u8], views: usize, scaling: Scaling) -> Result<Vec<Clip>, SkeletonError> {
     Ok(from_skeletons(&read_cells(bytes, &KINECT_20)?, &KINECT_20, &UTKINECT_ACTIVITIES, views, scaling))
 }
 
 /// The clips of Florence 3D Actions (a MAT-file's bytes) in `views` views.
-///
-/// # Errors
-/// A file that is not one.
 pub fn florence(bytes: &[u8], views: usize, scaling: Scaling) -> Result<Vec<Clip>, SkeletonError> {
     Ok(from_skeletons(&read_cells(bytes, &FLORENCE_15)?, &FLORENCE_15, &FLORENCE_ACTIVITIES, views, scaling))
 }

@@ -72,9 +72,6 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// See [`batch::run`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments {
         manifest,

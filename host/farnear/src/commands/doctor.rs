@@ -28,9 +28,6 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Where something is missing.
 pub fn run(arguments: Arguments) -> Result<()> {
     let settings = DoctorSettings { port: arguments.port, folders: arguments.folders };
     let figures = doctor::examine(&settings, &terminal::context()?)?;

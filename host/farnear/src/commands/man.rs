@@ -17,9 +17,6 @@ pub struct Arguments {
 }
 
 /// Writes the pages of the program whose arguments `C` describes.
-///
-/// # Errors
-/// A folder that cannot be written.
 pub fn run<C: CommandFactory>(arguments: &Arguments) -> Result<()> {
     let mut command = C::command().disable_help_subcommand(true);
     command.build();

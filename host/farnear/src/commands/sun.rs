@@ -45,9 +45,6 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Where SPA refuses the time.
 pub fn run(arguments: &Arguments) -> Result<()> {
     report::print(&position(&arguments.moment.moment(), arguments.model)?, arguments.json)
 }

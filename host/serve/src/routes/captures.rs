@@ -34,7 +34,7 @@ use crate::{
 /// Most images of a stack.
 const STACK_MAX: usize = 500;
 
-/// What to capture.
+/// Kind of capture.
 #[derive(Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum CaptureRequest {
@@ -47,22 +47,22 @@ pub enum CaptureRequest {
         #[serde(default = "once")]
         averaged: u16,
     },
-    /// Pair after pair.
+    /// Several pairs, one after the other.
     Series {
-        /// How many.
+        /// Number of pairs.
         pairs: usize,
     },
     /// One image where the sensor stands.
     Still {},
-    /// A focus stack.
+    /// A focus stack over positions of one axis.
     Stack {
         /// The axis that goes through it.
         axis: AxisName,
-        /// First position.
+        /// First position, um.
         from_um: f64,
-        /// Last position.
+        /// Last position, um.
         to_um: f64,
-        /// Images.
+        /// Number of images.
         steps: usize,
     },
 }
@@ -87,7 +87,7 @@ pub struct Captures {
     pub captures: Vec<Value>,
 }
 
-/// A capture.
+/// A capture of the session.
 #[derive(Serialize, JsonSchema)]
 pub struct OneCapture {
     /// Name, kind, images, files, optics, note.
@@ -101,17 +101,17 @@ pub struct Search {
     search: String,
 }
 
-/// A note.
+/// A note to a capture.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoteBody {
     /// 0 (not rated) to 5.
     pub rating: u8,
-    /// Anything.
+    /// Free text of the note.
     pub text: String,
 }
 
-/// A new name.
+/// New name of a capture.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RenameRequest {

@@ -20,7 +20,7 @@ use crate::{
     view::{self, DONE, Done, Nothing},
 };
 
-/// The log.
+/// Log lines of this session.
 #[derive(Serialize, JsonSchema)]
 pub struct Log {
     /// Its lines, the oldest first.

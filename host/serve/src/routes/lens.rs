@@ -29,7 +29,7 @@ pub struct Optics {
     pub optics: OpticsFile,
 }
 
-/// What is typed.
+/// Values as typed by the user.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Typed {
@@ -42,7 +42,7 @@ pub struct Typed {
     pub readings: Readings,
 }
 
-/// What follows.
+/// Working range and travel of a lens.
 #[derive(Serialize, JsonSchema)]
 pub struct Calculated {
     /// Working range, blur, resolution, readings.

@@ -73,7 +73,7 @@ pub struct Standing {
     pub azimuth_deg: f64,
     /// Viewing direction below the horizontal, degrees.
     pub pitch_deg: f64,
-    /// Focal length.
+    /// Focal length, mm.
     pub focal_length_mm: f64,
     /// Distance of neighbouring pixels.
     pub pixel_um: f64,
@@ -85,13 +85,13 @@ pub struct Standing {
 pub struct ShadowRequest {
     /// A video that was sent.
     pub video: String,
-    /// Where and when.
+    /// Place and time of a recording.
     pub sun: Sunlight,
     /// How the camera stood.
     pub camera: Standing,
 }
 
-/// What there is.
+/// Models and tools that are available.
 #[derive(Serialize, JsonSchema)]
 pub struct People {
     /// Names of the videos that were sent.

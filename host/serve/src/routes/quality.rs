@@ -29,7 +29,7 @@ const RECORD: &str = "quality.toml";
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QualityRequest {
-    /// Pairs, 2 to 50.
+    /// Number of pairs, 2 to 50.
     pub pairs: usize,
     /// How far the target is, where that is known.
     #[serde(default)]

@@ -45,19 +45,19 @@ pub struct PlayRequest {
     pub fast: bool,
 }
 
-/// A recording.
+/// A recording of live depth.
 #[derive(Serialize, JsonSchema)]
 pub struct OneRecording {
-    /// Its name.
+    /// Name of its file.
     pub name: String,
-    /// Its size.
+    /// Size of its file, bytes.
     pub megabytes: f64,
 }
 
-/// All of them.
+/// All recordings of the session.
 #[derive(Serialize, JsonSchema)]
 pub struct Recordings {
-    /// By name.
+    /// Recordings, sorted by name.
     pub recordings: Vec<OneRecording>,
 }
 

@@ -42,11 +42,11 @@ pub struct Home {
     pub axes: Vec<AxisName>,
 }
 
-/// Where an axis goes.
+/// Target of a move.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
-    /// Which.
+    /// Axis to move.
     pub axis: AxisName,
     /// Absolute position.
     pub to_um: f64,
@@ -77,7 +77,7 @@ pub enum FocusName {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Goto {
-    /// Which.
+    /// Far or near focus.
     pub focus: FocusName,
 }
 
@@ -100,11 +100,11 @@ fn half_a_millimetre() -> f64 {
     0.5
 }
 
-/// What is to be seen live. What is not named stays.
+/// Live settings; absent fields stay unchanged.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LiveRequest {
-    /// What.
+    /// Live mode.
     #[serde(default)]
     pub mode: Option<LiveMode>,
     /// Length of an exposure, also of captures.
@@ -119,7 +119,7 @@ pub struct LiveRequest {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Clear {
-    /// Its number.
+    /// Number of the alarm to clear.
     pub number: u32,
 }
 
@@ -163,9 +163,6 @@ pub fn routes(api: Api) -> Api {
 }
 
 /// The rig, where it is connected.
-///
-/// # Errors
-/// 503 with what to do.
 pub fn connected(app: &App) -> Result<OpenRig, Failure> {
     let state = app.state().rig;
     app.rig().ok_or_else(|| {
@@ -176,18 +173,12 @@ pub fn connected(app: &App) -> Result<OpenRig, Failure> {
 }
 
 /// Begins a job on the rig.
-///
-/// # Errors
-/// 409 with what is under way.
 pub fn begin(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
     let job = app.begin_on_rig(task).map_err(|title| Failure::busy(&title))?;
     Ok(Json(Begun { job }))
 }
 
 /// Figures as JSON.
-///
-/// # Errors
-/// [`farnear_workflows::WorkflowError::File`] for figures without a JSON form, such as a number that is not finite.
 pub fn figures(figures: impl Serialize) -> farnear_workflows::Result<Value> {
     let nowhere = std::path::Path::new("the figures");
     serde_json::to_value(figures).map_err(WorkflowError::file(nowhere, "plain values"))

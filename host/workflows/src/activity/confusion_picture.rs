@@ -12,9 +12,6 @@ const TEXT_PX: f32 = 18.0;
 const GAP_PX: u32 = 8;
 
 /// The matrix as PNG.
-///
-/// # Errors
-/// An encoder that refuses.
 pub fn png(confusion: &Confusion) -> Result<Vec<u8>, EncodeError> {
     let mut writer = Writer::new(TEXT_PX)?;
     let line = writer.height();

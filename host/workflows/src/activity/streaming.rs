@@ -85,9 +85,6 @@ impl<'m> StreamingRecogniser<'m> {
     }
 
     /// Takes the next frame.
-    ///
-    /// # Errors
-    /// Frames of different size, a model of several views.
     pub fn take(&mut self, pixels: &Pixels) -> Result<(Mask, RunningAnswer)> {
         let start = Instant::now();
         let frame = frame_of(pixels);
@@ -111,9 +108,6 @@ impl<'m> StreamingRecogniser<'m> {
     }
 
     /// The answer for all of it.
-    ///
-    /// # Errors
-    /// A model of several views.
     pub fn finish(&self) -> Result<RunningFigures> {
         let whole = joined(self.tracks.iter());
         let empty_frames = whole.empty_frames;
@@ -131,9 +125,6 @@ impl<'m> StreamingRecogniser<'m> {
 }
 
 /// Recognises a video and gives each frame with its answer to `on_moment`.
-///
-/// # Errors
-/// A video that cannot be read, a model that does not fit; [`crate::WorkflowError::Cancelled`]; what `on_moment` gives.
 pub fn video(
     path: &Path,
     model: &Model,
@@ -152,9 +143,6 @@ pub fn video(
 }
 
 /// Recognises what the rig's camera sees until the context or `on_moment` wants no more.
-///
-/// # Errors
-/// As [`live::watch`]; a model that does not fit; [`crate::WorkflowError::Cancelled`] at the wished end.
 pub fn camera(
     settings: &LiveSettings,
     model: &Model,

@@ -66,9 +66,6 @@ pub struct TrainingFigures {
 }
 
 /// Trains a model. With two or more subjects and a search, its settings are chosen by cross-validation over them.
-///
-/// # Errors
-/// Samples that cannot be read or used, a model that cannot be written.
 pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<TrainingFigures> {
     if let Some(window) = settings.window {
         at_least("window", window, WINDOW_MIN, "frames")?;

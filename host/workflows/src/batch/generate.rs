@@ -35,10 +35,6 @@ impl FromStr for Pattern {
 
 /// Writes a manifest (CSV) with a job of `kind` for each file that the first pattern matches, in the order of their names; returns how
 /// many. Patterns are relative to the manifest's folder.
-///
-/// # Errors
-/// [`BatchError::Pattern`] for patterns that match nothing or have more `*` than the first one, [`BatchError::UnknownKind`], and a
-/// manifest that exists.
 pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize> {
     jobs::kind(kind)?;
     let pattern = |reason: String| BatchError::Pattern(reason);

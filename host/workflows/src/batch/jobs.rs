@@ -18,7 +18,6 @@ use crate::{
     request::{Job, PathKind, Request, Task},
 };
 
-/// A kind of job.
 pub(super) struct Kind {
     pub name: &'static str,
     /// Whether its result is one file and not a folder.

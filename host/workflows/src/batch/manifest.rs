@@ -73,9 +73,6 @@ impl Manifest {
     }
 
     /// The next job; `None` at the end.
-    ///
-    /// # Errors
-    /// A file that cannot be read on. A job that cannot be understood is an [`Entry`].
     pub fn next(&mut self) -> Result<Option<Entry>, BatchError> {
         let found = match &mut self.source {
             Source::Csv { reader, names } => {

@@ -51,9 +51,6 @@ impl<'a> Tally<'a> {
     }
 
     /// A job has ended.
-    ///
-    /// # Errors
-    /// If the receiver is closed, or the failure cannot be written.
     pub fn tell(&self, report: &JobReport) -> Result<()> {
         // Held during the report, so that lines do not mix and counts rise.
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);

@@ -96,9 +96,6 @@ pub struct CorrectionFigures {
 }
 
 /// Learns a correction and saves it.
-///
-/// # Errors
-/// The list, its maps, [`WorkflowError::Correction`].
 pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Result<CorrectionFigures> {
     let maps = read(&settings.patterns)?;
     context.cancel.check("reading the maps")?;
@@ -138,18 +135,12 @@ struct Entry {
 
 /// The maps that a list of `[[pattern]]` with `depth = FILE` (relative to the list) and `true_mm = MM` names, with their
 /// true depths in mm.
-///
-/// # Errors
-/// [`WorkflowError::Read`]; [`WorkflowError::File`] for a list of another form or an empty one; [`WorkflowError::Map`].
 pub fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
     let folder = list.parent().unwrap_or(Path::new(""));
     self::list(list)?.into_iter().map(|(depth, mm)| Ok((map::read(&folder.join(depth))?, mm))).collect()
 }
 
 /// The files (relative to the list) and true depths in mm of a list of patterns.
-///
-/// # Errors
-/// As [`read`], without the maps.
 pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
     const EXPECTED: &str = "a list of [[pattern]] with depth = FILE and true_mm = MM";
     let text = fs::read_to_string(list).map_err(WorkflowError::read("the list of patterns", list))?;

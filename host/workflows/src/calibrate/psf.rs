@@ -144,9 +144,6 @@ pub struct PsfFigures {
 }
 
 /// Finds the point spread function.
-///
-/// # Errors
-/// Optics, images, [`WorkflowError::Calibration`]; [`WorkflowError::Parameter`] for a target inside the focal length.
 pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfFigures> {
     let optics = optics::read(&settings.optics)?;
     let (mut images, mut moved_px) = (Vec::new(), Vec::new());

@@ -84,9 +84,6 @@ struct FrameRecord {
 }
 
 /// Takes pictures. The folder appears when everything is in it.
-///
-/// # Errors
-/// Parameters, folder, camera: in this order; [`CameraError::Late`] where no picture comes.
 pub fn grab(settings: &GrabSettings, context: &Context<'_>) -> Result<GrabFigures> {
     if settings.frames == 0 {
         return Err(WorkflowError::parameter("frames", 0, "it takes no pictures, expected 1 or more"));

@@ -48,9 +48,6 @@ pub struct LiveFigures {
 
 /// Looks through a camera until time is up or it is cancelled, which is no error, and gives figures from time to time. A while without a
 /// picture gives none, and is said. Gives the number of pictures.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`], [`WorkflowError::Camera`], or what `line` gives as [`WorkflowError::Sink`].
 pub fn live(
     settings: &LiveSettings,
     line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,
@@ -86,9 +83,6 @@ pub fn live(
 }
 
 /// Gives picture after picture to `on_frame` until it or the context wants no more. The exposure is set where the camera has one.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`], [`WorkflowError::Camera`], [`WorkflowError::Cancelled`] at the wished end; what `on_frame` gives.
 pub fn watch(
     choice: &CameraChoice,
     exposure: Micros,

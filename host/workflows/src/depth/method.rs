@@ -56,15 +56,11 @@ pub enum Prepared {
     RationalOperators(Arc<Operators>),
     /// Designs its kernels for the optics.
     Whitened,
-    /// Learns its data.
     Baseline(baselines::Method),
 }
 
 impl Prepared {
     /// Finds the operators, or refuses those that `method` has no use for.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`]; why the operators cannot be designed.
     pub fn new(method: Method, asked: Option<&Path>, optics: &Optics, cache: &Cache) -> Result<Self> {
         match (method, asked) {
             (Method::RationalOperators, asked) => {

@@ -21,9 +21,6 @@ pub struct Pair {
 impl Pair {
     /// Reads both images. Their pixels must mean the same: integers of any depth share one scale, float files have their
     /// own. Where a camera of fewer bits saturates below the full scale, its white becomes 1.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Image`]; [`WorkflowError::Pair`] for integers with float and for one image given twice.
     pub fn read(far: &Path, near: &Path) -> Result<Self> {
         // Side by side: unpacking is what reading takes.
         let (far_image, near_image) = rayon::join(|| read_grey(far), || read_grey(near));

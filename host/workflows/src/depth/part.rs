@@ -63,9 +63,6 @@ impl Cut {
     }
 
     /// A camera's frames of the same place.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`] for frames of another size than the images.
     pub fn frames(&self, frames: &CameraFrames) -> Result<CameraFrames> {
         let (height, width) = frames.dark().dim();
         if (height, width) != self.image {

@@ -33,9 +33,6 @@ pub(super) struct Frames {
 }
 
 /// Compares and, with a model, aligns the frames.
-///
-/// # Errors
-/// Cancellation.
 pub(super) fn check(images: &[Array2<f32>], model: Option<Model>, context: &Context<'_>) -> Result<Frames> {
     let count = images.len();
     let same_size = images.windows(2).all(|two| two[0].dim() == two[1].dim());

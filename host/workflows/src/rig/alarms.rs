@@ -27,9 +27,6 @@ pub struct AlarmEntry {
 }
 
 /// Lists the alarms, after clearing the one with this number.
-///
-/// # Errors
-/// [`crate::WorkflowError::Client`], also where another alarm is latched or the cause remains.
 pub fn alarms(rig: &RigAddress, clear: Option<u32>, context: &Context<'_>) -> Result<AlarmFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if let Some(number) = clear {

@@ -22,7 +22,6 @@ pub struct CounterFigures {
     pub repaired_records: u32,
 }
 
-/// A reset.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ResetFigures {
     /// Number of the boot that it ended.
@@ -36,9 +35,6 @@ pub struct ResetFigures {
 }
 
 /// Reads the counters.
-///
-/// # Errors
-/// [`crate::WorkflowError::Simulator`], [`crate::WorkflowError::Client`].
 pub fn counters(rig: &RigAddress, context: &Context<'_>) -> Result<CounterFigures> {
     let counters = Rig::connect(rig, None, context)?.client.counters()?;
     Ok(CounterFigures {
@@ -53,9 +49,6 @@ pub fn counters(rig: &RigAddress, context: &Context<'_>) -> Result<CounterFigure
 }
 
 /// Resets the board; the stages have to be homed again afterwards.
-///
-/// # Errors
-/// [`crate::WorkflowError::Simulator`], [`crate::WorkflowError::Client`].
 pub fn reset(rig: &RigAddress, context: &Context<'_>) -> Result<ResetFigures> {
     let mut rig = Rig::connect(rig, None, context)?;
     let boot_before = rig.client.hello().boot;

@@ -65,9 +65,6 @@ impl FromStr for CameraAddress {
 
 impl CameraAddress {
     /// Opens the camera; `None` for the one that comes with the emulated rig.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Camera`], [`WorkflowError::Parameter`] for a kind that this program was built without.
     pub fn open(&self) -> Result<Option<Box<dyn Camera>>> {
         Ok(Some(match self {
             Self::Emulated => return Ok(None),
@@ -134,9 +131,6 @@ const OF_THE_EMULATED_RIG: &str = "it belongs to the emulated rig";
 impl CameraSettings {
     /// Opens the camera and connects to the rig, in the order in which the least is done in vain. Everything that takes
     /// pictures begins with this, after its folder.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`], [`WorkflowError::Camera`], [`WorkflowError::Simulator`], [`WorkflowError::Client`].
     pub fn connect(
         &self,
         address: &RigAddress,
@@ -147,9 +141,6 @@ impl CameraSettings {
     }
 
     /// Opens the camera, unless it is the one that comes with the emulated rig.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`] for the emulated rig's camera with another rig, [`WorkflowError::Camera`].
     pub fn open_early(&self, rig: &RigAddress) -> Result<EarlyCamera> {
         let other = match (&self.address, rig) {
             (CameraAddress::Emulated, RigAddress::Open(open)) if !open.is_emulated() => {
@@ -180,9 +171,6 @@ impl CameraSettings {
 
 impl EarlyCamera {
     /// Connects to the rig; without a named camera, to the emulated rig's.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Simulator`], [`WorkflowError::Client`], [`WorkflowError::Camera`].
     pub fn connect(
         self,
         address: &RigAddress,

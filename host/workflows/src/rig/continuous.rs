@@ -101,9 +101,6 @@ struct Ready {
 }
 
 /// Captures until the end condition. Cancelling ends it in order: the figures cover the exposures until then.
-///
-/// # Errors
-/// Parameters, program or optics, folder, camera, rig: in this order, so that nothing moves in vain.
 pub fn run(settings: &ContinuousSettings, context: &Context<'_>) -> Result<ContinuousFigures> {
     let pace = settings.pace()?;
     let (program, optics) = match &settings.cycle {

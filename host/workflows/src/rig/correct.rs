@@ -58,8 +58,6 @@ pub struct PixelDifference {
 }
 
 impl BoardCorrectFigures {
-    /// # Errors
-    /// [`WorkflowError::Differs`] where the board's depths are others than this computer's.
     pub fn check(&self) -> Result<()> {
         let Some(PixelDifference { row, column, board_mm, host_mm }) = self.first_difference else {
             return Ok(());
@@ -72,10 +70,6 @@ impl BoardCorrectFigures {
 }
 
 /// Lets the board correct a map.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a place with another ending; correction and map that cannot be read or do not belong
-/// together; the rig.
 pub fn correct(settings: &BoardCorrectSettings, context: &Context<'_>) -> Result<BoardCorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;

@@ -44,8 +44,6 @@ pub struct FitFigures {
 }
 
 impl FitFigures {
-    /// # Errors
-    /// [`WorkflowError::Differs`] where the board's coefficients are others than this computer's.
     pub fn check(&self) -> Result<()> {
         match self.different {
             0 => Ok(()),
@@ -55,9 +53,6 @@ impl FitFigures {
 }
 
 /// Sends the maps row by row, lets the board fit, and compares its coefficients with the same calculation here.
-///
-/// # Errors
-/// The method, the list and its maps, the rig.
 pub fn fit(settings: &FitSettings, context: &Context<'_>) -> Result<FitFigures> {
     if settings.method.board_form().is_none() {
         let expected = format!("the board fits {}", Method::board_names());

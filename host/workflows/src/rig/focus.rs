@@ -65,9 +65,6 @@ pub struct FocusFigures {
 }
 
 /// Finds the best focus of the target before the rig and leaves the sensor there.
-///
-/// # Errors
-/// Optics, parameters, camera, rig; [`WorkflowError::Focus`] if no focus is found.
 pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFigures> {
     let given = GivenOptics::read(&settings.optics)?;
     let optics = &given.optics;

@@ -41,9 +41,6 @@ pub struct GotoFigures {
 }
 
 /// Homes where needed, brings the coarse stage where the piezo reaches both focus settings, and sends the piezo to one.
-///
-/// # Errors
-/// Optics; [`crate::WorkflowError::Plan`] where the rig does not reach; [`crate::WorkflowError::Client`].
 pub fn goto(settings: &GotoSettings, context: &Context<'_>) -> Result<GotoFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let range = optics.optics.working_range();

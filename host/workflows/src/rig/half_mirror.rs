@@ -40,9 +40,6 @@ pub struct HalfMirrorSettings {
 }
 
 /// Captures a pair of one exposure: homes where needed, brings the stage to the far place, exposes both cameras by one trigger.
-///
-/// # Errors
-/// Optics, parameters, folder, cameras, rig: in this order, so that nothing moves where the result could not be kept.
 pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<PairFigures> {
     let HalfMirrorSettings { pair: PairSettings { camera, averaged, out, .. }, .. } = settings;
     let optics = GivenOptics::read(&settings.pair.optics)?;

@@ -74,9 +74,6 @@ impl From<&AxisStatus> for AxisFigures {
 }
 
 /// Asks the board who it is and how it is.
-///
-/// # Errors
-/// [`crate::WorkflowError::Simulator`], [`crate::WorkflowError::Client`].
 pub fn info(rig: &RigAddress, context: &Context<'_>) -> Result<InfoFigures> {
     let rig = Rig::connect(rig, None, context)?;
     let status = rig.client.status()?;

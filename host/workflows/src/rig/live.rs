@@ -32,9 +32,6 @@ pub struct LiveSettings {
 }
 
 /// Gives frame after frame to `on_frame` until it or the context wants no more. The rig is stopped before this returns.
-///
-/// # Errors
-/// [`WorkflowError::Cancelled`] or the client's word for it at the wished end; camera and rig; what `on_frame` gives.
 pub fn watch(
     settings: &LiveSettings,
     context: &Context<'_>,

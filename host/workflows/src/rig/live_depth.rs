@@ -45,9 +45,6 @@ pub struct LiveDepth<'a> {
 
 /// Gives pair after pair with its depth to `on_depth` until it or the context wants no more. Homes where needed. The rig is
 /// stopped before this returns.
-///
-/// # Errors
-/// Optics, operators, camera, rig, computation; [`crate::WorkflowError::Cancelled`] at the wished end; what `on_depth` gives.
 pub fn watch(
     settings: &LiveDepthSettings,
     context: &Context<'_>,

@@ -37,9 +37,6 @@ pub struct LogSettings {
 /// Takes the lines of a log, one by one and without their end.
 pub trait LogSink {
     /// Takes a line.
-    ///
-    /// # Errors
-    /// Where it cannot go on: following the log ends then.
     fn line(&mut self, line: &str) -> io::Result<()>;
 }
 
@@ -50,9 +47,6 @@ impl<F: FnMut(&str) -> io::Result<()>> LogSink for F {
 }
 
 /// Follows the log until the time is up or it is cancelled, which is not an error. Returns the number of lines.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`], [`WorkflowError::File`] for another ELF file, the rig, [`WorkflowError::Sink`].
 pub fn follow(settings: &LogSettings, sink: &mut dyn LogSink, context: &Context<'_>) -> Result<usize> {
     let table = settings.elf.as_deref().map(read_table).transpose()?;
     if let Some(seconds) = settings.seconds.filter(|seconds| !(0.0..1e9).contains(seconds)) {

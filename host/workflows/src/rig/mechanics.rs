@@ -45,9 +45,6 @@ pub enum MechanicsFigures {
 
 /// Lets the board measure; backlash and the piezo's figures are kept as settings. A stage is homed by having its travel
 /// measured, and before its backlash is.
-///
-/// # Errors
-/// [`crate::WorkflowError::Simulator`], [`crate::WorkflowError::Client`].
 pub fn measure(rig: &RigAddress, routine: Routine, context: &Context<'_>) -> Result<MechanicsFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if matches!(routine, Routine::Backlash { .. }) {

@@ -55,9 +55,6 @@ pub enum MoveFigures {
 }
 
 /// A position in micrometres as the wire carries it. `name` is the parameter's.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] outside the wire's range.
 pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
     sequence::nanometres(position_um).ok_or_else(|| {
         let expected = "expected a position of -2147483 to 2147483 um";
@@ -66,9 +63,6 @@ pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
 }
 
 /// Homes these axes at the same time; all that have a home switch where none are named.
-///
-/// # Errors
-/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
 pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<HomeFigures> {
     let rig = Rig::connect(rig, None, context)?;
     let axes = if axes.is_empty() { steppers(&rig.client.hello().capabilities) } else { axes.to_vec() };
@@ -84,9 +78,6 @@ pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<Ho
 }
 
 /// Moves axes to absolute positions.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for an invalid position, [`WorkflowError::Client`] also for one outside the limits.
 pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFigures> {
     let targets: Vec<_> = settings
         .targets
@@ -109,17 +100,11 @@ pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFig
 }
 
 /// Stops all motion along the ramps and ends a running program; positions stay known.
-///
-/// # Errors
-/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
 pub fn stop(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
     Ok(Rig::connect(rig, None, context)?.client.stop()?)
 }
 
 /// Emergency stop: what moved has lost its position, and the alarm has to be cleared.
-///
-/// # Errors
-/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
 pub fn halt(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
     Ok(Rig::connect(rig, None, context)?.client.halt()?)
 }

@@ -96,9 +96,6 @@ impl OpenRig {
     }
 
     /// Continues with a board that was reset or unplugged: it may have lost its position.
-    ///
-    /// # Errors
-    /// [`crate::WorkflowError::Client`] where it is not there (yet); it may be tried again.
     pub fn reopen(&self) -> Result<()> {
         let mut client = self.client().clone();
         client.reopen()?;

@@ -69,9 +69,6 @@ impl From<&Pair> for PairFigures {
 
 /// Captures a pair: homes where needed, brings the stage near, exposes both by piezo. The folder appears when everything
 /// is in it: far.png, near.png and capture.toml.
-///
-/// # Errors
-/// Optics, folder, camera, rig: in this order, so that nothing moves where the result could not be kept.
 pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFigures> {
     capture_seen(settings, context, |_| ())
 }

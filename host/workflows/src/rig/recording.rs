@@ -80,9 +80,6 @@ pub struct Recorder {
 
 impl Recorder {
     /// Begins a recording.
-    ///
-    /// # Errors
-    /// A folder that cannot be written, optics that cannot be.
     pub fn begin(target: &Path, optics: &GivenOptics) -> Result<Self> {
         let folder = target.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder)
@@ -116,9 +113,6 @@ impl Recorder {
     }
 
     /// Adds a pair; gives whether there is room for more.
-    ///
-    /// # Errors
-    /// A full disk: pairs that were added before stay. Images of more than 65,535 pixels along a side.
     pub fn add(&mut self, far: &Image, near: &Image) -> Result<bool> {
         let (height, width) = far.pixels.dim();
         let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
@@ -149,9 +143,6 @@ impl Recorder {
     }
 
     /// Moves the file to its final name.
-    ///
-    /// # Errors
-    /// A folder that has gone.
     pub fn finish(mut self) -> Result<RecordingFigures> {
         fs::rename(&self.partial, &self.target).map_err(StagingError::at(&self.target))?;
         self.finished = true;
@@ -187,9 +178,6 @@ pub struct Recording {
 
 impl Recording {
     /// Opens a file.
-    ///
-    /// # Errors
-    /// A file that is missing, or holds something else.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(WorkflowError::read("the recording", path))?;
         let mut file = BufReader::new(file);
@@ -210,9 +198,6 @@ impl Recording {
     }
 
     /// The next pair; `None` at the end.
-    ///
-    /// # Errors
-    /// A file that is cut short, or holds something else.
     pub fn next_pair(&mut self) -> Result<Option<RecordedPair>> {
         let (path, number) = (self.path.clone(), self.read + 1);
         let wrong = |what: &str| WorkflowError::file(&path, EXPECTED)(format!("pair {number} {what}"));
@@ -271,9 +256,6 @@ fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
 }
 
 /// Plays a recording and gives each pair with its depth to `on_depth`. One thread reads, another computes.
-///
-/// # Errors
-/// The file, optics, operators, computation; [`WorkflowError::Cancelled`]; what `on_depth` gives.
 pub fn play(
     path: &Path,
     computation: &Settings,

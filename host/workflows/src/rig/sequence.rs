@@ -29,7 +29,6 @@ use crate::{
 #[derive(Clone, PartialEq, Debug)]
 pub enum Program {
     File(PathBuf),
-    /// A focus stack.
     Stack {
         /// The axis that goes through it.
         axis: Axis,
@@ -67,9 +66,6 @@ pub struct SequenceFigures {
 }
 
 /// Runs a program and writes its images. The folder appears when everything is in it.
-///
-/// # Errors
-/// Parameters, program, optics, folder, camera, rig: in this order.
 pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<SequenceFigures> {
     if settings.runs == 0 {
         return Err(WorkflowError::parameter("runs", 0, "it takes no images, expected 1 or more"));

@@ -35,9 +35,6 @@ pub struct SeriesFigures {
 }
 
 /// Captures the pairs. A series that is cancelled keeps the pairs that are complete.
-///
-/// # Errors
-/// As [`super::pair::capture`]; [`WorkflowError::Parameter`] for no pairs or more than 1000.
 pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<SeriesFigures> {
     let count = settings.out.len();
     if count == 0 || count > MOST {

@@ -14,7 +14,6 @@ use crate::{
 pub struct SettingFigures {
     pub key: &'static str,
     pub value: i32,
-    /// Default value.
     pub default: i32,
     /// Smallest value allowed.
     pub min: i32,
@@ -36,9 +35,6 @@ pub struct AllSettings {
 }
 
 /// The setting of this name.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] with the names that there are.
 pub fn key(name: &str) -> Result<SettingKey> {
     SettingKey::ALL.into_iter().find(|key| key.name() == name).ok_or_else(|| {
         let names = SettingKey::ALL.map(SettingKey::name).join(", ");
@@ -47,9 +43,6 @@ pub fn key(name: &str) -> Result<SettingKey> {
 }
 
 /// Reads all settings.
-///
-/// # Errors
-/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
 pub fn list(rig: &RigAddress, context: &Context<'_>) -> Result<AllSettings> {
     let rig = Rig::connect(rig, None, context)?;
     let settings = SettingKey::ALL.iter().map(|key| Ok(rig.client.setting(*key)?.into()));
@@ -57,17 +50,11 @@ pub fn list(rig: &RigAddress, context: &Context<'_>) -> Result<AllSettings> {
 }
 
 /// Reads a setting.
-///
-/// # Errors
-/// [`WorkflowError::Simulator`], [`WorkflowError::Client`].
 pub fn get(rig: &RigAddress, key: SettingKey, context: &Context<'_>) -> Result<SettingFigures> {
     Ok(Rig::connect(rig, None, context)?.client.setting(key)?.into())
 }
 
 /// Changes a setting, now and for later boots.
-///
-/// # Errors
-/// [`WorkflowError::Client`], also for a value outside the setting's range.
 pub fn set(rig: &RigAddress, key: SettingKey, value: i32, context: &Context<'_>) -> Result<SettingFigures> {
     Ok(Rig::connect(rig, None, context)?.client.set_setting(key, value)?.into())
 }

@@ -45,9 +45,7 @@ pub struct BoardSunFigures {
     pub elevation_deg: f32,
     /// Clockwise from north; the board's.
     pub azimuth_deg: f32,
-    /// This computer's.
     pub host_elevation_deg: f32,
-    /// This computer's.
     pub host_azimuth_deg: f32,
     /// Reliability of the shadow's angle, or why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,8 +72,6 @@ pub struct BoardSunFigures {
 }
 
 impl BoardSunFigures {
-    /// # Errors
-    /// [`WorkflowError::Differs`] where the board's answer is another than this computer's.
     pub fn check(&self) -> Result<()> {
         match self.same_bits {
             true => Ok(()),
@@ -85,9 +81,6 @@ impl BoardSunFigures {
 }
 
 /// Asks the board, and calculates the same here.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for places and lengths that cannot be, the rig.
 pub fn sun(settings: &SunSettings, context: &Context<'_>) -> Result<BoardSunFigures> {
     let query = query(settings)?;
     let rig = Rig::connect(&settings.rig, None, context)?;

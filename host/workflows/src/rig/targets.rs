@@ -74,9 +74,6 @@ struct Entry {
 /// Captures a flat target at each distance, computes the depth maps and lists them. A series that was broken off goes on
 /// where it stood when it is started again with the same folder. A real rig stays connected, an emulated one is started
 /// before each target.
-///
-/// # Errors
-/// Optics, distances, camera, folder, rig, in this order; [`WorkflowError::Unanswered`] if the prompt is not answered.
 pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let operators = operators::find(None, &optics.optics)?;

@@ -240,7 +240,6 @@ impl Frame {
         })
     }
 
-    /// A mask's pixel.
     fn dot(&self, panel: &mut RgbImage, [x, y]: [f64; 2], colour: Rgb<u8>) {
         let times = self.times as f64;
         let place = |at: f64, first: usize| ((at.round() - first as f64) * times) as i64;

@@ -44,9 +44,6 @@ impl SkeletonSet {
 }
 
 /// Draws all performances of a set.
-///
-/// # Errors
-/// A file that is not of the set, masks that cannot be written; then the new folder is not there.
 pub fn draw(settings: &SkeletonsSettings, context: &Context<'_>) -> Result<PerformancesFigures> {
     settings.drawing.check()?;
     let path = &settings.file;

@@ -26,9 +26,6 @@ pub struct SyntheticSettings {
 }
 
 /// Draws every person at every activity.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`], masks that cannot be written; then the new folder is not there.
 pub fn draw(settings: &SyntheticSettings, context: &Context<'_>) -> Result<PerformancesFigures> {
     within("subjects", settings.subjects, &(1..=1000), "")?;
     within("frame rate", settings.rate_hz, &(1.0..=240.0), "frames per second")?;

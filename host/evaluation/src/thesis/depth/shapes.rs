@@ -14,7 +14,6 @@ const EDGE_PX: usize = 9;
 /// Contrast of sandpaper, and of skin.
 const CONTRAST: [f32; 2] = [0.2, 0.05];
 
-/// A test scene.
 pub struct TestScene {
     /// The thesis' abbreviation.
     pub name: &'static str,

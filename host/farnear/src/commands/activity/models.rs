@@ -25,9 +25,6 @@ struct List {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// An output that cannot be written.
 pub fn run(arguments: Arguments) -> Result<()> {
     if arguments.sheet {
         return report::to_stdout(shipped::SHEET.as_bytes());

@@ -64,9 +64,6 @@ enum Kind {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// Models and frames that cannot be read or do not belong together.
 pub fn run(arguments: Arguments) -> Result<()> {
     let mut model = Model::read(&arguments.model)?;
     if !arguments.adapt_to.is_empty() {

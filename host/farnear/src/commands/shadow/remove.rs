@@ -80,9 +80,6 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// See [`removal::remove_from_masks`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let json = arguments.json;
     let sun = arguments.lat.zip(arguments.lon).zip(arguments.time);

@@ -29,9 +29,6 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// See [`score::score`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { masks, truth, before, json } = arguments;
     report::print(&score::score(&ScoreSettings { masks, truth, before }, &terminal::context()?)?, json)

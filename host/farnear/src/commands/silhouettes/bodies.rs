@@ -80,9 +80,6 @@ impl DrawingArguments {
 }
 
 /// Runs `skeletons`.
-///
-/// # Errors
-/// See [`skeletons::draw`].
 pub fn skeletons(arguments: Skeletons) -> Result<()> {
     let json = arguments.drawing.json;
     let set = match arguments.set {
@@ -94,9 +91,6 @@ pub fn skeletons(arguments: Skeletons) -> Result<()> {
 }
 
 /// Runs `synthetic`.
-///
-/// # Errors
-/// See [`synthetic::draw`].
 pub fn synthetic(arguments: Synthetic) -> Result<()> {
     let json = arguments.drawing.json;
     let settings = SyntheticSettings {

@@ -42,9 +42,6 @@ pub struct Arguments {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// See [`passages::cut`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let settings = PassagesSettings {
         masks: arguments.masks,
