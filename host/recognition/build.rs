@@ -1,4 +1,4 @@
-//! Says whether the real data that some tests need lie beside the repository.
+//! Tells whether the real data that some tests need lie next to the repository.
 
 fn main() {
     farnear_test_data::declare();

@@ -1,4 +1,4 @@
-//! Registration of pairs given as files, with its processor time: what `peer_ecc.py` sets beside OpenCV's ECC.
+//! Registration of pairs given as files, with its processor time: what `peer_ecc.py` compares with OpenCV's ECC.
 //!
 //! Arguments: WIDTH HEIGHT TIMES FAR NEAR [FAR NEAR ...], images of 32-bit floats, row by row. One JSON object per pair. On one
 //! thread; the processor time is the least of TIMES runs, as Linux counts it for all threads.

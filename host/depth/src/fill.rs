@@ -37,7 +37,7 @@ use crate::depth_map::DepthMap;
 use region::Regions;
 use surface::Surface;
 
-/// Texture energy relative to its median below which a pixel beside a region belongs to it.
+/// Texture energy relative to its median below which a pixel next to a region belongs to it.
 pub const GROWN_TEXTURE: f32 = 0.7;
 
 /// Confidence of a filled pixel: less than any that was measured on enough texture.
@@ -135,7 +135,7 @@ pub fn fill_low_texture(map: &mut DepthMap, texture: ArrayView2<f32>, reach_px: 
     fill_by_surfaces(map, texture, low, reach_px)
 }
 
-/// Fills anew what was filled in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
+/// Fills again what was filled in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
 /// last.
 pub fn refill_as_thesis(map: &mut DepthMap) -> Filled {
     match map.filled.take() {
@@ -290,7 +290,7 @@ mod tests {
         }
     }
 
-    /// A wall begins 12 px beside the region: the margin must not take it for the region's own surface.
+    /// A wall begins 12 px next to the region: the margin must not take it for the region's own surface.
     #[test]
     fn a_step_in_a_wide_margin_is_left_out() {
         let size = (140, 160);

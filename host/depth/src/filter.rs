@@ -1,7 +1,7 @@
 //! Convolution of a whole image with an eight-fold symmetric kernel.
 //!
 //! Borders are reflected without repeating the edge pixel. The middle of the image is read and written in place; only
-//! columns near the left and right border go through a copy that has the reflected ones beside it.
+//! columns near the left and right border go through a copy that has the reflected ones next to it.
 //!
 //! Cost for 7x7: 16 multiply-adds and 10 additions per pixel (see `simd::convolve`), about 0.13 ms for 640x480 on one
 //! core with AVX-512.

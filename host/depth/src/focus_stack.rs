@@ -31,7 +31,7 @@ pub const LEAST_IMAGES: usize = 3;
 const BAND: usize = 48;
 /// Most that images are blurred by first, px.
 pub const MOST_SMOOTHING_PX: f32 = 10.0;
-/// Most that places are mended over, px.
+/// Most that places are corrected over, px.
 pub const MOST_GUIDED_PX: f32 = 100.0;
 /// Reliability below which a place has no depth, where nothing else is asked for.
 pub const USUAL_RELIABILITY: f32 = 0.1;
@@ -50,7 +50,7 @@ pub struct StackSettings {
     pub fit_points: usize,
     /// Side of the median over the places found, odd; 1 = none.
     pub median_px: usize,
-    /// Standard deviation of the window over which places are mended along the edges of the sharp image, px; 0 = not at all.
+    /// Standard deviation of the window over which places are corrected along the edges of the sharp image, px; 0 = not at all.
     pub guided_px: f32,
     /// Places below this reliability have no value.
     pub min_reliability: f32,
@@ -58,7 +58,7 @@ pub struct StackSettings {
 
 impl Default for StackSettings {
     /// The modified Laplacian, which the survey finds best on the whole, over 9 pixels of images blurred by 1; 11 points; a median
-    /// of 9x9, mended along the sharp image's edges within 10 px.
+    /// of 9x9, corrected along the sharp image's edges within 10 px.
     fn default() -> Self {
         Self {
             measure: Sharpness::ModifiedLaplacian,

@@ -1,5 +1,5 @@
 //! The two-dimensional Fourier transform, in one place and without vectors of one processor: the same bits everywhere, and the compiler, which makes
-//! the code for each number type anew where it is first used, takes 15 s less.
+//! the code for each number type again where it is first used, takes 15 s less.
 
 use ndarray::Array2;
 use rustfft::FftPlannerScalar;

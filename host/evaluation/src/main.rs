@@ -35,7 +35,7 @@ struct Arguments {
     /// The folder of the pages; pictures go to images/ in it.
     #[arg(long, value_name = "DIR")]
     docs: PathBuf,
-    /// The folder with real data; without it the one beside the repository.
+    /// The folder with real data; without it the one next to the repository.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Measure only these parts and print them; no page is written.

@@ -54,7 +54,7 @@ fn described(masks: &[Mask]) -> Array2<f32> {
     all
 }
 
-/// Runs `work` `repeats` times in a pool of so many threads and prints the times of one of its `per` parts.
+/// Runs `work` `repeats` times in a pool of this many threads and prints the times of one of its `per` parts.
 fn time<T: Send>(
     name: &str,
     threads: usize,

@@ -1,10 +1,10 @@
-//! Bringing what is recognised to what was learned from, where the two come from other cameras, sensors or bodies: unlabelled clips tell
+//! Domain adaptation for clips from other cameras, sensors or bodies than the training clips: unlabelled clips tell
 //! how their frames differ.
 //!
 //! Frame vectors of the target are moved so that their mean, their spread or their whole covariance over all of its clips are those of the
 //! training clips: adaptive statistics (Li et al., Pattern Recognition 80, 2018) or correlation alignment (CORAL; Sun et al., AAAI 2016;
 //! here the target goes to the source, so that a trained model stays as it is). No label is looked at. It rests on both
-//! sides doing about the same in about the same shares: one clip alone is no target.
+//! sides doing about the same in about the same shares: one clip alone is not enough.
 
 use crate::embedding::spectral;
 use ndarray::{Array1, Array2, Axis};

@@ -1,4 +1,4 @@
-//! An auxiliary model: what another recogniser says of a clip, against what it said of the training clips of the activity answered.
+//! An auxiliary model: another recogniser's answer for a clip, compared with its answers for the training clips of the activity.
 //!
 //! A recogniser knows the activities that it was taught, and what nobody taught often lies among them. Another one that knows many more
 //! activities - from synthetic people, whom everybody has - tells strangers from them better, though its own answer may be wrong: it need
@@ -15,7 +15,7 @@ use ndarray::{Array1, Array2, ArrayView1};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Another recogniser and what it says of the activities that were taught.
+/// Another recogniser with its answers for the trained activities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AuxiliaryModel {
     /// The other.
@@ -27,7 +27,7 @@ pub struct AuxiliaryModel {
 }
 
 impl AuxiliaryModel {
-    /// Asks another recogniser about clips of so many classes. The limits are the conformal rule's for people who taught nothing: every
+    /// Asks another recogniser about clips of this many classes. The limits are the conformal rule's for people who taught nothing: every
     /// clip is compared with other subjects' profile of its class (with a single subject, with that of the other clips), so that what is
     /// answered rightly is called unknown no more often than stated; a wrong answer oftener, and rightly.
     pub(super) fn learned(
@@ -81,7 +81,7 @@ impl AuxiliaryModel {
     }
 }
 
-/// Square roots of what a recogniser says of a clip; `None` where nobody is seen.
+/// Square roots of what a recogniser says of a clip; `None` without a visible person.
 fn roots(recogniser: &Recogniser, clip: &Clip) -> Result<Option<Array1<f32>>, ModelError> {
     let said = recogniser.recognise(&clip.views)?;
     Ok(said.outlier_score.is_finite().then(|| roots_of(&said)))

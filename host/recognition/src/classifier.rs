@@ -96,7 +96,7 @@ macro_rules! classifiers {
                 }
             }
 
-            /// Whether it is one for patterns of so many numbers and so many classes; a model file may hold anything.
+            /// Whether it is one for patterns of this many numbers and so many classes; a model file may hold anything.
             pub(super) fn fits(&self, width: usize, classes: usize) -> bool {
                 match self {
                     $(Self::$name(trained) => trained.fits(width, classes),)+

@@ -1,4 +1,4 @@
-//! Clips: what was seen of one performance from one or more views, as numbers per frame.
+//! Clips: one performance from one or more views, as numbers per frame.
 
 use crate::embedding::descriptor::{
     ANGLES, CELL_PIXELS, CELLS, CELLS_ACROSS, CentroidDistance, CoarseSilhouette, Scaling, described,
@@ -141,7 +141,7 @@ impl Clip {
         Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
     }
 
-    /// The performance cut into windows of `length` frames, half overlapping, for a recogniser of recordings that nobody cut; a
+    /// The performance cut into windows of `length` frames, half overlapping, for a recogniser of un-segmented recordings; a
     /// shorter clip stays whole. Views of unequal length are cut to the shortest.
     pub fn windows(&self, length: usize) -> Vec<Self> {
         let length = length.max(1);

@@ -1,6 +1,6 @@
 //! A clip's pattern over a codebook: how often its frames were near each of some hundred typical frames.
 //!
-//! Typical frames are k-means centres of the training frames (in place of the thesis' grid, whose cells grow with the power of the
+//! Typical frames are k-means centres of the training frames (instead of the thesis' grid, whose cells grow with the power of the
 //! dimensions). Each frame is assigned softly, to all centres by a Gaussian of its distance; the assignments are averaged over the clip and
 //! square-rooted, which makes the straight product of two patterns the Bhattacharyya coefficient. The average does not know the
 //! order of frames. An ordered pattern adds the same over the clip's halves and thirds. A second, smaller codebook may add its

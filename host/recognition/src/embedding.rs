@@ -20,7 +20,7 @@ use ndarray::{Array2, ArrayView2};
 /// Why an embedding could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EmbeddingError {
-    /// Whoever watches the work stopped it.
+    /// The work was cancelled.
     #[error("stopped before the embedding was made")]
     Stopped,
     /// Fewer samples than needed.
@@ -42,10 +42,10 @@ pub enum EmbeddingError {
     Disconnected {
         /// The samples of each part, largest part first.
         components: Vec<Vec<usize>>,
-        /// The neighbourhood that was asked for, in words.
+        /// The requested neighbourhood, in words.
         neighbours: String,
     },
-    /// Fewer dimensions carry anything than were asked for.
+    /// Fewer useful dimensions than requested.
     #[error(
         "only {found} eigenvalues are positive, {asked} dimensions were asked for: ask for at most {found}"
     )]

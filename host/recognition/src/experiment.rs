@@ -1,4 +1,4 @@
-//! What is chosen by cross-validation, and from which values.
+//! Parameters chosen by cross-validation, and their candidates.
 //!
 //! Choices are made by a sweep: every parameter in turn takes each of its values, the best stays. Accuracy is that of inner folds
 //! over the training subjects, so nothing is ever tuned on who is tested. Values were laid out by what they mean (factors of two or
@@ -67,7 +67,7 @@ impl Sweep {
     }
 }
 
-/// What is tried, and what is chosen from.
+/// Candidates of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Experiment {
     /// Where the sweeps start.
@@ -88,7 +88,7 @@ pub struct Experiment {
     pub self_training: usize,
     /// A space that is learned already, of a model's network: then only the classifier is trained, and nothing about spaces is chosen.
     pub features: Option<Box<Space>>,
-    /// Who says beside the trained recogniser whether a clip is unknown ([`super::auxiliary_model`]).
+    /// The auxiliary model that decides whether a clip is unknown ([`super::auxiliary_model`]).
     pub second: Option<Arc<Recogniser>>,
 }
 

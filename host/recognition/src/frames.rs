@@ -1,4 +1,4 @@
-//! What is known of one frame of a clip: its embedded point, its box relative to the clip, and (ordered mode) how both move.
+//! Features of one frame of a clip: its embedded point, its box relative to the clip, and (ordered mode) how both move.
 //!
 //! - Point: embedded coordinates over the gallery's spread, so that one unit is one standard deviation of the first dimension.
 //! - Relative point: the same against the clip's mean, which takes a person's build out.
@@ -36,7 +36,7 @@ impl std::str::FromStr for Mode {
 /// How much each part of a frame's vector weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Weights {
-    /// Embedded point against the clip's mean, beside the point itself.
+    /// Embedded point relative to the clip's mean, in addition to the point itself.
     pub relative_weight: f32,
     /// Box against embedded point.
     pub box_weight: f32,

@@ -19,10 +19,10 @@ pub struct Live<'a> {
     frames: VecDeque<Moment>,
 }
 
-/// What is known of a moment: `[opinion][view]`, as [`Recogniser::opinions`].
+/// Features of one frame: `[opinion][view]`, as [`Recogniser::opinions`].
 type Moment = Vec<Vec<Seen>>;
 
-/// A frame of a view, embedded; no row where nobody is seen.
+/// A frame of a view, embedded; no row without a visible person.
 #[derive(Debug)]
 struct Seen {
     points: Array2<f32>,
@@ -76,7 +76,7 @@ impl<'a> Live<'a> {
         })
     }
 
-    /// The answer of one opinion for the window; `None` where nobody is seen in it.
+    /// The answer of one opinion for the window; `None` without a visible person in it.
     fn answer(&self, opinion: usize) -> Option<Answer> {
         let Recogniser { space, settings, .. } = self.recogniser;
         let frames: Vec<&Vec<Seen>> = self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();
@@ -163,7 +163,7 @@ pub struct Segment {
     pub confidence: f32,
 }
 
-/// What was recognised in a stretch of a recording.
+/// Answer for a segment of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
     /// First frame, counted from 0.

@@ -1,4 +1,4 @@
-//! A trained recogniser as one value, and what it answers; [`super::training`] makes it, [`super::model_file`] saves and reads it.
+//! A trained recogniser and its answers; [`super::training`] makes it, [`super::model_file`] saves and reads it.
 
 use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::softmax::softmax;
@@ -56,7 +56,7 @@ pub struct Recogniser {
     pub classifier: Classifier,
     /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown where there is no auxiliary model.
     pub limits: Limits,
-    /// Training patterns, or what is typical of them, from whose nearest the outlier score is measured.
+    /// Training patterns, or prototypes of them; the outlier score is measured from the nearest.
     pub patterns: Array2<f32>,
     /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
     pub labels: Vec<usize>,
@@ -84,7 +84,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The answer where nobody was seen.
+    /// The answer without a visible person.
     pub(super) fn nobody(activities: &[String]) -> Self {
         let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
@@ -197,7 +197,7 @@ fn with(boxes: bool) -> &'static str {
 impl Recogniser {
     /// Recognises one clip.
     ///
-    /// A model of one view takes any number of views: the answers of all that see somebody count together. Whether the clip is unknown
+    /// A model of one view takes any number of views: the answers of all that see a person count together. Whether the clip is unknown
     /// says the auxiliary model, where the model has one.
     ///
     /// # Errors
@@ -235,14 +235,14 @@ impl Recogniser {
         Ok(())
     }
 
-    /// The views of which each group has an answer of its own, those that see somebody.
+    /// The views of which each group has its own answer, those that see a person.
     pub(super) fn groups(&self, views: &[Track]) -> Vec<Vec<Track>> {
         let mut groups = self.opinions(views);
         groups.retain(|group| group.iter().any(|view| view.frames() > 0));
         groups
     }
 
-    /// The views of which each group has an answer of its own: all of them together, or for a model of one view each, a network's with
+    /// The views of which each group has its own answer: all of them together, or for a model of one view each, a network's with
     /// its mirror.
     pub(super) fn opinions(&self, views: &[Track]) -> Vec<Vec<Track>> {
         if self.views > 1 {
@@ -306,12 +306,12 @@ impl Recogniser {
         })
     }
 
-    /// Squared distance of a pattern to the nearest of what was learned.
+    /// Squared distance of a pattern to the nearest training pattern.
     pub(super) fn distance(&self, pattern: ArrayView1<f32>) -> f32 {
         nearest(self.patterns.rows().into_iter(), pattern)
     }
 
-    /// Whether the box's motion is part of what was learned.
+    /// Whether the features include the box's motion.
     pub fn uses_boxes(&self) -> bool {
         let dimensions = match &self.space.map {
             Map::Rbf(rbf) => rbf.dimensions(),

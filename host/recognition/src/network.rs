@@ -19,7 +19,7 @@ pub mod variation;
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate, s};
 use serde::{Deserialize, Serialize};
 
-/// A layer: inputs x outputs, and what is added.
+/// A layer: inputs x outputs, and the bias.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Dense {
     /// Inputs x outputs.
@@ -65,13 +65,13 @@ pub struct Network {
 /// The layers of a member: two of a frame, then one of a clip.
 pub type Layers = [Dense; 3];
 
-/// What is below zero becomes zero.
+/// Rectifier: negative values become zero.
 fn rectified(mut values: Array2<f32>) -> Array2<f32> {
     values.mapv_inplace(|v| v.max(0.0));
     values
 }
 
-/// Every row with `reach` before and behind it side by side; zeros where there is none.
+/// Every row with `reach` before and behind it side by side; zeros beyond the ends.
 fn with_neighbours(rows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     let (n, width) = rows.dim();
     let mut out = Array2::zeros((n, (2 * reach + 1) * width));

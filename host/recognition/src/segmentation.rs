@@ -1,4 +1,4 @@
-//! Recordings that nobody cut: where one activity ends and the next begins.
+//! Un-segmented recordings: where one activity ends and the next begins.
 //!
 //! A recording is a row of segments, each with one activity: a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010) whose states
 //! last as long as an activity's clips do. A segment from frame a to b is worth
@@ -34,7 +34,7 @@ impl Default for Worth {
     }
 }
 
-/// Borders are looked for at so many places in a typical clip first.
+/// Borders are looked for at this many places in a typical clip first.
 const PLACES: usize = 12;
 /// In long recordings at no more places than this in all.
 const MOST_PLACES: usize = 1500;
@@ -49,7 +49,7 @@ struct Embedded {
     boxes: Option<Array2<f32>>,
 }
 
-/// A recording whose stretches can be asked for.
+/// A recording that can be asked for segments.
 struct Recording<'a> {
     recogniser: &'a Recogniser,
     nearest: Nearest<'a>,
@@ -306,7 +306,7 @@ mod tests {
         let stream = joined([track(0, 14, &mut rng), track(1, 14, &mut rng)].iter());
         let mut live = Live::new(&model, 10, true);
         for frame in 0..stream.frames() {
-            // Every fifth frame sees nobody.
+            // Every fifth frame is empty.
             let shown: &[usize] = if frame % 5 == 4 { &[] } else { &[frame] };
             let found = live.push_described(vec![stream.select(shown)]).expect("fits");
             let window: Vec<usize> =

@@ -39,7 +39,7 @@ pub enum PatternKind {
     /// Square-rooted mean soft assignments to a codebook of this size.
     Codebook(usize),
     /// What a network gives that has learned the activities' names; made by [`Recogniser::train_network`](super::model::Recogniser). Its
-    /// principal components see coarse silhouettes beside centroid distances.
+    /// principal components see coarse silhouettes next to centroid distances.
     Network,
 }
 
@@ -126,7 +126,7 @@ pub enum Pattern {
 /// The learned space of frames and patterns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Space {
-    /// What it was learned with.
+    /// Its training options.
     pub settings: SpaceSettings,
     /// How silhouettes are embedded.
     pub map: Map,

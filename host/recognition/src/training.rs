@@ -37,7 +37,7 @@ impl Recogniser {
             .map(|(recogniser, _)| recogniser)
     }
 
-    /// Trains with settings chosen by cross-validation over the clips' subjects; gives the accuracy over the folds beside it (0 to
+    /// Trains with settings chosen by cross-validation over the clips' subjects; gives the accuracy over the folds next to it (0 to
     /// 1, of the chosen settings and so a little too good), `None` where nothing was compared: one subject, or one of everything.
     ///
     /// # Errors
@@ -114,7 +114,7 @@ fn fits(clip: &Clip, expected: usize, expected_boxes: bool) -> Result<(), ModelE
     Err(ModelError::Clip { found, found_boxes, expected, expected_boxes })
 }
 
-/// What counts as unknown: every clip is compared with all other subjects' patterns, as somebody new would be; with a single subject,
+/// What counts as unknown: every clip is compared with all other subjects' patterns, as a new person would be; with a single subject,
 /// with their other clips. `clips` are followed by their mirrors, if those train too, and `patterns` are in the same order.
 fn limits(
     clips: &[&Clip],

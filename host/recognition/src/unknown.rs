@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct Limits {
     /// Per class.
     pub distances: Vec<f32>,
-    /// Share of what is known that is called unknown, as asked for.
+    /// Share of known clips that is called unknown.
     pub false_alarms: f32,
 }
 
@@ -54,7 +54,7 @@ fn limit(mut distances: Vec<f32>, false_alarms: f32) -> Option<f32> {
     distances.get(place(distances.len(), false_alarms).checked_sub(1)?).copied()
 }
 
-/// Which of so many distances, the smallest first and counted from 1, is the limit.
+/// Which of this many distances, the smallest first and counted from 1, is the limit.
 fn place(distances: usize, false_alarms: f32) -> usize {
     ((distances + 1) as f64 * (1.0 - f64::from(false_alarms))).ceil() as usize
 }

@@ -79,7 +79,7 @@ mod tests {
         assert!(bytes <= 1_500_000, "{bytes} bytes");
     }
 
-    /// No picture in the documents is older than the page: `npm run pictures` in `tests-browser` takes them anew, and writes these sums.
+    /// No picture in the documents is older than the page: `npm run pictures` in `tests-browser` takes them again, and writes these sums.
     #[test]
     fn the_pictures_of_the_documents_are_of_this_page() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/images/page.sha256");

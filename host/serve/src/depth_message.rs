@@ -66,7 +66,7 @@ pub fn show_fresh(app: &App, capture: &str, far: &Image, near: &Image) {
     }
 }
 
-/// Depth, confidence and the far image, with what the page shows beside them.
+/// Depth, confidence and the far image, with what the page shows next to them.
 fn picture(mut header: Value, map: &DepthMap, far: &Image, ends: [f32; 2]) -> Bytes {
     let (height, width) = map.depth_mm.dim();
     header["width"] = width.into();

@@ -33,7 +33,7 @@ pub enum Listen {
         address: SocketAddr,
         /// What everybody has to know.
         token: Token,
-        /// Names under which this computer is known, beside its addresses.
+        /// Names under which this computer is known, next to its addresses.
         names: Vec<String>,
     },
 }

@@ -97,7 +97,7 @@ fn ask(app: &App, rig: &OpenRig) {
         }
         Err(error) => {
             lost(app, &error);
-            // A board that was reset or unplugged is met anew; where it stands is known by nobody then.
+            // A board that was reset or unplugged is met again; where it stands is known by nobody then.
             if rig.reopen().is_ok() {
                 app.note("rig: it answers again; home it before it moves");
             }

@@ -217,7 +217,7 @@ pub fn secret(headers: &HeaderMap) -> &str {
     headers.get(CLIENT_HEADER).and_then(|value| value.to_str().ok()).unwrap_or_default()
 }
 
-/// Does what takes a while, in a thread of its own.
+/// Does what takes a while, in its own thread.
 pub async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {

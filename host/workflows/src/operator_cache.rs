@@ -2,7 +2,7 @@
 //!
 //! An entry belongs to what was asked for and to the very build of this program that designed it, so that it is
 //! what a new design would give, bit for bit. One that is broken or belongs to something else is not used but
-//! written anew; where nothing can be written, nothing is cached. Reading an entry takes well below a millisecond,
+//! written again; where nothing can be written, nothing is cached. Reading an entry takes well below a millisecond,
 //! a design some of them (a slow one a second).
 
 use std::{

@@ -234,7 +234,7 @@ fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<Str
     }
 }
 
-/// Beside this program, else on the PATH.
+/// Next to this program, else on the PATH.
 pub(crate) fn find() -> Result<PathBuf, SimulatorError> {
     find_program(PROGRAM)
 }
@@ -248,7 +248,7 @@ pub(crate) fn find_program(program: &'static str) -> Result<PathBuf, SimulatorEr
     beside.into_iter().chain(on_path).find(|place| place.is_file()).ok_or(SimulatorError::Missing { program })
 }
 
-/// The firmware that the simulator takes by itself: the one that FARNEAR_FIRMWARE names, else the one beside it.
+/// The firmware that the simulator takes by itself: the one that FARNEAR_FIRMWARE names, else the one next to it.
 pub(crate) fn firmware_of(program: &Path) -> PathBuf {
     std::env::var_os("FARNEAR_FIRMWARE").map_or_else(|| program.with_file_name(FIRMWARE), PathBuf::from)
 }

@@ -26,7 +26,7 @@ const INCH_MM: f64 = 25.4;
 const CELL_PX: f64 = 2.5;
 /// Cells that are finer than this many dots come out grey: ink spreads.
 const LEAST_DOTS: f64 = 2.0;
-/// Cells of so many pixels have half as much noise again.
+/// Cells of this many pixels have half as much noise again.
 const COARSE_PX: f64 = 4.0;
 /// What printers leave white around a page, mm.
 const MARGIN_MM: f64 = 10.0;
@@ -170,7 +170,7 @@ struct Texture {
 }
 
 impl Texture {
-    /// Each cell by itself black or white: all that a printer can do without a screen of its own, whose period would be seen.
+    /// Each cell by itself black or white: all that a printer can do without its own screen, whose period would be seen.
     fn drawn(columns: usize, rows: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (middle_column, middle_row) = (columns / 2, rows / 2);

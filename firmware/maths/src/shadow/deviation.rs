@@ -1,7 +1,7 @@
 //! First-order error propagation to the angle beta, and when not to believe it.
 //!
 //! `s_beta^2 = 1/4 [(Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (Hc rx ry / D)^2 s_u^2 + (u rx ry / D)^2 s_Hc^2]` with
-//! `D = u^2 rx^2 + Hc^2 ry^2`, for a subject on the optical axis; the general form has `t = u rx - X0 ry` in place of
+//! `D = u^2 rx^2 + Hc^2 ry^2`, for a subject on the optical axis; the general form has `t = u rx - X0 ry` instead of
 //! `u rx`. (Of Li 2014, eqs. 8.21 to 8.37: 8.24 needs the square of its sum, 8.27 counts the elevation twice, 8.36 and
 //! 8.37 lack covariances; printed, they are ten times too large.) `s_psi` follows from day, hour, latitude and longitude
 //! by the derivatives of the horizontal vector, `s_u` from `u = w v / wi`. The height of the subject does not enter beta.
@@ -47,7 +47,7 @@ impl Deviations {
 pub enum Reliability {
     /// It holds to a few percent.
     FirstOrder,
-    /// The shadow's end may lie beside or behind the camera: beta may jump, the deviation is too small.
+    /// The shadow's end may lie next to or behind the camera: beta may jump, the deviation is too small.
     ShadowNearCamera,
     /// The shadow may point to either side: beta folds back at the mirror, the deviation is too large or too small.
     EitherSide,

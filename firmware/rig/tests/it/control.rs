@@ -147,7 +147,7 @@ fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() 
     assert!(awake(&mut control, &mut fake) >= quiet);
     run(&mut control, &mut fake, 9);
     assert!((0..100).all(|_| tick(&mut control, &mut fake) == REST_TICKS));
-    // Noise is no request, but who makes it may be about to speak.
+    // Noise is not a request, but who makes it may be about to speak.
     fake.hear(&[1, 0]);
     assert!(awake(&mut control, &mut fake) >= quiet);
     // A request is answered without another rest.

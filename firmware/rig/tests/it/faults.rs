@@ -129,7 +129,7 @@ proptest! {
             prop_assert_eq!(latched, Some(interrupted));
             prop_assert_eq!(bench.status().coarse.state, PositionState::Lost);
         }
-        // Whatever was torn is mended by the next write.
+        // Whatever was torn is corrected by the next write.
         bench.run_ms(20);
         bench.restart(1, ResetCause::PowerOn);
         bench.tick();

@@ -222,7 +222,7 @@ fn honest_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     assert!(accepted, "it works at once: {said:?}");
     ledger.fine = target.0;
     ledger.ends.insert(id, 0);
-    // The enemy goes on meanwhile.
+    // The enemy continues meanwhile.
     for _ in 0..40 {
         enemy.replay(bench, 2);
         for _ in 0..5 {

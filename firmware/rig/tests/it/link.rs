@@ -54,7 +54,7 @@ fn garbage_is_counted_and_malformed_bodies_are_told() {
     bench.send_bytes(&[0]);
     let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: 5, boot: BOOT };
     bench.send_bytes(&frame::encode(header, &[0xEEu8; 3]).expect("it fits"));
-    // An echo of the board's own frames is no request.
+    // An echo of the board's own frames is not a request.
     let echo = Header { kind: Kind::Response, ..header };
     bench.send_bytes(&frame::encode(echo, &Response::Accepted).expect("it fits"));
     bench.tick();

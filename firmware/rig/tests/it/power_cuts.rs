@@ -209,7 +209,7 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
     assert!(old * 10 > cuts && early * 20 > cuts, "the cuts hit nothing: {old} {early}");
 }
 
-/// Power comes on; ids begin anew.
+/// Power comes on; ids begin again.
 fn start(bench: &mut Bench) {
     bench.next_id = 1;
     bench.restart(1, ResetCause::PowerOn);

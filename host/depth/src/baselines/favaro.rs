@@ -80,7 +80,7 @@ impl Favaro {
         Ok(Self { psf: optics.psf(), max_blur_px: optics.max_blur_px(), alphas, signals })
     }
 
-    /// Depth of a pair; as [`super::depth_from_pair`] without learning anew.
+    /// Depth of a pair; as [`super::depth_from_pair`] without learning again.
     ///
     /// # Errors
     /// [`BaselineError::OtherOptics`] where the projectors were learned for another blur, [`BaselineError::Pair`].

@@ -6,7 +6,7 @@
 //! C.1, which reads `sigma = k d s / 2 (1/F - 1/u - 1/s)` put right (`k` multiplies the blur radius; the printed form
 //! lacks `s / 2` and has `k` the wrong way up).
 //!
-//! Every pixel gets a window of its own: the discrete Fourier transform of a Hann window of 21 px, at twelve frequencies,
+//! Every pixel gets its own window: the discrete Fourier transform of a Hann window of 21 px, at twelve frequencies,
 //! computed as separable filters. Cost: about 2000 operations a pixel.
 
 use std::f64::consts::TAU;

@@ -14,7 +14,7 @@ use crate::psf::{Otf, Psf};
 pub(super) const TOGETHER: f64 = (35.0 / 18.0) * (35.0 / 18.0);
 
 /// Coefficients of a band in which noise is looked for. Lighting, aliases and misplaced images add to most bands, not to all; and
-/// with so many chance takes little off: 5 %.
+/// with this many chance takes little off: 5 %.
 const QUIET_BAND: f64 = 1500.0;
 
 /// A ring as the fit sees it.

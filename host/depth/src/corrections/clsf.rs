@@ -20,7 +20,7 @@ fn membership(index: usize, length: usize) -> [f64; REGIONS] {
 }
 
 impl Learned for Clsf {
-    // 1, U, U^2 and U^3 cannot be told apart by fewer.
+    // 1, U, U^2 and U^3 cannot be distinguished by fewer.
     const PATTERNS_NEEDED: usize = 4;
     const BOARD_FORM: Option<BoardForm> = Some(BoardForm::Regions);
 

@@ -66,7 +66,7 @@ impl Surface {
             if let Some(surface) = Self::fit_all(within(width_px)) {
                 let spread = surface.spread_mm(within(NARROW_PX));
                 match &best {
-                    // Nothing nearer than 1 um is told apart.
+                    // Nothing nearer than 1 um is distinguished.
                     Some((_, narrow)) if spread > TOLERANCE * narrow.max(1e-3) => break,
                     Some((_, narrow)) => best = Some((surface, narrow.max(1e-3))),
                     None => best = Some((surface, spread)),

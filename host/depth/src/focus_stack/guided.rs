@@ -1,6 +1,6 @@
-//! Places of a stack, mended along the edges of the sharp image.
+//! Places of a stack, corrected along the edges of the sharp image.
 //!
-//! Where a surface shows little, the window over which sharpness is taken reaches to a stronger detail beside it: things grow by the
+//! Where a surface shows little, the window over which sharpness is taken reaches to a stronger detail next to it: things grow by the
 //! window and by their own blur, mostly over a dull background. The image that is sharp everywhere still shows where they end. So each
 //! place becomes the weighted median of those around it (Ma et al., Constant time weighted median filtering for stereo matching and
 //! beyond, ICCV 2013). Near ones and equally bright ones count more. Each counts by the inverse of its own sharpness, for strong detail puts
@@ -30,7 +30,7 @@ const CONFIRMED: f32 = 1.0;
 const STEPS: f32 = 16.0;
 const END: f32 = 4.0;
 
-/// What the places are mended by; all (height, width).
+/// What the places are corrected by; all (height, width).
 pub(super) struct Guide<'a> {
     /// The image that is sharp everywhere, finite.
     pub sharp: ArrayView2<'a, f32>,
@@ -44,7 +44,7 @@ pub(super) struct Guide<'a> {
     pub images: usize,
 }
 
-/// The places (finite) mended along the guide's edges.
+/// The places (finite) corrected along the guide's edges.
 pub(super) fn mended(place: ArrayView2<f32>, guide: &Guide<'_>) -> Array2<f32> {
     let (height, width) = place.dim();
     let offsets = offsets(guide.reach_px);

@@ -71,7 +71,7 @@ impl DepthError {
         [by_gm1, by_gp2, weight * misfit * inverse]
     }
 
-    /// For each point three rows `[by Gm1, by Gp2, residual]` in place of one per sample: the triangular factor of the
+    /// For each point three rows `[by Gm1, by Gp2, residual]` instead of one per sample: the triangular factor of the
     /// point's rows. A rotation of the rows changes neither the sum of squares nor the normal equations.
     fn compressed(&self, taps: &[f64]) -> impl Iterator<Item = (usize, [[f64; 3]; 3])> {
         self.samples.samples.chunk_by(|a, b| a.point == b.point).map(move |samples| {

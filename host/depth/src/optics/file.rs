@@ -1,6 +1,6 @@
 //! `optics.toml`: what a user writes, and the check that makes [`Optics`] of it.
 //!
-//! The renderer (`hil-sim/scene`) reads the same files with a parser of its own, so that neither's physics leans on the
+//! The renderer (`hil-sim/scene`) reads the same files with its own parser, so that neither's physics leans on the
 //! other's; a test of this crate holds both to the same numbers and the same messages.
 
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The border of a map, where the kernels reach beyond the images.
 //!
-//! Reflecting an image at its border supposes that the scene goes on as its own mirror image. The blur knows better:
+//! Reflecting an image at its border supposes that the scene continues as its own mirror image. The blur knows better:
 //! it mixed in what really lies beyond, by another amount in each of the two images, and depth within one kernel size of
 //! the border is off by millimetres even without noise. So border pixels take the depth of the nearest pixel whose
 //! operators (pre-filter and kernel, half a kernel size each) saw nothing but image, at [`BORDER_CONFIDENCE`] of its

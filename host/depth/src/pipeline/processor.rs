@@ -58,7 +58,7 @@ impl Processor {
     /// As [`super::depth_from_pair`]; the map of the pair before is lost then.
     pub fn run(&mut self, far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<&DepthMap, RunError> {
         if self.settings.thread_count() > 1 {
-            // From within the pool: each of the parallel stages would otherwise have to wake it anew.
+            // From within the pool: each of the parallel stages would otherwise have to wake it again.
             rayon::scope(|_| self.run_here(far, near))?;
         } else {
             self.run_here(far, near)?;

@@ -8,7 +8,7 @@ use crate::border::reflect;
 use crate::metrics::dilate_square;
 
 impl Job<'_> {
-    /// Takes the pixels out that an invalid one takes part in, and takes the medians beside them over the rest.
+    /// Takes the pixels out that an invalid one takes part in, and takes the medians next to them over the rest.
     pub fn repair(&self, map: &mut DepthMap, invalid: &Array2<bool>) {
         let size = map.depth_mm.dim();
         let settings = Settings { median_px: 1, ..*self.settings };

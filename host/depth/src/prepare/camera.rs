@@ -216,7 +216,7 @@ impl CameraFrames {
         self.bad.iter().filter(|bad| **bad).count()
     }
 
-    /// The image (values from 0 to 1) as a camera without these faults would have taken it, single bad pixels mended from their
+    /// The image (values from 0 to 1) as a camera without these faults would have taken it, single bad pixels corrected from their
     /// neighbours. A patch of them stays as it is: nothing is known of it.
     ///
     /// # Errors

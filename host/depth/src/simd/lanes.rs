@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 
 /// A vector of [`Lanes::N`] numbers.
 ///
-/// Functions over lanes must use loops rather than closures: a closure is a function of its own, which is compiled
+/// Functions over lanes must use loops rather than closures: a closure is its own function, which is compiled
 /// without the instructions of the function around it.
 ///
 /// The methods that take pointers are unsafe in what they read; all others are, for the x86 types, only to be called
@@ -40,7 +40,7 @@ pub(crate) trait Lanes: Copy {
         vectors
     }
 
-    /// The vector at `p + K` beside `here` at `p` and `next` at `p + N`, from memory or from these, whichever is cheaper.
+    /// The vector at `p + K` next to `here` at `p` and `next` at `p + N`, from memory or from these, whichever is cheaper.
     ///
     /// # Safety
     /// `K + N` numbers must be readable at `p`; `K` is at most 10.

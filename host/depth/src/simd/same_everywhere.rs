@@ -1,7 +1,7 @@
 //! One small pair through the whole run time and the adaptive windows: every vector unit on every processor must give what
 //! AVX2 gave when the numbers below were written down.
 //!
-//! To write them down anew, after a change of the mathematics, run the test and copy what it prints.
+//! To write them down again, after a change of the mathematics, run the test and copy what it prints.
 
 use ndarray::Array2;
 

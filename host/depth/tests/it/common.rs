@@ -37,7 +37,7 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (-2.0 * a.ln()).sqrt() * (2.0 * PI * b).cos()
 }
 
-/// Two-dimensional transform in place of a square of side `n`, unscaled.
+/// Two-dimensional transform instead of a square of side `n`, unscaled.
 fn transform(data: &mut [Complex64], n: usize, direction: FftDirection) {
     let fft = FftPlannerScalar::new().plan_fft(n, direction);
     for _ in 0..2 {

@@ -52,7 +52,7 @@ fn of_the_wall(map: &StackMap, columns: std::ops::Range<usize>) -> f64 {
 fn a_thing_does_not_grow_over_the_dull_wall_behind_it() {
     let images = stack();
     let [plain, guided] = [0.0, 10.0].map(|reach| measured(&images, reach, 0.0));
-    // Without mending the thing reaches to column 65, where the median over places begins to mix both.
+    // Without correcting the thing reaches to column 65, where the median over places begins to mix both.
     let strip = EDGE..EDGE + 5;
     assert!(of_the_wall(&plain, strip.clone()) < 0.5, "{}", of_the_wall(&plain, strip));
     assert!(of_the_wall(&guided, strip.clone()) > 0.95, "{}", of_the_wall(&guided, strip));

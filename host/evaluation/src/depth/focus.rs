@@ -1,4 +1,4 @@
-//! Depth from focus over a rendered stack, beside the pair.
+//! Depth from focus over a rendered stack, compared with the pair.
 
 use anyhow::Result;
 use farnear_depth::{

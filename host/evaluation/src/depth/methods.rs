@@ -1,4 +1,4 @@
-//! This project's method beside other people's, on the same pairs.
+//! This project's method compared with published ones on the same pairs.
 
 use anyhow::Result;
 use farnear_depth::{

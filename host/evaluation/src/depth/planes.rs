@@ -11,7 +11,7 @@ use crate::{
 };
 
 const PLANES: usize = 24;
-/// Seed of the first plane; each has a texture of its own.
+/// Seed of the first plane; each has its own texture.
 const SEED: u64 = 100;
 
 pub fn measure(page: &mut Page) -> Result<()> {

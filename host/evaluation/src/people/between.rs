@@ -25,7 +25,7 @@ const SAME: [(&str, &str); 6] = [
     ("bend", "bow"),
     ("jack", "jumping jack"),
 ];
-/// UTKinect waves with both hands, which the strips tell from one: names where the two are told apart.
+/// UTKinect waves with both hands, which the strips tell from one: names where the two are distinguished.
 const BOTH_HANDS: (&str, &str) = ("wave hands", "wave two hands");
 
 /// A pair of sets.
@@ -152,7 +152,7 @@ fn common(clips: &[Clip], activities: &[&str], same: &[(&str, &str)]) -> Vec<Cli
     named.filter(|clip| activities.contains(&clip.activity.as_str())).collect()
 }
 
-/// Every view as a clip of its own.
+/// Every view as its own clip.
 fn apart(clips: &[Clip]) -> Vec<Clip> {
     clips
         .iter()

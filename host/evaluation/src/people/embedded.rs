@@ -138,7 +138,7 @@ fn embedded() -> Result<Embedded> {
 }
 
 impl Embedded {
-    /// Where the silhouettes lie in a picture of so many rows and columns, [row, column].
+    /// Where the silhouettes lie in a picture of this many rows and columns, [row, column].
     fn places(&self, [rows, columns]: [usize; 2]) -> Vec<[usize; 2]> {
         const MARGIN: f32 = 0.06;
         let place = |value: f32, k: usize, length: usize| {

@@ -134,7 +134,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// What says beside a trained model what is unknown, of `everyday` and the activity that is left out.
+/// What says next to a trained model what is unknown, of `everyday` and the activity that is left out.
 type Second = fn(&Recogniser, &str) -> Option<Recogniser>;
 
 /// The ways in which clips are strange.

@@ -1,5 +1,5 @@
-//! How many dimensions silhouettes need: residual variance of Isomap beside principal components, and landmark Isomap
-//! beside the whole; like Li 2014, section 9.3.1.
+//! How many dimensions silhouettes need: residual variance of Isomap compared with principal components, and landmark Isomap
+//! compared with the whole; like Li 2014, section 9.3.1.
 
 use anyhow::Result;
 use farnear_recognition::embedding::{

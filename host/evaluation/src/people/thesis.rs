@@ -1,4 +1,4 @@
-//! Chapters 7 to 9 of the thesis once more: its tables beside ours on the data at hand.
+//! Chapters 7 to 9 of the thesis once more: its tables compared with ours on the available data.
 
 use anyhow::{Context, Result};
 use farnear_recognition::classifier::ClassifierKind;
@@ -144,7 +144,7 @@ fn shares(confusion: &Confusion) -> Vec<(String, f64)> {
     confusion.classes.iter().zip(&confusion.counts).map(row).collect()
 }
 
-/// A set by the thesis' method tuned and by ours, one view, beside numbers of the thesis.
+/// A set by the thesis' method tuned and by ours, one view, compared with numbers of the thesis.
 fn compared(page: &mut Page, set: &Set, thesis: &[(&str, f64)], thesis_mean: f64) -> Result<()> {
     let ours = |mode| Experiment {
         mirror: set.mirror,

@@ -1,4 +1,4 @@
-//! Recordings that nobody cut: clips of one person one after the other, cut again by the recogniser.
+//! Un-segmented recordings: clips of one person one after the other, cut again by the recogniser.
 
 use anyhow::Result;
 use farnear_recognition::choice::names;

@@ -1,4 +1,4 @@
-//! Our registration beside OpenCV's ECC: figures of a script, which is run by hand because it needs OpenCV.
+//! Our registration compared with OpenCV's ECC: figures of a script, which is run by hand because it needs OpenCV.
 
 use anyhow::Result;
 

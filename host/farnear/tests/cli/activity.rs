@@ -51,7 +51,7 @@ impl People {
         self.folder.text(&format!("people/{name}-1/view{view}"))
     }
 
-    /// The samples of which `keep` holds, as a file of their own beside the others.
+    /// The samples of which `keep` holds, as a file of their own next to the others.
     fn only(&self, name: &str, keep: impl Fn(&str) -> bool) -> String {
         let all = fs::read_to_string(&self.samples).expect("samples");
         let kept: String = all.split_inclusive("\n\n").filter(|sample| keep(sample)).collect();
@@ -155,7 +155,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
         windows.len() > 1 && windows[0]["from"] == 1 && windows.last().expect("one")["to"] == whole["frames"]
     );
 
-    // A lying bar that pulses is no person at any of these.
+    // A lying bar that pulses is not a person at any of these.
     let bar = people.text("bar");
     fs::create_dir(&bar).expect("a folder");
     for frame in 0..20_u32 {

@@ -151,7 +151,7 @@ fn what_has_changed_is_done_again_and_nothing_else() {
     picture.get_pixel_mut(80, 60).0[0] ^= 0x10;
     picture.save(&far).expect("a writable folder");
     assert_eq!(again(), ["done"; 2], "an image");
-    // The optics beside the pair, which no field names.
+    // The optics next to the pair, which no field names.
     let optics = fs::read_to_string(folder.path("pair/optics.toml")).expect("optics");
     folder.file("pair/optics.toml", format!("{optics}# looked through\n"));
     assert_eq!(again(), ["done"; 2], "optics");
@@ -166,7 +166,7 @@ fn what_has_changed_is_done_again_and_nothing_else() {
     fs::write(folder.path("maps/1/depth.npy"), bytes).expect("a writable file");
     assert_eq!(again(), ["already"; 2]);
     assert_eq!(states(&["batch", &manifest, "--verify"]), ["already", "done"], "another byte");
-    // What another setting wrote does not stay beside what this one writes.
+    // What another setting wrote does not stay next to what this one writes.
     edit("'npy'", "'png'");
     assert_eq!(again(), ["done"; 2]);
     assert!(!folder.path("maps/0/depth.npy").exists() && folder.path("maps/0/depth.png").exists());

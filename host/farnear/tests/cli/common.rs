@@ -8,7 +8,7 @@ use std::{
 use assert_cmd::Command;
 use serde_json::Value;
 
-/// The program, with a cache of its own instead of the user's.
+/// The program, with its own cache instead of the user's.
 pub fn farnear(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_farnear"));
     command.env("XDG_CACHE_HOME", concat!(env!("CARGO_TARGET_TMPDIR"), "/cache")).args(arguments);

@@ -3,7 +3,7 @@
 //! A story is a list of commands that run one after another in an empty folder. What each prints and writes is held
 //! against `outputs/golden/NAME.toml`: byte for byte on the kind of processor that it was recorded on, in form and to a
 //! tolerance elsewhere, because depth is the same to the bit on one kind of processor only. How the recordings were made and
-//! are made anew: `outputs/golden/README.md`.
+//! are made again: `outputs/golden/README.md`.
 
 mod digest;
 mod held;

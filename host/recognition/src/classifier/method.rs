@@ -1,10 +1,10 @@
-//! What a classifier must do to stand in the table of [`super`].
+//! Interface of a classifier in the table of [`super`].
 
 use ndarray::{ArrayView1, ArrayView2};
 
 /// A classifier: trained from patterns for use, and from their Gram matrix alone for cross-validation.
 pub trait Method: Sized {
-    /// What is chosen for it.
+    /// Its chosen parameters.
     type Parameter: Copy + 'static;
     /// Its name, as users write it.
     const NAME: &'static str;

@@ -2,7 +2,7 @@
 //! squared hinge loss).
 //!
 //! Clips are few and patterns long, so the descent runs on the patterns' Gram matrix: a step costs as many operations as
-//! there are clips, whatever the patterns' length, and cross-validation folds share one Gram matrix.
+//! there are clips, independent of the patterns' length, and cross-validation folds share one Gram matrix.
 
 use super::method::{Fold, Method, largest};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};

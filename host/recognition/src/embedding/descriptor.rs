@@ -5,8 +5,8 @@
 //! holes and breaks inside the outermost contour change nothing. Distances are in units of the frame's side, so they lie in
 //! [0, 0.7072] for a centroid at the middle. Angle 0 points right, angles grow anticlockwise. About 20 us a silhouette.
 //!
-//! Beside it the silhouette itself, coarsely: set pixels in each cell of that frame ("zoning": Trier, Jain and Taxt, Pattern Recognition 29,
-//! 1996). It shows what lies inside the outermost contour: an arm before the body's side, the gap under a raised hand.
+//! Next to it the silhouette itself, coarsely: set pixels in each cell of that frame ("zoning": Trier, Jain and Taxt, Pattern Recognition 29,
+//! 1996). It describes the inside of the outermost contour: an arm before the body's side, the gap under a raised hand.
 
 use farnear_silhouettes::mask::BoundingBox;
 use ndarray::ArrayView2;

@@ -28,7 +28,7 @@ impl Ord for Entry {
     }
 }
 
-/// Distances from `source` to every node, infinite where there is no path. O(E log N).
+/// Distances from `source` to every node, infinite without a path. O(E log N).
 pub fn dijkstra(graph: &Graph, source: usize) -> Vec<f32> {
     let mut distance = vec![f32::INFINITY; graph.nodes()];
     distance[source] = 0.0;
@@ -61,7 +61,7 @@ pub fn from_sources(graph: &Graph, sources: &[usize]) -> Array2<f32> {
     let arch = pulp::Arch::new();
     let mut all = Array2::<f32>::zeros((sources.len(), n));
     if let Some(rows) = all.as_slice_mut() {
-        // Sources that lie together have paths alike, so that what one lane has settled seldom has to be looked at for another.
+        // Sources that lie together have paths alike, so that a node settled in one lane is seldom visited for another.
         let mut rank = vec![0_u32; n];
         for (place, &node) in (0..).zip(&order) {
             rank[node as usize] = place;
@@ -86,7 +86,7 @@ pub fn from_sources(graph: &Graph, sources: &[usize]) -> Array2<f32> {
     all
 }
 
-/// Sweeps forth and back until nothing changes. A node is looked at only where one of its neighbours has changed since.
+/// Sweeps forth and back until nothing changes. A node is visited only if one of its neighbours has changed since.
 #[inline(always)]
 fn relax(graph: &Graph, order: &[u32], sources: &[usize], distance: &mut [[f32; LANES]]) {
     let mut stale = vec![false; distance.len()];

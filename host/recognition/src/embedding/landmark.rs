@@ -1,7 +1,7 @@
 //! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for galleries of thousands: only the paths from some landmarks are
 //! found and scaled, the other samples are placed by their distances to the landmarks.
 //!
-//! Landmarks are chosen by farthest-point steps over the path lengths, so they cover the data. Memory is L N floats in place of
+//! Landmarks are chosen by farthest-point steps over the path lengths, so they cover the data. Memory is L N floats instead of
 //! N^2; 20,000 samples of 360 numbers take seconds, most of it the neighbour search.
 
 use super::geodesic::{dijkstra, from_sources};

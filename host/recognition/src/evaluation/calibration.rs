@@ -1,4 +1,4 @@
-//! Whether answers are as sure as they should be, and whether a score tells what is strange.
+//! Calibration of confidences, and separation of known from unknown by a score.
 
 /// Bins of confidence.
 const BINS: usize = 15;

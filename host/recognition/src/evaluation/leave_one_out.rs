@@ -27,11 +27,11 @@ pub struct Outcome {
     pub each: Confusion,
     /// All views fused.
     pub fused: Confusion,
-    /// What was chosen in every fold.
+    /// Choices of every fold.
     pub chosen: Vec<Choice>,
 }
 
-/// What was chosen in one fold.
+/// Choices of one fold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Who was left out.
@@ -63,7 +63,7 @@ pub enum EvaluationError {
     /// Leaving one out needs two.
     #[error("leave-one-subject-out needs at least 3 subjects, the samples have {0}")]
     Subjects(usize),
-    /// Two halves of subjects, each enough to say what is usual.
+    /// Two halves of subjects, each enough for a threshold.
     #[error("an open set needs at least 4 subjects, the samples have {0}")]
     OpenSetSubjects(usize),
     /// Two activities are taught when one is left out.

@@ -1,4 +1,4 @@
-//! Activities that nobody has taught: are they called unknown, and what is known not?
+//! Activities outside the training set: are they called unknown, and known ones not?
 //!
 //! Each activity in turn is left out of the training, on half of the subjects; the other half does all activities, and the other way round.
 
@@ -14,10 +14,10 @@ use crate::watch::{Unwatched, Watch};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// How what is strange was told from what is known.
+/// Separation of unknown from known clips.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OpenSet {
-    /// The activity that nobody taught; in a mean over all of them, `None`.
+    /// The activity left out of training; in a mean over all of them, `None`.
     pub left_out: Option<String>,
     /// Clips of activities that were taught.
     pub known: usize,

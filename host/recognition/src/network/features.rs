@@ -5,7 +5,7 @@ use super::Network;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-/// A network and the statistics of what it gives.
+/// A network and the statistics of its output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Features {
     /// The network, learned from other clips.

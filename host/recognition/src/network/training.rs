@@ -24,7 +24,7 @@ pub struct NetworkSettings {
     pub rate: f32,
     /// How much weights shrink in a step, times its size.
     pub decay: f32,
-    /// Least share of a clip's frames that a step sees: each clip draws its share between this and all anew, 1 for all. Motion is taken between
+    /// Least share of a clip's frames that a step sees: each clip draws its share between this and all again, 1 for all. Motion is taken between
     /// those that are left.
     pub keep: f32,
     /// Spread of what is added at random to each component of a clip in a step, the same to all of its frames, in spreads of that component.
@@ -322,7 +322,7 @@ fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, sm
     gradient / n as f32
 }
 
-/// The gradient of what was rectified.
+/// Gradient of the rectifier.
 fn only_above_zero(gradient: &mut Array2<f32>, values: &Array2<f32>) {
     gradient.zip_mut_with(values, |gradient, &value| {
         if value <= 0.0 {

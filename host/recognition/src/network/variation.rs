@@ -22,7 +22,7 @@ pub struct Embedded {
 /// Frames that a clip is left with at least, if it has them.
 const FEWEST: usize = 6;
 
-/// Clips as a step of the training sees them, drawn with a seed of its own.
+/// Clips as a step of the training sees them, drawn with its own seed.
 pub(super) fn varied(clips: &[Embedded], settings: &NetworkSettings) -> Vec<Embedded> {
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let spread = spread(clips);
@@ -72,7 +72,7 @@ impl Embedded {
         }
     }
 
-    /// The clip with an offset of its own on each component, the same in all frames, drawn with `shift` times the component's
+    /// The clip with its own offset on each component, the same in all frames, drawn with `shift` times the component's
     /// `spread`.
     fn shifted(mut self, spread: &Array1<f32>, shift: f32, rng: &mut ChaCha8Rng) -> Self {
         if shift > 0.0 {

@@ -67,7 +67,7 @@ pub const ACTIVITIES: &[Activity] = &[
 
 /// One performance: who, and where the joints are.
 pub struct Performance {
-    /// Who does it.
+    /// Name of the person.
     pub person: Person,
     /// Joints of every frame, about the origin.
     pub joints: Vec<Joints>,
@@ -148,7 +148,7 @@ pub fn clips(first: usize, people: usize, scaling: Scaling) -> Vec<Clip> {
         .collect()
 }
 
-/// One clip; should a camera's border leave nothing of somebody, the next camera looks.
+/// One clip; if a person is outside the image, the next camera is used.
 fn clip(subject: usize, activity: usize, scaling: Scaling) -> Clip {
     let seed = (subject * ACTIVITIES.len() + activity) as u64;
     let Performance { person, joints } = performance(activity, seed);

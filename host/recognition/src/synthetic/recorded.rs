@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Somebody's body frame by frame, millimetres, z up.
+/// A person's body frame by frame, millimetres, z up.
 #[derive(Clone, Debug)]
 pub enum Bodies<'a> {
     /// Capsules about bones.
@@ -36,7 +36,7 @@ const CLOSED_MM: [f64; 2] = [126.0, 40.0];
 /// Cameras that look, one after the other, until one sees at least half of the frames.
 const LOOKS: usize = 8;
 
-/// A recording from `count` sides, one track each; fewer where nobody could be seen.
+/// A recording from `count` sides, one track each; fewer without a visible person.
 pub fn tracks(bodies: &Bodies, rate_hz: f64, count: usize, seed: u64, scaling: Scaling) -> Vec<Track> {
     let mut bodies = bodies.clone();
     bodies.drop_empty();
@@ -62,7 +62,7 @@ pub fn tracks(bodies: &Bodies, rate_hz: f64, count: usize, seed: u64, scaling: S
         .collect()
 }
 
-/// The frames of a clip out of a recording of so many.
+/// The frames of a clip out of a recording of this many.
 fn cut(frames: usize, rate_hz: f64, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let recorded_hz = if rate_hz > 0.0 { rate_hz } else { USUAL_HZ };
     let seconds = frames as f64 / recorded_hz;
@@ -160,7 +160,7 @@ impl Bodies<'_> {
         }
     }
 
-    /// In clothes: so many times as thick.
+    /// Clothed: thickness as a factor.
     fn dressed(mut self, thickness: f64) -> Self {
         match &mut self {
             Self::Capsules(frames) => frames.iter_mut().flatten().for_each(|c| c.radius_mm *= thickness),

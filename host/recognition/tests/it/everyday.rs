@@ -103,7 +103,7 @@ fn the_shipped_models_are_small_and_know_people_they_never_saw() {
     }
 }
 
-/// An experiment with the shipped model beside it.
+/// An experiment with the shipped model next to it.
 fn with_auxiliary_model() -> Experiment {
     let other = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
     let space =

@@ -66,7 +66,7 @@ async fn send(folder: PathBuf, file: String) -> Result<Response, Failure> {
         Some("toml") => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     };
-    // A map may be computed anew under the same name.
+    // A map may be computed again under the same name.
     Ok(([(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")], file_body(opened))
         .into_response())
 }

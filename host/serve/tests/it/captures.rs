@@ -178,7 +178,7 @@ fn what_another_program_does_to_the_session_is_seen_and_said() {
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 1);
     assert_eq!(listed(), 2);
-    // A capture goes, comes under another name, loses an image, or is no folder any more.
+    // A capture goes, comes under another name, loses an image, or is not a folder any more.
     fs::rename(served.session.join("pair-001"), served.session.join("moved")).unwrap();
     assert_eq!((listed(), served.get("/api/captures/pair-001").status), (2, 404));
     assert_eq!(served.get("/api/captures/moved").status, 200);
@@ -192,7 +192,7 @@ fn what_another_program_does_to_the_session_is_seen_and_said() {
     fs::write(served.session.join("pair-002"), b"a file").unwrap();
     let refused = served.get("/api/captures/pair-002");
     assert!(refused.status == 404 && refused.error().contains("pair-002"), "{refused:?}");
-    // The optics are spoiled, then mended.
+    // The optics are spoiled, then corrected.
     let whole = fs::read(served.session.join("optics.toml")).unwrap();
     fs::write(served.session.join("optics.toml"), "[lens]\nfocal_length_mm = \"?\"\n").unwrap();
     let spoiled = served.get("/api/optics");

@@ -46,7 +46,7 @@ pub struct LiveFigures {
     pub bits: u8,
 }
 
-/// Looks through a camera until time is up or it is cancelled, which is no error, and gives figures from time to time. A while without a
+/// Looks through a camera until time is up or it is cancelled, which is not an error, and gives figures from time to time. A while without a
 /// picture gives none, and is said. Gives the number of pictures.
 pub fn live(
     settings: &LiveSettings,

@@ -236,7 +236,7 @@ impl EquippedRig {
         Ok(())
     }
 
-    /// What a capture's record says beside what was measured. `psf` and `optics` are those that were captured with, as
+    /// What a capture's record says next to what was measured. `psf` and `optics` are those that were captured with, as
     /// far as they are known.
     pub fn circumstances(&self, psf: Psf, optics: toml::Table) -> Circumstances {
         Circumstances {

@@ -71,7 +71,7 @@ struct Entry {
     true_mm: f64,
 }
 
-/// Captures a flat target at each distance, computes the depth maps and lists them. A series that was broken off goes on
+/// Captures a flat target at each distance, computes the depth maps and lists them. A series that was broken off continues
 /// where it stood when it is started again with the same folder. A real rig stays connected, an emulated one is started
 /// before each target.
 pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {

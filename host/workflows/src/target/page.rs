@@ -8,7 +8,7 @@ use super::{MARGIN_MM, Paper, Texture};
 const POINTS: f64 = 72.0 / 25.4;
 /// Length of the line that tells whether the page was printed true to scale.
 const RULER_MM: f64 = 100.0;
-/// Length of the marks beside the texture's middles.
+/// Length of the marks next to the texture's middles.
 const MARK_MM: f64 = 5.0;
 
 /// The page as a PDF file.

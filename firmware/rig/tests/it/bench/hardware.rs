@@ -7,7 +7,7 @@ use farnear_rig::io::{
 
 use super::motor::Motor;
 
-/// What can be wrong beside the motors.
+/// What can be wrong next to the motors.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
     /// The gauge answers this whatever the position.

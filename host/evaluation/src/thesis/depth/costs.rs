@@ -1,4 +1,4 @@
-//! Section 6.6.4: what the corrections cost, and what depth costs beside them.
+//! Section 6.6.4: what the corrections cost, compared with depth itself.
 
 use std::time::Instant;
 
@@ -18,7 +18,7 @@ use crate::{page::Page, rig};
 
 /// (height, width) of the thesis' maps: one depth for 7x7 pixels.
 const SMALL: (usize, usize) = (63, 86);
-/// The least of so many times counts: other work on the machine only adds.
+/// The least of this many times counts: other work on the machine only adds.
 const TIMES: usize = 15;
 
 /// Times in ms, least of [`TIMES`].

@@ -2,7 +2,7 @@
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
-/// A person's 20 joints as lines of text, metres with y up: in so many frames the arms go up, or the trunk comes down.
+/// A person's 20 joints as lines of text, metres with y up: in this many frames the arms go up, or the trunk comes down.
 fn kinect(size: f64, raise: f64, stoop: f64) -> String {
     let mut text = String::new();
     for frame in 0..30 {

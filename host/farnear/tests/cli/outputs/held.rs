@@ -20,7 +20,7 @@ const TEXT_TOLERANCE: [f64; 2] = [2e-3, 2e-3];
 pub struct Story<'a> {
     /// Name of the recording.
     pub name: &'a str,
-    /// Files that lie there, beside the rig's optics as `rig.toml`.
+    /// Files that lie there, next to the rig's optics as `rig.toml`.
     pub files: &'a [(&'a str, &'a str)],
     /// Commands that run first, whose output is not held.
     pub before: &'a [&'a str],

@@ -16,7 +16,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::HashMap;
 
-/// A camera that looks at the middle of where somebody is.
+/// A camera directed at a person.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     view: View,
@@ -85,7 +85,7 @@ impl Camera {
         let p = [p[0], p[1], p[2] - self.target_mm];
         let [x, depth, z] =
             std::array::from_fn(|i| matrix[i][0] * p[0] + matrix[i][1] * p[1] + matrix[i][2] * p[2]);
-        // Nobody comes nearer than a third of the way.
+        // A person comes no nearer than a third of the way.
         let scale = self.distance_mm / (self.distance_mm + depth).max(0.33 * self.distance_mm);
         ([scale * x, 0.0, scale * z], scale)
     }
@@ -116,7 +116,7 @@ impl Camera {
         self.filmed(&reach, stature_mm, drawn, scaling, rng)
     }
 
-    /// The same of somebody in a suit whose points a template makes a body of; gaps between parts up to `gap_mm` are closed.
+    /// The same of a person in a suit whose points a template makes a body of; gaps between parts up to `gap_mm` are closed.
     pub fn track_of_parts(
         &self,
         frames: &[HashMap<&str, Point3>],
@@ -179,7 +179,7 @@ impl Camera {
     }
 }
 
-/// Segmenters drop what is too small for a person.
+/// Segmenters drop regions that are too small for a person.
 fn large_enough(mask: &Mask, person_px: f64) -> bool {
     BoundingBox::of(mask.view())
         .is_some_and(|bounds| bounds.height().max(bounds.width()) as f64 > 0.3 * person_px)

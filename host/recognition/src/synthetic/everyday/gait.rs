@@ -16,7 +16,7 @@ const WALK_KNEE: Cycle = [5.0, 15.0, 18.0, 11.0, 7.0, 11.0, 35.0, 61.0, 54.0, 17
 const RUN_HIP: Cycle = [35.0, 31.0, 16.0, 0.0, -9.0, 0.0, 22.0, 42.0, 53.0, 46.0];
 const RUN_KNEE: Cycle = [18.0, 41.0, 36.0, 22.0, 28.0, 66.0, 98.0, 104.0, 78.0, 36.0];
 
-/// How somebody goes.
+/// A person's gait.
 #[derive(Clone, Copy, Debug)]
 pub struct Gait {
     /// 0 walking to 1 running.
@@ -178,7 +178,7 @@ mod tests {
         let gait = Gait::walk(&mut ChaCha8Rng::seed_from_u64(3));
         let (a, b) = (gait.at(0.2), gait.at(1.7));
         assert!((a.pose.legs[0].knee_deg - b.pose.legs[1].knee_deg).abs() < 1e-9);
-        // A stride of 1.2 to 1.6 m in somebody of average height at average amplitude (Winter: 1.5 m).
+        // A stride of 1.2 to 1.6 m in a person of average height at average amplitude (Winter: 1.5 m).
         let gait = Gait { stride: 1.0, ..gait };
         let stride_m = 1.7 * gait.stride_statures();
         assert!((0.9..1.6).contains(&stride_m), "{stride_m}");

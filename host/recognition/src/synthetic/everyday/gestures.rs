@@ -1,4 +1,4 @@
-//! What is done with arms and hands while the body stands.
+//! Gestures of arms and hands while the body stands.
 //!
 //! Places of hands are in lengths of the stretched arm from the shoulder: the mouth is 0.3 inwards and 0.3 up, the ear 0.1 inwards and
 //! 0.35 up (Winter's proportions). Times are those of unhurried grown-ups; all vary.

@@ -1,4 +1,4 @@
-//! What moves, at one moment, and how one moment goes over into the next.
+//! Posture at one moment, and interpolation between postures.
 
 use farnear_silhouettes::synthetic::body::{Leg, Pose};
 
@@ -107,7 +107,7 @@ pub struct Moment {
     pub arc: f64,
 }
 
-/// `a` and what lies `s` of the way to `b`.
+/// Interpolation from `a` to `b`, `s` from 0 to 1.
 fn mixed(a: f64, b: f64, s: f64) -> f64 {
     a + (b - a) * s
 }
@@ -194,7 +194,7 @@ impl Moment {
     }
 }
 
-/// A motion: seconds to get there, and what is there.
+/// A motion: its duration, seconds, and the posture at its end.
 pub type Keys = Vec<(f64, Moment)>;
 
 /// Seconds that keys take.

@@ -5,7 +5,7 @@ use super::moment::{Hand, Keys, Moment, at, duration};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// What somebody does.
+/// Kind of motion.
 #[derive(Clone, Debug)]
 pub enum Motion {
     /// Going, without an end.
@@ -16,7 +16,7 @@ pub enum Motion {
         keys: Keys,
         /// Where the activity begins.
         from: f64,
-        /// Where it ends.
+        /// Posture at the end.
         to: f64,
         /// Where everything is ready for it, from which some clips begin.
         ready: f64,
@@ -27,7 +27,7 @@ pub enum Motion {
         keys: Keys,
         /// Where repetition begins.
         from: f64,
-        /// Where it ends.
+        /// Posture at the end.
         to: f64,
         /// Seconds of one repetition.
         period: f64,
@@ -47,7 +47,7 @@ pub struct Maker<'r> {
 }
 
 impl<'r> Maker<'r> {
-    /// Somebody: nine in ten use the right hand.
+    /// A person; nine in ten use the right hand.
     pub fn new(rng: &'r mut ChaCha8Rng) -> Self {
         let main = usize::from(rng.random_bool(0.85));
         let tempo = rng.random_range(0.55_f64.ln()..1.45_f64.ln()).exp();

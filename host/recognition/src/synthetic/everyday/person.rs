@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 pub struct Person {
     /// Proportions.
     pub build: Build,
-    /// Trunk, with what is worn.
+    /// Trunk, with clothes.
     trunk: f64,
     /// Arms.
     arms: f64,
@@ -30,7 +30,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Somebody. Stature after the spread of grown-ups (mean 1.70 m, SD 0.10 m; NCD-RisC, eLife 5, 2016), breadths and lengths of limbs
+    /// A person. Stature after the spread of grown-ups (mean 1.70 m, SD 0.10 m; NCD-RisC, eLife 5, 2016), breadths and lengths of limbs
     /// with the coefficients of variation of Gordon et al. (ANSUR, 1989), 4 to 6 %, and down to the shorter trunks and arms that trackers of
     /// joints measure (trunk and arm 0.48 and 0.67 of a leg, where Winter has 0.59 and 0.79); clothes are guessed wide.
     pub fn drawn(rng: &mut ChaCha8Rng) -> Self {

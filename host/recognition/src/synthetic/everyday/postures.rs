@@ -1,4 +1,4 @@
-//! What is done with the whole body: bending, sitting, lying, kicking, jumping, digging.
+//! Motions of the whole body: bending, sitting, lying, kicking, jumping, digging.
 
 use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
@@ -29,7 +29,7 @@ fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     moment
 }
 
-/// How far from the thing on the ground somebody stands before and after, of stature: most make a step.
+/// Distance from the thing on the ground before and after, of stature: most make a step.
 fn steps(maker: &mut Maker) -> (f64, f64) {
     if maker.chance(0.4) {
         return (0.0, 0.0);

@@ -12,7 +12,7 @@ use farnear_workflows::{
 
 use super::{Face, camera};
 
-/// A person beside the scripted board.
+/// A person next to the scripted board.
 struct Person {
     board: Peer,
     face: Face,
