@@ -63,9 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         work,
     };
     if !git(&["status", "--porcelain"])?.is_empty() {
-        eprintln!(
-            "note: there are uncommitted changes; the files carry the last commit's time"
-        );
+        eprintln!("note: there are uncommitted changes; the files carry the last commit's time");
     }
 
     firmware::build()?;

@@ -18,7 +18,8 @@ pub struct Sizes {
 /// Reads the sizes from an ELF.
 pub fn measure(elf: &Path) -> Result<Sizes> {
     let bytes = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
-    let file = object::File::parse(&*bytes).with_context(|| format!("{} is not an ELF file", elf.display()))?;
+    let file =
+        object::File::parse(&*bytes).with_context(|| format!("{} is not an ELF file", elf.display()))?;
     let mut sizes = Sizes { flash: 0, ram: 0 };
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags } = section.flags() else { continue };

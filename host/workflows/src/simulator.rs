@@ -78,10 +78,7 @@ pub enum SimulatorError {
     Ended { status: String },
     /// It printed something else than where it listens.
     #[error("{PROGRAM} printed no address but {line:?}: {reason}")]
-    Address {
-        line: String,
-        reason: String,
-    },
+    Address { line: String, reason: String },
     /// It did not say where it listens.
     #[error("{PROGRAM} did not say where it listens within {START:?}")]
     Silent,

@@ -26,9 +26,7 @@ impl FromStr for Pattern {
             Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
                 Ok(Self { name: name.trim().into(), value: value.trim().into() })
             }
-            _ => Err(BatchError::Pattern(format!(
-                "`{text}`: expected NAME=VALUE, such as far=*/far.png"
-            ))),
+            _ => Err(BatchError::Pattern(format!("`{text}`: expected NAME=VALUE, such as far=*/far.png"))),
         }
     }
 }
