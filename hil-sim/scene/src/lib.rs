@@ -11,6 +11,8 @@
 //!    over the pixel ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
 //! 4. **Exposure.** Shading and hot pixels, where asked for ([`defects`]); electrons, shot noise, read noise, full well, quantisation ([`camera`]).
 //!
+//! [`wave`] has a lens by wave optics for flat surfaces: diffraction, spherical aberration, astigmatism, several wavelengths.
+//!
 //! [`render()`] makes one exposure; [`Renderer`] keeps the texture for many. Everything is a function of its
 //! arguments and the seed: no clock, no thread count, no CPU feature enters.
 
@@ -37,6 +39,7 @@ pub mod standard;
 pub mod texture;
 mod thin_lens;
 pub mod view;
+pub mod wave;
 
 pub use camera::{Camera, CameraError, Noise};
 pub use defects::Defects;
@@ -51,3 +54,4 @@ pub use scene_error::SceneError;
 pub use scene_file::SceneFile;
 pub use texture::Texture;
 pub use view::View;
+pub use wave::WaveLens;
