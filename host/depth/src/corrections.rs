@@ -51,8 +51,8 @@ pub use pattern::Pattern;
 /// Version of the stored form; other versions are refused.
 pub const FORMAT: u32 = 1;
 
-/// A working range may reach beyond the patterns' range by this part of it.
-const RANGE_TOLERANCE: f64 = 0.05;
+/// Least part of the working range that the patterns' range must share with it.
+const SHARED_RANGE: f64 = 0.25;
 
 // All corrections: what it is in a few words; variant, name, and what learns it.
 corrections! {
@@ -147,15 +147,14 @@ impl Correction {
         (self.far_mm, self.near_mm)
     }
 
-    /// Checks that this correction was made for a working range, up to 5 % of it.
+    /// Checks that this correction was made for a part of a working range. Beyond its own range [`Self::apply`] gives no depth.
     ///
     /// # Errors
     /// [`CorrectionError::RangeMismatch`].
     pub fn check_range(&self, range: &WorkingRange) -> Result<(), CorrectionError> {
-        let tolerance = RANGE_TOLERANCE * (range.far_mm - range.near_mm);
-        let covers = range.far_mm <= self.far_mm + tolerance && range.near_mm >= self.near_mm - tolerance;
-        let overlaps = (self.far_mm - self.near_mm) <= 2.0 * (range.far_mm - range.near_mm);
-        if covers && overlaps {
+        let (width, own) = (range.far_mm - range.near_mm, self.far_mm - self.near_mm);
+        let shared = range.far_mm.min(self.far_mm) - range.near_mm.max(self.near_mm);
+        if shared >= SHARED_RANGE * width && own <= 2.0 * width {
             return Ok(());
         }
         Err(CorrectionError::RangeMismatch {

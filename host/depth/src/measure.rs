@@ -238,7 +238,7 @@ pub fn measure_pair(
     Ok(Measurement { map, validity, report, findings, left_over, excess, prepared })
 }
 
-fn measure(
+pub(crate) fn measure(
     prepared: &Prepared,
     optics: &Optics,
     method: DepthMethod<'_>,

@@ -22,7 +22,7 @@ pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
-pub use stage::{RESPONSE_POINTS, Stage};
+pub use stage::{RESPONSE_POINTS, Stage, unexplained};
 
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.
 fn image_mm(focal_length_mm: f64, object_mm: f64) -> f64 {
@@ -60,6 +60,9 @@ pub struct WorkingRange {
     /// Object distance of alpha = 0, which is not the middle of the range in millimetres.
     pub alpha0_mm: f64,
 }
+
+/// Largest blur radius that operators of 7x7 taps can use, px: at 6 px most of a scene has no depth.
+pub const USABLE_BLUR_PX: f64 = 4.5;
 
 impl Optics {
     /// Focal length F in mm.
@@ -122,6 +125,12 @@ impl Optics {
     /// The same geometry with another point-spread function.
     pub fn with_psf(self, psf: Psf) -> Self {
         Self { psf, ..self }
+    }
+
+    /// The same optics for images of which `bin` x `bin` pixels were averaged into one.
+    pub fn binned(self, bin: usize) -> Self {
+        let bin = bin.max(1) as f64;
+        Self { pixel_um: self.pixel_um * bin, max_blur_px: self.max_blur_px / bin, ..self }
     }
 
     /// Half the sensor travel, e, in mm.

@@ -193,10 +193,17 @@ pub struct Report {
     pub detailed_fraction: f64,
     /// Part of the pixels that show something else in each image.
     pub moved_fraction: f64,
+    /// Part of the pixels that show the same in both images with more blur than a pair has.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub too_blurred_fraction: f64,
     /// Part of the pixels that are saturated in at least one image.
     pub saturated_fraction: f64,
     /// Whether the near image is magnified as by a lens that is not telecentric, though the optics do not say so.
     pub looks_not_telecentric: bool,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// A pair that is ready.
@@ -326,15 +333,18 @@ fn finish(
         {
             return Err(PrepareError::Unrelated { correlation });
         }
-        if let Some(moved) = &agreement.moved {
-            for (at, _) in moved.indexed_iter().filter(|(_, moved)| **moved) {
+        let masks = [(&agreement.moved, Reason::Moved), (&agreement.too_blurred, Reason::Misfit)];
+        for (mask, reason) in masks {
+            let Some(mask) = mask else { continue };
+            for (at, _) in mask.indexed_iter().filter(|(_, differs)| **differs) {
                 if reasons[at] == 0 {
-                    reasons[at] = Reason::Moved.code();
+                    reasons[at] = reason.code();
                 }
                 (far[at], near[at]) = (f32::NAN, f32::NAN);
             }
-            report.moved_fraction = part_of(&reasons, Reason::Moved);
         }
+        report.moved_fraction = part_of(&reasons, Reason::Moved);
+        report.too_blurred_fraction = part_of(&reasons, Reason::Misfit);
     }
     Ok(Prepared { far, near, reasons, noise, report })
 }

@@ -256,7 +256,9 @@ fn pixel_variance(
             // Both images have one brightness around a pixel; its average over the window is what the noise follows.
             let area = (2 * window * window) as f64;
             let brightness = window_sums(&(&far + &near), window);
-            brightness.mapv(|b| constant + per_unit * f64::from(b) / area)
+            // Below a camera's black level, where there is read noise only, the line would fall below 0.
+            let least = (0.01 * per_unit * per_unit).max(f64::MIN_POSITIVE);
+            brightness.mapv(|b| (constant + per_unit * f64::from(b) / area).max(least))
         }
         Noise::Estimated => {
             let area = (window * window) as f64;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::adaptive_window::Estimate;
 use crate::depth_map::DepthMap;
 use crate::metrics::dilate_square;
-use crate::optics::Optics;
+use crate::optics::{Optics, unexplained};
 use crate::prepare::Prepared;
 use crate::reason::Reason;
 
@@ -76,11 +76,8 @@ pub fn assess(
     let mut reasons = prepared.reasons.clone();
     let Estimate { mut deviation_mm, misfit, left_over, .. } = estimate;
     let range = Range::new(optics);
-    let of_model = match optics.stage() {
-        Some(stage) => stage.residual.powi(2) as f32,
-        None => MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0),
-    } * range.slope_mm.powi(2);
-    let usual = optics.stage().map_or(1.0, |stage| stage.usual_misfit.max(1.0) as f32);
+    let stage = optics.stage().map(|stage| [stage.residual, stage.usual_unexplained].map(|value| value as f32));
+    let of_model = MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0) * range.slope_mm.powi(2);
     let filled = map.filled.take().filter(|_| settings.filled);
     let is_filled = |at: (usize, usize)| filled.as_ref().is_some_and(|filled| filled[at]);
     Zip::indexed(&mut reasons)
@@ -94,12 +91,19 @@ pub fn assess(
                 return;
             }
             let noise = *deviation;
-            let misfit = &(misfit / usual);
-            *deviation = (*deviation * *deviation * misfit.max(1.0) + of_model).sqrt();
+            let mut misfit = *misfit;
+            *deviation = match stage {
+                Some([residual, usual]) => {
+                    // Relative to the target that the lens was learned from.
+                    misfit = unexplained(misfit, noise / range.slope_mm) / usual;
+                    noise.hypot(model_error(residual, misfit) * range.slope_mm)
+                }
+                None => (noise * noise * misfit.max(1.0) + of_model).sqrt(),
+            };
             let verdict = if *reason != 0 || !depth.is_finite() {
                 None
             } else {
-                range.verdict(*depth, [noise, *deviation], *misfit, settings.least_confidence)
+                range.verdict(*depth, [noise, *deviation], misfit, settings.least_confidence)
             };
             match verdict {
                 Some(Ok(probability)) => *confidence = probability,
@@ -120,6 +124,12 @@ pub fn assess(
     Validity { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
 }
 
+/// Standard deviation of normalised depth by the model's error, where it leaves `ratio` times as much as on the target that it was
+/// learned from.
+pub(crate) fn model_error(residual: f32, ratio: f32) -> f32 {
+    residual * ratio.max(1.0).sqrt()
+}
+
 /// How many pixels have no depth, by reason, from the map of reasons.
 pub fn lost_pixels(reasons: &Array2<u8>) -> Vec<Lost> {
     let total = reasons.len() as f64;
@@ -137,12 +147,14 @@ struct Range {
     near_mm: f32,
     /// Magnitude of the change of depth with alpha, mm, at alpha 0.
     slope_mm: f32,
+    /// Whether the model's error was learned; the deviation has it all then.
+    learned: bool,
 }
 
 impl Range {
     fn new(optics: &Optics) -> Self {
         let [far_mm, near_mm] = [-LARGEST_ALPHA, LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha) as f32);
-        Self { far_mm, near_mm, slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32 }
+        Self { far_mm, near_mm, slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32, learned: optics.stage().is_some() }
     }
 
     /// The confidence of a depth, or why there is none.
@@ -161,7 +173,7 @@ impl Range {
         if !(self.near_mm..=self.far_mm).contains(&depth) {
             return Some(Err(Reason::OutOfRange));
         }
-        if misfit > LARGEST_MISFIT || of_alpha > 3.0 * LARGEST_DEVIATION {
+        if (!self.learned && misfit > LARGEST_MISFIT) || of_alpha > 3.0 * LARGEST_DEVIATION {
             return Some(Err(Reason::Misfit));
         }
         let probability = probability(of_alpha, misfit);
@@ -192,7 +204,7 @@ fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
     }
     // Reasons that make holes around them, before the judge's own.
     let spreading =
-        [Reason::Saturated, Reason::Dark, Reason::Edge, Reason::Moved, Reason::BadPixel, Reason::NotFinite];
+        [Reason::Saturated, Reason::Dark, Reason::Edge, Reason::Moved, Reason::Misfit, Reason::BadPixel, Reason::NotFinite];
     let original = reasons.clone();
     for reason in spreading {
         if left.is_empty() {

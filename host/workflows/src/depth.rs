@@ -13,8 +13,8 @@ use farnear_depth::{
     adaptive_window::Window,
     corrections::Correction,
     fill::{FillBy, LowTexture, refill_as_thesis},
-    measure::{MeasureSettings, measure_pair},
-    optics::Optics,
+    measure::{MeasureSettings, binned, measure_pair},
+    optics::{Optics, USABLE_BLUR_PX},
     pipeline::{DepthMap, Settings},
     prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
     reason::Reason,
@@ -72,7 +72,7 @@ pub struct DepthRequest {
     /// [default: designed for the optics].
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME|FILE"))]
     pub operators: Option<PathBuf>,
-    /// Method: ro (rational operators), whitened (operators at the noise limit), or for comparison subbarao, subbarao-fourier or
+    /// Method: ro (rational operators; whitened for a lens file of calibrate stack), whitened (operators at the noise limit), or for comparison subbarao, subbarao-fourier or
     /// favaro.
     #[cfg_attr(feature = "clap", arg(long, default_value_t))]
     #[serde_as(as = "DisplayFromStr")]
@@ -99,6 +99,9 @@ pub struct DepthRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "X,Y,W,H"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub region: Option<Rectangle>,
+    /// Average so many pixels per side into one first; 1 keeps all [default: as many as a largest blur of more than 4.5 px needs].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX"))]
+    pub bin: Option<usize>,
     /// Folder with the camera's dark and flat frames, from `farnear calibrate camera`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub camera_frames: Option<PathBuf>,
@@ -123,8 +126,8 @@ pub struct DepthRequest {
     #[serde_as(as = "DisplayFromStr")]
     pub low_texture: LowTexture,
     /// Write uncertainty.npy: the standard deviation of each depth in mm for noise that is estimated from the pair, or for
-    /// the camera's noise, --uncertainty=camera:full_well_e=20000,read_noise_e=12 (add bits=12 if the file has more bits). Methods ro
-    /// and whitened only.
+    /// the camera's noise, --uncertainty=camera:full_well_e=20000,read_noise_e=12 (add bits=12 if the file has more bits,
+    /// black=100 if a pixel without light has that code). Methods ro and whitened only.
     #[cfg_attr(
         feature = "clap",
         arg(long, value_name = "NOISE", num_args = 0..=1, require_equals = true, default_missing_value = "estimated")
@@ -158,6 +161,7 @@ impl Default for DepthRequest {
             align: Align::default(),
             balance: Balance::default(),
             region: None,
+            bin: None,
             camera_frames: None,
             min_confidence: 0.0,
             correction: None,
@@ -203,6 +207,13 @@ impl Request for DepthRequest {
         }
         if let (Method::Whitened, Some(asked)) = (self.method, &self.operators) {
             return Err(WorkflowError::parameter("operators", asked.display(), "method whitened uses none"));
+        }
+        if let Some(bin) = self.bin.filter(|bin| !(1..=16).contains(bin)) {
+            return Err(WorkflowError::parameter("bin", bin, "1 to 16 pixels"));
+        }
+        if let Some(bin) = self.bin.filter(|bin| *bin > 1 && !self.may_bin()) {
+            let expected = "region, camera_frames and operators are of the whole image: give none of them, or bin 1";
+            return Err(WorkflowError::parameter("bin", bin, expected));
         }
         if let (Some(_), Some(file)) = (self.region, &self.correction) {
             let expected = "a correction knows the lens by the place in the whole image: correct the whole map, or give no region";
@@ -273,6 +284,7 @@ pub struct DepthFigures {
 /// correction, computation, files.
 pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
     settings.check()?;
+    let settings = &settings.for_lens(context)?;
     let mut inputs = Inputs::read(settings, context)?;
     let start = Instant::now();
     let computed = inputs.compute(settings, context)?;
@@ -298,6 +310,40 @@ pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFi
 }
 
 impl DepthRequest {
+    /// The request with the method that its lens was calibrated for by `calibrate stack`, unless operators are named.
+    fn for_lens(&self, context: &Context<'_>) -> Result<Self> {
+        let usual = self.method == Method::default() && self.operators.is_none();
+        if !usual || optics::of_pair(self.optics.as_deref(), &self.far)?.0.stage().is_none() {
+            return Ok(self.clone());
+        }
+        context.info("method whitened: calibrate stack made this lens file for it");
+        Ok(Self { method: Method::Whitened, ..self.clone() })
+    }
+
+    /// Whether nothing else is tied to the pixels of the images.
+    fn may_bin(&self) -> bool {
+        self.region.is_none() && self.camera_frames.is_none() && self.operators.is_none()
+    }
+
+    /// Pixels per side that are averaged into one, and what there is to say of that.
+    fn bin_for(&self, optics: &Optics, doubts: &mut Vec<String>) -> usize {
+        let blur_px = optics.max_blur_px();
+        let needed = (blur_px / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize;
+        if let Some(bin) = self.bin {
+            return bin;
+        }
+        if needed == 1 {
+            return 1;
+        }
+        let too_much = format!("a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used");
+        if optics.distortion().is_some() || optics.stage().is_some() || !self.may_bin() {
+            doubts.push(format!("{too_much}: average {needed} x {needed} pixels of the images into one first"));
+            return 1;
+        }
+        doubts.push(format!("{too_much}: {needed} x {needed} pixels were averaged into one; bin 1 keeps all pixels"));
+        needed
+    }
+
     /// Windows, filling and threads as the library takes them.
     pub fn computation(&self) -> Settings {
         let usual = Settings::default();
@@ -375,6 +421,13 @@ impl Inputs {
             None => (optics, doubts),
         };
         let mut pair = Pair::read(&settings.far, &settings.near)?;
+        let (optics, mut doubts) = (optics, doubts);
+        let bin = settings.bin_for(&optics, &mut doubts);
+        if bin > 1 {
+            let [far, near] = [&mut pair.far, &mut pair.near].map(|image| binned(std::mem::take(image), bin));
+            (pair.far, pair.near) = (far, near);
+        }
+        let optics = optics.binned(bin);
         let around = optics.distortion().is_none().then_some(AROUND_PX);
         let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
         let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, &context.cache)?;

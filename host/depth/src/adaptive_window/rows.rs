@@ -387,10 +387,12 @@ impl<'a> Tile<'a> {
             Window::Fixed(_) => {}
             Window::Adaptive => {
                 let factor = bank.weighing_factor();
+                // Windows that differ by the model's own error see no step.
+                let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32);
                 let weighing = Weighing {
                     gamma: GAMMA * factor.sqrt(),
-                    floor: FLOOR * FLOOR / factor,
-                    largest: SAYS_NOTHING * SAYS_NOTHING / factor,
+                    floor: (FLOOR * FLOOR + tolerance * tolerance) / factor,
+                    largest: (SAYS_NOTHING * SAYS_NOTHING + tolerance * tolerance) / factor,
                 };
                 let choice = Choice { alpha: chosen, variance: of_chosen, low, high, open };
                 simd::choose(backend, alpha, variance, noise, weighing, choice);

@@ -73,15 +73,16 @@ impl Whitened {
     /// # Errors
     /// [`DesignError`] if a least squares is singular or the point spread function is none.
     pub fn design(optics: &Optics) -> Result<Self, DesignError> {
-        Self::for_psf(optics.psf(), optics.max_blur_px())
+        let floor_px = optics.stage().map_or(0.0, |stage| stage.blur_floor_px);
+        Self::for_psf(optics.psf(), optics.max_blur_px(), floor_px)
     }
 
-    fn for_psf(psf: Psf, max_blur_px: f64) -> Result<Self, DesignError> {
-        let otf = psf.checked()?.otf(1.2 * max_blur_px);
+    fn for_psf(psf: Psf, max_blur_px: f64, floor_px: f64) -> Result<Self, DesignError> {
+        let otf = psf.checked()?.otf((1.2 * max_blur_px).hypot(floor_px));
         let points = points();
         let alphas: [f64; ALPHAS] =
             std::array::from_fn(|i| REACH * (2.0 * i as f64 / (ALPHAS - 1) as f64 - 1.0));
-        let sampled = |point: &Point| alphas.map(|alpha| sample(&otf, max_blur_px, point.at.w, alpha));
+        let sampled = |point: &Point| alphas.map(|alpha| sample(&otf, [max_blur_px, floor_px], point.at.w, alpha));
         let samples: Vec<[Sample; ALPHAS]> = points.iter().map(sampled).collect();
         let residual = residual(&points, &samples)?;
         let matched = matched(&points, &samples, &residual)?;
@@ -106,8 +107,10 @@ fn points() -> Vec<Point> {
         .collect()
 }
 
-fn sample(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> Sample {
-    let both = |alpha: f64| [1.0 + alpha, 1.0 - alpha].map(|factor| otf.at(0.5 * factor * max_blur_px, w));
+fn sample(otf: &Otf, [max_blur_px, floor_px]: [f64; 2], w: f64, alpha: f64) -> Sample {
+    let both = |alpha: f64| {
+        [1.0 + alpha, 1.0 - alpha].map(|factor| otf.at((0.5 * factor * max_blur_px).hypot(floor_px), w))
+    };
     let h = both(alpha);
     let (above, below) = (both(alpha + STEP), both(alpha - STEP));
     let slope = |i: usize| (above[i] - below[i]) / (2.0 * STEP);
@@ -240,7 +243,7 @@ mod tests {
     /// The taps that an independent study printed for the Gaussian.
     #[test]
     fn the_taps_are_those_of_the_study() {
-        let found = Whitened::for_psf(Psf::Gaussian { k: 0.4578 }, 2.703).unwrap();
+        let found = Whitened::for_psf(Psf::Gaussian { k: 0.4578 }, 2.703, 0.0).unwrap();
         let printed = [
             [0.29505, 0.09289, 0.04108, 0.00455, 0.00016, 0.00095],
             [0.42695, -0.01821, -0.03542, -0.0235, -0.01588, 0.00177],
@@ -260,7 +263,7 @@ mod tests {
     #[test]
     fn noise_does_not_bias_and_the_mean_says_nothing() {
         for psf in [Psf::PillBox, Psf::Gaussian { k: 0.4578 }, Psf::Generalised { p: 1.8, k: 0.4802 }] {
-            let found = Whitened::for_psf(psf, 2.703).unwrap();
+            let found = Whitened::for_psf(psf, 2.703, 0.0).unwrap();
             let [_, r1, _, r3] = &found.residual;
             for kernel in [r1, r3, &found.matched] {
                 assert!(kernel.response(0.0, 0.0).abs() < 1e-9, "{psf}");

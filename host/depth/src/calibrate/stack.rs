@@ -3,13 +3,14 @@
 //! 1. [`focus_plane`]: depth from focus per block gives the slice in focus at each pixel, a plane.
 //! 2. [`blur`]: spectra of each slice against the sharpest give blur over distance, on both sides of focus.
 //! 3. Pair separation and binning for a largest blur of 2 to 3 px.
-//! 4. Every pair (i, i + d) is measured with several PSFs and blur radii; the response from measured to true normalised depth is
-//!    a polynomial fitted on one half of a checkerboard of blocks. The other half chooses among them and gives the error that is
-//!    left, which becomes a part of every later standard deviation.
+//! 4. Every pair (i, i + d) is measured with several PSFs, blur radii and least blurs; the response from measured to true normalised
+//!    depth is a polynomial fitted on one half of the field in every other pair. The other parts choose among them and give the
+//!    error that is left, which becomes a part of every later standard deviation.
 //!
 //! Distances are relative: the far plane lies at [`StackSettings::far_mm`], and depth falls by one step of the stage per slice.
 
 pub mod blur;
+mod curve;
 pub mod focus_plane;
 mod response;
 
@@ -30,6 +31,8 @@ const AIM_PX: f64 = 2.5;
 const USABLE_PX: [f64; 2] = [1.6, 3.4];
 /// Binnings that are tried.
 const BINS: [usize; 4] = [1, 2, 4, 8];
+/// Pairs that see the target at as many depths within the range are enough to learn a response from.
+const ENOUGH_DEPTHS: usize = 4;
 /// Fewest slices.
 pub const FEWEST: usize = 5;
 
@@ -106,7 +109,7 @@ pub struct StackLens {
     pub trials: Vec<Trial>,
 }
 
-/// Errors on blocks that the response was not learned from.
+/// Errors on parts that the response was not learned from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// `1.4826 x` median of |error|, mm.
@@ -121,6 +124,8 @@ pub struct HeldOut {
     pub fill: f64,
     /// Part of the errors within three predicted standard deviations.
     pub within_three: f64,
+    /// Root mean square of error over predicted standard deviation.
+    pub scatter: f64,
     /// Number of pairs.
     pub pairs: usize,
 }
@@ -138,8 +143,15 @@ pub fn calibrate_stack(slices: &[Array2<f32>], settings: &StackSettings) -> Resu
     let plane_of_bins = plane.binned(bin);
     let radius = (blur.px_per_slice() * pair_step as f64 / bin as f64).clamp(1.0, 4.0);
     let optics_of = |psf: Psf, max_blur_px: f64| optics(psf, max_blur_px, bin, pair_step, settings);
-    let (optics, held_out, trials) =
-        response::learn(&small, &plane_of_bins, pair_step, bin, radius, settings.step_mm, &optics_of)?;
+    let (optics, held_out, trials) = response::learn(&response::Target {
+        slices: &small,
+        plane: &plane_of_bins,
+        pair_step,
+        bin,
+        radius_px: radius,
+        step_mm: settings.step_mm,
+        optics_of: &optics_of,
+    })?;
     Ok(StackLens { optics, plane, blur, held_out, trials })
 }
 
@@ -163,7 +175,8 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     Ok(())
 }
 
-/// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first.
+/// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first, and separations of at least
+/// [`ENOUGH_DEPTHS`] slices: with one of n slices, n pairs see the target within their range.
 fn separation(
     blur: &BlurCurve,
     slices: usize,
@@ -180,8 +193,10 @@ fn separation(
         .map(|(bin, step)| (bin, step, per_slice * step as f64 / bin as f64))
         .filter(|(_, _, radius)| forced || (USABLE_PX[0]..=USABLE_PX[1]).contains(radius))
         .min_by(|a, b| {
-            let cost =
-                |(bin, _, radius): &(usize, usize, f64)| (radius - AIM_PX).abs() + 0.3 * (*bin as f64).log2();
+            let cost = |(bin, step, radius): &(usize, usize, f64)| {
+                let missing = ENOUGH_DEPTHS.saturating_sub(*step) as f64;
+                (radius - AIM_PX).abs() + 0.3 * (*bin as f64).log2() + 0.5 * missing
+            };
             cost(a).total_cmp(&cost(b))
         })
         .map(|(bin, step, _)| (bin, step))

@@ -18,10 +18,22 @@ pub struct Stage {
     pub measured: [f64; 2],
     /// True normalised depth at evenly spaced measured ones, rising.
     pub response: [f64; RESPONSE_POINTS],
+    /// Least blur radius of the lens (diffraction, aberration), binned px: radii are `sqrt(geometric^2 + floor^2)`.
+    #[serde(default)]
+    pub blur_floor_px: f64,
+    /// Difference of normalised depth by which windows of several sizes may differ without a step in the scene.
+    #[serde(default)]
+    pub window_tolerance: f64,
     /// Standard deviation of the normalised depth beyond what noise explains, on held-out parts of the target.
     pub residual: f64,
-    /// Median of what the model leaves relative to the noise.
-    pub usual_misfit: f64,
+    /// Median over the target of [`unexplained`].
+    pub usual_unexplained: f64,
+}
+
+/// What the model leaves of the texture around a pixel, as a variance of normalised depth: `misfit` is its mean square relative
+/// to the noise, `deviation` the standard deviation of normalised depth by noise.
+pub fn unexplained(misfit: f32, deviation: f32) -> f32 {
+    (misfit - 1.0).max(0.0) * deviation * deviation
 }
 
 impl Stage {
@@ -31,7 +43,16 @@ impl Stage {
         let response = std::array::from_fn(|i| {
             measured[0] + (measured[1] - measured[0]) * i as f64 / (RESPONSE_POINTS - 1) as f64
         });
-        Self { bin, pair_step, measured, response, residual: 0.0, usual_misfit: 1e6 }
+        Self {
+            bin,
+            pair_step,
+            measured,
+            response,
+            blur_floor_px: 0.0,
+            window_tolerance: 0.0,
+            residual: 0.0,
+            usual_unexplained: 1.0,
+        }
     }
 
     /// True normalised depth and slope at a measured one; `None` outside the learned range.
@@ -59,8 +80,17 @@ impl Stage {
         if self.response.windows(2).any(|pair| pair[1] < pair[0]) {
             return Some("response must rise");
         }
-        let positive = self.residual >= 0.0 && self.residual < 2.0 && self.usual_misfit > 0.0;
-        (!positive).then_some("residual must be 0 to 2 and usual_misfit above 0")
+        if !(0.0..=8.0).contains(&self.blur_floor_px) {
+            return Some("blur_floor_px must be 0 to 8");
+        }
+        if !(0.0..=0.5).contains(&self.window_tolerance) {
+            return Some("window_tolerance must be 0 to 0.5");
+        }
+        let positive = self.residual >= 0.0
+            && self.residual < 2.0
+            && self.usual_unexplained > 0.0
+            && self.usual_unexplained.is_finite();
+        (!positive).then_some("residual must be 0 to 2 and usual_unexplained above 0")
     }
 }
 

@@ -1,14 +1,15 @@
 //! Where both images show the same: what moved between the exposures, and pairs that are none.
 //!
 //! In the band that defocus leaves to both images (`band`) these are correlated by nearly 1 wherever they show
-//! the same surface, less what noise takes. A window in which they are not, although both have detail far above the noise,
-//! shows something else in each: it moved.
+//! the same surface, less what noise takes. A window in which they are not, although both have detail far above the noise, either
+//! moved or is blurred more than the band allows for: much blur turns the sign of detail. Coarse detail tells them apart, because
+//! blur leaves it alone; so does a shift that brings the detail of both images together.
 //!
-//! Cost: three box means per pixel of the small images (`thinned`).
+//! Cost: three box means per pixel of the small images (`thinned`), and 24 more where something differs.
 
 use ndarray::{Array2, Zip};
 
-use super::band::{band_noise_gain, box_mean, halving_noise_gain};
+use super::band::{band, band_noise_gain, box_mean, halved, halving_noise_gain};
 use super::noise::PairNoise;
 use super::thinned::Thinned;
 
@@ -18,6 +19,15 @@ const WINDOW_PX: usize = 21;
 const DETAIL: f32 = 0.6;
 /// Correlation relative to what noise allows below which a window shows different things.
 const DIFFERENT: f32 = 0.5;
+
+/// Halvings down to coarse detail.
+const COARSER: usize = 2;
+/// Correlation of coarse detail from which a window shows the same thing, blurred.
+const SAME_COARSE: f32 = 0.6;
+/// Correlation at a shift from which a window shows the same thing, moved.
+const SAME_SHIFTED: f32 = 0.75;
+/// Shifts that are tried along both axes and both diagonals, px.
+const SHIFTS_PX: [isize; 3] = [2, 4, 6];
 
 /// What the comparison of a pair says.
 #[derive(Debug, Clone)]
@@ -29,6 +39,8 @@ pub struct Agreement {
     pub detailed: f64,
     /// Pixels that show different things, (height, width) of the images; `None` where there are none.
     pub moved: Option<Array2<bool>>,
+    /// Pixels that show the same thing with more blur than a pair has.
+    pub too_blurred: Option<Array2<bool>>,
 }
 
 /// Compares a pair that lies on each other and has `size` at full size.
@@ -53,12 +65,63 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
         }
     });
     let detailed = windows / different.len() as f64;
-    let any = different.iter().any(|d| *d);
+    let mut too_blurred = Array2::from_elem(different.dim(), false);
+    if different.iter().any(|d| *d) {
+        let coarse = coarse_correlation(pair);
+        let mut unmoved = coarse.mapv(|correlation| correlation > SAME_COARSE);
+        let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
+        for shift in SHIFTS_PX {
+            for (dy, dx) in [(0, 1), (1, 0), (1, 1), (1, -1), (0, -1), (-1, 0), (-1, -1), (-1, 1)] {
+                let shifted = product_at(a, b, dy * shift, dx * shift);
+                Zip::from(&mut unmoved)
+                    .and(&shifted)
+                    .and(&limit)
+                    .for_each(|unmoved, product, limit| *unmoved &= product < limit);
+            }
+        }
+        Zip::from(&mut too_blurred).and(&mut different).and(&unmoved).for_each(|blurred, moved, unmoved| {
+            *blurred = *moved && *unmoved;
+            *moved &= !*unmoved;
+        });
+    }
+    let mask = |mask: &Array2<bool>| mask.iter().any(|d| *d).then(|| enlarged(mask, factor, size));
     Agreement {
         correlation: (windows > 0.0).then(|| sum / expected),
         detailed,
-        moved: any.then(|| enlarged(&different, factor, size)),
+        moved: mask(&different),
+        too_blurred: mask(&too_blurred),
     }
+}
+
+/// Correlation of coarse detail around each pixel of the small images.
+fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
+    let size = pair.far.image.dim();
+    let [a, b] = [&pair.far.image, &pair.near.image].map(|image| {
+        let mut small = image.clone();
+        for _ in 0..COARSER {
+            small = halved(small.view());
+        }
+        band(small.view())
+    });
+    let window = WINDOW_PX / 2 + 1;
+    let mean = |x: &Array2<f32>, y: &Array2<f32>| box_mean((x * y).view(), window);
+    let [product, of_a, of_b] = [mean(&a, &b), mean(&a, &a), mean(&b, &b)];
+    let correlation = Zip::from(&product).and(&of_a).and(&of_b).map_collect(|product, a, b| {
+        product / (a * b).sqrt().max(f32::MIN_POSITIVE)
+    });
+    let (height, width) = correlation.dim();
+    let factor = 1 << COARSER;
+    Array2::from_shape_fn(size, |(y, x)| correlation[((y / factor).min(height - 1), (x / factor).min(width - 1))])
+}
+
+/// Mean product of `a` and `b` around each pixel, `b` moved by so many pixels down and to the right.
+fn product_at(a: &Array2<f32>, b: &Array2<f32>, down: isize, right: isize) -> Array2<f32> {
+    let (height, width) = a.dim();
+    let inside = |i: usize, by: isize, n: usize| (i as isize + by).clamp(0, n as isize - 1) as usize;
+    let product = Array2::from_shape_fn((height, width), |(y, x)| {
+        a[(y, x)] * b[(inside(y, down, height), inside(x, right, width))]
+    });
+    box_mean(product.view(), WINDOW_PX)
 }
 
 /// A mask of a level in the pixels of the image.

@@ -1,7 +1,7 @@
 //! Pixels that do not say what the scene is: saturated, black, bad, not finite.
 //!
 //! A single one is replaced by the mean of its neighbours: among the hundreds of pixels that a depth rests on, its error
-//! counts no more than a little noise. A patch has no such neighbours and becomes a hole (NaN), which takes everything
+//! counts no more than a little noise. A clipped highlight stays as it is: its value is a lower bound, and its neighbours are darker. A patch has no such neighbours and becomes a hole (NaN), which takes everything
 //! along that sees it.
 
 use ndarray::{Array2, ArrayView2};
@@ -12,6 +12,9 @@ use crate::reason::Reason;
 const NEIGHBOURHOOD_PX: isize = 2;
 /// Most defects in it, the pixel included.
 const ALONE: usize = 6;
+
+/// Mean of the neighbours relative to a saturated pixel from which it is a clipped highlight; a pixel far above them is defective.
+const HIGHLIGHT: f32 = 0.5;
 
 /// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a camera
 /// that clips, `bad` the camera's bad pixels.
@@ -85,7 +88,9 @@ pub(super) fn mend(image: &mut Array2<f32>, marks: &Array2<u8>) {
             sum += weight * image[at];
             weights += weight;
         }
-        mended.push(((y, x), if defects <= ALONE && weights > 0.5 { sum / weights } else { f32::NAN }));
+        let clipped = marks[(y, x)] == Reason::Saturated.code() && sum / weights > HIGHLIGHT * image[(y, x)];
+        let value = if clipped { image[(y, x)] } else { sum / weights };
+        mended.push(((y, x), if defects <= ALONE && weights > 0.5 { value } else { f32::NAN }));
     }
     for (at, value) in mended {
         image[at] = value;
@@ -111,6 +116,15 @@ mod tests {
         mend(&mut image, &marks);
         assert!((image[(10, 10)] - 0.4).abs() < 1e-3 && (image[(15, 5)] - 0.4).abs() < 1e-3);
         assert!(image[(22, 22)].is_nan() && !image[(18, 18)].is_nan());
+    }
+
+    #[test]
+    fn a_clipped_highlight_stays_at_its_lower_bound() {
+        let mut image = Array2::from_shape_fn((30, 40), |(y, x)| 0.7 + 0.003 * (y + x) as f32);
+        image[(10, 10)] = 1.0;
+        let marks = find(image.view(), Some([0.0, 1.0]), None).unwrap();
+        mend(&mut image, &marks);
+        assert_eq!(image[(10, 10)], 1.0);
     }
 
     #[test]

@@ -331,8 +331,9 @@ fn what_cannot_be_learned_or_applied_says_so() {
     let error = correction.apply(Array2::zeros((60, 81)).view()).unwrap_err();
     assert!(error.to_string().contains("81x60") && error.to_string().contains("80x60"), "{error}");
     correction.check_range(&optics().working_range()).unwrap();
-    let mut other = optics().working_range();
-    other.far_mm = 960.0;
+    let range = optics().working_range();
+    let mut other = range;
+    (other.far_mm, other.near_mm) = (range.far_mm + 100.0, range.near_mm + 100.0);
     assert!(matches!(correction.check_range(&other), Err(CorrectionError::RangeMismatch { .. })));
     assert!("clfs".parse::<Method>().is_err());
 }

@@ -11,4 +11,7 @@ mod measure;
 mod optics_files;
 mod planes;
 mod stack;
+mod random_planes;
 mod uncertainty;
+mod wave;
+mod scratch;

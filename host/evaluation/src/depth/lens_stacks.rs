@@ -38,6 +38,8 @@ struct Judged {
     slope: f64,
     fill: f64,
     within_three: f64,
+    /// Root mean square of error over predicted SD.
+    scatter: f64,
 }
 
 pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
@@ -83,10 +85,11 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
             format!("{:.3}", found.slope),
             format!("{:.3}", found.fill),
             format!("{:.1} %", 100.0 * found.within_three),
+            format!("{:.2}", found.scatter),
         ]);
     }
     let head =
-        ["binning, step", "peer", "robust error", "of the peer's", "RMSE", "slope", "fill", "within 3 SD"];
+        ["binning, step", "peer", "robust error", "of the peer's", "RMSE", "slope", "fill", "within 3 SD", "error / SD"];
     page.table(1, &head, &rows);
     Ok(())
 }
@@ -100,6 +103,7 @@ fn judge(slices: &[Array2<f32>], optics: &Optics, truth: &Truth, bin: usize, ste
     let (far_mm, half_mm) = (optics.working_range().far_mm, 0.5 * truth.step_mm * step as f64);
     let plane = &truth.plane_slice;
     let (mut sizes, mut squares, mut total, mut within) = (Vec::new(), 0.0, 0_usize, 0_usize);
+    let mut relative = 0.0;
     let mut medians: Vec<[f64; 2]> = Vec::new();
     let size = slices[0].dim();
     let focus = |y: usize, x: usize| {
@@ -126,7 +130,9 @@ fn judge(slices: &[Array2<f32>], optics: &Optics, truth: &Truth, bin: usize, ste
                 let error = depth - true_mm;
                 sizes.push(error.abs());
                 squares += error * error;
-                within += usize::from(error.abs() <= 3.0 * f64::from(found.validity.deviation_mm[(y, x)]));
+                let predicted = f64::from(found.validity.deviation_mm[(y, x)]);
+                within += usize::from(error.abs() <= 3.0 * predicted);
+                relative += (error / predicted).powi(2);
                 measured.push(depth);
                 true_ones.push(true_mm);
             }
@@ -147,6 +153,7 @@ fn judge(slices: &[Array2<f32>], optics: &Optics, truth: &Truth, bin: usize, ste
         slope: xy / xx,
         fill: count as f64 / total as f64,
         within_three: within as f64 / count as f64,
+        scatter: (relative / count as f64).sqrt(),
     })
 }
 

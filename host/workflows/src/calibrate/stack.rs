@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_depth::calibrate::stack::{StackLens, StackSettings, blur::BlurPoint, calibrate_stack};
+use farnear_depth::calibrate::stack::{StackLens, StackSettings, calibrate_stack};
+use farnear_depth::optics::{RESPONSE_POINTS, Stage};
 use farnear_files::{image_file::read_grey, staging};
 use ndarray::Array2;
 use schemars::JsonSchema;
@@ -21,6 +22,8 @@ const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
 const HONEST: f64 = 0.97;
 /// Part of the pixels that must have a depth.
 const FILLED: f64 = 0.9;
+/// Normalised depth, of 2, that the response must span.
+const LEARNED: f64 = 1.2;
 
 /// Calibrate a lens from a z-stack of a flat, textured target (tilted or not), slices one stage step apart.
 ///
@@ -32,13 +35,13 @@ const FILLED: f64 = 0.9;
     feature = "clap",
     command(after_help = "\
 Example: farnear calibrate stack slices --step-mm 0.1 --out lens.toml
-         farnear depth slices/05.png slices/07.png --optics lens.toml --method whitened")
+         farnear depth slices/06.png slices/11.png --optics lens.toml")
 )]
 #[serde(default)]
 pub struct CalibrateStackRequest {
     /// Folder with the slices, one image each.
     pub folder: PathBuf,
-    /// Distance between neighbouring slices, mm.
+    /// Distance between neighbouring slices in mm, or in any unit of the stage (um, steps); all depths are in that unit then.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub step_mm: f64,
     /// Pixel pitch of the camera, um; only the scale of point clouds depends on it.
@@ -93,6 +96,8 @@ impl Request for CalibrateStackRequest {
 pub struct StackFigures {
     /// `good`, or what to change.
     pub verdict: String,
+    /// How to measure with the lens file.
+    pub next: String,
     /// Number of slices.
     pub slices: usize,
     /// Slices from the far to the near image of a pair.
@@ -107,9 +112,13 @@ pub struct StackFigures {
     pub range_mm: f64,
     /// Blur radius per slice before and behind the focus, px of the camera.
     pub blur_per_slice_px: [f64; 2],
-    /// Blur of every slice.
-    pub blur: Vec<BlurPoint>,
-    /// `1.4826 x` median of |error| on held-out blocks, mm.
+    /// Slices from the focus and blur radius beyond the sharpest slice's, px of the camera, for every slice.
+    pub blur: Vec<[f64; 2]>,
+    /// Least blur radius, binned px.
+    pub blur_floor_px: f64,
+    /// Part of the range that was learned, mm.
+    pub learned_mm: f64,
+    /// `1.4826 x` median of |error| on held-out parts of the target, mm.
     pub robust_mm: f64,
     /// Root mean square error there, mm.
     pub rms_mm: f64,
@@ -121,6 +130,8 @@ pub struct StackFigures {
     pub fill: f64,
     /// Part of the errors within three predicted standard deviations there.
     pub within_three: f64,
+    /// Root mean square of error over predicted standard deviation there.
+    pub scatter: f64,
     /// Standard deviation beyond what noise explains, mm.
     pub residual_mm: f64,
     /// Number of pairs.
@@ -132,11 +143,13 @@ pub struct StackFigures {
 /// # Errors
 /// The folder, its images; [`WorkflowError::Parameter`] for a stack that gives no lens.
 pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Result<StackFigures> {
-    let mut slices = slices(&request.folder)?;
-    context.cancel.check("reading the slices")?;
+    let mut files = files(&request.folder)?;
     if request.near_first {
-        slices.reverse();
+        files.reverse();
     }
+    let slices =
+        files.iter().map(|path| Ok(read_grey(path)?.pixels)).collect::<Result<Vec<Array2<f32>>>>()?;
+    context.cancel.check("reading the slices")?;
     let settings = StackSettings {
         step_mm: request.step_mm,
         pixel_um: request.pixel_um,
@@ -149,37 +162,62 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     context.cancel.check("calibrating the lens")?;
     staging::write_file(&request.out, toml::to_string(&found.optics)?.as_bytes())?;
     context.info(&format!("wrote {}", request.out.display()));
-    Ok(figures(&found, slices.len(), request))
+    Ok(figures(&found, &files, slices[0].dim(), request))
 }
 
-fn figures(found: &StackLens, slices: usize, request: &CalibrateStackRequest) -> StackFigures {
-    let StackLens { optics, blur, held_out, .. } = found;
-    let (bin, pair_step, residual) =
-        optics.stage().map_or((1, 1, f64::NAN), |stage| (stage.bin, stage.pair_step, stage.residual));
+fn figures(
+    found: &StackLens,
+    files: &[PathBuf],
+    size: (usize, usize),
+    request: &CalibrateStackRequest,
+) -> StackFigures {
+    let StackLens { optics, blur, held_out, plane, .. } = found;
+    let stage = optics.stage().copied().unwrap_or_else(|| Stage::identity(1, 1));
+    let Stage { bin, pair_step, residual, .. } = stage;
     let range_mm = request.step_mm * pair_step as f64;
+    let learned = stage.response[RESPONSE_POINTS - 1] - stage.response[0];
+    let middle = plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64) - 0.5 * pair_step as f64;
+    let far = (middle.round().max(0.0) as usize).min(files.len().saturating_sub(pair_step + 1));
+    let next = format!(
+        "take pairs {pair_step} slices ({range_mm} mm) apart, the far-focused image first: farnear depth {} {} --optics {}",
+        files[far].display(),
+        files[far + pair_step].display(),
+        request.out.display()
+    );
     StackFigures {
-        verdict: verdict(found),
-        slices,
+        verdict: verdict(found, learned),
+        next,
+        slices: files.len(),
         pair_step,
         bin,
         psf: optics.psf().to_string(),
         max_blur_px: rounded(optics.max_blur_px(), 3),
         range_mm: rounded(range_mm, 6),
         blur_per_slice_px: blur.per_slice_px.map(|blur| rounded(blur, 3)),
-        blur: blur.points.clone(),
+        blur: blur.points.iter().map(|p| [p.slices, p.radius_px].map(|value| rounded(value, 3))).collect(),
+        blur_floor_px: stage.blur_floor_px,
+        learned_mm: rounded(0.5 * learned * range_mm, 6),
         robust_mm: rounded(held_out.robust_mm, 6),
         rms_mm: rounded(held_out.rms_mm, 6),
         bias_mm: rounded(held_out.bias_mm, 6),
         slope: rounded(held_out.slope, 4),
         fill: rounded(held_out.fill, 4),
         within_three: rounded(held_out.within_three, 4),
+        scatter: rounded(held_out.scatter, 3),
         residual_mm: rounded(0.5 * residual * range_mm, 6),
         pairs: held_out.pairs,
     }
 }
 
-fn verdict(found: &StackLens) -> String {
+fn verdict(found: &StackLens, learned: f64) -> String {
     let held_out = &found.held_out;
+    if learned < LEARNED {
+        return format!(
+            "only {:.0} % of the range of a pair was learned, depths outside that part are left out: take more slices around the focus, \
+             or tilt the target",
+            50.0 * learned
+        );
+    }
     if held_out.fill < FILLED {
         return format!(
             "only {:.0} % of the target has a depth: use a target with more fine texture, more light or a finer step",
@@ -203,7 +241,7 @@ fn verdict(found: &StackLens) -> String {
 }
 
 /// The images of a folder by the last number in their names.
-fn slices(folder: &Path) -> Result<Vec<Array2<f32>>> {
+fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let unusable = |expected: String| WorkflowError::parameter("folder", folder.display(), expected);
     let entries = std::fs::read_dir(folder).map_err(|error| unusable(error.to_string()))?;
     let mut files: Vec<(f64, PathBuf)> = entries
@@ -218,7 +256,7 @@ fn slices(folder: &Path) -> Result<Vec<Array2<f32>>> {
     if files.is_empty() {
         return Err(unusable("expected images whose names hold their number, such as 01.png".into()));
     }
-    files.into_iter().map(|(_, path)| Ok(read_grey(&path)?.pixels)).collect()
+    Ok(files.into_iter().map(|(_, path)| path).collect())
 }
 
 /// The last number in a file's name.

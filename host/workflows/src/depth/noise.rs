@@ -26,12 +26,14 @@ pub enum CameraNoise {
     Estimated,
     /// From the camera's data sheet.
     Camera {
-        /// Electrons at the images' largest code (float images: at the value 1).
+        /// Electrons from black to the images' largest code (float images: to the value 1).
         full_well_e: f64,
         /// Read noise, electrons.
         read_noise_e: f64,
         /// Bits of the camera, where the file has more.
         bits: Option<u8>,
+        /// Code of a pixel without light, in the codes of the camera (float images: value).
+        black: f64,
     },
 }
 
@@ -53,18 +55,19 @@ impl FromStr for CameraNoise {
 }
 
 fn parse(text: &str) -> Result<CameraNoise, String> {
-    const EXPECTED: &str = "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12)";
+    const EXPECTED: &str = "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12, black=100)";
     if text == "estimated" {
         return Ok(CameraNoise::Estimated);
     }
     let values = text.strip_prefix("camera:").ok_or(EXPECTED)?;
-    let [mut full_well, mut read_noise, mut bits] = [None; 3];
+    let [mut full_well, mut read_noise, mut bits, mut black] = [None; 4];
     for part in values.split(',') {
         let (name, value) = part.split_once('=').ok_or(EXPECTED)?;
         let place = match name {
             "full_well_e" => &mut full_well,
             "read_noise_e" => &mut read_noise,
             "bits" => &mut bits,
+            "black" => &mut black,
             _ => return Err(format!("unknown {name}: {EXPECTED}")),
         };
         let number: f64 =
@@ -84,16 +87,22 @@ fn parse(text: &str) -> Result<CameraNoise, String> {
         Some(bits) => return Err(format!("bits = {bits}: a camera has 4 to 16")),
         None => None,
     };
-    Ok(CameraNoise::Camera { full_well_e, read_noise_e, bits })
+    let black = black.unwrap_or(0.0);
+    let brightest = bits.map_or(65_535.0, |bits| 2f64.powi(i32::from(bits)) - 1.0);
+    if !(0.0..brightest).contains(&black) {
+        return Err(format!("black = {black}: expected a code from 0 to below {brightest}"));
+    }
+    Ok(CameraNoise::Camera { full_well_e, read_noise_e, bits, black })
 }
 
 impl fmt::Display for CameraNoise {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Estimated => write!(f, "estimated"),
-            Self::Camera { full_well_e, read_noise_e, bits } => {
+            Self::Camera { full_well_e, read_noise_e, bits, black } => {
                 write!(f, "camera:full_well_e={full_well_e},read_noise_e={read_noise_e}")?;
-                bits.map_or(Ok(()), |bits| write!(f, ",bits={bits}"))
+                bits.map_or(Ok(()), |bits| write!(f, ",bits={bits}"))?;
+                if *black > 0.0 { write!(f, ",black={black}") } else { Ok(()) }
             }
         }
     }
@@ -105,7 +114,7 @@ impl CameraNoise {
         match self.of(samples) {
             Noise::Camera { constant, per_unit } => {
                 // At half of full scale.
-                Some(PairNoise { constant, per_unit, mean_variance: constant + 0.5 * per_unit })
+                Some(PairNoise { constant, per_unit, mean_variance: (constant + 0.5 * per_unit).max(0.0) })
             }
             Noise::Estimated => None,
         }
@@ -113,15 +122,19 @@ impl CameraNoise {
 
     /// The noise of images whose files have such samples and whose values are 1 at full scale.
     fn of(self, samples: Samples) -> Noise {
-        let Self::Camera { full_well_e, read_noise_e, bits } = self else { return Noise::Estimated };
+        let Self::Camera { full_well_e, read_noise_e, bits, black } = self else { return Noise::Estimated };
         let bits = match samples {
             Samples::Integer(of_file) => Some(bits.map_or(of_file, |bits| bits.min(of_file))),
             Samples::Float => bits,
         };
-        let rounding = bits.map_or(0.0, |bits| (2f64.powi(i32::from(bits)) - 1.0).powi(-2) / 12.0);
+        let code = bits.map_or(1.0, |bits| (2f64.powi(i32::from(bits)) - 1.0).recip());
+        let rounding = bits.map_or(0.0, |_| code * code / 12.0);
+        let black = (black * code).clamp(0.0, 0.99);
+        let per_unit = (1.0 - black) / full_well_e;
+        // Shot noise counts from the black level on.
         Noise::Camera {
-            constant: (read_noise_e / full_well_e).powi(2) + rounding,
-            per_unit: 1.0 / full_well_e,
+            constant: ((1.0 - black) * read_noise_e / full_well_e).powi(2) + rounding - per_unit * black,
+            per_unit,
         }
     }
 }
@@ -206,7 +219,8 @@ mod tests {
     #[test]
     fn noise_is_named_like_everything_else() {
         let camera = "camera:full_well_e=20000,read_noise_e=12,bits=12";
-        for text in ["estimated", camera, "camera:full_well_e=5e4,read_noise_e=0"] {
+        let with_black = "camera:full_well_e=20000,read_noise_e=12,bits=16,black=100";
+        for text in ["estimated", camera, with_black, "camera:full_well_e=5e4,read_noise_e=0"] {
             let noise: CameraNoise = text.parse().unwrap();
             assert_eq!(noise.to_string().parse(), Ok(noise));
         }
@@ -218,6 +232,8 @@ mod tests {
             ("camera:full_well_e=1,read_noise_e=1,gain=2", "unknown gain"),
             ("camera:full_well_e=1,full_well_e=1,read_noise_e=1", "twice"),
             ("camera:full_well_e=1,read_noise_e=1,bits=17", "4 to 16"),
+            ("camera:full_well_e=1,read_noise_e=1,bits=8,black=255", "below 255"),
+            ("camera:full_well_e=1,read_noise_e=1,black=-1", "from 0"),
         ] {
             let error = wrong.parse::<CameraNoise>().unwrap_err();
             assert!(error.reason.contains(phrase), "{wrong}: {error}");
@@ -230,11 +246,23 @@ mod tests {
         let Noise::Camera { constant, per_unit } = Noise::camera(20_000.0, 12.0, 255.0) else {
             unreachable!()
         };
-        let noise = CameraNoise::Camera { full_well_e: 20_000.0, read_noise_e: 12.0, bits: None };
+        let noise = CameraNoise::Camera { full_well_e: 20_000.0, read_noise_e: 12.0, bits: None, black: 0.0 };
         let Noise::Camera { constant: of_unit, per_unit: shot } = noise.of(Samples::Integer(8)) else {
             unreachable!()
         };
         assert!((of_unit * 255.0 * 255.0 / constant - 1.0).abs() < 1e-12);
         assert!((shot * 255.0 / per_unit - 1.0).abs() < 1e-12);
+    }
+
+    /// A camera whose black is at code 100 of 1,023 has at code 100 its read noise alone, and its full well at code 1,023.
+    #[test]
+    fn shot_noise_counts_from_the_black_level() {
+        let noise: CameraNoise = "camera:full_well_e=20000,read_noise_e=12,bits=10,black=100".parse().unwrap();
+        let Noise::Camera { constant, per_unit } = noise.of(Samples::Integer(10)) else { unreachable!() };
+        let codes_per_electron: f64 = 923.0 / 20_000.0;
+        let at = |code: f64| (constant + per_unit * code / 1023.0) * 1023.0 * 1023.0 - 1.0 / 12.0;
+        let read = (12.0 * codes_per_electron).powi(2);
+        assert!((at(100.0) - read).abs() < 1e-9, "{}", at(100.0));
+        assert!((at(1023.0) - read - 923.0 * codes_per_electron).abs() < 1e-9);
     }
 }

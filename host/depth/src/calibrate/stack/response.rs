@@ -1,30 +1,59 @@
-//! The response from measured to true normalised depth, learned on half of the blocks of a checkerboard and judged on the rest.
+//! Which PSF, blur and response fit the target, learned on a part of it and judged on the rest.
+//!
+//! Choices are made on a checkerboard of blocks. The error is stated more strictly: a part is a half of the field in every other
+//! pair, judged by what was learned on the other half in the other pairs, at other places and other distances; and the target is judged
+//! a second time with its texture made coarser, which no choice may depend on.
 
-use nalgebra::{DMatrix, DVector};
-use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use ndarray::Array2;
+
+use super::curve::Curve;
 use super::focus_plane::FocusPlane;
 use super::{HeldOut, StackError};
 use crate::adaptive_window::Window;
-use crate::measure::{DepthMethod, MeasureSettings, measure_pair};
-use crate::optics::{Optics, RESPONSE_POINTS, Stage};
+use crate::border::reflect;
+use crate::measure::{DepthMethod, MeasureSettings, measure};
+use crate::optics::{Optics, Stage, unexplained};
 use crate::pipeline::Settings;
+use crate::prepare::{PrepareSettings, Prepared, prepare_owned};
 use crate::psf::Psf;
+use crate::validity::model_error;
 
-/// Side of a block, px: larger than what windows see.
+/// Side of a block of the checkerboard, px: larger than what windows see.
 const BLOCK_PX: usize = 48;
 /// Border that takes no part, px.
 const BORDER_PX: usize = 12;
-/// One of so many pixels is used.
+/// One of so many pixels is used, along both axes.
 const THIN: usize = 5;
 /// True normalised depths that are learned; a little beyond the range.
 const LEARNED: f64 = 1.12;
+/// Measured normalised depths that the operators still tell apart.
+const MEASURED: f64 = 1.17;
+/// Standard deviation of normalised depth by noise beyond which a pixel has no depth.
+const TOO_NOISY: f64 = 0.12;
 /// Degrees of the polynomial.
 const DEGREES: [usize; 3] = [1, 3, 5];
 /// Blur radii relative to the measured one.
 const FACTORS: [f64; 5] = [0.7, 0.85, 1.0, 1.2, 1.4];
+/// Price of a blur that differs from the measured one, per square of the logarithm of their ratio.
+const UNLIKELY: f64 = 0.5;
+/// Least blur radii that are tried with the best PSF, px.
+const FLOORS_PX: [f64; 2] = [0.5, 0.9];
+/// Differences between windows that are tried with the best lens.
+const TOLERANCES: [f64; 2] = [0.02, 0.05];
+/// Gain for which a lens with one more number is taken.
+const WORTH: f64 = 0.97;
+/// Fewest pairs of which some are held out.
+const PAIRS_TO_SPLIT: usize = 4;
+/// What smoothing leaves of the noise's variance: sum of the squared taps.
+const SMOOTHED_NOISE: f64 = 0.0748;
+/// What is unexplained, relative to the variance of the model's error, from which it tells of that error.
+const TELLING: f64 = 0.25;
+/// Least part of the errors within three standard deviations and largest root mean square of error over standard deviation, of the
+/// target and of the target with coarser texture.
+const HONEST: [[f64; 2]; 2] = [[0.985, 1.0], [0.975, 1.15]];
 
 /// One combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,20 +62,55 @@ pub struct Trial {
     pub psf: String,
     /// Largest blur radius, px.
     pub max_blur_px: f64,
+    /// Least blur radius, px.
+    pub blur_floor_px: f64,
     /// Degree of the response.
     pub degree: usize,
-    /// Robust error on the held-out blocks, mm.
+    /// Robust error on the held-out parts, mm.
     pub robust_mm: f64,
 }
 
 /// A pixel of a pair.
 #[derive(Clone, Copy)]
-struct Sample {
-    measured: f64,
-    truth: f64,
+pub(super) struct Sample {
+    pub measured: f64,
+    pub truth: f64,
     /// Standard deviation of `measured` by noise.
     noise: f64,
+    /// Mean square of what the model leaves, relative to the noise.
+    misfit: f32,
+    /// Colour of its block on a checkerboard.
     even: bool,
+    /// Half of the field, and every other pair.
+    part: [bool; 2],
+    /// Of the target as it is, not with coarser texture.
+    original: bool,
+}
+
+/// How samples are split into those that are learned from and those that are judged.
+#[derive(Clone, Copy, PartialEq)]
+enum Split {
+    /// A checkerboard over the field: what a choice is made by.
+    Blocks,
+    /// Halves of the field and every other pair: what the error is stated by.
+    Parts,
+}
+
+#[cfg(test)]
+impl Sample {
+    /// Without noise.
+    pub(super) fn exact(measured: f64, truth: f64) -> Self {
+        Self { measured, truth, noise: 0.0, misfit: 1.0, even: false, part: [false; 2], original: true }
+    }
+}
+
+/// A held-out pixel.
+struct Judged {
+    error: f64,
+    truth: f64,
+    noise: f64,
+    unexplained: f32,
+    original: bool,
 }
 
 struct Samples {
@@ -55,210 +119,331 @@ struct Samples {
     pairs: usize,
 }
 
+/// A pair of slices that is ready to be measured.
+struct Pair {
+    far: usize,
+    prepared: Prepared,
+    /// As it is, not smoothed.
+    original: bool,
+}
+
 type Learned = (Optics, HeldOut, Vec<Trial>);
 
-pub(super) fn learn(
-    slices: &[Array2<f32>],
-    plane: &FocusPlane,
-    pair_step: usize,
-    bin: usize,
-    radius_px: f64,
-    step_mm: f64,
-    optics_of: &(dyn Fn(Psf, f64) -> Result<Optics, StackError> + Sync),
-) -> Result<Learned, StackError> {
-    let half_mm = 0.5 * step_mm * pair_step as f64;
-    let psfs = [Psf::PillBox, Psf::Gaussian { k: 0.5 }, Psf::Generalised { p: 3.0, k: 0.62 }];
-    let mut best: Option<(f64, usize, Optics, Samples)> = None;
+/// What is calibrated, binned.
+pub(super) struct Target<'a> {
+    pub slices: &'a [Array2<f32>],
+    pub plane: &'a FocusPlane,
+    pub pair_step: usize,
+    pub bin: usize,
+    /// Largest blur radius as measured, px.
+    pub radius_px: f64,
+    pub step_mm: f64,
+    pub optics_of: &'a (dyn Fn(Psf, f64) -> Result<Optics, StackError> + Sync),
+}
+
+struct Best {
+    cost: f64,
+    psf: Psf,
+    factor: f64,
+    degree: usize,
+    optics: Optics,
+    samples: Samples,
+}
+
+pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
+    let pairs = target.pairs()?;
+    let half_mm = 0.5 * target.step_mm * target.pair_step as f64;
+    let psfs = [
+        Psf::PillBox,
+        Psf::Generalised { p: 3.0, k: 0.62 },
+        Psf::Gaussian { k: 0.5 },
+        Psf::Generalised { p: 1.5, k: 0.42 },
+    ];
+    let mut best: Option<Best> = None;
     let mut trials = Vec::new();
+    let mut attempt = |psf: Psf, factor: f64, [floor_px, tolerance]: [f64; 2], best: &mut Option<Best>| {
+        let worth = if floor_px > 0.0 || tolerance > 0.0 { WORTH } else { 1.0 };
+        let max_blur_px = (target.radius_px * factor).clamp(0.8, 4.5);
+        let optics = (target.optics_of)(psf, max_blur_px)?;
+        let stage = Stage {
+            blur_floor_px: floor_px,
+            window_tolerance: tolerance,
+            ..Stage::identity(target.bin, target.pair_step)
+        };
+        let optics = optics.with_stage(stage);
+        // With a PSF that fits badly a target may have no depth.
+        let Ok(samples) = target.measure(&pairs, &optics) else { return Ok(()) };
+        for degree in DEGREES {
+            let Some((judged, inside)) = judge(&samples, degree, Split::Blocks) else { continue };
+            // Holes count: what is not measured has no error.
+            let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
+            let of = |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
+            // A lens is right with any texture.
+            let robust = (of(true) * of(false)).sqrt() * half_mm;
+            // The response makes up for a wrong blur, so that errors hardly tell: what was measured is preferred.
+            let unlikely = 1.0 + UNLIKELY * factor.ln().powi(2);
+            let cost = unlikely * robust / fill.clamp(0.05, 1.0).powi(2);
+            trials.push(Trial {
+                psf: psf.to_string(),
+                max_blur_px,
+                blur_floor_px: floor_px,
+                degree,
+                robust_mm: robust,
+            });
+            if best.as_ref().is_none_or(|best| cost < worth * best.cost) {
+                let samples = Samples { of: samples.of.clone(), ..samples };
+                *best = Some(Best { cost, psf, factor, degree, optics, samples });
+            }
+        }
+        Ok::<(), StackError>(())
+    };
     for psf in psfs {
         for factor in FACTORS {
-            let max_blur_px = (radius_px * factor).clamp(0.8, 4.5);
-            let optics = optics_of(psf, max_blur_px)?;
-            let samples = measure(slices, plane, pair_step, &optics)?;
-            for degree in DEGREES {
-                let Some(errors) = held_out_errors(&samples, degree) else { continue };
-                // Holes count: what is not measured has no error.
-                let fill = samples.of.len() as f64 / samples.looked_at.max(1) as f64;
-                let robust = robust(&errors) * half_mm;
-                let cost = robust / fill.clamp(0.05, 1.0).powi(2);
-                trials.push(Trial { psf: psf.to_string(), max_blur_px, degree, robust_mm: robust });
-                if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                    let copy = Samples { of: samples.of.clone(), ..samples };
-                    best = Some((cost, degree, optics, copy));
-                }
+            attempt(psf, factor, [0.0; 2], &mut best)?;
+        }
+    }
+    if let Some((psf, factor)) = best.as_ref().map(|best| (best.psf, best.factor)) {
+        for floor_px in FLOORS_PX {
+            for factor in [0.85 * factor, factor] {
+                attempt(psf, factor, [floor_px, 0.0], &mut best)?;
             }
+        }
+    }
+    if let Some((psf, factor, floor_px)) =
+        best.as_ref().map(|best| (best.psf, best.factor, best.optics.stage().map_or(0.0, |s| s.blur_floor_px)))
+    {
+        for tolerance in TOLERANCES {
+            attempt(psf, factor, [floor_px, tolerance], &mut best)?;
         }
     }
     trials.sort_by(|a, b| a.robust_mm.total_cmp(&b.robust_mm));
-    let Some((_, degree, optics, samples)) = best else { return Err(StackError::NoPair(pair_step)) };
-    let (stage, held_out) = finish(&samples, degree, bin, pair_step, half_mm);
+    let unfit = StackError::NoPair(target.pair_step);
+    let Some(Best { degree, optics, samples, .. }) = best else { return Err(unfit) };
+    let Some((stage, held_out)) = finish(&samples, degree, &optics, half_mm) else { return Err(unfit) };
     Ok((optics.with_stage(stage), held_out, trials))
 }
 
-/// Measures every pair whose target lies within the range somewhere.
-fn measure(
-    slices: &[Array2<f32>],
-    plane: &FocusPlane,
-    step: usize,
-    optics: &Optics,
-) -> Result<Samples, StackError> {
-    let (height, width) = slices[0].dim();
-    let identity = optics.with_stage(Stage::identity(1, step));
-    let settings = MeasureSettings {
-        window: Window::Adaptive,
-        run: Settings { median_px: 3, ..Settings::default() },
-        ..MeasureSettings::default()
+impl Target<'_> {
+    fn alpha(&self, far: usize, y: usize, x: usize) -> f64 {
+        -1.0 + 2.0 * (self.plane.at(y as f64, x as f64) - far as f64) / self.pair_step as f64
+    }
+
+    /// Every pair whose target lies within the range somewhere.
+    fn pairs(&self) -> Result<Vec<Pair>, StackError> {
+        let (height, width) = self.slices[0].dim();
+        let usable = |far: &usize| {
+            let corners = [(0, 0), (0, width - 1), (height - 1, 0), (height - 1, width - 1)];
+            let alphas = corners.map(|(y, x)| self.alpha(*far, y, x));
+            let [low, high] = alphas.iter().fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(*v), b.max(*v)]);
+            low < 1.05 && high > -1.05
+        };
+        let optics = (self.optics_of)(Psf::PillBox, 2.0)?;
+        let settings = PrepareSettings { trust: true, ..PrepareSettings::default() };
+        Ok((0..self.slices.len().saturating_sub(self.pair_step))
+            .filter(usable)
+            .collect::<Vec<usize>>()
+            .into_par_iter()
+            .filter_map(|far| {
+                let pair = [far, far + self.pair_step].map(|i| self.slices[i].clone());
+                let prepared = prepare_owned(pair, &optics, None, &settings).ok()?;
+                let [far_image, near_image] = [&prepared.far, &prepared.near].map(smoothed);
+                let mut coarse =
+                    Prepared { far: far_image, near: near_image, ..prepared.clone() };
+                let noise = &mut coarse.noise;
+                for value in [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance] {
+                    *value *= SMOOTHED_NOISE;
+                }
+                let pair = |prepared, original| Pair { far, prepared, original };
+                Some([pair(prepared, true), pair(coarse, false)])
+            })
+            .flatten_iter()
+            .collect())
+    }
+
+    fn measure(&self, pairs: &[Pair], optics: &Optics) -> Result<Samples, StackError> {
+        let settings = MeasureSettings {
+            window: Window::Adaptive,
+            run: Settings { median_px: 3, ..Settings::default() },
+            ..MeasureSettings::default()
+        };
+        let found: Vec<(Vec<Sample>, usize)> =
+            pairs.par_iter().map(|pair| self.samples(pair, optics, &settings)).collect();
+        let looked_at = found.iter().map(|(_, n)| n).sum();
+        let of: Vec<Sample> = found.into_iter().flat_map(|(samples, _)| samples).collect();
+        if of.len() < 200 {
+            return Err(StackError::NoPair(self.pair_step));
+        }
+        Ok(Samples { of, looked_at, pairs: pairs.iter().filter(|pair| pair.original).count() })
+    }
+
+    fn samples(&self, pair: &Pair, optics: &Optics, settings: &MeasureSettings) -> (Vec<Sample>, usize) {
+        let (height, width) = self.slices[0].dim();
+        let found = measure(&pair.prepared, optics, DepthMethod::Whitened, settings).ok();
+        let (mut samples, mut looked_at) = (Vec::new(), 0);
+        let places = (BORDER_PX..height.saturating_sub(BORDER_PX)).step_by(THIN).flat_map(|y| {
+            (BORDER_PX..width.saturating_sub(BORDER_PX)).step_by(THIN).map(move |x| (y, x))
+        });
+        for (y, x) in places {
+            let truth = self.alpha(pair.far, y, x);
+            if truth.abs() > LEARNED {
+                continue;
+            }
+            looked_at += 1;
+            let Some((map, estimate)) = &found else { continue };
+            let measured = optics.alpha(f64::from(map.depth_mm[(y, x)]));
+            let slope = optics.depth_per_alpha_mm(0.0).abs();
+            let noise = f64::from(estimate.deviation_mm[(y, x)]) / slope;
+            let usable = pair.prepared.reasons[(y, x)] == 0 && measured.abs() < MEASURED && noise < TOO_NOISY;
+            if usable {
+                samples.push(Sample {
+                    measured,
+                    truth,
+                    noise,
+                    misfit: estimate.misfit[(y, x)],
+                    even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
+                    part: [2 * x < width, pair.far.is_multiple_of(2)],
+                    original: pair.original,
+                });
+            }
+        }
+        (samples, looked_at)
+    }
+}
+
+/// Every sample judged by what was learned from the other ones. Depths beyond those that were learned are not judged. With the part of
+/// the judged ones that has a depth.
+fn judge(samples: &Samples, degree: usize, by: Split) -> Option<(Vec<Judged>, f64)> {
+    let split = by == Split::Parts && samples.pairs >= PAIRS_TO_SPLIT;
+    let part = |s: &Sample| match by {
+        Split::Blocks => [s.even, false],
+        Split::Parts => [s.part[0], split && s.part[1]],
     };
-    let alpha =
-        |i: usize, y: usize, x: usize| -1.0 + 2.0 * (plane.at(y as f64, x as f64) - i as f64) / step as f64;
-    let usable: Vec<usize> = (0..slices.len().saturating_sub(step))
-        .filter(|i| alpha(*i, height / 2, width / 2).abs() < 1.0 + 0.3)
-        .collect();
-    let found: Vec<(Vec<Sample>, usize)> = usable
-        .par_iter()
-        .map(|&i| {
-            let pair = [slices[i].clone(), slices[i + step].clone()];
-            let found = measure_pair(pair, &identity, DepthMethod::Whitened, None, &settings).ok();
-            let (mut samples, mut looked_at) = (Vec::new(), 0);
-            for y in (BORDER_PX..height.saturating_sub(BORDER_PX)).step_by(THIN) {
-                for x in (BORDER_PX..width.saturating_sub(BORDER_PX)).step_by(THIN) {
-                    let truth = alpha(i, y, x);
-                    if truth.abs() > LEARNED {
-                        continue;
-                    }
-                    looked_at += 1;
-                    let Some(found) = &found else { continue };
-                    let depth = f64::from(found.map.depth_mm[(y, x)]);
-                    if depth.is_finite() {
-                        let measured = optics.alpha(depth);
-                        let slope = optics.depth_per_alpha_mm(measured).abs();
-                        samples.push(Sample {
-                            measured,
-                            truth,
-                            noise: f64::from(found.validity.deviation_mm[(y, x)]) / slope,
-                            even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
-                        });
-                    }
-                }
-            }
-            (samples, looked_at)
+    let parts: Vec<[bool; 2]> = samples.of.iter().map(part).collect();
+    let mut judged = Vec::with_capacity(samples.of.len());
+    let mut eligible = 0_usize;
+    for part in [[false, false], [true, false], [false, true], [true, true]] {
+        let others = || {
+            let other = |of: &[bool; 2]| of[0] != part[0] && (!split || of[1] != part[1]);
+            samples.of.iter().zip(&parts).filter(move |(s, of)| s.original && other(of)).map(|(s, _)| s)
+        };
+        let own: Vec<&Sample> =
+            samples.of.iter().zip(&parts).filter(|(_, of)| **of == part).map(|(s, _)| s).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let curve = Curve::fit(others(), degree)?;
+        let [low, high] =
+            others().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s.truth), high.max(s.truth)]);
+        for s in own.into_iter().filter(|s| (low..=high).contains(&s.truth)) {
+            eligible += 1;
+            judged.extend(curve.judge(s));
+        }
+    }
+    let inside = judged.len() as f64 / eligible.max(1) as f64;
+    (judged.len() > 100).then_some((judged, inside))
+}
+
+impl Curve {
+    fn judge(&self, s: &Sample) -> Option<Judged> {
+        let [found, slope] = self.at(s.measured)?;
+        let noise = s.noise * slope;
+        Some(Judged {
+            error: found - s.truth,
+            truth: s.truth,
+            original: s.original,
+            noise,
+            unexplained: unexplained(s.misfit, noise as f32),
         })
-        .collect();
-    let looked_at = found.iter().map(|(_, n)| n).sum();
-    let of: Vec<Sample> = found.into_iter().flat_map(|(samples, _)| samples).collect();
-    if of.len() < 200 {
-        return Err(StackError::NoPair(step));
     }
-    Ok(Samples { of, looked_at, pairs: usable.len() })
 }
 
-/// Coefficients of the polynomial from measured to true, by least squares with Huber's weights; `None` where it falls.
-fn polynomial<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usize) -> Option<Vec<f64>> {
-    let n = degree + 1;
-    let mut found: Vec<f64> = (0..n).map(|k| f64::from(u8::from(k == 1))).collect();
-    let mut limit = f64::INFINITY;
-    for _ in 0..6 {
-        let mut normal = DMatrix::<f64>::zeros(n, n);
-        let mut right = DVector::<f64>::zeros(n);
-        let mut sizes = Vec::new();
-        for s in samples.clone() {
-            let error = s.truth - value(&found, s.measured);
-            sizes.push(error.abs());
-            let weight = if error.abs() > limit { limit / error.abs() } else { 1.0 };
-            let powers: Vec<f64> = (0..n).map(|k| s.measured.powi(k as i32)).collect();
-            for i in 0..n {
-                right[i] += weight * powers[i] * s.truth;
-                for j in 0..n {
-                    normal[(i, j)] += weight * powers[i] * powers[j];
-                }
-            }
-        }
-        for i in 0..n {
-            normal[(i, i)] += 1e-9 * sizes.len() as f64;
-        }
-        found = normal.lu().solve(&right)?.iter().copied().collect();
-        let middle = sizes.len() / 2;
-        limit = 1.5 * 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-        limit = limit.max(1e-4);
+/// The image smoothed by a binomial of five taps: the same target with coarser texture, for blur and smoothing commute.
+fn smoothed(image: &Array2<f32>) -> Array2<f32> {
+    let (height, width) = image.dim();
+    let pass = |image: &Array2<f32>, down: isize, right: isize| {
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            let at = |i: isize| {
+                let [y, x] = [reflect(y as isize + i * down, height), reflect(x as isize + i * right, width)];
+                image[(y, x)]
+            };
+            (at(-2) + 4.0 * at(-1) + 6.0 * at(0) + 4.0 * at(1) + at(2)) / 16.0
+        })
+    };
+    pass(&pass(image, 1, 0), 0, 1)
+}
+
+fn robust(errors: impl Iterator<Item = f64>) -> f64 {
+    let mut sizes: Vec<f64> = errors.map(f64::abs).collect();
+    if sizes.is_empty() {
+        return f64::NAN;
     }
-    Some(found)
-}
-
-fn value(c: &[f64], x: f64) -> f64 {
-    c.iter().rev().fold(0.0, |sum, c| sum * x + c)
-}
-
-fn held_out_errors(samples: &Samples, degree: usize) -> Option<Vec<f64>> {
-    let mut errors = Vec::with_capacity(samples.of.len());
-    for even in [true, false] {
-        let c = polynomial(samples.of.iter().filter(|s| s.even == even), degree)?;
-        errors.extend(samples.of.iter().filter(|s| s.even != even).map(|s| value(&c, s.measured) - s.truth));
-    }
-    Some(errors)
-}
-
-fn robust(errors: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = errors.iter().map(|e| e.abs()).collect();
     let middle = sizes.len() / 2;
     1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+fn rms(judged: &[Judged]) -> f64 {
+    (judged.iter().map(|j| j.error * j.error).sum::<f64>() / judged.len().max(1) as f64).sqrt()
+}
+
 /// The response of all samples, and what the held-out ones say of it.
-fn finish(samples: &Samples, degree: usize, bin: usize, step: usize, half_mm: f64) -> (Stage, HeldOut) {
-    let mut measured: Vec<f64> = samples.of.iter().map(|s| s.measured).collect();
-    measured.sort_by(f64::total_cmp);
-    let quantile = |q: f64| measured[((measured.len() - 1) as f64 * q) as usize];
-    let range = [(quantile(0.001) - 0.05).max(-1.19), (quantile(0.999) + 0.05).min(1.19)];
-    let all = polynomial(samples.of.iter(), degree).unwrap_or_else(|| vec![0.0, 1.0]);
-    let mut response: [f64; RESPONSE_POINTS] = std::array::from_fn(|i| {
-        let at = range[0] + (range[1] - range[0]) * i as f64 / (RESPONSE_POINTS - 1) as f64;
-        value(&all, at).clamp(-1.3, 1.3)
-    });
-    // Rising outwards from the middle.
-    let middle = RESPONSE_POINTS / 2;
-    for i in middle + 1..RESPONSE_POINTS {
-        response[i] = response[i].max(response[i - 1] + 1e-6);
-    }
-    for i in (0..middle).rev() {
-        response[i] = response[i].min(response[i + 1] - 1e-6);
-    }
-    let mut stage =
-        Stage { bin, pair_step: step, measured: range, response, residual: 0.0, usual_misfit: 1e6 };
-    let errors = held_out_errors(samples, degree).unwrap_or_default();
-    let noise: Vec<f64> = [true, false]
-        .iter()
-        .flat_map(|even| samples.of.iter().filter(move |s| s.even != *even))
-        .map(|s| s.noise * stage.respond(s.measured).map_or(1.0, |[_, slope]| slope))
-        .collect();
-    let within = |residual: f64| {
-        let inside = errors.iter().zip(&noise).filter(|(e, n)| e.abs() <= 3.0 * n.hypot(residual)).count();
-        inside as f64 / errors.len().max(1) as f64
+fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Option<(Stage, HeldOut)> {
+    let (judged, inside) = judge(samples, degree, Split::Parts)?;
+    let curve = Curve::fit(samples.of.iter().filter(|s| s.original), degree)?;
+    let mut left: Vec<f32> = judged.iter().map(|j| j.unexplained).collect();
+    let middle = left.len() / 2;
+    let median = f64::from(*left.select_nth_unstable_by(middle, f32::total_cmp).1);
+    // What is less than the model's error tells nothing of it.
+    let usual = |residual: f64| median.max(TELLING * residual * residual).max(1e-9);
+    let predicted = |j: &Judged, residual: f64| {
+        let ratio = j.unexplained / usual(residual) as f32;
+        j.noise.hypot(f64::from(model_error(residual as f32, ratio)))
+    };
+    // Part within three deviations, and root mean square of error over deviation.
+    let honesty = |original: bool, residual: f64| {
+        let relative = judged
+            .iter()
+            .filter(|j| j.original == original)
+            .map(|j| (j.error / predicted(j, residual)).powi(2))
+            .fold([0.0; 3], |[n, held, sum], square| {
+                [n + 1.0, held + f64::from(u8::from(square <= 9.0)), sum + square]
+            });
+        let [n, held, sum] = relative;
+        [held / f64::max(n, 1.0), (sum / f64::max(n, 1.0)).sqrt()]
     };
     let [mut low, mut high] = [0.0, 1.0];
     for _ in 0..30 {
-        let try_it = 0.5 * (low + high);
-        if within(try_it) < 0.99 { low = try_it } else { high = try_it }
+        let middle = 0.5 * (low + high);
+        let holds = [true, false].iter().zip(HONEST).all(|(original, [least, most])| {
+            let [within, scatter] = honesty(*original, middle);
+            within >= least && scatter <= most
+        });
+        if holds { high = middle } else { low = middle }
     }
-    stage.residual = high;
-    let count = errors.len().max(1) as f64;
-    let truths: Vec<f64> = [true, false]
-        .iter()
-        .flat_map(|even| samples.of.iter().filter(move |s| s.even != *even))
-        .map(|s| s.truth)
-        .collect();
-    let mean = truths.iter().sum::<f64>() / count;
-    let [cross, square] = truths
-        .iter()
-        .zip(&errors)
-        .fold([0.0; 2], |[a, b], (t, e)| [a + (t - mean) * (t + e), b + (t - mean) * (t - mean)]);
+    let identity = optics.stage()?;
+    let stage = Stage {
+        measured: curve.measured,
+        response: curve.response,
+        residual: high,
+        usual_unexplained: usual(high),
+        ..*identity
+    };
+    let [within, scatter] = honesty(true, high);
+    let judged: Vec<Judged> = judged.into_iter().filter(|j| j.original).collect();
+    let count = judged.len() as f64;
+    let mean = judged.iter().map(|j| j.truth).sum::<f64>() / count;
+    let [cross, square] = judged.iter().fold([0.0; 2], |[a, b], j| {
+        let away = j.truth - mean;
+        [a + away * (j.truth + j.error), b + away * away]
+    });
     let held_out = HeldOut {
-        robust_mm: robust(&errors) * half_mm,
-        rms_mm: (errors.iter().map(|e| e * e).sum::<f64>() / count).sqrt() * half_mm,
-        bias_mm: -errors.iter().sum::<f64>() / count * half_mm,
+        robust_mm: robust(judged.iter().map(|j| j.error)) * half_mm,
+        rms_mm: rms(&judged) * half_mm,
+        bias_mm: -judged.iter().map(|j| j.error).sum::<f64>() / count * half_mm,
         slope: cross / square,
-        fill: samples.of.len() as f64 / samples.looked_at.max(1) as f64,
-        within_three: within(stage.residual),
+        fill: inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64,
+        within_three: within,
+        scatter,
         pairs: samples.pairs,
     };
-    (stage, held_out)
+    Some((stage, held_out))
 }
