@@ -402,6 +402,8 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
     if report.detailed_fraction < 0.01 {
         findings.push(Finding::NothingSharp);
     } else if report.detailed_fraction > TELLING
+        // A lens of calibrate stack has what its model leaves in every deviation.
+        && optics.stage().is_none()
         && estimate.left_over > DOUBTFUL
         && estimate.excess > EXCESSIVE
     {

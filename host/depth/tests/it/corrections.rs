@@ -332,6 +332,9 @@ fn what_cannot_be_learned_or_applied_says_so() {
     assert!(error.to_string().contains("81x60") && error.to_string().contains("80x60"), "{error}");
     correction.check_range(&optics().working_range()).unwrap();
     let range = optics().working_range();
+    let mut wider = range;
+    wider.far_mm += 0.8 * (range.far_mm - range.near_mm);
+    correction.check_range(&wider).unwrap();
     let mut other = range;
     (other.far_mm, other.near_mm) = (range.far_mm + 100.0, range.near_mm + 100.0);
     assert!(matches!(correction.check_range(&other), Err(CorrectionError::RangeMismatch { .. })));

@@ -14,4 +14,3 @@ mod stack;
 mod random_planes;
 mod uncertainty;
 mod wave;
-mod scratch;

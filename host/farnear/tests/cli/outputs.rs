@@ -96,7 +96,6 @@ fn calibration() {
             "correct 910/depth/depth.npy --correction clsf.toml --out clsf.npy --json",
             "correct 910/depth/depth.npy --correction clsf.toml --as-board --out board.tiff",
             "correct 910/depth/depth.npy --correction cdc.toml --out cdc.npy",
-            "depth 910/far.png 910/near.png --correction clsf.toml --uncertainty --out corrected --json",
         ],
     }
     .is_held();
