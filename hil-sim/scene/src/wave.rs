@@ -42,7 +42,13 @@ pub struct WaveLens {
 
 /// One period of a random texture, cells of half a pixel: mean 1, SD = `contrast`. Even `sand` (or else `fractal`).
 #[must_use]
-pub fn random_texture(sand: bool, width_px: usize, height_px: usize, contrast: f64, seed: u64) -> Array2<f32> {
+pub fn random_texture(
+    sand: bool,
+    width_px: usize,
+    height_px: usize,
+    contrast: f64,
+    seed: u64,
+) -> Array2<f32> {
     let spectrum = if sand { Spectrum::Sand } else { Spectrum::Fractal };
     spectrum.synthesise(width_px, height_px, contrast, seed)
 }
@@ -102,7 +108,8 @@ impl WaveLens {
                     .outer_iter()
                     .zip(&down)
                     .map(|(row, down)| {
-                        let sum: f64 = row.iter().zip(&across).map(|(light, wave)| f64::from(*light) * wave).sum();
+                        let sum: f64 =
+                            row.iter().zip(&across).map(|(light, wave)| f64::from(*light) * wave).sum();
                         down * sum
                     })
                     .sum()
@@ -177,9 +184,8 @@ impl WaveLens {
         let inside = |v: f64, u: f64| {
             let parts = 0..PUPIL_PARTS * PUPIL_PARTS;
             let at = |i: usize| (i as f64 + 0.5) / PUPIL_PARTS as f64 - 0.5;
-            let count = parts.clone().filter(|i| {
-                (u + at(i % PUPIL_PARTS)).hypot(v + at(i / PUPIL_PARTS)) <= radius
-            });
+            let count =
+                parts.clone().filter(|i| (u + at(i % PUPIL_PARTS)).hypot(v + at(i / PUPIL_PARTS)) <= radius);
             count.count() as f64 / parts.len() as f64
         };
         (0..SIDE * SIDE)
@@ -202,7 +208,13 @@ mod tests {
     use super::*;
 
     fn lens(spherical_waves: f64) -> WaveLens {
-        WaveLens { f_number: 4.0, pixel_um: 6.0, light: vec![[0.55, 1.0]], spherical_waves, astigmatism_waves: 0.0 }
+        WaveLens {
+            f_number: 4.0,
+            pixel_um: 6.0,
+            light: vec![[0.55, 1.0]],
+            spherical_waves,
+            astigmatism_waves: 0.0,
+        }
     }
 
     /// The transfer function of a perfect lens in focus is known in closed form, and so is a square pixel's.
@@ -212,7 +224,9 @@ mod tests {
         for cycles in [0.1, 0.25, 0.45_f64] {
             let s = cycles / lens.pixel_um * 0.55 * lens.f_number;
             let diffraction = 2.0 / std::f64::consts::PI * (s.acos() - s * (1.0 - s * s).sqrt());
-            let box_of = |width: f64| (std::f64::consts::PI * cycles * width).sin() / (std::f64::consts::PI * cycles * width);
+            let box_of = |width: f64| {
+                (std::f64::consts::PI * cycles * width).sin() / (std::f64::consts::PI * cycles * width)
+            };
             let expected = diffraction * box_of(1.0) * box_of(0.5);
             let found = lens.transfer(0.0, &[[cycles, 0.0]])[0];
             assert!((found - expected).abs() < 0.01, "{cycles}: {found} {expected}");

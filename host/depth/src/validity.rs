@@ -76,8 +76,10 @@ pub fn assess(
     let mut reasons = prepared.reasons.clone();
     let Estimate { mut deviation_mm, misfit, left_over, .. } = estimate;
     let range = Range::new(optics);
-    let stage = optics.stage().map(|stage| [stage.residual, stage.usual_unexplained].map(|value| value as f32));
-    let of_model = MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0) * range.slope_mm.powi(2);
+    let stage =
+        optics.stage().map(|stage| [stage.residual, stage.usual_unexplained].map(|value| value as f32));
+    let of_model =
+        MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0) * range.slope_mm.powi(2);
     let filled = map.filled.take().filter(|_| settings.filled);
     let is_filled = |at: (usize, usize)| filled.as_ref().is_some_and(|filled| filled[at]);
     Zip::indexed(&mut reasons)
@@ -154,7 +156,12 @@ struct Range {
 impl Range {
     fn new(optics: &Optics) -> Self {
         let [far_mm, near_mm] = [-LARGEST_ALPHA, LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha) as f32);
-        Self { far_mm, near_mm, slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32, learned: optics.stage().is_some() }
+        Self {
+            far_mm,
+            near_mm,
+            slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32,
+            learned: optics.stage().is_some(),
+        }
     }
 
     /// The confidence of a depth, or why there is none.
@@ -203,8 +210,15 @@ fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
         return;
     }
     // Reasons that make holes around them, before the judge's own.
-    let spreading =
-        [Reason::Saturated, Reason::Dark, Reason::Edge, Reason::Moved, Reason::Misfit, Reason::BadPixel, Reason::NotFinite];
+    let spreading = [
+        Reason::Saturated,
+        Reason::Dark,
+        Reason::Edge,
+        Reason::Moved,
+        Reason::Misfit,
+        Reason::BadPixel,
+        Reason::NotFinite,
+    ];
     let original = reasons.clone();
     for reason in spreading {
         if left.is_empty() {

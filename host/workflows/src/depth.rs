@@ -212,7 +212,8 @@ impl Request for DepthRequest {
             return Err(WorkflowError::parameter("bin", bin, "1 to 16 pixels"));
         }
         if let Some(bin) = self.bin.filter(|bin| *bin > 1 && !self.may_bin()) {
-            let expected = "region, camera_frames and operators are of the whole image: give none of them, or bin 1";
+            let expected =
+                "region, camera_frames and operators are of the whole image: give none of them, or bin 1";
             return Err(WorkflowError::parameter("bin", bin, expected));
         }
         if let (Some(_), Some(file)) = (self.region, &self.correction) {
@@ -335,12 +336,16 @@ impl DepthRequest {
         if needed == 1 {
             return 1;
         }
-        let too_much = format!("a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used");
+        let too_much =
+            format!("a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used");
         if optics.distortion().is_some() || optics.stage().is_some() || !self.may_bin() {
-            doubts.push(format!("{too_much}: average {needed} x {needed} pixels of the images into one first"));
+            doubts
+                .push(format!("{too_much}: average {needed} x {needed} pixels of the images into one first"));
             return 1;
         }
-        doubts.push(format!("{too_much}: {needed} x {needed} pixels were averaged into one; bin 1 keeps all pixels"));
+        doubts.push(format!(
+            "{too_much}: {needed} x {needed} pixels were averaged into one; bin 1 keeps all pixels"
+        ));
         needed
     }
 

@@ -82,7 +82,8 @@ impl Whitened {
         let points = points();
         let alphas: [f64; ALPHAS] =
             std::array::from_fn(|i| REACH * (2.0 * i as f64 / (ALPHAS - 1) as f64 - 1.0));
-        let sampled = |point: &Point| alphas.map(|alpha| sample(&otf, [max_blur_px, floor_px], point.at.w, alpha));
+        let sampled =
+            |point: &Point| alphas.map(|alpha| sample(&otf, [max_blur_px, floor_px], point.at.w, alpha));
         let samples: Vec<[Sample; ALPHAS]> = points.iter().map(sampled).collect();
         let residual = residual(&points, &samples)?;
         let matched = matched(&points, &samples, &residual)?;

@@ -104,12 +104,15 @@ fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
     let window = WINDOW_PX / 2 + 1;
     let mean = |x: &Array2<f32>, y: &Array2<f32>| box_mean((x * y).view(), window);
     let [product, of_a, of_b] = [mean(&a, &b), mean(&a, &a), mean(&b, &b)];
-    let correlation = Zip::from(&product).and(&of_a).and(&of_b).map_collect(|product, a, b| {
-        product / (a * b).sqrt().max(f32::MIN_POSITIVE)
-    });
+    let correlation = Zip::from(&product)
+        .and(&of_a)
+        .and(&of_b)
+        .map_collect(|product, a, b| product / (a * b).sqrt().max(f32::MIN_POSITIVE));
     let (height, width) = correlation.dim();
     let factor = 1 << COARSER;
-    Array2::from_shape_fn(size, |(y, x)| correlation[((y / factor).min(height - 1), (x / factor).min(width - 1))])
+    Array2::from_shape_fn(size, |(y, x)| {
+        correlation[((y / factor).min(height - 1), (x / factor).min(width - 1))]
+    })
 }
 
 /// Mean product of `a` and `b` around each pixel, `b` moved by so many pixels down and to the right.

@@ -10,7 +10,7 @@ mod input;
 mod measure;
 mod optics_files;
 mod planes;
-mod stack;
 mod random_planes;
+mod stack;
 mod uncertainty;
 mod wave;

@@ -251,7 +251,8 @@ fn clipped_highlights_hardly_raise_the_error() {
     let optics = rig(PSF);
     let truth = Array2::from_elem(far.dim(), optics.depth_mm(0.3) as f32);
     let rms_at = |gain: f32| {
-        let images = [(&far, 1), (&near, 2)].map(|(image, seed)| crate::common::eight_bit(&(image * gain), seed) / 255.0);
+        let images = [(&far, 1), (&near, 2)]
+            .map(|(image, seed)| crate::common::eight_bit(&(image * gain), seed) / 255.0);
         let clipped = images[1].iter().chain(&images[0]).filter(|v| **v >= 1.0).count();
         let [far, near] = images;
         let pair = Pair { far, near, truth: truth.clone() };

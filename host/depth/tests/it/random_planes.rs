@@ -31,8 +31,11 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
     for number in 0..count {
         let mut random = ChaCha8Rng::seed_from_u64(number);
         // Half of the planes in and near the range of 887 to 933 mm, half anywhere.
-        let depth: f64 =
-            if number % 2 == 0 { random.random_range(870.0..950.0) } else { random.random_range(600.0..1500.0) };
+        let depth: f64 = if number % 2 == 0 {
+            random.random_range(870.0..950.0)
+        } else {
+            random.random_range(600.0..1500.0)
+        };
         let magnification: f64 = random.random_range(0.9..1.1);
         let scene: Scene = format!("plane:{depth:.2}").parse().unwrap();
         let camera = Camera::new(SIZE.0, SIZE.1, Noise::EightBit);

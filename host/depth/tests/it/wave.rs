@@ -38,7 +38,14 @@ impl Plane {
 }
 
 /// The slice `index` of a target, 8 bit, values 0 to 1. `best_um` is the defocus of the sharpest image.
-fn slice(lens: &WaveLens, cells: &Array2<f32>, plane: Plane, index: usize, best_um: f64, seed: u64) -> Array2<f32> {
+fn slice(
+    lens: &WaveLens,
+    cells: &Array2<f32>,
+    plane: Plane,
+    index: usize,
+    best_um: f64,
+    seed: u64,
+) -> Array2<f32> {
     let image = lens.image(cells, &|y, x| best_um + STEP_UM * (index as f64 - plane.at(y, x)));
     let part = image.slice(s![..SIZE[1], ..SIZE[0]]).to_owned();
     eight_bit(&part, seed * 1000 + index as u64) / 255.0

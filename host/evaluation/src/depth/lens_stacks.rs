@@ -86,8 +86,16 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
             format!("{:.2}", found.scatter),
         ]);
     }
-    let head =
-        ["binning, step", "peer", "robust error", "of the peer's", "RMSE", "fill", "within 3 SD", "error / SD"];
+    let head = [
+        "binning, step",
+        "peer",
+        "robust error",
+        "of the peer's",
+        "RMSE",
+        "fill",
+        "within 3 SD",
+        "error / SD",
+    ];
     page.table(1, &head, &rows);
     page.paragraph(
         "Pairs that are few slices apart see the plate at few depths only. A response that may be flat at these has 0.62, 0.74, 0.68 and 0.69 of the peer's error here, and measures no other scene: \

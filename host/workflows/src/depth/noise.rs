@@ -55,7 +55,8 @@ impl FromStr for CameraNoise {
 }
 
 fn parse(text: &str) -> Result<CameraNoise, String> {
-    const EXPECTED: &str = "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12, black=100)";
+    const EXPECTED: &str =
+        "expected estimated or camera:full_well_e=20000,read_noise_e=12 (and bits=12, black=100)";
     if text == "estimated" {
         return Ok(CameraNoise::Estimated);
     }
@@ -257,7 +258,8 @@ mod tests {
     /// A camera whose black is at code 100 of 1,023 has at code 100 its read noise alone, and its full well at code 1,023.
     #[test]
     fn shot_noise_counts_from_the_black_level() {
-        let noise: CameraNoise = "camera:full_well_e=20000,read_noise_e=12,bits=10,black=100".parse().unwrap();
+        let noise: CameraNoise =
+            "camera:full_well_e=20000,read_noise_e=12,bits=10,black=100".parse().unwrap();
         let Noise::Camera { constant, per_unit } = noise.of(Samples::Integer(10)) else { unreachable!() };
         let codes_per_electron: f64 = 923.0 / 20_000.0;
         let at = |code: f64| (constant + per_unit * code / 1023.0) * 1023.0 * 1023.0 - 1.0 / 12.0;

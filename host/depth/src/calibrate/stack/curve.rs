@@ -145,7 +145,11 @@ mod tests {
             let curve = Curve::fit(learned.iter(), degree).unwrap();
             let unit = (curve.measured[1] - curve.measured[0]) / (RESPONSE_POINTS - 1) as f64;
             let slopes = curve.response.windows(2).map(|pair| (pair[1] - pair[0]) / unit);
-            assert!(slopes.clone().all(|slope| (0.2..3.1).contains(&slope)), "{degree} {:?}", slopes.collect::<Vec<_>>());
+            assert!(
+                slopes.clone().all(|slope| (0.2..3.1).contains(&slope)),
+                "{degree} {:?}",
+                slopes.collect::<Vec<_>>()
+            );
         }
     }
 }

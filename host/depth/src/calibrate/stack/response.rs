@@ -177,7 +177,8 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
             let Some((judged, inside)) = judge(&samples, degree, Split::Blocks) else { continue };
             // Holes count: what is not measured has no error.
             let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
-            let of = |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
+            let of =
+                |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
             // A lens is right with any texture.
             let robust = (of(true) * of(false)).sqrt() * half_mm;
             // The response makes up for a wrong blur, so that errors hardly tell: what was measured is preferred.
@@ -209,8 +210,9 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
             }
         }
     }
-    if let Some((psf, factor, floor_px)) =
-        best.as_ref().map(|best| (best.psf, best.factor, best.optics.stage().map_or(0.0, |s| s.blur_floor_px)))
+    if let Some((psf, factor, floor_px)) = best
+        .as_ref()
+        .map(|best| (best.psf, best.factor, best.optics.stage().map_or(0.0, |s| s.blur_floor_px)))
     {
         for tolerance in TOLERANCES {
             attempt(psf, factor, [floor_px, tolerance], &mut best)?;
@@ -247,8 +249,7 @@ impl Target<'_> {
                 let pair = [far, far + self.pair_step].map(|i| self.slices[i].clone());
                 let prepared = prepare_owned(pair, &optics, None, &settings).ok()?;
                 let [far_image, near_image] = [&prepared.far, &prepared.near].map(smoothed);
-                let mut coarse =
-                    Prepared { far: far_image, near: near_image, ..prepared.clone() };
+                let mut coarse = Prepared { far: far_image, near: near_image, ..prepared.clone() };
                 let noise = &mut coarse.noise;
                 for value in [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance] {
                     *value *= SMOOTHED_NOISE;
@@ -280,9 +281,9 @@ impl Target<'_> {
         let (height, width) = self.slices[0].dim();
         let found = measure(&pair.prepared, optics, DepthMethod::Whitened, settings).ok();
         let (mut samples, mut looked_at) = (Vec::new(), 0);
-        let places = (BORDER_PX..height.saturating_sub(BORDER_PX)).step_by(THIN).flat_map(|y| {
-            (BORDER_PX..width.saturating_sub(BORDER_PX)).step_by(THIN).map(move |x| (y, x))
-        });
+        let places = (BORDER_PX..height.saturating_sub(BORDER_PX))
+            .step_by(THIN)
+            .flat_map(|y| (BORDER_PX..width.saturating_sub(BORDER_PX)).step_by(THIN).map(move |x| (y, x)));
         for (y, x) in places {
             let truth = self.alpha(pair.far, y, x);
             if truth.abs() > LEARNED {
