@@ -2,11 +2,14 @@
 
 use std::ops::Range;
 
-use farnear_recognition::live::Segment;
-use farnear_recognition::model::Answer;
+use farnear_recognition::clip::Track;
+use farnear_recognition::live::{Segment, joined, windows};
+use farnear_recognition::model::{Answer, Recogniser};
+use farnear_recognition::segmentation::{Worth, segmented};
+use farnear_silhouettes::mask::{BoundingBox, Mask};
 use serde::Serialize;
 
-use crate::figures::rounded;
+use crate::{error::Result, figures::rounded};
 
 /// The answer for all that was seen of one person.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -22,6 +25,48 @@ pub struct AnswerSummary {
     pub reason: Option<String>,
     /// Probability of every activity.
     pub probabilities: Vec<Probability>,
+}
+
+/// One person in a frame: the same for a clip, a stream and several people.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PersonInFrame {
+    /// The number, from 1 in the order of coming.
+    pub person: usize,
+    /// First row, first column, one past the last row and column of what is seen; `None` where nothing is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub top_left_bottom_right: Option<[usize; 4]>,
+    /// The activity so far; `None` is unknown.
+    pub activity: Option<String>,
+    /// Probability of the activity, 0 to 1.
+    pub confidence: f64,
+    /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
+    pub outlier_score: Option<f64>,
+    /// What is doubtful: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flags: Vec<String>,
+}
+
+/// What one person did in a recording: the same for a clip, a stream and several people.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct PersonFigures {
+    pub person: usize,
+    /// First frame with a silhouette.
+    pub from: usize,
+    /// Last frame with a silhouette.
+    pub to: usize,
+    /// Frames with a silhouette.
+    pub silhouettes: usize,
+    /// Frames in one blob with others.
+    pub crossing_frames: usize,
+    /// Those with whom this one may have been swapped.
+    pub perhaps_swapped_with: Vec<usize>,
+    /// For all that was seen.
+    #[serde(flatten)]
+    pub answer: AnswerSummary,
+    /// Answers for windows that overlap by half.
+    pub windows: Vec<Part>,
+    /// Stretches of one activity each, by a hidden semi-Markov model.
+    pub segments: Vec<Part>,
 }
 
 /// Probability of an activity.
@@ -84,6 +129,70 @@ pub(super) fn passages(seen: &[bool]) -> Vec<Range<usize>> {
         }
     }
     found
+}
+
+/// The windows and segments of a recording, passage by passage: `tracks[view][frame]`, and which frames show anybody.
+pub(super) fn stretches(
+    model: &Recogniser,
+    tracks: &[Vec<Track>],
+    seen: &[bool],
+    window: usize,
+    among: &[String],
+) -> Result<(Vec<Part>, Vec<Part>)> {
+    let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());
+    for passage in passages(seen) {
+        let frames = |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
+        let views: Vec<Vec<Track>> = tracks.iter().map(frames).collect();
+        let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
+        let mut found = windows(model, &whole, window, window.div_ceil(2))?;
+        found.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), among));
+        let segments = segmented(model, &whole, among, Worth::default())?;
+        // Frames without anybody are not in the tracks.
+        let numbers: Vec<usize> = views
+            .iter()
+            .find(|view| view.iter().any(|track| track.frames() > 0))
+            .into_iter()
+            .flat_map(|view| (passage.start..).zip(view).filter(|(_, track)| track.frames() > 0))
+            .map(|(frame, _)| frame + 1)
+            .collect();
+        let answers = found.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
+        in_windows.extend(parts(answers, &numbers, passage.end));
+        in_segments.extend(parts(of_segments(&segments), &numbers, passage.end));
+    }
+    Ok((in_windows, in_segments))
+}
+
+/// The only person of a recording; `None` in an empty one.
+pub(super) fn only_person(
+    seen: &[bool],
+    answer: &AnswerSummary,
+    windows: &[Part],
+    segments: &[Part],
+) -> Option<PersonFigures> {
+    Some(PersonFigures {
+        person: 1,
+        from: seen.iter().position(|seen| *seen)? + 1,
+        to: seen.iter().rposition(|seen| *seen)? + 1,
+        silhouettes: seen.iter().filter(|seen| **seen).count(),
+        crossing_frames: 0,
+        perhaps_swapped_with: Vec::new(),
+        answer: answer.clone(),
+        windows: windows.to_vec(),
+        segments: segments.to_vec(),
+    })
+}
+
+/// The only person of a frame; `None` where the mask is empty.
+pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[String]) -> Option<PersonInFrame> {
+    let b = BoundingBox::of(mask.view())?;
+    Some(PersonInFrame {
+        person: 1,
+        top_left_bottom_right: Some([b.top, b.left, b.bottom, b.right]),
+        activity: answer.activity.clone(),
+        confidence: rounded_probability(answer.confidence),
+        outlier_score: outlier_score(answer),
+        flags: flags.to_vec(),
+    })
 }
 
 /// The segments as [`parts`] takes them.

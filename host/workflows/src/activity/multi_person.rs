@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Instant};
 
 use farnear_recognition::clip::Track;
-use farnear_recognition::live::{Live, joined};
+use farnear_recognition::live::{Live, joined, windows};
 use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::segmentation::{Worth, segmented};
 use farnear_silhouettes::mask::{
@@ -15,7 +15,10 @@ use serde::Serialize;
 
 use super::{
     annotated_video::{AnnotatedVideo, Shown},
-    answer::{AnswerSummary, Part, of_segments, outlier_score, parts, restricted, rounded_probability},
+    answer::{
+        AnswerSummary, PersonFigures, PersonInFrame, of_segments, outlier_score, parts, restricted,
+        rounded_probability,
+    },
     recognition::Model,
     views::{Frames, View},
 };
@@ -51,56 +54,21 @@ pub struct FrameOfPeople {
     pub flags: Vec<String>,
 }
 
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct PersonInFrame {
-    /// The number, from 1 in the order of coming.
-    pub person: usize,
-    /// First row, first column, one past the last row and column of what is seen; `None` where nothing is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub top_left_bottom_right: Option<[usize; 4]>,
-    /// The activity so far; `None` is unknown.
-    pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
-    pub confidence: f64,
-    /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
-    pub outlier_score: Option<f64>,
-    /// What is doubtful: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub flags: Vec<String>,
-}
-
 /// Everybody in the recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct EverybodyFigures {
     pub people: Vec<PersonFigures>,
     pub frames: usize,
+    /// Frames in which no person is followed.
+    pub empty_frames: usize,
+    /// Frames with something doubtful.
+    pub flagged_frames: usize,
     pub window: usize,
     /// From a file to everybody's part of a streaming answer.
     pub seconds_per_frame: f64,
     /// What a user should know about how the view was read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
-}
-
-/// What one of them did.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct PersonFigures {
-    pub person: usize,
-    /// First frame with a silhouette.
-    pub from: usize,
-    /// Last frame with a silhouette.
-    pub to: usize,
-    /// Frames with a silhouette.
-    pub silhouettes: usize,
-    /// Frames in one blob with others.
-    pub crossing_frames: usize,
-    /// Those with whom this one may have been swapped.
-    pub perhaps_swapped_with: Vec<usize>,
-    /// For all that was seen.
-    #[serde(flatten)]
-    pub answer: AnswerSummary,
-    /// Stretches of one activity each, by a hidden semi-Markov model.
-    pub segments: Vec<Part>,
 }
 
 /// Silhouettes at 100x100 or several views, where one view of full frames is needed.
@@ -134,6 +102,8 @@ pub struct MultiPersonTracker<'m> {
     people: Vec<Somebody<'m>>,
     annotated_video: Option<AnnotatedVideo>,
     count: usize,
+    empty_frames: usize,
+    flagged_frames: usize,
     seconds: f64,
     remarks: Vec<String>,
 }
@@ -174,6 +144,8 @@ impl<'m> MultiPersonTracker<'m> {
             people: Vec::new(),
             annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
             count: 0,
+            empty_frames: 0,
+            flagged_frames: 0,
             seconds: 0.0,
             model: recogniser,
         })
@@ -202,6 +174,9 @@ impl<'m> MultiPersonTracker<'m> {
             .into_iter()
             .map(|followed| self.answered(followed).about(|| moved.name.clone()))
             .collect::<Result<Vec<PersonInFrame>>>()?;
+        self.empty_frames += usize::from(people.is_empty());
+        let doubtful = flag.is_some() || people.iter().any(|person| !person.flags.is_empty());
+        self.flagged_frames += usize::from(doubtful);
         self.seconds += start.elapsed().as_secs_f64();
         if let Some(annotated_video) = &mut self.annotated_video {
             let shown: Vec<Shown> = people.iter().filter_map(shown).collect();
@@ -286,15 +261,17 @@ impl<'m> MultiPersonTracker<'m> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
         }
-        let (model, among) = (self.model, &self.among);
+        let (model, among, window) = (self.model, &self.among, self.window);
         let people = (1..)
             .zip(&self.people)
             .filter(|(_, somebody)| !somebody.tracks.is_empty())
-            .map(|(person, somebody)| figures(model, among, person, somebody))
+            .map(|(person, somebody)| figures(model, among, window, person, somebody))
             .collect::<Result<Vec<PersonFigures>>>()?;
         Ok(EverybodyFigures {
             people,
             frames: self.count,
+            empty_frames: self.empty_frames,
+            flagged_frames: self.flagged_frames,
             window: self.window,
             seconds_per_frame: rounded(self.seconds / self.count.max(1) as f64, 6),
             remarks: self.remarks,
@@ -305,6 +282,7 @@ impl<'m> MultiPersonTracker<'m> {
 fn figures(
     model: &Recogniser,
     among: &[String],
+    window: usize,
     person: usize,
     somebody: &Somebody<'_>,
 ) -> Result<PersonFigures> {
@@ -319,15 +297,20 @@ fn figures(
     let at = |index: usize| numbers.get(index).copied().unwrap_or(0);
     let answer = restricted(model.recognise(std::slice::from_ref(&whole))?, among);
     let found = segmented(model, std::slice::from_ref(&whole), among, Worth::default())?;
+    let last = at(numbers.len().saturating_sub(1));
+    let mut in_windows = windows(model, std::slice::from_ref(&whole), window, window.div_ceil(2))?;
+    in_windows.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), among));
+    let of_windows = in_windows.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
     Ok(PersonFigures {
+        windows: parts(of_windows, &numbers, last),
         person,
         from: at(0),
-        to: at(numbers.len().saturating_sub(1)),
+        to: last,
         silhouettes: numbers.len(),
         crossing_frames: somebody.crossing_frames,
         perhaps_swapped_with: somebody.perhaps_swapped_with.clone(),
         answer: AnswerSummary::new(answer, numbers.len()),
-        segments: parts(of_segments(&found), &numbers, at(numbers.len().saturating_sub(1))),
+        segments: parts(of_segments(&found), &numbers, last),
     })
 }
 

@@ -8,9 +8,8 @@ use std::{
 
 use farnear_files::masks;
 use farnear_recognition::clip::Track;
-use farnear_recognition::live::{Live, joined, windows};
+use farnear_recognition::live::{Live, joined};
 use farnear_recognition::model::Recogniser;
-use farnear_recognition::segmentation::{Worth, segmented};
 use farnear_recognition::self_training::ROUNDS;
 use farnear_silhouettes::mask::{Mask, centre::SIDE_PX, subject::Flag};
 use serde::Serialize;
@@ -18,7 +17,8 @@ use serde::Serialize;
 use super::{
     annotated_video::AnnotatedVideo,
     answer::{
-        AnswerSummary, Part, of_segments, outlier_score, parts, passages, restricted, rounded_probability,
+        AnswerSummary, Part, PersonFigures, PersonInFrame, only_in_frame, only_person, outlier_score, restricted,
+        rounded_probability, stretches,
     },
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
@@ -160,6 +160,8 @@ pub struct FrameAnswer {
     pub confidence: f64,
     /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
     pub outlier_score: Option<f64>,
+    /// The person in the first view, if any: the schema of several people.
+    pub people: Vec<PersonInFrame>,
     /// What is doubtful about the frame's masks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
@@ -168,8 +170,11 @@ pub struct FrameAnswer {
 /// The answer for the whole recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecognitionFigures {
+    /// The answer for the only person, who is in `people` too.
     #[serde(flatten)]
     pub answer: AnswerSummary,
+    /// One person, or none in an empty recording: the schema of several people.
+    pub people: Vec<PersonFigures>,
     pub frames: usize,
     /// Masks of all views without anybody.
     pub empty_frames: usize,
@@ -272,7 +277,9 @@ impl<'m> Recognition<'m> {
         let flags: Vec<String> =
             moment.iter().flat_map(|seen| seen.flags.iter().map(Flag::to_string)).collect();
         self.flagged_frames += usize::from(!flags.is_empty());
+        let only = moment.first().and_then(|first| only_in_frame(&first.mask, &answer, &flags));
         Ok(Some(FrameAnswer {
+            people: only.into_iter().collect(),
             frame: self.frames,
             name,
             confidence: rounded_probability(answer.confidence),
@@ -297,35 +304,17 @@ impl<'m> Recognition<'m> {
                 self.tracks.iter().any(|view| view.get(frame).is_some_and(|track| track.frames() > 0))
             })
             .collect();
-        let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());
-        for passage in passages(&seen) {
-            let frames =
-                |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
-            let views: Vec<Vec<Track>> = self.tracks.iter().map(frames).collect();
-            let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
-            let mut stretches = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
-            stretches.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), &self.among));
-            let found = segmented(self.model, &whole, &self.among, Worth::default())?;
-            // Frames without anybody are not in the tracks.
-            let numbers: Vec<usize> = views
-                .iter()
-                .find(|view| view.iter().any(|track| track.frames() > 0))
-                .into_iter()
-                .flat_map(|view| (passage.start..).zip(view).filter(|(_, track)| track.frames() > 0))
-                .map(|(frame, _)| frame + 1)
-                .collect();
-            let answers = stretches.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
-            in_windows.extend(parts(answers, &numbers, passage.end));
-            in_segments.extend(parts(of_segments(&found), &numbers, passage.end));
-        }
+        let (windows, segments) = stretches(self.model, &self.tracks, &seen, self.window, &self.among)?;
+        let answer = AnswerSummary::new(answer, self.frames);
         Ok(RecognitionFigures {
-            answer: AnswerSummary::new(answer, self.frames),
+            people: only_person(&seen, &answer, &windows, &segments).into_iter().collect(),
+            answer,
             frames: self.frames,
             empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
             flagged_frames: self.flagged_frames,
             window: self.window,
-            windows: in_windows,
-            segments: in_segments,
+            windows,
+            segments,
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
             remarks: self.remarks,
         })

@@ -17,7 +17,10 @@ use ndarray::{Array2, Axis};
 use serde::Serialize;
 
 use super::{
-    answer::{Probability, probabilities, rounded_probability},
+    answer::{
+        AnswerSummary, PersonFigures, PersonInFrame, Probability, only_in_frame, only_person, outlier_score,
+        probabilities, rounded_probability, stretches,
+    },
     recognition::Model,
 };
 use crate::{
@@ -40,8 +43,12 @@ pub struct RunningAnswer {
     pub activity: Option<String>,
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
+    /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
+    pub outlier_score: Option<f64>,
     /// The likeliest activities, the best first.
     pub best: Vec<Probability>,
+    /// The person, if any: the schema of several people.
+    pub people: Vec<PersonInFrame>,
     /// Doubts about the frame's mask.
     pub flags: Vec<String>,
 }
@@ -56,12 +63,13 @@ pub struct Moment<'a> {
 /// The answer for all frames.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RunningFigures {
-    /// The activity; `None` is unknown.
-    pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
-    pub confidence: f64,
+    /// The answer for the only person, who is in `people` too.
+    #[serde(flatten)]
+    pub answer: AnswerSummary,
     /// The likeliest activities, the best first.
     pub best: Vec<Probability>,
+    /// One person, or none in an empty recording: the schema of several people.
+    pub people: Vec<PersonFigures>,
     pub frames: usize,
     pub empty_frames: usize,
     /// From a frame to its answer, mean, in s.
@@ -97,14 +105,17 @@ impl<'m> StreamingRecogniser<'m> {
         self.tracks.push(track.clone());
         let answer = self.live.push_described(vec![track])?;
         self.seconds += start.elapsed().as_secs_f64();
-        let told = RunningAnswer {
+        let flags: Vec<String> = found.flags.iter().map(Flag::to_string).collect();
+        let running = RunningAnswer {
             frame: self.tracks.len(),
+            outlier_score: outlier_score(&answer),
+            people: only_in_frame(&found.mask, &answer, &flags).into_iter().collect(),
             confidence: rounded_probability(answer.confidence),
             best: best(&answer),
             activity: answer.activity,
-            flags: found.flags.iter().map(Flag::to_string).collect(),
+            flags,
         };
-        Ok((found.mask, told))
+        Ok((found.mask, running))
     }
 
     /// The answer for all of it.
@@ -113,10 +124,16 @@ impl<'m> StreamingRecogniser<'m> {
         let empty_frames = whole.empty_frames;
         let answer = self.model.recognise(&[whole])?;
         let frames = self.tracks.len();
+        let seen: Vec<bool> = self.tracks.iter().map(|track| track.frames() > 0).collect();
+        let window = self.model.typical_frames.max(1);
+        let (windows, segments) =
+            stretches(self.model, std::slice::from_ref(&self.tracks), &seen, window, &[])?;
+        let best = best(&answer);
+        let answer = AnswerSummary::new(answer, frames);
         Ok(RunningFigures {
-            confidence: rounded_probability(answer.confidence),
-            best: best(&answer),
-            activity: answer.activity,
+            people: only_person(&seen, &answer, &windows, &segments).into_iter().collect(),
+            best,
+            answer,
             frames,
             empty_frames,
             seconds_per_frame: rounded(self.seconds / frames.max(1) as f64, 6),
@@ -132,7 +149,11 @@ pub fn video(
     mut on_moment: impl FnMut(&Moment<'_>) -> Result<()>,
 ) -> Result<RunningFigures> {
     let mut watcher = StreamingRecogniser::new(model);
-    for frame in Video::open(path)? {
+    let video = Video::open(path)?;
+    if let Some(remark) = &video.remark {
+        context.progress.warn(&format!("{}: {remark}", path.display()));
+    }
+    for frame in video {
         context.cancel.check("recognising")?;
         let VideoFrame { name, pixels } = frame?;
         let (mask, answer) = watcher.take(&pixels).about(|| name.clone())?;

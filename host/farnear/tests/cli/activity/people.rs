@@ -70,6 +70,18 @@ fn two_people_side_by_side_get_an_answer_each() {
         let path = written(&folder, &format!("alone{index}"), &frames);
         let recognise = ["activity", "recognise", &path, "--as", "masks", "--model", "everyday", "--json"];
         let alone = figures(farnear(&recognise).args(["--among", "dig,crouch"]));
+        // One schema: the only person of a clip and one of several have the same keys and answers.
+        let only = alone["people"][0].as_object().expect("a person");
+        let keys = |person: &serde_json::Map<String, Value>| person.keys().cloned().collect::<Vec<String>>();
+        let without = |mut keys: Vec<String>| {
+            keys.retain(|key| key != "reason");
+            keys
+        };
+        assert_eq!(without(keys(only)), without(keys(person.as_object().expect("a person"))));
+        for key in ["frames", "empty_frames", "flagged_frames", "window", "seconds_per_frame", "people"] {
+            assert!(!found[key].is_null() && !alone[key].is_null(), "{key}");
+        }
+        assert_eq!((&only["silhouettes"], &only["windows"]), (&person["silhouettes"], &person["windows"]));
         for key in ["probabilities", "activity", "segments"] {
             assert_eq!(person[key], alone[key], "{key}: {person} {alone}");
         }
