@@ -141,7 +141,8 @@ pub(super) fn stretches(
 ) -> Result<(Vec<Part>, Vec<Part>)> {
     let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());
     for passage in passages(seen) {
-        let frames = |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
+        let frames =
+            |view: &Vec<Track>| passage.clone().filter_map(|f| view.get(f)).cloned().collect::<Vec<_>>();
         let views: Vec<Vec<Track>> = tracks.iter().map(frames).collect();
         let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
         let mut found = windows(model, &whole, window, window.div_ceil(2))?;

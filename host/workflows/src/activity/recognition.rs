@@ -17,8 +17,8 @@ use serde::Serialize;
 use super::{
     annotated_video::AnnotatedVideo,
     answer::{
-        AnswerSummary, Part, PersonFigures, PersonInFrame, only_in_frame, only_person, outlier_score, restricted,
-        rounded_probability, stretches,
+        AnswerSummary, Part, PersonFigures, PersonInFrame, only_in_frame, only_person, outlier_score,
+        restricted, rounded_probability, stretches,
     },
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
