@@ -292,6 +292,9 @@ impl Driver {
             vcd.ordered(stop.at.0, order);
         }
         self.access(|rig| order.give(rig), session, stop, host);
+        if matches!(order, CameraOrder::FreeRun { period_us: 0, .. }) {
+            self.patience.end_free_run();
+        }
     }
 
     /// Puts on the line what came for the board, unless time passes on request.

@@ -11,7 +11,7 @@ use std::{
 
 use farnear_protocol::{
     BoardMicros,
-    camera::{FRAME_HEADER, FrameHeader},
+    camera::{FRAME_HEADER, FREE_RUNNING, FrameHeader},
 };
 use farnear_scene::{Camera, Lens, Psf, Renderer, Scene, View};
 
@@ -143,8 +143,9 @@ pub fn watch(
         .name("camera".into())
         .spawn(move || {
             for (number, shot) in shots.into_iter().enumerate() {
+                let dropped = shot.id == FREE_RUNNING && pictures.is_of_ended_run(number);
                 for (at, (imager, frames)) in cameras.iter_mut().enumerate() {
-                    if !pictures.wants(at, number) {
+                    if dropped || !pictures.wants(at, number) {
                         imager.exposures += 1; // the noise of those after it stays what it would be
                         continue;
                     }

@@ -24,6 +24,8 @@ pub struct Pictures {
     done: AtomicUsize,
     /// Nobody wants those that were exposed before this one, of each camera.
     wanted_from: [AtomicUsize; CAMERAS_MAX],
+    /// The free run that exposed those before this one has ended.
+    free_run_from: AtomicUsize,
 }
 
 impl Pictures {
@@ -41,6 +43,16 @@ impl Pictures {
         if let Some(wanted_from) = self.wanted_from.get(camera) {
             wanted_from.store(self.exposed.load(Ordering::Relaxed), Ordering::Relaxed);
         }
+    }
+
+    /// Drops the pictures of a free run that has ended: rendering them would keep the next client waiting.
+    fn end_free_run(&self) {
+        self.free_run_from.store(self.exposed.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+
+    /// Whether this exposure, counted from 0, belongs to a free run that has ended.
+    pub fn is_of_ended_run(&self, number: usize) -> bool {
+        number < self.free_run_from.load(Ordering::Relaxed)
     }
 
     /// Whether anybody wants this camera's picture of this exposure, both counted from 0.
@@ -72,6 +84,13 @@ impl Patience {
     pub fn expose(&self) {
         if let Some(pictures) = &self.pictures {
             pictures.expose();
+        }
+    }
+
+    /// The camera runs freely no more.
+    pub fn end_free_run(&self) {
+        if let Some(pictures) = &self.pictures {
+            pictures.end_free_run();
         }
     }
 
@@ -115,5 +134,16 @@ mod tests {
         pictures.expose();
         assert_eq!([0, 1, 2].map(|number| pictures.wants(0, number)), [false, false, true]);
         assert_eq!([0, 1, 2].map(|number| pictures.wants(1, number)), [true; 3], "the other camera's");
+    }
+
+    #[test]
+    fn pictures_of_an_ended_free_run_are_not_rendered() {
+        let pictures = Arc::new(Pictures::default());
+        let patience = Patience::new(Some(Arc::clone(&pictures)));
+        patience.expose();
+        assert!(!pictures.is_of_ended_run(0));
+        patience.end_free_run();
+        patience.expose();
+        assert_eq!([0, 1].map(|number| pictures.is_of_ended_run(number)), [true, false]);
     }
 }

@@ -239,3 +239,31 @@ fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
         reasons[at] = Reason::NoTexture.code();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With a slope of 30 mm: 3.6 mm of noise, 10.8 mm with the model's error, misfit 60.
+    #[test]
+    fn depths_are_believed_up_to_each_limit_and_no_further() {
+        let range = Range { far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0 };
+        let verdict = |depth, deviations_mm, misfit| range.verdict(depth, deviations_mm, misfit, 0.0);
+        let believed = |verdict: Option<Result<f32, Reason>>| matches!(verdict, Some(Ok(_)));
+        let why = |verdict: Option<Result<f32, Reason>>| verdict.and_then(Result::err);
+        assert!(believed(verdict(900.0, [0.3, 0.3], 59.0)));
+        assert_eq!(why(verdict(900.0, [0.3, 0.3], 61.0)), Some(Reason::Misfit));
+        assert!(believed(verdict(900.0, [3.5, 3.5], 1.0)));
+        assert_eq!(why(verdict(900.0, [3.7, 3.7], 1.0)), Some(Reason::NoTexture));
+        assert_eq!(why(verdict(900.0, [f32::NAN, 0.3], 1.0)), Some(Reason::NoTexture));
+        assert!(believed(verdict(900.0, [0.3, 10.7], 1.0)));
+        assert_eq!(why(verdict(900.0, [0.3, 10.9], 1.0)), Some(Reason::Misfit));
+        for depth in [880.0, 950.0] {
+            assert!(believed(verdict(depth, [0.3, 0.3], 1.0)), "{depth}");
+        }
+        for depth in [879.9, 950.1] {
+            assert_eq!(why(verdict(depth, [0.3, 0.3], 1.0)), Some(Reason::OutOfRange), "{depth}");
+        }
+        assert_eq!(why(range.verdict(900.0, [0.3, 0.3], 1.0, 1.0)), Some(Reason::Unsure));
+    }
+}

@@ -50,6 +50,13 @@ export function make(host, remember) {
       panel("Files", links(() => show.name)))));
 
   viewer.onprobe = (at) => side.under(show.maps, at);
+  viewer.overlay = (context, point) => {
+    const map = show.maps.depth ?? show.maps.far;
+    const middle = show.maps.depth ? range(show.maps.depth, 0.5)[0] : show.capture?.optics?.focus?.far_mm;
+    const mm = pixelAt(middle, show.capture?.optics);
+    if (map && mm > 0) viewer.canvas.dataset.scale = scaleBar(context, point, map, mm);
+    else delete viewer.canvas.dataset.scale;
+  };
   viewer.onshape = (kind, from, to) => show.name && show.capture?.has_depth && side.shape(show.name, kind, from, to);
 
   const use = (tool) => {
@@ -323,9 +330,11 @@ function compute(name, done) {
   const filled = h("input", { type: "checkbox" });
   const corrected = h("input", { type: "checkbox" });
   const keep = h("input", { type: "checkbox" });
+  const more = furtherOptions();
   const start = async () => {
     if (!name()) return;
-    const wish = { method: method.value, median_px: Number(median.value), fill: filled.checked ? "surface" : null, corrected: corrected.checked };
+    /** @type {Record<string, any>} */
+    const wish = { ...more.values(), method: method.value, median_px: Number(median.value), fill: filled.checked ? "surface" : null, corrected: corrected.checked };
     if (smooth.value) wish.window = smooth.value;
     if (["ro", "whitened"].includes(method.value)) wish.uncertainty = "estimated";
     if (keep.checked) wish.variant = `${method.value}-${smooth.value || "default"}-${median.value}${filled.checked ? "-filled" : ""}${corrected.checked ? "-corrected" : ""}`;
@@ -335,7 +344,60 @@ function compute(name, done) {
   return panel("Compute", field("Method", method), field("Window", smooth, "px"), field("Median", median),
     h("label", { class: "check" }, filled, "fill low texture"), h("label", { class: "check" }, corrected, "correction of this session"),
     h("label", { class: "check" }, keep, "keep as another map, to compare"),
-    button("Compute depth", start));
+    more.element, button("Compute depth", start));
+}
+
+/** Options of a depth request that have a control of their own, or that the page fills in. */
+const SHOWN = ["method", "window", "median_px", "fill", "corrected", "variant", "uncertainty", "write"];
+
+/** All other options of a depth request, from its schema: what the program learns is offered here. */
+function furtherOptions() {
+  const place = h("div", { class: "details" });
+  const element = h("details", {}, h("summary", {}, "All options"), place);
+  /** @type {[string, string, HTMLInputElement][]} */
+  let inputs = [];
+  element.addEventListener("toggle", async () => {
+    if (inputs.length) return;
+    try {
+      const { components } = await get("/openapi.json");
+      const all = /** @type {[string, any][]} */ (Object.entries(components.schemas.CaptureDepthRequest.properties));
+      inputs = all.filter(([name]) => !SHOWN.includes(name)).map(([name, { type, default: usual, description }]) => {
+        const [kind] = [type].flat();
+        const input = /** @type {HTMLInputElement} */ (h("input", { type: kind === "boolean" ? "checkbox" : kind === "string" ? "text" : "number", step: "any", name, title: description, placeholder: usual ?? "default" }));
+        return [name, kind, input];
+      });
+      place.replaceChildren(...inputs.flatMap(([name, , input]) => [field(name.replaceAll("_", " "), input), h("p", { class: "dim about" }, input.title)]));
+    } catch (error) {
+      notice(error.message, "error", error.hint);
+    }
+  });
+  const values = () => Object.fromEntries(inputs.filter(([, kind, input]) => (kind === "boolean" ? input.checked : input.value !== ""))
+    .map(([name, kind, input]) => [name, kind === "boolean" ? true : kind === "string" ? input.value : Number(input.value)]));
+  return { element, values };
+}
+
+/** Lateral size of a pixel at a distance of a thin lens, mm. */
+function pixelAt(mm, optics) {
+  const [pixel, focal] = [optics?.sensor?.pixel_um, optics?.lens?.focal_length_mm];
+  return pixel > 0 && mm > focal ? ((pixel / 1000) * (mm - focal)) / focal : NaN;
+}
+
+/** A bar of 1, 2 or 5 times a power of ten mm, at most a quarter of the picture.
+ * @param {CanvasRenderingContext2D} context @param {(x: number, y: number) => number[]} point @param {{ width: number, height: number }} map @param {number} mm of a pixel */
+function scaleBar(context, point, map, mm) {
+  const most = (mm * map.width) / 4;
+  const decade = 10 ** Math.floor(Math.log10(most));
+  const length = [5, 2, 1].map((times) => times * decade).find((size) => size <= most) ?? decade;
+  const [left, y] = point(0.03 * map.width, 0.95 * map.height);
+  const [right] = point(0.03 * map.width + length / mm, 0);
+  const text = `${Number(length.toPrecision(1))} mm`;
+  context.font = "12px system-ui";
+  context.fillStyle = "#000b";
+  context.fillRect(left - 5, y - 20, Math.max(right - left, context.measureText(text).width) + 10, 27);
+  context.fillStyle = "#fff";
+  context.fillRect(left, y, right - left, 3);
+  context.fillText(text, left, y - 5);
+  return text;
 }
 
 function links(name) {

@@ -112,6 +112,20 @@ export function make(host) {
     const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
     probe.textContent = at ? (code && live ? number(live.low_mm + ((code - 1) * (live.high_mm - live.low_mm)) / 65534, 2, "mm") : "no depth") : "";
   };
+  /** Nothing of the mode before is shown as if it were new. */
+  const forgetShown = (mode) => {
+    [live, shown, pictured] = [null, false, performance.now()];
+    scale.hidden = true;
+    for (const viewer of [image, depth]) viewer.clear();
+    values.length = 0;
+    best = 0;
+    focus.replaceChildren("–");
+    plot.set([[], []]);
+    bars(histogram, []);
+    figures.replaceChildren(mode === "depth" ? h("p", { class: "dim" }, "Live depth has no focus value and no histogram.") : "");
+    warnings.replaceChildren();
+    write(status, { image: "waiting for the first image", depth: "waiting for the first map" }[mode] ?? "live is off");
+  };
   key("l", "Live image on or off", () => mode("image"));
 
   const mode = (wanted) => act("/api/live", { mode: store.state?.live.mode === wanted ? "off" : wanted });
@@ -126,6 +140,7 @@ export function make(host) {
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
     measure.value = live.measure;
     const playing = state.computation?.kind === "play" && state.computation.phase === "running";
+    if (before && before.live.mode !== live.mode && live.mode !== "off") forgetShown(live.mode);
     resting.hidden = live.mode !== "off" || !seen || playing || shown;
     depth.element.hidden = live.mode !== "depth" && !playing;
     if (depth.element.hidden) scale.hidden = true;

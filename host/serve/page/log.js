@@ -11,7 +11,8 @@ export function make(host) {
   let seen = -1;
   async function refresh() {
     const end = lines.scrollTop + lines.clientHeight > lines.scrollHeight - 40;
-    lines.textContent = (await get("/api/log")).lines.join("\n");
+    const { lines: all } = await get("/api/log");
+    lines.textContent = all.map(({ unix_ms, text }) => `${new Date(unix_ms).toLocaleTimeString()}  ${text}`).join("\n");
     if (end) lines.scrollTop = lines.scrollHeight;
   }
   async function read() {

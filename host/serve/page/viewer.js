@@ -40,6 +40,12 @@ export class Viewer {
     this.draw();
   }
 
+  /** Removes the picture. */
+  clear() {
+    [this.source.width, this.source.height, this.second] = [0, 0, null];
+    this.draw();
+  }
+
   /** Takes a region or a line from now on: `pan`, `region`, `line`. */
   use(tool) {
     this.tool = tool;

@@ -30,11 +30,12 @@ use tokio::sync::watch;
 use crate::{
     connections::Limits,
     control::ControlLock,
+    depth_message::unix_ms,
     guard::{Guard, Throttle},
     job_queue::{JobQueue, Task},
     server::ServeSettings,
     stopping::{Stop, Stops},
-    view::{ControlState, LiveMode, LiveState, Phase, RigState, State},
+    view::{ControlState, LiveMode, LiveState, LogLine, Phase, RigState, State},
 };
 
 /// Lines of the log that are kept.
@@ -65,7 +66,7 @@ pub struct App {
     /// The newest live picture, as it is sent.
     pub pictures: watch::Sender<Bytes>,
     live: Mutex<Live>,
-    log: Mutex<VecDeque<String>>,
+    log: Mutex<VecDeque<LogLine>>,
     /// The recording of live depth that is under way.
     pub recorder: Mutex<Option<Recorder>>,
     /// The answer to a question, until the job has taken it.
@@ -262,13 +263,13 @@ impl App {
         if log.len() == LOG_MAX {
             log.pop_front();
         }
-        log.push_back(line.into());
+        log.push_back(LogLine { unix_ms: unix_ms(), text: line.into() });
         drop(log);
         self.change(|state| state.log += 1);
     }
 
     /// The log, the oldest line first.
-    pub fn log(&self) -> Vec<String> {
+    pub fn log(&self) -> Vec<LogLine> {
         lock(&self.log).iter().cloned().collect()
     }
 

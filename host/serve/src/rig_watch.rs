@@ -13,7 +13,10 @@ use farnear_workflows::{
     rig::{RigAddress, info, open::OpenRig},
 };
 
-use crate::{app::App, view::Phase};
+use crate::{
+    app::App,
+    view::{LiveMode, Phase},
+};
 
 /// From one question to the next while somebody looks.
 const OFTEN: Duration = Duration::from_millis(100);
@@ -65,8 +68,18 @@ fn connect(app: &App) {
     let opened =
         GivenOptics::read(&app.optics_file()).and_then(|optics| OpenRig::open(address, &optics, &context));
     match opened {
-        Ok(rig) => app.set_rig(Some(rig)),
+        Ok(rig) => {
+            app.set_rig(Some(rig));
+            resume_live(app);
+        }
         Err(error) => lost(app, &error),
+    }
+}
+
+/// Shows the live image again if an error had ended it: the rig that caused the error is there again.
+fn resume_live(app: &App) {
+    if app.state().live.error.is_some() {
+        app.set_live(|live| live.mode = LiveMode::Image);
     }
 }
 
@@ -100,6 +113,7 @@ fn ask(app: &App, rig: &OpenRig) {
             // A board that was reset or unplugged is met again; where it stands is known by nobody then.
             if rig.reopen().is_ok() {
                 app.note("rig: it answers again; home it before it moves");
+                resume_live(app);
             }
         }
     }

@@ -29,6 +29,14 @@ pub struct State {
     pub log: u64,
 }
 
+/// A line of the log.
+#[derive(Clone, PartialEq, Debug, Serialize, JsonSchema)]
+pub struct LogLine {
+    /// Milliseconds since 1970 by the clock of the rig's computer.
+    pub unix_ms: f64,
+    pub text: String,
+}
+
 /// The rig.
 #[derive(Clone, PartialEq, Debug, Serialize, JsonSchema)]
 pub struct RigState {

@@ -306,3 +306,41 @@ fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
     clear_left_of(mask.view(), out, shadow.beta_rad as f32, limit, shadow.mirrored);
     Edge { beta_rad: shadow.beta_rad, limit: Some(limit), half_plane: true }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A body of 20 x 60 px, and its shadow as a bar in this direction from its feet.
+    fn cut_of_shadow_at(eta_rad: f64) -> Edge {
+        let (foot, length) = ([60.0, 90.0], 40.0);
+        let (sin, cos) = eta_rad.sin_cos();
+        let mask = Mask::from_shape_fn((140, 160), |(y, x)| {
+            let body = (50..70).contains(&x) && (30..90).contains(&y);
+            let (dx, dy) = (x as f64 - foot[0], y as f64 - foot[1]);
+            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            body || (along > 0.0 && along < length && across.abs() < 5.0)
+        });
+        let m_px = [length * cos, length * sin];
+        let shadow = ImageShadow {
+            foot_px: foot,
+            tip_px: [foot[0] + m_px[0], foot[1] + m_px[1]],
+            m_px,
+            eta_rad,
+            beta_rad: 0.75 * PI - 0.5 * eta_rad,
+            mirrored: false,
+            height_px: 60.0,
+            shortened: false,
+        };
+        let outline = Outline::new(&mask).expect("not empty");
+        hybrid(&mask, &mut mask.clone(), &outline, &shadow)
+    }
+
+    #[test]
+    fn a_shadow_is_cut_sideways_up_to_its_limit_and_by_the_half_plane_beyond_it() {
+        for side in [1.0, -1.0] {
+            assert!(!cut_of_shadow_at(side * 0.44_f64.asin()).half_plane, "{side}");
+            assert!(cut_of_shadow_at(side * 0.46_f64.asin()).half_plane, "{side}");
+        }
+    }
+}

@@ -1,16 +1,19 @@
 //! Reading a saved depth correction.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use farnear_depth::corrections::Correction;
 
-use crate::error::{Result, WorkflowError};
+use crate::{
+    error::{Result, WorkflowError},
+    text_file,
+};
 
 /// What the file holds, as [`WorkflowError::File`] names it.
 pub const KIND: &str = "a saved correction";
 
 /// Reads and checks a correction.
 pub fn read(path: &Path) -> Result<Correction> {
-    let text = fs::read_to_string(path).map_err(WorkflowError::read(KIND, path))?;
+    let text = text_file::read(path).map_err(WorkflowError::read(KIND, path))?;
     toml::from_str(&text).map_err(WorkflowError::file(path, KIND))
 }

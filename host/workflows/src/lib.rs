@@ -95,6 +95,7 @@ pub mod silhouettes;
 pub mod simulator;
 pub mod sun;
 pub mod target;
+pub mod text_file;
 
 pub use context::{Cancel, Context, Progress, Questions, Unattended};
 pub use error::{Result, WorkflowError};

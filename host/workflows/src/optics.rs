@@ -3,10 +3,7 @@
 mod expected;
 mod task;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use farnear_capture::record::{CAPTURE_FILE, read_record};
 use farnear_depth::{
@@ -17,7 +14,10 @@ use farnear_depth::{
 pub use expected::{ExpectedError, expected_error};
 pub use task::{OpticsFigures, OpticsRequest};
 
-use crate::error::{About, Result, WorkflowError};
+use crate::{
+    error::{About, Result, WorkflowError},
+    text_file,
+};
 
 /// Optics and the file they come from.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ impl GivenOptics {
     /// # Errors
     /// [`WorkflowError::Read`], or which value makes no optics.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = fs::read_to_string(path).map_err(WorkflowError::read("the optics file", path))?;
+        let text = text_file::read(path).map_err(WorkflowError::read("the optics file", path))?;
         Self::parse(&text, path)
     }
 

@@ -11,7 +11,10 @@ use farnear_capture::record::{CAPTURE_FILE, CaptureRecord, read_record};
 use farnear_files::staging::write_file;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{About, Result, WorkflowError};
+use crate::{
+    error::{About, Result, WorkflowError},
+    text_file,
+};
 
 const NOTE_FILE: &str = "note.toml";
 /// Longest note, bytes: a note, not a file store.
@@ -276,8 +279,8 @@ fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
     if search.trim().is_empty() {
         return true;
     }
-    let record = fs::read_to_string(folder.join(CAPTURE_FILE)).unwrap_or_default();
-    let depth = fs::read_to_string(folder.join("depth.toml")).unwrap_or_default();
+    let record = text_file::read(&folder.join(CAPTURE_FILE)).unwrap_or_default();
+    let depth = text_file::read(&folder.join("depth.toml")).unwrap_or_default();
     let all = format!("{} {} {record} {depth}", capture.name, capture.note.text).to_lowercase();
     search.to_lowercase().split_whitespace().all(|word| all.contains(word))
 }
@@ -285,7 +288,7 @@ fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
 /// The note; empty if there is none.
 pub fn read_note(folder: &Path) -> Result<Note> {
     let path = folder.join(NOTE_FILE);
-    match fs::read_to_string(&path) {
+    match text_file::read(&path) {
         Ok(text) => toml::from_str(&text).about(|| format!("the note {}", path.display())),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Note::default()),
         Err(error) => Err(WorkflowError::read("the note", &path)(error)),

@@ -286,3 +286,22 @@ fn it_runs_freely_and_by_software_with_region_gain_and_format() {
     assert!((factor - 1.5).abs() < 0.03, "{factor}");
     assert!(program.end().success());
 }
+
+#[test]
+fn every_free_running_client_of_a_paced_rig_gets_frames_immediately() {
+    let (camera, text) = address(4);
+    let program = Program::start(&["--paced", "--scene", "plane:900", "--gige", &text]);
+    for number in 0..3 {
+        let mut client = Client::controlling(camera);
+        assert_eq!(client.write(ACQUISITION, START), 0);
+        let begin = Instant::now();
+        let frame = client.frame();
+        assert_eq!(frame.number, 1, "client {number}");
+        // A picture takes a fraction of a second, hundreds of old ones a minute.
+        assert!(begin.elapsed() < Duration::from_secs(20), "client {number} waited {:?}", begin.elapsed());
+        // The rig goes on exposing while nobody reads, faster than it renders.
+        std::thread::sleep(Duration::from_secs(2));
+        assert_eq!(client.write(PRIVILEGE, 0), 0);
+    }
+    assert!(program.end().success());
+}

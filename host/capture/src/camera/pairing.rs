@@ -386,6 +386,23 @@ mod tests {
         assert!(matches!(error, CameraError::Mispaired { wanted: 1, .. }), "{error:?}");
     }
 
+    /// Two crystals of 100 ppm drift apart by 200 ppm at most: 200 ms in 1000 s, and the jitter of a stamp.
+    #[test]
+    fn clocks_may_drift_apart_by_two_hundred_ppm_and_no_more() {
+        let after_1000_s = |camera_us: u64| {
+            let mut pairing = Pairing::default();
+            pairing.judge("c", stamp(None, Some(0)), &shot(0, 0)).unwrap();
+            pairing.judge("c", stamp(None, Some(camera_us)), &shot(1, 1_000_000_000))
+        };
+        for drift_us in [190_000, 150_000, 0] {
+            assert_eq!(after_1000_s(1_000_000_000 + drift_us).unwrap(), Belongs::Here, "{drift_us}");
+            assert_eq!(after_1000_s(1_000_000_000 - drift_us).unwrap(), Belongs::Here, "-{drift_us}");
+        }
+        let beyond_us = 210_000 + JITTER.as_micros() as u64;
+        assert!(after_1000_s(1_000_000_000 + beyond_us).is_err());
+        assert!(after_1000_s(1_000_000_000 - beyond_us).is_err());
+    }
+
     #[test]
     fn with_nothing_but_their_order_frames_go_with_consecutive_triggers_only() {
         let mut pairing = Pairing::default();

@@ -23,8 +23,8 @@ use crate::{
 /// Log lines of this session.
 #[derive(Serialize, JsonSchema)]
 pub struct Log {
-    /// Its lines, the oldest first.
-    pub lines: Vec<String>,
+    /// The oldest line first.
+    pub lines: Vec<view::LogLine>,
 }
 
 /// Answer to a request for control.

@@ -2,7 +2,6 @@
 //! record, so that a rig's health is seen over weeks.
 
 use std::{
-    fs,
     io::ErrorKind,
     path::{Path, PathBuf},
 };
@@ -27,6 +26,7 @@ use crate::{
     measure::{Measured, Unit, fit},
     operators,
     optics::GivenOptics,
+    text_file,
 };
 
 /// Fewest and most pairs.
@@ -80,7 +80,7 @@ pub struct QualityRecord {
 /// # Errors
 /// [`WorkflowError::Read`], [`WorkflowError::File`].
 pub fn read_record(path: &Path) -> Result<QualityRecord> {
-    match fs::read_to_string(path) {
+    match text_file::read(path) {
         Ok(text) => toml::from_str(&text).map_err(WorkflowError::file(path, "a record of depth quality")),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(QualityRecord::default()),
         Err(error) => Err(WorkflowError::read("the record", path)(error)),
@@ -244,9 +244,9 @@ mod tests {
         assert_eq!(read_record(&path).unwrap(), QualityRecord::default());
         let measurements = vec![figures(&maps(1.0), None, PROJECTION, None).unwrap()];
         let record = QualityRecord { measurements };
-        fs::write(&path, toml::to_string(&record).unwrap()).unwrap();
+        std::fs::write(&path, toml::to_string(&record).unwrap()).unwrap();
         assert_eq!(read_record(&path).unwrap(), record);
-        fs::write(&path, "measurement = 3").unwrap();
+        std::fs::write(&path, "measurement = 3").unwrap();
         assert!(read_record(&path).is_err());
     }
 }

@@ -27,6 +27,7 @@ use crate::{
     figures::rounded,
     operators,
     optics::GivenOptics,
+    text_file,
 };
 
 /// Name of the list in the series' folder.
@@ -195,7 +196,7 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
 }
 
 fn read_list(path: &Path) -> Result<List> {
-    match fs::read_to_string(path) {
+    match text_file::read(path) {
         Ok(text) => toml::from_str(&text).map_err(WorkflowError::file(path, "a list of targets")),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(List::default()),
         Err(error) => Err(WorkflowError::read("the list of targets", path)(error)),
