@@ -247,12 +247,14 @@ mod tests {
     /// With a slope of 30 mm: 3.6 mm of noise, 10.8 mm with the model's error, misfit 60.
     #[test]
     fn depths_are_believed_up_to_each_limit_and_no_further() {
-        let range = Range { far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0 };
+        let range = Range { far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0, learned: false };
         let verdict = |depth, deviations_mm, misfit| range.verdict(depth, deviations_mm, misfit, 0.0);
         let believed = |verdict: Option<Result<f32, Reason>>| matches!(verdict, Some(Ok(_)));
         let why = |verdict: Option<Result<f32, Reason>>| verdict.and_then(Result::err);
         assert!(believed(verdict(900.0, [0.3, 0.3], 59.0)));
         assert_eq!(why(verdict(900.0, [0.3, 0.3], 61.0)), Some(Reason::Misfit));
+        let learned = Range { learned: true, far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0 };
+        assert!(believed(learned.verdict(900.0, [0.3, 0.3], 61.0, 0.0)), "the deviation has the model's error");
         assert!(believed(verdict(900.0, [3.5, 3.5], 1.0)));
         assert_eq!(why(verdict(900.0, [3.7, 3.7], 1.0)), Some(Reason::NoTexture));
         assert_eq!(why(verdict(900.0, [f32::NAN, 0.3], 1.0)), Some(Reason::NoTexture));
