@@ -254,7 +254,10 @@ mod tests {
         assert!(believed(verdict(900.0, [0.3, 0.3], 59.0)));
         assert_eq!(why(verdict(900.0, [0.3, 0.3], 61.0)), Some(Reason::Misfit));
         let learned = Range { learned: true, far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0 };
-        assert!(believed(learned.verdict(900.0, [0.3, 0.3], 61.0, 0.0)), "the deviation has the model's error");
+        assert!(
+            believed(learned.verdict(900.0, [0.3, 0.3], 61.0, 0.0)),
+            "the deviation has the model's error"
+        );
         assert!(believed(verdict(900.0, [3.5, 3.5], 1.0)));
         assert_eq!(why(verdict(900.0, [3.7, 3.7], 1.0)), Some(Reason::NoTexture));
         assert_eq!(why(verdict(900.0, [f32::NAN, 0.3], 1.0)), Some(Reason::NoTexture));

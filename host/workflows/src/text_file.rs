@@ -39,7 +39,8 @@ mod tests {
             }
         });
         for _ in 0..2 {
-            let error = finished.recv_timeout(Duration::from_secs(20)).expect("it does not wait for a writer");
+            let error =
+                finished.recv_timeout(Duration::from_secs(20)).expect("it does not wait for a writer");
             assert!(error.contains("expected a regular file"), "{error}");
         }
         assert!(read(folder.path()).is_err());
