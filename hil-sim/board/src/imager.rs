@@ -183,7 +183,7 @@ mod tests {
             piezo_min_um: 0.0,
             piezo_max_um: 0.0,
         };
-        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth }
+        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth, light: [0.0; 2] }
     }
 
     /// Codes of a picture of 64 x 48 px.

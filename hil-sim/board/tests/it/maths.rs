@@ -32,6 +32,7 @@ impl Here {
             firmware: "test",
             unique_id: [0; 12],
             boot: 1,
+            piezo_code: None,
             reset_cause: ResetCause::PowerOn,
             emulated: true,
             own_clock: false,
