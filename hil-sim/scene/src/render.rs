@@ -198,6 +198,23 @@ impl Renderer {
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
+    /// As [`Renderer::expose`], under light that is so many times as bright.
+    ///
+    /// # Errors
+    /// As [`Renderer::expose`].
+    pub fn expose_lit(
+        &self,
+        sensor_distance_mm: f64,
+        exposure_number: u32,
+        brightness: f64,
+    ) -> Result<Array2<u16>, RenderError> {
+        let mut radiance = self.radiance(sensor_distance_mm)?;
+        if brightness != 1.0 {
+            radiance *= brightness.max(0.0) as f32;
+        }
+        Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
+    }
+
     /// The mean radiance on each pixel, shape (height, width); the scene's mean is 1.
     ///
     /// # Errors
