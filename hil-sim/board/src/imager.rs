@@ -126,7 +126,7 @@ impl Imager {
             self.renderer.look(View { shift_px, ..self.view });
         }
         let exposed_ns = (shot.begin_ns, shot.end_ns);
-        let brightness = self.light.map_or(1.0, |light| light.brightness(exposed_ns, shot.light));
+        let brightness = self.light.map_or((1.0, 0.0), |light| light.brightness(exposed_ns, shot.light));
         let image = self
             .renderer
             .expose_lit(shot.truth.sensor_mm + self.further_mm, number, brightness)
@@ -248,9 +248,9 @@ mod tests {
 
     #[test]
     fn lamps_add_to_the_rooms_light_and_flicker_averages_out_over_whole_periods() {
-        let light = LightParts { room: 0.5, flicker: 0.4, flicker_hz: 100.0, lamps: [0.3, 1.0] };
+        let light = LightParts { room: 0.5, flicker: 0.4, flicker_hz: 100.0, lamps: [0.3, 1.0], blank_walls: false };
         let over = |begin_us: u64, length_us: u64| {
-            light.brightness((1_000 * begin_us, 1_000 * (begin_us + length_us)), [0.5, 0.1])
+            light.brightness((1_000 * begin_us, 1_000 * (begin_us + length_us)), [0.5, 0.1]).0
         };
         for begin_us in [0, 1_300, 2_500, 7_500] {
             let lamps = 0.15 + 0.1;
@@ -267,6 +267,23 @@ mod tests {
         let mut lit = lit.lit_by(LightParts { flicker: 0.0, ..light });
         let (dark, bright) = (mean(&mut lit, [0.0; 2]), mean(&mut lit, [1.0, 0.0]));
         assert!((bright / dark - 1.6).abs() < 0.01, "{dark} {bright}");
+    }
+
+    #[test]
+    fn a_blank_wall_has_structure_only_under_the_projectors_pattern() {
+        let blank = LightParts { room: 0.5, flicker: 0.0, flicker_hz: 100.0, lamps: [0.0, 0.5], blank_walls: true };
+        let contrast = |light: LightParts, outputs: [f64; 2]| {
+            let (imager, far_mm) = imager("");
+            let codes = codes(&mut imager.lit_by(light), &Shot { light: outputs, ..shot(0, far_mm) });
+            let mean = codes.iter().map(|code| f64::from(*code)).sum::<f64>() / codes.len() as f64;
+            let variance = codes.iter().map(|code| (f64::from(*code) - mean).powi(2)).sum::<f64>();
+            (variance / codes.len() as f64).sqrt() / mean
+        };
+        let textured = contrast(LightParts { blank_walls: false, ..blank }, [0.0; 2]);
+        assert!(contrast(blank, [0.0; 2]) < 1e-4, "a wall without a pattern");
+        // Half of the light is the room's, which is even.
+        let projected = contrast(blank, [0.0, 1.0]);
+        assert!((projected / textured - 0.5).abs() < 0.05, "{projected} {textured}");
     }
 
     #[test]

@@ -95,6 +95,101 @@ pub struct LightParts {
     pub flicker_hz: f64,
     /// What each of the board's light outputs adds when fully on.
     pub lamps: [f64; 2],
+    /// The scene has no texture of its own; the second output is a projector whose pattern is the scene's texture.
+    pub blank_walls: bool,
+}
+
+impl LightParts {
+    /// Mean brightness of an exposure, with the mean of each light output: what falls on the texture, and what is even.
+    pub fn brightness(&self, (begin_ns, end_ns): (u64, u64), outputs: [f64; 2]) -> (f64, f64) {
+        let turn = |at_ns: u64| std::f64::consts::TAU * self.flicker_hz * 1e-9 * at_ns as f64;
+        let (begin, end) = (turn(begin_ns), turn(end_ns));
+        let swing = if end > begin { (begin.cos() - end.cos()) / (end - begin) } else { begin.sin() };
+        let room = self.room * (1.0 + self.flicker * swing);
+        let [first, second] = [0, 1].map(|i| self.lamps[i] * outputs[i]);
+        if self.blank_walls { (second, room + first) } else { (room + first + second, 0.0) }
+    }
+}
+
+/// What instructions cost.
+    pub processor: ProcessorParts,
+    /// The converter behind the strain gauge.
+    pub gauge_converter: ConverterParts,
+    /// The strain gauge with its amplifier.
+    pub gauge: GaugeParts,
+    /// The piezo with its flexure.
+    pub piezo: PiezoParts,
+    pub memory: MemoryParts,
+    /// The chip's own supervision of its supply.
+    pub supply: SupplyParts,
+    pub switches: SwitchParts,
+    /// The motors' driver chips.
+    pub driver: DriverParts,
+    /// Lens, light and sensor besides blur and noise.
+    pub imaging: ImagingParts,
+    /// The half mirror and the second camera, where there are some.
+    pub half_mirror: HalfMirrorParts,
+}
+
+/// The half mirror behind the lens, and the second camera.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HalfMirrorParts {
+    /// Share of the light that each camera gets, the first and the second.
+    pub light: [f64; 2],
+    /// How far the second camera's picture lies beside the first's, right and down.
+    pub second_shift_px: [f64; 2],
+    /// How far it is turned against the first's, from x towards y.
+    pub second_rotation_deg: f64,
+    /// Whether left is right in the second camera's picture.
+    pub second_mirrored: bool,
+}
+
+impl HalfMirrorParts {
+    /// How the second camera sees what the first one sees.
+    pub fn second_view(&self) -> View {
+        View { shift_px: self.second_shift_px, rotation_deg: self.second_rotation_deg, ..View::default() }
+    }
+}
+
+/// Lens, light and sensor besides blur and noise.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImagingParts {
+    /// [`EllipticalDistortion::offset`].
+    pub field_offset: f64,
+    /// [`EllipticalDistortion::curvature`].
+    pub field_curvature: f64,
+    /// [`EllipticalDistortion::slope`].
+    pub field_slope: f64,
+    /// [`EllipticalDistortion::centre`].
+    pub field_centre: [f64; 2],
+    /// [`EllipticalDistortion::radius`].
+    pub field_radius: [f64; 2],
+    /// [`Defects::vignetting`].
+    pub vignetting: f64,
+    /// [`Defects::uneven_light`].
+    pub uneven_light: [f64; 2],
+    /// [`Defects::hot_pixel_share`].
+    pub hot_pixel_share: f64,
+    /// [`Defects::hot_pixel_e`].
+    pub hot_pixel_e: f64,
+    /// How fast the scene moves across the image.
+    pub scene_px_per_s: [f64; 2],
+    pub light: LightParts,
+}
+
+/// What lights the scene.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightParts {
+    /// Brightness of the room; 1 exposes as the camera's exposure level says.
+    pub room: f64,
+    /// Share of the room's light that flickers, and how often a second.
+    pub flicker: f64,
+    pub flicker_hz: f64,
+    /// What each of the board's light outputs adds when fully on.
+    pub lamps: [f64; 2],
 }
 
 impl LightParts {

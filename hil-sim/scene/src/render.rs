@@ -198,7 +198,8 @@ impl Renderer {
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
-    /// As [`Renderer::expose`], under light that is so many times as bright.
+    /// As [`Renderer::expose`], under light of this brightness: `textured` times the scene's texture, and `even` on top of it, which
+    /// a blank wall reflects. With 1 and 0 the same as [`Renderer::expose`].
     ///
     /// # Errors
     /// As [`Renderer::expose`].
@@ -206,11 +207,11 @@ impl Renderer {
         &self,
         sensor_distance_mm: f64,
         exposure_number: u32,
-        brightness: f64,
+        (textured, even): (f64, f64),
     ) -> Result<Array2<u16>, RenderError> {
         let mut radiance = self.radiance(sensor_distance_mm)?;
-        if brightness != 1.0 {
-            radiance *= brightness.max(0.0) as f32;
+        if (textured, even) != (1.0, 0.0) {
+            radiance.mapv_inplace(|radiance| textured.max(0.0) as f32 * radiance + even.max(0.0) as f32);
         }
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
