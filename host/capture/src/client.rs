@@ -123,8 +123,8 @@ impl Client {
         Ok(Self { port: Arc::new(port), session, interrupt: None, light: None })
     }
 
-    /// Gives every shot that the board triggers this light, from the start of its exposure to the end; `None` for no light.
-    /// Programs that this handle arms from now on have it.
+    /// Gives every shot of the programs that this handle arms this light, from the start of its exposure to the end; `None` for no
+    /// light. The board refuses it for shots that it does not trigger.
     pub fn set_light(&mut self, light: Option<LightLevels>) {
         self.light = light;
     }

@@ -15,8 +15,7 @@ use std::{
 
 use farnear_protocol::{
     Request, Response,
-    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotLight,
-        TriggerMode},
+    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotLight},
     units::{Micros, Nanometres},
 };
 
@@ -391,7 +390,7 @@ impl Client {
         for (index, shot) in (0..count).zip(shots) {
             let request = Request::LoadShot { index, shot: *shot };
             self.expect_accepted(&request, &format!("loading shot {index}"))?;
-            if let Some(levels) = self.light().filter(|_| shot.mode == TriggerMode::Hardware) {
+            if let Some(levels) = self.light() {
                 let light = Some(ShotLight { levels, delay: Micros(0), length: shot.exposure });
                 let during = format!("setting the light of shot {index}");
                 self.expect_accepted(&Request::SetShotLight { index, light }, &during)?;
