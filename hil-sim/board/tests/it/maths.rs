@@ -60,6 +60,7 @@ impl Here {
             gauge_code: Some(GAUGE_CODE_ZERO),
             emergency_stop: false,
             supply_low: false,
+            memory_failed: false,
             link_overflow: false,
             exposure: None,
             strobe: None,
