@@ -19,6 +19,7 @@ mod board;
 mod calibration;
 mod call;
 mod event;
+mod light;
 mod link;
 mod maths;
 mod memory;
@@ -35,6 +36,7 @@ pub use self::{
     calibration::{Calibration, Routine},
     call::{Call, ID_STEP_MAX, NO_SESSION},
     event::{Event, EventKind, Failure},
+    light::{LIGHT_LEVEL_MAX, LIGHT_TIME_MAX, LightFault, LightLevels, ShotLight},
     link::{LINK_TRIAL, LinkRate},
     maths::{
         CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm, CorrectionInfo,

@@ -19,6 +19,7 @@ use crate::{
     camera::CameraPort,
     clock,
     encoder::Encoder,
+    light::LightPort,
     link::Link,
     memory::Memory,
     piezo::Piezo,
@@ -36,6 +37,7 @@ pub struct Nucleo {
     lens: Axis<TIM8, TIM3>,
     piezo: Piezo,
     camera: CameraPort,
+    lights: LightPort,
     /// Where records survive without power; `None` where no such chip answers.
     pub memory: Option<Memory>,
     supply: Supply,
@@ -75,6 +77,7 @@ impl Nucleo {
             },
             piezo: Piezo::new(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD0, p.PD1),
             camera: CameraPort::new(p.TIM2, p.PB10, p.PB11),
+            lights: LightPort::new(p.TIM12, p.PB14, p.PB15),
             supply: Supply::new(),
             link,
             watchdog: IndependentWatchdog::new(p.IWDG, WATCHDOG_US),
@@ -123,6 +126,10 @@ impl Board for Nucleo {
         self.supply.is_low()
     }
 
+    fn memory_failed(&mut self) -> bool {
+        self.memory.as_mut().is_some_and(Memory::take_failure)
+    }
+
     fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
         self.camera.take_edges(now)
     }
@@ -137,6 +144,10 @@ impl Board for Nucleo {
         }
         self.coarse.apply(&outputs.coarse);
         self.lens.apply(&outputs.lens);
+        self.lights.set(outputs.lights);
+        if outputs.cancel_flash {
+            self.camera.cancel_flash();
+        }
         self.camera.listen(outputs.listen);
         if let Some(trigger) = outputs.trigger {
             self.camera.expose(trigger);

@@ -1,7 +1,8 @@
 //! The camera's trigger and its exposure-active signal (strobe), both on TIM2, which counts board microseconds.
 //!
 //! Trigger: channel 3, PB10. Both edges are compare matches, so they come at their microsecond whatever the
-//! program does; the interrupt only prepares the next. Strobe: channel 4, PB11, captured by the hardware, after a trigger
+//! program does; the interrupt only prepares the next. Flash: channels 1 and 2 without pins, whose compare interrupts
+//! switch the light and stamp it. Strobe: channel 4, PB11, captured by the hardware, after a trigger
 //! or, where the camera exposes by itself, while somebody listens.
 
 use core::cell::RefCell;
@@ -17,7 +18,7 @@ use embassy_stm32::{
     rcc,
     timer::{Ch3, Ch4, input_capture::CapturePin, simple_pwm::PwmPin},
 };
-use farnear_protocol::BoardMicros;
+use farnear_protocol::{BoardMicros, message::ShotLight};
 use farnear_rig::{
     io::{ExposureEdges, StrobeEdges, Trigger},
     stamp,
@@ -25,10 +26,13 @@ use farnear_rig::{
 
 use crate::{
     clock::{self, APB1_TIMER_HZ},
+    light,
     registers,
 };
 
-/// Channel 3 and 4 in the register arrays, which start at 0.
+/// Channels 1 to 4 in the register arrays, which start at 0.
+const FLASH_ON: usize = 0;
+const FLASH_OFF: usize = 1;
 const TRIGGER: usize = 2;
 const STROBE: usize = 3;
 /// From the order to the rising edge: long enough to set the compare match up.
@@ -44,6 +48,15 @@ struct Exposure {
     pulse_ended: bool,
     strobe_start: Option<u32>,
     strobe_end: Option<u32>,
+    flash: Option<Flash>,
+}
+
+/// A flash and when it began and ended.
+#[derive(Clone, Copy)]
+struct Flash {
+    light: ShotLight,
+    on: Option<u32>,
+    off: Option<u32>,
 }
 
 /// What the strobe input is for.
@@ -92,6 +105,7 @@ fn TIM2() {
             });
             trigger_edge(exposure.triggered());
         }
+        flash_edges(exposure.triggered(), [flags.ccif(FLASH_ON), flags.ccif(FLASH_OFF)]);
         if flags.ccif(STROBE) {
             let stamp = timer.ccr(STROBE).read(); // clears the flag
             strobe_edge(&mut exposure, stamp);
@@ -115,6 +129,22 @@ fn trigger_edge(exposure: Option<&mut Exposure>) {
     }
     timer.dier().modify(|w| w.set_ccie(TRIGGER, false));
     exposure.pulse_ended = true;
+}
+
+/// Switches the light where a compare match of the flash has come.
+fn flash_edges(exposure: Option<&mut Exposure>, [on, off]: [bool; 2]) {
+    let timer = pac::TIM2;
+    let Some(flash) = exposure.and_then(|exposure| exposure.flash.as_mut()) else { return };
+    if on && flash.on.is_none() {
+        light::begin_flash(flash.light.levels);
+        flash.on = Some(timer.cnt().read());
+        timer.dier().modify(|w| w.set_ccie(FLASH_ON, false));
+    }
+    if off && flash.on.is_some() && flash.off.is_none() {
+        light::end_flash();
+        flash.off = Some(timer.cnt().read());
+        timer.dier().modify(|w| w.set_ccie(FLASH_OFF, false));
+    }
 }
 
 fn strobe_edge(strobe: &mut Strobe, stamp: u32) {
@@ -198,15 +228,47 @@ impl CameraPort {
                 pulse_ended: false,
                 strobe_start: None,
                 strobe_end: None,
+                flash: order.flash.map(|light| Flash { light, on: None, off: None }),
             });
+            if let Some(light) = order.flash {
+                let on = rising.wrapping_add(light.delay.0);
+                timer.ccr(FLASH_ON).write_value(on);
+                timer.ccr(FLASH_OFF).write_value(on.wrapping_add(light.length.0));
+            }
             timer.ccr(TRIGGER).write_value(rising);
             drive(vals::Ocm::ACTIVE_ON_MATCH);
             timer.sr().write(|w| {
                 w.0 = u32::MAX;
                 w.set_ccif(TRIGGER, false);
                 w.set_ccif(STROBE, false);
+                w.set_ccif(FLASH_ON, false);
+                w.set_ccif(FLASH_OFF, false);
             });
-            timer.dier().modify(|w| w.set_ccie(TRIGGER, true));
+            timer.dier().modify(|w| {
+                w.set_ccie(TRIGGER, true);
+                w.set_ccie(FLASH_ON, order.flash.is_some());
+                w.set_ccie(FLASH_OFF, order.flash.is_some());
+            });
+        });
+    }
+
+    /// Ends the flash that is in progress; one that has not begun does not come.
+    pub fn cancel_flash(&mut self) {
+        critical_section::with(|cs| {
+            let mut strobe = EXPOSURE.borrow_ref_mut(cs);
+            let Some(exposure) = strobe.triggered() else { return };
+            pac::TIM2.dier().modify(|w| {
+                w.set_ccie(FLASH_ON, false);
+                w.set_ccie(FLASH_OFF, false);
+            });
+            match &mut exposure.flash {
+                Some(flash) if flash.on.is_some() && flash.off.is_none() => {
+                    light::end_flash();
+                    flash.off = Some(pac::TIM2.cnt().read());
+                }
+                Some(Flash { on: None, .. }) => exposure.flash = None,
+                _ => {}
+            }
         });
     }
 
@@ -250,10 +312,15 @@ impl CameraPort {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);
             let edges = strobe.triggered().and_then(|exposure| {
                 exposure.pulse_ended.then_some(())?;
+                let flash = match exposure.flash {
+                    None => None,
+                    Some(flash) => Some([stamp::extend(flash.on?, now), stamp::extend(flash.off?, now)]),
+                };
                 Some(ExposureEdges {
                     trigger: stamp::extend(exposure.rising, now),
                     strobe_start: stamp::extend(exposure.strobe_start?, now),
                     strobe_end: stamp::extend(exposure.strobe_end?, now),
+                    flash,
                 })
             });
             if edges.is_some() {

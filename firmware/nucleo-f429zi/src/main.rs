@@ -34,6 +34,7 @@ mod clock;
 mod clock_tree;
 mod control;
 mod encoder;
+mod light;
 mod link;
 mod memory;
 mod option_bytes;
@@ -49,6 +50,7 @@ use embassy_stm32::{
     uid,
 };
 use embassy_time::{Duration, block_for};
+use farnear_protocol::message::ResetCause;
 use farnear_rig::{Identity, Rig, io::MEMORY_BYTES};
 use static_cell::StaticCell;
 
@@ -83,6 +85,15 @@ fn count_cycles() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
+    }
+}
+
+/// The code that the piezo's DAC has. A DAC8830 starts at 0 with its supply; after a dip of the supply it may have either.
+fn kept_piezo_code(cause: ResetCause) -> Option<u16> {
+    match cause {
+        ResetCause::PowerOn => Some(0),
+        ResetCause::Pin | ResetCause::Software | ResetCause::Watchdog => retained::piezo_code(),
+        ResetCause::BrownOut | ResetCause::LowPower | ResetCause::Unknown => None,
     }
 }
 
@@ -126,6 +137,7 @@ async fn main(_spawner: Spawner) {
         firmware: env!("CARGO_PKG_VERSION"),
         unique_id: uid::uid(),
         boot,
+        piezo_code: kept_piezo_code(reset_cause),
         reset_cause,
         own_clock,
         emulated,

@@ -21,6 +21,11 @@ const WRITE_ENABLE: u8 = 0x06;
 const WRITE: u8 = 0x02;
 const READ: u8 = 0x03;
 const READ_ID: u8 = 0x9f;
+const READ_STATUS: u8 = 0x05;
+/// Of the status register: these bits are always 0, except the second, which reports that a write is enabled (table 4). Without
+/// the chip they all read as ones.
+const STATUS_MASK: u8 = 0b0011_0011;
+const WRITE_ENABLED: u8 = 0b0000_0010;
 /// Manufacturer, family and density (table 6), behind six bytes of a continuation code. A last byte, the revision, follows: 00
 /// of the FM25V02, 08 of the FM25V02A.
 const ID: [u8; 8] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22];
@@ -32,6 +37,7 @@ const PIECE: usize = 256;
 pub struct Memory {
     spi: Spi<'static, Blocking, Master>,
     select: Output<'static>,
+    failed: bool,
 }
 
 impl Memory {
@@ -49,7 +55,7 @@ impl Memory {
         config.frequency = SPI_HZ;
         // Without the chip all bytes read as ones.
         config.miso_pull = embassy_stm32::gpio::Pull::Up;
-        Self { spi: Spi::new_blocking(spi, clock, data_out, data_in, config), select }
+        Self { spi: Spi::new_blocking(spi, clock, data_out, data_in, config), select, failed: false }
     }
 
     fn command(
@@ -99,10 +105,23 @@ impl Memory {
         true
     }
 
-    /// Writes; a failure shows at the next start, where each record is checked.
+    /// Whether the chip did not confirm a write since the last call.
+    pub const fn take_failure(&mut self) -> bool {
+        core::mem::replace(&mut self.failed, false)
+    }
+
+    /// Whether the chip confirms that it accepts a write. Takes 1.5 us.
+    fn enable_write(&mut self) -> bool {
+        self.send(&[WRITE_ENABLE], &[]);
+        let mut status = [0];
+        let answered = self.command(&[READ_STATUS], |spi| spi.blocking_read(&mut status).is_ok());
+        answered && status[0] & STATUS_MASK == WRITE_ENABLED
+    }
+
+    /// Writes. A chip that does not answer is reported; its contents are checked at the next start.
     pub fn write(&mut self, order: &MemoryWrite) {
         let [high, low] = order.address.to_be_bytes();
-        self.send(&[WRITE_ENABLE], &[]);
+        self.failed |= !(0..ATTEMPTS).any(|_| self.enable_write());
         self.send(&[WRITE, high, low], &order.bytes);
     }
 

@@ -24,7 +24,7 @@ use embassy_stm32::{
 };
 use farnear_rig::io::GAUGE_CODE_MAX;
 
-use crate::clock;
+use crate::{clock, registers::retained};
 
 /// APB1 / 4; the slowest part stands twice this.
 const SPI_HZ: Hertz = Hertz(10_500_000);
@@ -115,6 +115,7 @@ impl Piezo {
             return;
         }
         self.silent_ticks = 0;
+        retained::keep_piezo_code(code);
         self.dac_select.set_low();
         self.exchange(code);
         self.dac_select.set_high();

@@ -10,6 +10,7 @@
 //! An exposure that the board does not trigger (by the host, or of a camera that runs freely) is listened for: the first
 //! one that begins after listening did is it.
 
+use farnear_protocol::message::ShotLight;
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::io::{ExposureEdges, Inputs, Trigger};
@@ -73,10 +74,10 @@ impl Camera {
     }
 
     /// Orders an exposure at a moment; gives its number, from 0. The camera is ready then.
-    pub(crate) fn trigger(&mut self, exposure: Micros, at: BoardMicros) -> u32 {
+    pub(crate) fn trigger(&mut self, exposure: Micros, flash: Option<ShotLight>, at: BoardMicros) -> u32 {
         let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
-        self.order = Some(Trigger { at, length: exposure });
+        self.order = Some(Trigger { at, length: exposure, flash });
         let shortest_us = u64::from(exposure.0).saturating_sub(SHORTER_US);
         self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
     }
@@ -121,7 +122,12 @@ impl Camera {
         let edges = match pending.awaited {
             Awaited::Triggered => inputs.exposure,
             Awaited::Since(ready) => inputs.strobe.filter(|strobe| strobe.start >= ready).map(|strobe| {
-                ExposureEdges { trigger: ready, strobe_start: strobe.start, strobe_end: strobe.end }
+                ExposureEdges {
+                    trigger: ready,
+                    strobe_start: strobe.start,
+                    strobe_end: strobe.end,
+                    flash: None,
+                }
             }),
         };
         if let Some(edges) = edges {
@@ -159,11 +165,12 @@ mod tests {
         // Found by the campaign: a wire came back within an exposure, which was told 0.86 ms late.
         let answer = |lost_us: u64| {
             let mut camera = Camera::new(Settings::DEFAULT.camera);
-            let number = camera.trigger(Micros(5_884), BoardMicros(1_000));
+            let number = camera.trigger(Micros(5_884), None, BoardMicros(1_000));
             let edges = ExposureEdges {
                 trigger: BoardMicros(1_000),
                 strobe_start: BoardMicros(1_020 + lost_us),
                 strobe_end: BoardMicros(6_904),
+                flash: None,
             };
             camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(BoardMicros(7_000)) });
             assert!(!camera.is_ready(BoardMicros(7_000)), "it reads out");

@@ -62,6 +62,9 @@ pub trait Board {
     /// Whether the supply is below the level at which the board can still stop in order.
     fn supply_low(&mut self) -> bool;
 
+    /// [`Inputs::memory_failed`].
+    fn memory_failed(&mut self) -> bool;
+
     /// [`Inputs::exposure`]; edges are stamped as moments before `now`.
     fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges>;
 
@@ -215,6 +218,7 @@ fn read(board: &mut impl Board, gauge_code: Option<u32>, link_overflow: bool) ->
         gauge_code,
         emergency_stop,
         supply_low: board.supply_low(),
+        memory_failed: board.memory_failed(),
         link_overflow,
         exposure: board.exposure(now),
         strobe: board.strobe(now),

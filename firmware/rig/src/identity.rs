@@ -14,6 +14,8 @@ pub struct Identity {
     /// What retained RAM says is the number of this boot, not 0: one more than [`crate::Rig::boot`] of the boot before, or
     /// 1 after a loss of power. The memory knows better, where it is good.
     pub boot: u32,
+    /// Code that the piezo's DAC has kept over the reset; `None` where it is not known.
+    pub piezo_code: Option<u16>,
     /// Why the board was reset.
     pub reset_cause: ResetCause,
     /// Whether the clock from outside did not come, or stopped in the boot before, so that the chip runs on its own.

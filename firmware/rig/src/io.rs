@@ -21,6 +21,7 @@
 //! The rig relies on it: the mark that an axis moves lies in the memory before the first STEP pulse.
 //! [`crate::Rig::boot`] is then the number of this boot; the binary keeps it in its retained RAM.
 
+use farnear_protocol::message::{LightLevels, ShotLight};
 use farnear_protocol::{BoardMicros, Micros};
 use heapless::Vec;
 
@@ -88,6 +89,8 @@ pub struct ExposureEdges {
     /// Rising edge of the camera's exposure-active signal.
     pub strobe_start: BoardMicros,
     pub strobe_end: BoardMicros,
+    /// Start and end of the flash, where the order had one.
+    pub flash: Option<[BoardMicros; 2]>,
 }
 
 /// An exposure that came without a trigger of the board.
@@ -139,6 +142,8 @@ pub struct Inputs {
     pub emergency_stop: bool,
     /// The supply is below the level at which the board can still stop in order.
     pub supply_low: bool,
+    /// The memory did not confirm the last write.
+    pub memory_failed: bool,
     /// Bytes from the link were lost since the tick before.
     pub link_overflow: bool,
     /// The edges of the last ordered exposure, given once, in the first tick after all three are known.
@@ -158,6 +163,7 @@ impl Inputs {
             gauge_code: Some(GAUGE_CODE_ZERO),
             emergency_stop: false,
             supply_low: false,
+            memory_failed: false,
             link_overflow: false,
             exposure: None,
             strobe: None,
@@ -209,6 +215,8 @@ pub struct Trigger {
     /// Its rising edge, to the microsecond, at most a few ticks ahead; as soon as possible where that is over.
     pub at: BoardMicros,
     pub length: Micros,
+    /// Flash within the pulse.
+    pub flash: Option<ShotLight>,
 }
 
 /// What the board is to do now.
@@ -223,6 +231,10 @@ pub struct Outputs {
     /// Measure exposures that come without a trigger: report each that begins from now on as [`Inputs::strobe`]. Not
     /// set together with `trigger`, nor while a triggered exposure is awaited.
     pub listen: bool,
+    /// Brightness of the light outputs, except during a flash.
+    pub lights: LightLevels,
+    /// End the flash that is in progress or ordered, now.
+    pub cancel_flash: bool,
     /// Give a trigger pulse, and capture its edges.
     pub trigger: Option<Trigger>,
     /// Write this to the memory now.

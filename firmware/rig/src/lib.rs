@@ -52,6 +52,7 @@ pub mod events;
 pub mod gains;
 pub mod identity;
 pub mod io;
+mod light;
 mod link_rate;
 mod matrix;
 mod memory;

@@ -9,7 +9,7 @@
 //! learns what is left of them.
 //!
 //! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a reset of the board, so at
-//! the start the piezo may stand anywhere: nothing is played until the gauge has said where, and it is led down from there,
+//! the start the piezo may stand anywhere. Retained memory has the code, 0 after power-on; where it has not, nothing is played until the gauge has said where. It is led down from there,
 //! for a stack that is let go at once swings into tension. If the gauge fails, the command is held and the loop opens until
 //! the next move. So it does where the piezo does not move as it should: a loop that feeds a mode of the flexure which it does
 //! not know is opened before the stack is pulled apart.
@@ -110,6 +110,8 @@ pub(crate) struct Piezo {
     scale: Scale,
     gauge: GaugeScale,
     start: Start,
+    /// Code that the DAC has kept over the reset.
+    kept_code: Option<u16>,
     /// What hysteresis and creep should be, as the calibration found them.
     lag: Lag,
     control: Option<Loop>,
@@ -141,6 +143,7 @@ impl Piezo {
             scale: Scale::new(settings.gain_pm_per_code),
             gauge: GaugeScale::new(settings.gauge_gain_ppm, settings.gauge_offset),
             start: Start::Unknown,
+            kept_code: None,
             lag: Lag::new(settings.hysteresis_ppm, settings.creep_ppm_per_decade),
             control: None,
             closing: false,
@@ -156,6 +159,11 @@ impl Piezo {
             middle: 0,
             passed: 1,
         }
+    }
+
+    /// The DAC has kept this code over the reset.
+    pub(crate) const fn start_at(&mut self, code: Option<u16>) {
+        self.kept_code = code;
     }
 
     /// So many control ticks' time after the tick before comes the one that follows.
@@ -326,7 +334,11 @@ impl Piezo {
 
     /// The gauge has said for the first time where the piezo stands.
     fn begin_to_relax(&mut self) {
-        let (from, command) = self.scale.playable(fixed(self.measured));
+        // A gauge that is off, or whose front end is dead, would make the DAC jump by as much.
+        let (from, command) = match self.kept_code {
+            Some(code) => (code, self.scale.played(code)),
+            None => self.scale.playable(fixed(self.measured)),
+        };
         (self.start, self.code, self.command) = if from > RELAXED {
             (Start::Down { from, ticks: 0 }, from, command)
         } else {

@@ -12,7 +12,8 @@
 pub(crate) mod pace;
 
 use farnear_protocol::message::{
-    Axis, DropReason, Failure, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode,
+    Axis, DropReason, Failure, LightLevels, ProgramState, ProgramStatus, Shot, ShotFault, ShotLight,
+    ShotRecord, TriggerMode,
 };
 use farnear_protocol::{BoardMicros, Micros, Nanometres, Settle};
 
@@ -30,12 +31,14 @@ pub const SHOTS_MAX: usize = 64;
 #[derive(Clone, Debug)]
 pub(crate) struct Shots {
     shots: [Option<Shot>; SHOTS_MAX],
+    /// Flashes of the shots; not kept without power.
+    lights: [Option<ShotLight>; SHOTS_MAX],
     armed: u8,
 }
 
 impl Shots {
     pub(crate) const fn new() -> Self {
-        Self { shots: [None; SHOTS_MAX], armed: 0 }
+        Self { shots: [None; SHOTS_MAX], lights: [None; SHOTS_MAX], armed: 0 }
     }
 
     /// Puts a shot into its place; limits of the axis are the caller's.
@@ -54,6 +57,7 @@ impl Shots {
             return Err(ShotFault::Repeat);
         }
         *place = Some(shot);
+        self.set_light(index, None);
         self.armed = 0;
         Ok(())
     }
@@ -74,6 +78,17 @@ impl Shots {
     /// How many are armed, 0 = none.
     pub(crate) const fn armed(&self) -> u8 {
         self.armed
+    }
+
+    /// Gives a shot a flash, or none; the caller has checked it.
+    pub(crate) fn set_light(&mut self, index: u8, light: Option<ShotLight>) {
+        if let Some(place) = self.lights.get_mut(usize::from(index)) {
+            *place = light;
+        }
+    }
+
+    pub(crate) fn light(&self, index: u8) -> Option<ShotLight> {
+        self.lights.get(usize::from(index)).copied().flatten()
     }
 
     /// A loaded shot.
@@ -101,12 +116,23 @@ enum Phase {
     Paused,
 }
 
+/// A flash as it was.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flash {
+    pub(crate) trigger_number: u32,
+    pub(crate) levels: LightLevels,
+    pub(crate) edges: [BoardMicros; 2],
+}
+
 /// A program under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     shots: u8,
     index: u8,
     shot: Shot,
+    light: Option<ShotLight>,
+    /// Flash of the exposure that was just taken.
+    flash: Option<Flash>,
     repeat: u16,
     exposures: u16,
     pace: Option<Pace>,
@@ -155,7 +181,7 @@ pub(crate) enum Progress {
 impl Run {
     /// Sets off to the first of `count` shots; all of them are loaded, and `first` is the first. With a pace it goes on for ever.
     pub(crate) fn start(
-        (count, first): (u8, Shot),
+        (count, (first, light)): (u8, (Shot, Option<ShotLight>)),
         pace: Option<Pace>,
         stage: &mut Stage,
         settings: &Settings,
@@ -165,6 +191,8 @@ impl Run {
             shots: count,
             index: 0,
             shot: first,
+            light,
+            flash: None,
             repeat: 0,
             exposures: 0,
             pace,
@@ -174,6 +202,11 @@ impl Run {
             pausing: false,
             resuming: false,
         }
+    }
+
+    /// Flash of the exposure that was just taken; given once.
+    pub(crate) const fn take_flash(&mut self) -> Option<Flash> {
+        self.flash.take()
     }
 
     /// For the status answer.
@@ -260,6 +293,11 @@ impl Run {
                     Some(Err(NoAnswer)) => self.go_without(frame),
                     Some(Ok(edges)) => {
                         let shot = self.record(number, places, &edges);
+                        self.flash = edges.flash.zip(self.light).map(|(edges, light)| Flash {
+                            trigger_number: number,
+                            levels: light.levels,
+                            edges,
+                        });
                         self.exposures = self.exposures.saturating_add(1);
                         self.phase = Phase::Positioning;
                         let Some(pace) = &mut self.pace else {
@@ -326,7 +364,7 @@ impl Run {
         now: BoardMicros,
     ) -> Progress {
         let number = match self.shot.mode {
-            TriggerMode::Hardware => camera.trigger(self.shot.exposure, due),
+            TriggerMode::Hardware => camera.trigger(self.shot.exposure, self.light, due),
             TriggerMode::Software | TriggerMode::FreeRunning => camera.listen(now),
         };
         let places = Places {
@@ -360,7 +398,7 @@ impl Run {
         };
         let place = |shot: &Shot| (shot.axis, shot.target, shot.settle_window, shot.settle_dwell);
         let stays = self.pace.is_some() && place(shot) == place(&self.shot);
-        self.shot = *shot;
+        (self.shot, self.light) = (*shot, shots.light(self.index));
         if !stays {
             self.settle = None;
         }

@@ -4,7 +4,7 @@ use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, RecordName};
 
 use crate::calibrate::Step;
-use crate::program::{Progress, Run};
+use crate::program::{Flash, Progress, Run};
 use crate::rig::Rig;
 use crate::work::{AxisWork, WholeWork};
 
@@ -126,6 +126,9 @@ impl Rig {
             Progress::Failed { axis, reason } => return Err((axis, reason)),
         };
         self.events.push(now, told);
+        if let Some(Flash { trigger_number, levels, edges: [on, off] }) = run.take_flash() {
+            self.events.push(now, EventKind::Flash { request, trigger_number, levels, on, off });
+        }
         Ok(end)
     }
 

@@ -44,6 +44,8 @@ impl Rig {
             Request::RunContinuously { period, exposures, silence } => {
                 self.run_continuously(*period, *exposures, (id, *silence), now)
             }
+            Request::SetLights { levels, time, silence } => self.set_lights(*levels, (*time, *silence), now),
+            Request::SetShotLight { index, light } => self.set_shot_light(*index, *light),
             Request::PauseProgram => self.pause_program(),
             Request::ResumeProgram => self.resume_program(now),
             Request::Calibrate { routine, silence } => self.calibrate(*routine, (id, *silence)),
@@ -81,6 +83,7 @@ impl Rig {
     fn stop(&mut self) -> Response {
         self.stage.stop();
         self.camera.give_up();
+        self.lights.off();
         for axis in Axis::ALL {
             self.works.end(axis, Failure::Stopped);
         }

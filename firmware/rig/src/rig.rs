@@ -12,6 +12,7 @@ use crate::correction::Correction;
 use crate::events::Events;
 use crate::identity::{Identity, LastWords};
 use crate::io::{Inputs, MEMORY_BYTES, MemoryWrite, MotorOutputs, Outputs};
+use crate::light::Lights;
 use crate::link_rate::LinkSpeed;
 use crate::memory::contents::{Contents, Restored};
 use crate::memory::record::{self, Found, RECORDS};
@@ -49,6 +50,7 @@ pub struct Rig {
     pub(crate) works: Works,
     pub(crate) alarms: Alarms,
     pub(crate) silence: Silence,
+    pub(crate) lights: Lights,
     pub(crate) correction: Correction,
     pub(crate) events: Events,
     pub(crate) session: Session,
@@ -111,12 +113,13 @@ impl Rig {
             parts,
             values,
             settings,
-            stage: Stage::new(&settings),
+            stage: Stage::new(&settings, identity.piezo_code),
             camera: Camera::new(settings.camera),
             shots,
             works: Works::new(),
             alarms,
             silence: Silence::new(now),
+            lights: Lights::new(),
             correction: Correction::new(correction),
             events,
             session: Session::new(boot),
@@ -313,10 +316,13 @@ impl Rig {
         self.watch(now);
         self.advance(now);
         self.remember_motion();
+        self.lights.tick(self.silence.time(now), now);
         let mut outputs = Outputs {
             piezo_dac: None,
             coarse: MotorOutputs::default(),
             lens: MotorOutputs::default(),
+            lights: self.lights.levels(),
+            cancel_flash: self.lights.take_cancel(),
             listen: self.camera.is_listening(),
             trigger: self.camera.take_order(),
             memory: None,
@@ -345,6 +351,9 @@ impl Rig {
         }
         if inputs.supply_low {
             self.alarm(Alarm::SupplyLow, now);
+        }
+        if inputs.memory_failed {
+            self.alarm(Alarm::MemoryMissing, now);
         }
         if inputs.link_overflow {
             self.alarm(Alarm::QueueOverflow, now);
@@ -379,6 +388,7 @@ impl Rig {
         self.store.mark(RecordName::Counters);
         self.stage.abort();
         self.camera.give_up();
+        self.lights.off();
         let number = record.number;
         let own = alarms::as_failure(&alarm);
         for axis in Axis::ALL {

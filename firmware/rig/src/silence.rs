@@ -34,6 +34,11 @@ impl Silence {
         *self = Self::new(now);
     }
 
+    /// Time since the last request of the open session.
+    pub(crate) fn time(&self, now: BoardMicros) -> Micros {
+        since(self.heard, now)
+    }
+
     /// Looks at the clock, with the request under way that allows the shortest silence.
     pub(crate) fn check(&mut self, now: BoardMicros, shortest: Option<(u32, Micros)>) -> Verdict {
         let Some((request, allowed)) = shortest else { return Verdict::Fine };

@@ -212,6 +212,16 @@ impl RigAccess<'_, '_> {
         length - 4 * painted.count() as u64
     }
 
+    /// Brightness of both light outputs, 0 to 1.
+    pub fn lights(&mut self) -> [f64; 2] {
+        self.wiring.lights().levels()
+    }
+
+    /// Changes of their brightness since the last call, in virtual nanoseconds; the first call begins to record.
+    pub fn take_light_changes(&mut self) -> Vec<(u64, [f64; 2])> {
+        self.wiring.lights().take_changes()
+    }
+
     /// Begins to note when each STEP edge comes.
     pub fn record_steps(&mut self) {
         self.wiring.record_steps();

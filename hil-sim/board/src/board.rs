@@ -155,6 +155,8 @@ pub const fn pins(stage: StageName) -> &'static StagePins {
 
 pub const TRIGGER: PinName = PinName::new(b'B', 10);
 pub const STROBE: PinName = PinName::new(b'B', 11);
+/// Light outputs.
+pub const LIGHTS: [PinName; 2] = [PinName::new(b'B', 14), PinName::new(b'B', 15)];
 /// Strap that tells the firmware that it is emulated.
 const STRAP: PinName = PinName::new(b'D', 15);
 

@@ -15,7 +15,7 @@ use farnear_protocol::{
 };
 use farnear_scene::{Camera, Lens, Psf, Renderer, Scene, View};
 
-use crate::{error::SimError, parts::HalfMirrorParts, pictures::Pictures, wiring::Shot};
+use crate::{error::SimError, parts::{HalfMirrorParts, LightParts}, pictures::Pictures, wiring::Shot};
 
 /// A picture with when it was taken, for a camera that stamps its frames by a clock of its own.
 #[derive(Clone, PartialEq, Debug)]
@@ -54,6 +54,7 @@ pub struct Imager {
     view: View,
     /// How fast the scene moves, px/s right and down.
     speed_px_per_s: [f64; 2],
+    light: Option<LightParts>,
     /// How much further from the lens the sensor stands than the stage says.
     further_mm: f64,
     mirrored: bool,
@@ -75,7 +76,16 @@ impl Imager {
             )));
         }
         let (view, speed_px_per_s) = (View::default(), [0.0; 2]);
-        Ok(Self { renderer, camera, view, speed_px_per_s, further_mm: 0.0, mirrored: false, exposures: 0 })
+        Ok(Self {
+            renderer,
+            camera,
+            view,
+            speed_px_per_s,
+            light: None,
+            further_mm: 0.0,
+            mirrored: false,
+            exposures: 0,
+        })
     }
 
     /// The second camera behind a half mirror, before the same scene: its sensor stands further from the lens, and has noise and hot
@@ -94,6 +104,12 @@ impl Imager {
         Self { speed_px_per_s, ..self }
     }
 
+    /// The same under this light instead of a steady one.
+    #[must_use]
+    pub fn lit_by(self, light: LightParts) -> Self {
+        Self { light: Some(light), ..self }
+    }
+
     /// One exposure as the endpoint sends it: length, header, pixels.
     pub fn frame(&mut self, shot: &Shot) -> Result<Vec<u8>, SimError> {
         Ok(self.picture(shot)?.frame)
@@ -109,9 +125,11 @@ impl Imager {
             let shift_px = [right + right_px_per_s * middle_s, down + down_px_per_s * middle_s];
             self.renderer.look(View { shift_px, ..self.view });
         }
+        let exposed_ns = (shot.begin_ns, shot.end_ns);
+        let brightness = self.light.map_or((1.0, 0.0), |light| light.brightness(exposed_ns, shot.light));
         let image = self
             .renderer
-            .expose(shot.truth.sensor_mm + self.further_mm, number)
+            .expose_lit(shot.truth.sensor_mm + self.further_mm, number, brightness)
             .map_err(|error| SimError::Scene(error.to_string()))?;
         let header = FrameHeader {
             shot_id: shot.id,
@@ -184,7 +202,7 @@ mod tests {
             piezo_min_um: 0.0,
             piezo_max_um: 0.0,
         };
-        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth }
+        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth, light: [0.0; 2] }
     }
 
     /// Codes of a picture of 64 x 48 px.
@@ -227,6 +245,46 @@ mod tests {
             }
         }
         assert_ne!(before, after);
+    }
+
+    #[test]
+    fn lamps_add_to_the_rooms_light_and_flicker_averages_out_over_whole_periods() {
+        let light = LightParts { room: 0.5, flicker: 0.4, flicker_hz: 100.0, lamps: [0.3, 1.0], blank_walls: false };
+        let over = |begin_us: u64, length_us: u64| {
+            light.brightness((1_000 * begin_us, 1_000 * (begin_us + length_us)), [0.5, 0.1]).0
+        };
+        for begin_us in [0, 1_300, 2_500, 7_500] {
+            let lamps = 0.15 + 0.1;
+            assert!((over(begin_us, 10_000) - (0.5 + lamps)).abs() < 1e-9, "from {begin_us} us");
+            // 1 ms sees the flicker's phase: from its lowest to its highest at 2.5 and 7.5 ms.
+            assert!((over(begin_us, 1_000) - (0.5 + lamps)).abs() < 0.2 + 1e-9);
+        }
+        assert!(over(2_000, 1_000) > over(7_000, 1_000) + 0.39);
+        let (lit, far_mm) = imager("");
+        let mean = |imager: &mut Imager, outputs: [f64; 2]| {
+            let codes = codes(imager, &Shot { light: outputs, ..shot(0, far_mm) });
+            codes.iter().map(|code| f64::from(*code)).sum::<f64>() / codes.len() as f64
+        };
+        let mut lit = lit.lit_by(LightParts { flicker: 0.0, ..light });
+        let (dark, bright) = (mean(&mut lit, [0.0; 2]), mean(&mut lit, [1.0, 0.0]));
+        assert!((bright / dark - 1.6).abs() < 0.01, "{dark} {bright}");
+    }
+
+    #[test]
+    fn a_blank_wall_has_structure_only_under_the_projectors_pattern() {
+        let blank = LightParts { room: 0.5, flicker: 0.0, flicker_hz: 100.0, lamps: [0.0, 0.5], blank_walls: true };
+        let contrast = |light: LightParts, outputs: [f64; 2]| {
+            let (imager, far_mm) = imager("");
+            let codes = codes(&mut imager.lit_by(light), &Shot { light: outputs, ..shot(0, far_mm) });
+            let mean = codes.iter().map(|code| f64::from(*code)).sum::<f64>() / codes.len() as f64;
+            let variance = codes.iter().map(|code| (f64::from(*code) - mean).powi(2)).sum::<f64>();
+            (variance / codes.len() as f64).sqrt() / mean
+        };
+        let textured = contrast(LightParts { blank_walls: false, ..blank }, [0.0; 2]);
+        assert!(contrast(blank, [0.0; 2]) < 1e-4, "a wall without a pattern");
+        // Half of the light is the room's, which is even.
+        let projected = contrast(blank, [0.0, 1.0]);
+        assert!((projected / textured - 0.5).abs() < 0.05, "{projected} {textured}");
     }
 
     #[test]

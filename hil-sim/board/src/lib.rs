@@ -38,6 +38,7 @@ pub mod firmware;
 pub mod half_mirror;
 pub mod imager;
 
+mod lights;
 mod link_rates;
 pub mod lockstep;
 pub mod memory;

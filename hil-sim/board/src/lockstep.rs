@@ -88,6 +88,8 @@ impl Work {
             | Request::Stop
             | Request::Halt
             | Request::LoadShot { .. }
+            | Request::SetLights { .. }
+            | Request::SetShotLight { .. }
             | Request::ArmProgram { .. }
             | Request::PauseProgram
             | Request::ReadEvent { .. }
@@ -218,6 +220,7 @@ impl Lockstep {
                 return;
             }
             EventKind::ShotDone { .. }
+            | EventKind::Flash { .. }
             | EventKind::Alarm(_)
             | EventKind::AlarmCleared { .. }
             | EventKind::RecordRepaired { .. } => return,

@@ -211,7 +211,7 @@ fn serve(run: &Run) -> Result<()> {
     let imager = |light: f64| -> Result<Imager> {
         let camera = Camera { exposure_level: camera.exposure_level * light, ..camera.clone() };
         let imager = Imager::new(&scene, &lens, &run.psf, camera, config.seed)?;
-        Ok(imager.moving(imaging.scene_px_per_s))
+        Ok(imager.moving(imaging.scene_px_per_s).lit_by(imaging.light))
     };
     let mirror = &config.parts.half_mirror;
     let (first, second) = match run.half_mirror {

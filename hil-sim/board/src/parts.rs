@@ -81,6 +81,34 @@ pub struct ImagingParts {
     pub hot_pixel_e: f64,
     /// How fast the scene moves across the image.
     pub scene_px_per_s: [f64; 2],
+    pub light: LightParts,
+}
+
+/// What lights the scene.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightParts {
+    /// Brightness of the room; 1 exposes as the camera's exposure level says.
+    pub room: f64,
+    /// Share of the room's light that flickers, and how often a second.
+    pub flicker: f64,
+    pub flicker_hz: f64,
+    /// What each of the board's light outputs adds when fully on.
+    pub lamps: [f64; 2],
+    /// The scene has no texture of its own; the second output is a projector whose pattern is the scene's texture.
+    pub blank_walls: bool,
+}
+
+impl LightParts {
+    /// Mean brightness of an exposure, with the mean of each light output: what falls on the texture, and what is even.
+    pub fn brightness(&self, (begin_ns, end_ns): (u64, u64), outputs: [f64; 2]) -> (f64, f64) {
+        let turn = |at_ns: u64| std::f64::consts::TAU * self.flicker_hz * 1e-9 * at_ns as f64;
+        let (begin, end) = (turn(begin_ns), turn(end_ns));
+        let swing = if end > begin { (begin.cos() - end.cos()) / (end - begin) } else { begin.sin() };
+        let room = self.room * (1.0 + self.flicker * swing);
+        let [first, second] = [0, 1].map(|i| self.lamps[i] * outputs[i]);
+        if self.blank_walls { (second, room + first) } else { (room + first + second, 0.0) }
+    }
 }
 
 impl ImagingParts {
@@ -322,6 +350,11 @@ impl Parts {
             ("piezo.second_mode_share", self.piezo.second_mode_share, 0.0, 1.0),
             ("switches.bounces_per_ms", self.switches.bounces_per_ms, 0.0, 1e3),
             ("switches.glitches_per_s", self.switches.glitches_per_s, 0.0, 1e4),
+            ("imaging.light.room", self.imaging.light.room, 0.0, 100.0),
+            ("imaging.light.flicker", self.imaging.light.flicker, 0.0, 1.0),
+            ("imaging.light.flicker_hz", self.imaging.light.flicker_hz, 0.1, 10_000.0),
+            ("imaging.light.lamps, first", self.imaging.light.lamps[0], 0.0, 100.0),
+            ("imaging.light.lamps, second", self.imaging.light.lamps[1], 0.0, 100.0),
             ("imaging.field_offset", self.imaging.field_offset, -2.0, 2.0),
             ("imaging.field_curvature", self.imaging.field_curvature, -5.0, 5.0),
             ("imaging.field_slope", self.imaging.field_slope, -5.0, 5.0),

@@ -11,6 +11,7 @@ use crate::{
     board::{Chip, PinName, STROBE, TIM2, TRIGGER, pins},
     camera::{Camera, Edge},
     chips::{SharedPlant, with_plant},
+    lights::Lights,
     parts::{DriverParts, Parts},
     plant::{Contact, ExposureTruth, Noise, StageName},
 };
@@ -43,6 +44,8 @@ pub struct Shot {
     pub end_ns: u64,
     /// Where the sensor was.
     pub truth: ExposureTruth,
+    /// Mean brightness of both light outputs during the exposure, 0 to 1.
+    pub light: [f64; 2],
 }
 
 /// STEP pulses of one motor, one behind the other.
@@ -80,6 +83,7 @@ pub struct Wiring {
     plant: SharedPlant,
     camera: Camera,
     stages: [StageWires; 2],
+    lights: Lights,
     trigger: bool,
     strobe_cut: bool,
     exposures_begun: u64,
@@ -245,6 +249,7 @@ impl Wiring {
             plant,
             camera,
             stages,
+            lights: Lights::default(),
             trigger: false,
             strobe_cut: false,
             exposures_begun: 0,
@@ -260,12 +265,15 @@ impl Wiring {
 
     /// Whether a write to this address can move a watched pin.
     pub fn watches(address: u64) -> bool {
-        WATCHED.iter().any(|range| range.contains(&address))
+        Lights::watches(address) || WATCHED.iter().any(|range| range.contains(&address))
     }
 
     /// Looks at the pins at a moment, after a register was `written` where one was, and lets what is due at the camera happen.
     pub fn look(&mut self, chip: &mut Chip, at: VirtualNanos, written: Option<u64>) {
         let driver_written = written.is_some_and(|address| DRIVER_PORT.contains(&address));
+        if written.is_some_and(Lights::watches) {
+            self.lights.look(chip, at);
+        }
         while let Some((at_ns, edge)) = self.camera.due(at.0) {
             self.expose(chip, at, at_ns, edge);
         }
@@ -293,6 +301,7 @@ impl Wiring {
         match edge {
             Edge::Begin(id) => {
                 self.exposures_begun += 1;
+                self.lights.begin_exposure(at_ns);
                 with_plant(&self.plant, |plant| plant.begin_exposure(at_ns));
                 let low = Operate::peek(chip, at, TIM2_CNT, Width::W32).unwrap_or(0);
                 // The counter has the lower 32 bits of about the virtual time; a run has few of their periods.
@@ -302,7 +311,8 @@ impl Wiring {
             Edge::End => {
                 let truth = with_plant(&self.plant, |plant| plant.end_exposure(at_ns));
                 if let (Some(truth), Some((id, board_us, begin_ns))) = (truth, self.begun.take()) {
-                    self.shots.push(Shot { id, board_us, begin_ns, end_ns: at_ns, truth });
+                    let light = self.lights.end_exposure(at_ns, at_ns - begin_ns);
+                    self.shots.push(Shot { id, board_us, begin_ns, end_ns: at_ns, truth, light });
                 }
             }
         }
@@ -421,6 +431,10 @@ impl Wiring {
         self.stages.each_mut().map(|stage| stage.record.as_mut().map(std::mem::take).unwrap_or_default())
     }
 
+    pub fn lights(&mut self) -> &mut Lights {
+        &mut self.lights
+    }
+
     /// The camera, for its host's commands.
     pub fn camera_mut(&mut self) -> &mut Camera {
         &mut self.camera
@@ -435,6 +449,7 @@ impl Wiring {
             // A resistor holds EN while the chip's pins float.
             (stage.step, stage.driver.enabled_ns) = (false, None);
         }
+        self.lights.board_reset(at.0);
         if std::mem::take(&mut self.trigger) {
             self.camera.trigger(at.0, false);
         }

@@ -198,6 +198,24 @@ impl Renderer {
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
+    /// As [`Renderer::expose`], under light of this brightness: `textured` times the scene's texture, and `even` on top of it, which
+    /// a blank wall reflects. With 1 and 0 the same as [`Renderer::expose`].
+    ///
+    /// # Errors
+    /// As [`Renderer::expose`].
+    pub fn expose_lit(
+        &self,
+        sensor_distance_mm: f64,
+        exposure_number: u32,
+        (textured, even): (f64, f64),
+    ) -> Result<Array2<u16>, RenderError> {
+        let mut radiance = self.radiance(sensor_distance_mm)?;
+        if (textured, even) != (1.0, 0.0) {
+            radiance.mapv_inplace(|radiance| textured.max(0.0) as f32 * radiance + even.max(0.0) as f32);
+        }
+        Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
+    }
+
     /// The mean radiance on each pixel, shape (height, width); the scene's mean is 1.
     ///
     /// # Errors

@@ -18,7 +18,7 @@ use std::{
 
 use farnear_protocol::{
     Request, Response,
-    message::{Axis, Hello, LinkRate, Status},
+    message::{Axis, Hello, LightLevels, LinkRate, Status},
 };
 
 use crate::{
@@ -42,6 +42,8 @@ pub struct Client {
     port: Arc<Port>,
     session: Session,
     interrupt: Option<Arc<AtomicBool>>,
+    /// Light of the shots that the board triggers.
+    light: Option<LightLevels>,
 }
 
 /// The way to the thread that owns the port; the thread ends with the last handle.
@@ -118,7 +120,17 @@ impl Client {
             inbox: Some(inbox),
             thread: Some(thread),
         };
-        Ok(Self { port: Arc::new(port), session, interrupt: None })
+        Ok(Self { port: Arc::new(port), session, interrupt: None, light: None })
+    }
+
+    /// Gives every shot of the programs that this handle arms this light, from the start of its exposure to the end; `None` for no
+    /// light. The board refuses it for shots that it does not trigger.
+    pub fn set_light(&mut self, light: Option<LightLevels>) {
+        self.light = light;
+    }
+
+    pub(crate) fn light(&self) -> Option<LightLevels> {
+        self.light
     }
 
     /// Goes on with a board after it was reset or unplugged: says hello if that has not happened yet. What was moving is

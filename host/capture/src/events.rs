@@ -73,6 +73,7 @@ pub(crate) fn request_of(kind: &EventKind) -> Option<(u32, bool)> {
         | EventKind::FrameTaken { request, .. }
         | EventKind::FrameDropped { request, .. }
         | EventKind::ShotReady { request, .. }
+        | EventKind::Flash { request, .. }
         | EventKind::Paused { request, .. }
         | EventKind::StillThere { request } => Some((request, false)),
         EventKind::Started { .. }

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use farnear_protocol::{
     Request, RequestError, Response,
-    message::{AlarmRecord, Axis, Counters, Setting, SettingKey, SunAnswer, SunQuery},
+    message::{AlarmRecord, Axis, Counters, LightLevels, Setting, SettingKey, SunAnswer, SunQuery},
+    units::Micros,
 };
 
 use crate::{client::Client, error::ClientError, owner::nonsense};
@@ -39,6 +40,12 @@ impl Client {
             }
             std::thread::sleep(LOOK);
         }
+    }
+
+    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after [`Client::keep_alive`] without a request.
+    pub fn set_lights(&self, levels: LightLevels, time: Micros) -> Result<(), ClientError> {
+        let request = Request::SetLights { levels, time, silence: self.keep_alive() };
+        self.expect_accepted(&request, "switching the light")
     }
 
     /// Emergency stop: the last step comes within a millisecond, what moved has lost its position, and the alarm has to

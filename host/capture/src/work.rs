@@ -15,7 +15,7 @@ use std::{
 
 use farnear_protocol::{
     Request, Response,
-    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot},
+    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotLight},
     units::{Micros, Nanometres},
 };
 
@@ -390,6 +390,11 @@ impl Client {
         for (index, shot) in (0..count).zip(shots) {
             let request = Request::LoadShot { index, shot: *shot };
             self.expect_accepted(&request, &format!("loading shot {index}"))?;
+            if let Some(levels) = self.light() {
+                let light = Some(ShotLight { levels, delay: Micros(0), length: shot.exposure });
+                let during = format!("setting the light of shot {index}");
+                self.expect_accepted(&Request::SetShotLight { index, light }, &during)?;
+            }
         }
         self.expect_accepted(&Request::ArmProgram { shots: count }, "arming the exposure program")
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Alarm, AlarmRecord, Axis, Codes, CoefficientBits, CorrectionFault, CorrectionInfo, Counters, Event,
-    Hello, PositionState, ProgramState, Setting, ShotFault, Status, SunAnswer,
+    Hello, LightFault, PositionState, ProgramState, Setting, ShotFault, Status, SunAnswer,
 };
 use crate::units::{Micros, Nanometres};
 
@@ -163,5 +163,10 @@ pub enum RequestError {
     Period {
         /// The longest exposure of the armed shots and the camera's read-out.
         min: Micros,
+    },
+    /// The light cannot be set like this.
+    Light {
+        /// Why.
+        reason: LightFault,
     },
 }

@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{AlarmRecord, Axis, Calibration, DropReason, RecordName, ResetCause, ShotRecord};
+use super::{AlarmRecord, Axis, Calibration, DropReason, LightLevels, RecordName, ResetCause, ShotRecord};
 use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// Something that happened, with the board's time. Events are numbered from 0 at each boot; the number travels
@@ -144,6 +144,19 @@ pub enum EventKind {
         exposures: u32,
         /// Frames dropped.
         dropped: u32,
+    },
+    /// The flash of an exposure; follows its [`EventKind::ShotDone`] or [`EventKind::FrameTaken`].
+    Flash {
+        /// The request that runs the program.
+        request: u32,
+        /// The exposure's [`ShotRecord::trigger_number`].
+        trigger_number: u32,
+        /// Brightness.
+        levels: LightLevels,
+        /// Start of the flash.
+        on: BoardMicros,
+        /// End of the flash.
+        off: BoardMicros,
     },
 }
 

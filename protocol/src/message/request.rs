@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use super::{Axis, Codes, CoefficientBits, CorrectionInfo, LinkRate, Routine, SettingKey, Shot, SunQuery};
+use super::{Axis, Codes, CoefficientBits, CorrectionInfo, LightLevels, LinkRate, Routine, SettingKey, Shot, ShotLight, SunQuery};
 use crate::units::{Micros, Nanometres};
 
 /// What the host can ask. Each request carries an id, larger than all before it; the board answers a repeated id with
@@ -186,5 +186,24 @@ pub enum Request {
     SetLinkRate {
         /// The new rate.
         rate: LinkRate,
+    },
+    /// Set the brightness of both light outputs. They go off after `time`, after `silence` without a request of the
+    /// session, and with [`Request::Stop`], [`Request::OpenSession`], every alarm and every reset. Refused while an alarm is
+    /// latched, except to switch both off. Answer: [`super::Response::Accepted`].
+    SetLights {
+        /// Brightness.
+        levels: LightLevels,
+        /// How long they may stay on, at most [`super::LIGHT_TIME_MAX`].
+        time: Micros,
+        /// How long the host may send nothing, within the limits of [`Request::Move`]. Expires without an alarm.
+        silence: Micros,
+    },
+    /// Give a loaded shot a flash, or none. [`Request::LoadShot`] and a reset remove it. Refused while a program runs. Each
+    /// flash is reported by [`super::EventKind::Flash`]. Answer: [`super::Response::Accepted`].
+    SetShotLight {
+        /// Place in the program.
+        index: u8,
+        /// The flash.
+        light: Option<ShotLight>,
     },
 }

@@ -37,7 +37,7 @@ fn the_document_states_the_numbers_of_the_code() {
     for stated in [
         format!("Version {PROTOCOL_CURRENT}."),
         format!("at most {FRAME_MAX} bytes with its ending 0, a body at most {BODY_MAX} bytes"),
-        format!("by at most {step} at a time"),
+        format!("by at most {step}."),
     ] {
         assert!(page.contains(&stated), "docs/protocol.md does not say {stated:?}");
     }

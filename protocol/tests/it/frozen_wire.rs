@@ -65,7 +65,7 @@ pub const BY_HAND: &str = "0403010501010a0403020108070605030902c0843d54a3e34300"
 
 #[test]
 fn the_schema_key_changes_only_with_the_table() {
-    assert_eq!(format!("{SCHEMA_KEY:016x}"), "1d8ebf60040f0422");
+    assert_eq!(format!("{SCHEMA_KEY:016x}"), "783177dfbfb5477b");
 }
 
 #[test]

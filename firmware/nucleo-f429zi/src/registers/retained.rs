@@ -24,6 +24,31 @@ unsafe impl Sync for Retained {}
 #[unsafe(link_section = ".uninit.retained")]
 static RETAINED: Retained = Retained(UnsafeCell::new(MaybeUninit::uninit()));
 
+/// The DAC's code in the lower half, its complement in the upper.
+struct PiezoCode(UnsafeCell<MaybeUninit<u32>>);
+
+// SAFETY: all access is by single, aligned, volatile words, from thread mode only.
+unsafe impl Sync for PiezoCode {}
+
+// SAFETY: as of `RETAINED`.
+#[unsafe(link_section = ".uninit.piezo_code")]
+static PIEZO_CODE: PiezoCode = PiezoCode(UnsafeCell::new(MaybeUninit::uninit()));
+
+/// Keeps the code that the piezo's DAC is about to get.
+pub fn keep_piezo_code(code: u16) {
+    let word = u32::from(code) | u32::from(!code) << 16;
+    // SAFETY: the place is valid, aligned static memory; see `PiezoCode`.
+    unsafe { PIEZO_CODE.0.get().cast::<u32>().write_volatile(word) };
+}
+
+/// The code that the DAC had last; `None` where memory has none.
+pub fn piezo_code() -> Option<u16> {
+    // SAFETY: as above; any bits are a valid u32.
+    let word = unsafe { PIEZO_CODE.0.get().cast::<u32>().read_volatile() };
+    let [code, complement] = [word as u16, (word >> 16) as u16];
+    (code == !complement).then_some(code)
+}
+
 /// Why the program stopped itself.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Last {

@@ -20,11 +20,13 @@ pub(crate) struct Stage {
 }
 
 impl Stage {
-    pub(crate) const fn new(settings: &Settings) -> Self {
+    pub(crate) const fn new(settings: &Settings, piezo_code: Option<u16>) -> Self {
+        let mut fine = Piezo::new(settings.fine);
+        fine.start_at(piezo_code);
         Self {
             coarse: Stepper::new(settings.coarse),
             lens: Stepper::new(settings.lens),
-            fine: Piezo::new(settings.fine),
+            fine,
             looped: None,
             on_time: true,
         }

@@ -1,9 +1,12 @@
 //! Requests about the exposure program.
 
-use farnear_protocol::message::{Axis, RecordName, RequestError, Response, Shot, ShotFault};
+use farnear_protocol::message::{
+    Axis, LightLevels, RecordName, RequestError, Response, Shot, ShotFault, ShotLight,
+};
 use farnear_protocol::{BoardMicros, Micros};
 
 use super::Answer;
+use crate::light;
 use crate::program::{Run, SHOTS_MAX, pace::Pace};
 use crate::rig::Rig;
 use crate::work::{Active, WholeWork};
@@ -16,6 +19,32 @@ impl Rig {
             .load(index, *shot, &self.settings)
             .map_err(|reason| RequestError::Shot { index, reason })?;
         self.store.mark(RecordName::Program);
+        Ok(Response::Accepted)
+    }
+
+    pub(super) fn set_lights(
+        &mut self,
+        levels: LightLevels,
+        (time, silence): (Micros, Micros),
+        now: BoardMicros,
+    ) -> Answer {
+        if levels.is_on() {
+            self.may_move(silence)?; // no alarm, and a silence within its limits
+        }
+        self.lights
+            .set(levels, (time, silence), now)
+            .map_err(|reason| RequestError::Light { reason })?;
+        Ok(Response::Accepted)
+    }
+
+    pub(super) fn set_shot_light(&mut self, index: u8, light: Option<ShotLight>) -> Answer {
+        self.no_program_runs()?;
+        let missing = RequestError::Shot { index, reason: ShotFault::Missing };
+        let shot = self.shots.get(index).ok_or(missing)?;
+        if let Some(light) = &light {
+            light::check(light, shot).map_err(|reason| RequestError::Light { reason })?;
+        }
+        self.shots.set_light(index, light);
         Ok(Response::Accepted)
     }
 
@@ -55,6 +84,7 @@ impl Rig {
         };
         // Since it was armed axes may have lost their positions, or moved. The second round begins where the first one ends.
         self.check_program(count, if pace.is_some() { 2 } else { 1 })?;
+        let first = (first, self.shots.light(0));
         let run = Run::start((count, first), pace, &mut self.stage, &self.settings, now);
         self.works.whole = Some(Active { request, silence, work: WholeWork::Program(run) });
         Ok(Response::Accepted)

@@ -311,6 +311,7 @@ pub fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
         firmware: "0.1.0",
         unique_id: [3; 12],
         boot,
+        piezo_code: None,
         reset_cause,
         emulated: true,
         own_clock: false,

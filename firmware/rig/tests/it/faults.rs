@@ -6,7 +6,8 @@ use crate::bench::{self, Bench, SILENCE, ends, go, home};
 use farnear_protocol::message::{
     Alarm, Axis, EventKind, Failure, PositionState, ResetCause, Routine, SettingKey,
 };
-use farnear_protocol::{Request, RequestError};
+use farnear_protocol::{BoardMicros, Request, RequestError};
+use farnear_rig::{Identity, Rig};
 use proptest::prelude::*;
 
 /// What happens to the rig.
@@ -210,5 +211,37 @@ proptest! {
             bench.accepted(&Request::ClearAlarm { number: alarm.number });
         }
         works_again(&mut bench)?;
+    }
+}
+
+#[test]
+fn a_memory_that_stops_answering_is_an_alarm() {
+    let mut bench = Bench::new(700.0);
+    bench.hardware.faults.memory_failed = true;
+    bench.tick();
+    bench.hardware.faults.memory_failed = false;
+    assert_eq!(bench.alarm(), Some(Alarm::MemoryMissing));
+}
+
+#[test]
+fn a_gauge_that_is_off_at_the_start_does_not_move_the_piezo() {
+    // A dead front end reads 121 um; the DAC starts at 0 with its supply.
+    for (kept, step_max) in [(0u16, 0), (50_000, 200)] {
+        let mut bench = Bench::new(700.0);
+        bench.hardware.dac = kept;
+        bench.hardware.faults.gauge = Some(Some(131_072));
+        let identity = Identity { piezo_code: Some(kept), ..*bench.rig.identity() };
+        bench.rig = Rig::new(identity, None, BoardMicros(0));
+        let mut before = kept;
+        for _ in 0..1_000 {
+            let inputs = bench.hardware.inputs(BoardMicros(bench.now));
+            let outputs = bench.rig.tick(&inputs);
+            bench.hardware.run(&outputs, bench.now);
+            bench.now += 200;
+            let step = bench.hardware.dac.abs_diff(before);
+            assert!(step <= step_max, "a step of {step} codes");
+            before = bench.hardware.dac;
+        }
+        assert_eq!(before, 0, "it is relaxed at the end");
     }
 }

@@ -7,6 +7,7 @@ mod continuous;
 mod control;
 mod faults;
 mod hostile;
+mod light;
 mod link;
 mod maths;
 mod power_cuts;

@@ -2,7 +2,8 @@
 
 use crate::bench::{self, Bench, SILENCE, ends};
 use farnear_protocol::message::{
-    Axis, CorrectionForm, CorrectionInfo, Routine, SettingKey, Shot, SunQuery, TriggerMode,
+    Axis, CorrectionForm, CorrectionInfo, LightLevels, Routine, SettingKey, Shot, ShotLight, SunQuery,
+    TriggerMode,
 };
 use farnear_protocol::{Micros, Nanometres, Request};
 use proptest::prelude::*;
@@ -67,6 +68,19 @@ fn maths() -> impl Strategy<Value = Request> {
         (any::<u16>(), any::<u16>(), any::<u16>(), any::<i16>(), codes()).prop_map(
             |(row, first, step, truth, codes)| Request::FitSamples { row, first, step, truth, codes }
         ),
+        (0u16..1_100, 0u16..1_100, 0u32..2_000_000).prop_map(|(first, second, time)| Request::SetLights {
+            levels: LightLevels { first, second },
+            time: Micros(time),
+            silence: Micros(200_000),
+        }),
+        (0u8..4, 0u32..6_000).prop_map(|(index, length)| Request::SetShotLight {
+            index,
+            light: Some(ShotLight {
+                levels: LightLevels { first: 1_000, second: 0 },
+                delay: Micros(100),
+                length: Micros(length),
+            }),
+        }),
         Just(Request::SolveFit),
         (any::<u16>(), codes()).prop_map(|(first, codes)| Request::PutRow { first, codes }),
         any::<u16>().prop_map(|row| Request::CorrectRow { row }),

@@ -8,6 +8,7 @@ mod calibration;
 mod continuous;
 mod fuzz;
 mod gige;
+mod light;
 mod link_rate;
 mod maths;
 mod memory;

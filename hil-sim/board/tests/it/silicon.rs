@@ -433,3 +433,32 @@ fn a_clock_that_fails_for_a_moment_is_told() {
     bench.clear(|alarm| *alarm == Alarm::ClockLost);
     works(&mut bench);
 }
+
+#[test]
+fn a_memory_that_stops_answering_while_the_board_runs_is_an_alarm() {
+    let mut bench = Bench::new(1);
+    bench.access(|rig| rig.set_memory_make(MemoryMake::None));
+    let write = Request::WriteSetting { key: SettingKey::CoarseBacklashNm, value: 3_000 };
+    assert!(bench.ask(&write).is_ok());
+    bench.rig.advance_us(20_000).expect("runs");
+    assert_eq!(bench.alarm().map(|record| record.alarm), Some(Alarm::MemoryMissing));
+}
+
+#[test]
+fn a_gauge_that_is_off_does_not_kick_the_piezo_at_the_start() {
+    // 20 um off; hysteresis, creep and a reset leave no more than the way down from where it stood.
+    let mut bench = rig_with(|parts| parts.gauge.offset_um = 20.0);
+    let mut highest: f64 = 0.0;
+    for _ in 0..50 {
+        highest = highest.max(bench.rig.advance_us(200).expect("runs").piezo_um);
+    }
+    let end = bench.report().piezo_um.max(highest);
+    assert!(end < 1.0, "{end} um");
+    bench.move_to(Axis::SensorFine, Nanometres(100_000));
+    let stood = bench.report().piezo_um;
+    bench.access(|rig| rig.press_reset());
+    for _ in 0..2_000 {
+        let now = bench.rig.advance_us(200).expect("runs").piezo_um;
+        assert!(now < stood + 1.0, "{now} um, from {stood} um");
+    }
+}

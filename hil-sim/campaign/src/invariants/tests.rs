@@ -222,7 +222,7 @@ fn an_exposure_too_many_is_seen_and_one_that_takes_the_place_of_an_unseen_one_is
         };
         Sight {
             at_ns: end_ns,
-            seen: Seen::Exposed(Shot { id, board_us: ms * 1000, begin_ns, end_ns, truth }),
+            seen: Seen::Exposed(Shot { id, board_us: ms * 1000, begin_ns, end_ns, truth, light: [0.0; 2] }),
         }
     };
     let reason = DropReason::NoStrobe;

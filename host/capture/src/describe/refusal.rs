@@ -2,7 +2,7 @@
 
 use farnear_protocol::{
     RequestError,
-    message::{Axis, CorrectionFault, ShotFault},
+    message::{Axis, CorrectionFault, LIGHT_LEVEL_MAX, LIGHT_TIME_MAX, LightFault, ShotFault},
 };
 
 use super::{alarm_text, axis_name, program_name, state_name, um};
@@ -30,6 +30,7 @@ pub fn refusal_text(error: &RequestError) -> String {
         RequestError::Period { min } => {
             format!("the camera takes {} us for an exposure and its read-out; ask for a longer period", min.0)
         }
+        RequestError::Light { reason } => format!("the light: {}", light_fault_text(*reason)),
         RequestError::OutOfRange { axis, asked, min, max } => format!(
             "{:.3} um is outside the limits of the {}, {:.3} to {:.3} um",
             um(*asked),
@@ -116,5 +117,14 @@ fn correction_fault_text(fault: CorrectionFault) -> &'static str {
         CorrectionFault::CoefficientTooLarge => {
             "a coefficient of the fit is too large: the depth scale does not suit the samples"
         }
+    }
+}
+
+fn light_fault_text(reason: LightFault) -> String {
+    match reason {
+        LightFault::Level => format!("a brightness exceeds {} %", LIGHT_LEVEL_MAX / 10),
+        LightFault::Time => format!("its time is outside 1 us to {} s", LIGHT_TIME_MAX.0 / 1_000_000),
+        LightFault::Exposure => "the flash does not end within the exposure; shorten its delay or its length".into(),
+        LightFault::Mode => "only a shot that the board triggers can have a flash".into(),
     }
 }

@@ -118,6 +118,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             exposure: Micros(5_000),
             image_wait: Duration::from_secs(30),
             settings: arguments.set,
+            light: None,
         },
         session,
         optics: arguments.optics,

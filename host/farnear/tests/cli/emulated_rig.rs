@@ -131,3 +131,30 @@ fn a_capture_on_a_full_disk_is_said_and_leaves_nothing() {
     // The same name is free for the capture that follows.
     succeeds(&mut on_the_rig(&["capture", "--optics", rig_optics(), "--out", &pair]));
 }
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_lamp_of_the_board_makes_both_images_brighter() {
+    let folder = Folder::new();
+    // The emulated lamps are as bright as the room.
+    let means = [None, Some("30"), Some("10,20")].map(|light| {
+        let out = folder.text(light.unwrap_or("off"));
+        let mut capture = on_the_rig(&["capture", "--optics", rig_optics(), "--out", &out, "--json"]);
+        if let Some(light) = light {
+            capture.args(["--light", light]);
+        }
+        succeeds(&mut capture);
+        ["far.png", "near.png"].map(|file| {
+            let image = image::open(format!("{out}/{file}")).expect("an image").into_luma16();
+            image.pixels().map(|pixel| f64::from(pixel.0[0])).sum::<f64>() / f64::from(image.width() * image.height())
+        })
+    });
+    for lit in &means[1..] {
+        for (lit, dark) in lit.iter().zip(means[0]) {
+            // 1.3, less what saturates.
+            assert!((1.2..1.32).contains(&(lit / dark)), "{means:?}");
+        }
+    }
+    let mut too_bright = on_the_rig(&["capture", "--optics", rig_optics(), "--out", &folder.text("bright")]);
+    fails(too_bright.args(["--light", "130"]), 2, &["130", "0 to 100 %"]);
+}

@@ -70,6 +70,7 @@ impl Served {
             exposure: Micros(5_000),
             image_wait: Duration::from_secs(5),
             settings: Vec::new(),
+            light: None,
         };
         let listen = listen(folder.path());
         let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen, limits };

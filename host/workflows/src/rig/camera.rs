@@ -12,7 +12,10 @@ use farnear_capture::{
     record::Circumstances,
 };
 use farnear_depth::psf::Psf;
-use farnear_protocol::Micros;
+use farnear_protocol::{
+    Micros,
+    message::{LIGHT_LEVEL_MAX, LightLevels},
+};
 
 use super::{Rig, RigAddress};
 use crate::{
@@ -116,6 +119,23 @@ pub struct CameraSettings {
     pub image_wait: Duration,
     /// Controls to set before anything moves, in this order; never the exposure.
     pub settings: Vec<Setting>,
+    /// Light outputs of the board during each exposure.
+    pub light: Option<LightLevels>,
+}
+
+/// Reads `FIRST` or `FIRST,SECOND`, percent.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn parse_light(text: &str) -> std::result::Result<LightLevels, String> {
+    let level = |part: &str| match part.trim().parse::<f64>() {
+        Ok(percent) if (0.0..=100.0).contains(&percent) => {
+            Ok((percent / 100.0 * f64::from(LIGHT_LEVEL_MAX)).round() as u16)
+        }
+        _ => Err(format!("{part:?} is no brightness: expected 0 to 100 %")),
+    };
+    let (first, second) = text.split_once(',').unwrap_or((text, "0"));
+    Ok(LightLevels { first: level(first)?, second: level(second)? })
 }
 
 /// A camera that does not hang on the emulated rig, opened before the rig: one that is not there is known before anything
@@ -177,7 +197,8 @@ impl EarlyCamera {
         optics: Option<(&Path, Psf)>,
         context: &Context<'_>,
     ) -> Result<EquippedRig> {
-        let rig = Rig::connect(address, optics, context)?;
+        let mut rig = Rig::connect(address, optics, context)?;
+        rig.client.set_light(self.settings.light);
         let camera = match (self.camera, &rig.emulation) {
             (Some(camera), _) => camera,
             (None, Some((simulator, _))) => {

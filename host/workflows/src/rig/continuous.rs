@@ -216,6 +216,7 @@ mod tests {
                 exposure: Micros(5_000),
                 image_wait: std::time::Duration::from_secs(1),
                 settings: Vec::new(),
+                light: None,
             },
             cycle: Cycle::Program { path: "none".into() },
             rate_hz,

@@ -49,6 +49,7 @@ fn camera(folder: &Path) -> CameraSettings {
         exposure: Micros(5_000),
         image_wait: Duration::from_secs(30),
         settings: Vec::new(),
+        light: None,
     }
 }
 

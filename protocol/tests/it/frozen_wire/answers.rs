@@ -4,7 +4,7 @@ use farnear_protocol::{
     BoardMicros, Event, EventKind, Micros, Nanometres, RequestError, Response,
     frame::Kind,
     message::{
-        Alarm, Axis, AxisStatus, Capabilities, CorrectionFault, Counters, Hello, Limits, LinkCounters,
+        Alarm, Axis, AxisStatus, Capabilities, CorrectionFault, Counters, Hello, LightFault, Limits, LinkCounters,
         PositionState, ProgramState, ResetCause, ShadowAnswer, ShadowReliability, ShotFault, Status,
         SunAnswer,
     },
@@ -151,6 +151,7 @@ fn errors() -> Vec<RequestError> {
         RequestError::IdNotNew { last: 300 },
         RequestError::QueueFull { outstanding: 8 },
         RequestError::Period { min: Micros(15_500) },
+        RequestError::Light { reason: LightFault::Exposure },
     ]
 }
 
@@ -212,6 +213,7 @@ fn errors_are_frozen() {
             "0403030101010c0403020115ac0296b6584200",
             "0403030101010b0403020116083fbed21f00",
             "0403030101010c04030201178c79eeee8f1300",
+            "0403030101010b040302011802af7a846100",
         ],
     );
 }

@@ -8,7 +8,7 @@ use farnear_protocol::{
 
 use super::{
     check, lists_every_variant,
-    parts::{ALARMS, RECORD, alarm},
+    parts::{ALARMS, LEVELS, RECORD, alarm},
     wire,
 };
 
@@ -78,6 +78,13 @@ fn table() -> Vec<EventKind> {
     let dropped = |reason| EventKind::FrameDropped { request: 4, frame: 301, index: 1, reason };
     table.extend(drop_reasons().map(dropped));
     table.push(EventKind::ContinuousDone { request: 4, exposures: 300, dropped: 1 });
+    table.push(EventKind::Flash {
+        request: 4,
+        trigger_number: 70_000,
+        levels: LEVELS,
+        on: BoardMicros(2_000_300),
+        off: BoardMicros(2_004_300),
+    });
     table
 }
 
@@ -143,6 +150,7 @@ fn events() {
             "0403040701011204030201c0843d0e04ad0201013911fce900",
             "0403040701011204030201c0843d0e04ad0201028340f57000",
             "0403040701011104030201c0843d0f04ac0201a63f7cac00",
+            "0403040701011a04030201c0843d1004f0a204e80719ac8b7accaa7ab46bc5df00",
         ],
     );
 }

@@ -3,7 +3,7 @@
 use farnear_protocol::{
     BoardMicros, Micros, Nanometres,
     message::{
-        Alarm, AlarmRecord, Axis, AxisStatus, CorrectionFault, CorrectionForm, CorrectionInfo, PositionState,
+        Alarm, AlarmRecord, Axis, AxisStatus, CorrectionFault, CorrectionForm, CorrectionInfo, LightLevels, PositionState,
         ProgramState, ProgramStatus, QueryDeviations, RecordName, ResetCause, Setting, SettingKey,
         ShadowQuery, ShadowReliability, Shot, ShotFault, ShotRecord, SunQuery, TriggerMode,
     },
@@ -177,3 +177,6 @@ fn settings_keep_the_names_that_files_know_them_by() {
         assert_eq!(name.replace('_', ""), variant);
     }
 }
+
+/// Brightness that takes one byte and two.
+pub const LEVELS: LightLevels = LightLevels { first: 1_000, second: 25 };

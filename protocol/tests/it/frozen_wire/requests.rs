@@ -3,12 +3,12 @@
 use farnear_protocol::{
     Call, Micros, Nanometres, Request,
     frame::Kind,
-    message::{Axis, LinkRate, Routine, SettingKey, SunQuery},
+    message::{Axis, LinkRate, Routine, SettingKey, ShotLight, SunQuery},
 };
 
 use super::{
     SESSION, check, lists_every_variant,
-    parts::{CORRECTION, SHADOW, SHOT, SUN},
+    parts::{CORRECTION, LEVELS, SHADOW, SHOT, SUN},
     wire,
 };
 
@@ -56,6 +56,12 @@ pub fn table() -> Vec<Request> {
         Request::OpenSession,
         Request::RunContinuously { period: Micros(40_000), exposures: 15_000, silence },
         Request::SetLinkRate { rate: LinkRate::Baud921600 },
+        Request::SetLights { levels: LEVELS, time: Micros(5_000_000), silence },
+        Request::SetShotLight { index: 3, light: None },
+        Request::SetShotLight {
+            index: 3,
+            light: Some(ShotLight { levels: LEVELS, delay: Micros(300), length: Micros(4_000) }),
+        },
     ]
 }
 
@@ -111,6 +117,9 @@ fn requests() {
             "1403010d0c0b0a04030201080706051e15e0768c00",
             "1c03010d0c0b0a04030201080706051fc0b802987580897a199a08ce00",
             "1503010d0c0b0a040302010807060520016d56918900",
+            "1e03010d0c0b0a040302010807060521e80719c096b10280897a6c2da89e00",
+            "1103010d0c0b0a0403020108070605220305d2d53ad000",
+            "1d03010d0c0b0a0403020108070605220301e80719ac02a01f5ab7208500",
         ],
     );
 }

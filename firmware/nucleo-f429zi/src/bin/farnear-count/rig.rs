@@ -51,6 +51,7 @@ fn identity() -> Identity {
         firmware: env!("CARGO_PKG_VERSION"),
         unique_id: [0; 12],
         boot: 1,
+        piezo_code: None,
         reset_cause: ResetCause::PowerOn,
         emulated: true,
         own_clock: false,

@@ -1,5 +1,6 @@
 //! A model of the rig's hardware: two stepper axes, piezo, gauge, camera, the safety inputs. And its faults.
 
+use farnear_protocol::message::{LightLevels, ShotLight};
 use farnear_protocol::{BoardMicros, Micros};
 use farnear_rig::io::{
     DAC_FULL_SCALE_NM, ExposureEdges, GAUGE_CODE_ZERO, Inputs, Outputs, StrobeEdges, Trigger,
@@ -20,6 +21,8 @@ pub struct Faults {
     pub emergency_stop: bool,
     pub supply_low: bool,
     pub link_overflow: bool,
+    /// The memory confirms no write.
+    pub memory_failed: bool,
 }
 
 pub struct Hardware {
@@ -30,7 +33,10 @@ pub struct Hardware {
     piezo_velocity: f64,
     pub dac: u16,
     random: u64,
-    exposure: Option<(BoardMicros, Micros)>,
+    exposure: Option<(BoardMicros, Micros, Option<ShotLight>)>,
+    /// Brightness of the light outputs, and whether the last tick ended a flash.
+    pub lights: LightLevels,
+    pub flash_cancelled: bool,
     /// Rising edges of the trigger: when, and how long.
     pub triggers: Vec<(u64, Micros)>,
     /// Where the piezo was at each trigger.
@@ -53,6 +59,8 @@ impl Hardware {
             dac: 0,
             random: 1,
             exposure: None,
+            lights: LightLevels::OFF,
+            flash_cancelled: false,
             triggers: Vec::new(),
             piezo_at_trigger: Vec::new(),
             free_running: None,
@@ -82,6 +90,7 @@ impl Hardware {
             lens: self.lens.inputs(0.0),
             emergency_stop: self.faults.emergency_stop,
             supply_low: self.faults.supply_low,
+            memory_failed: self.faults.memory_failed,
             link_overflow: self.faults.link_overflow,
             exposure: self.exposure(now),
             strobe: self.strobe(now),
@@ -96,14 +105,16 @@ impl Hardware {
 
     /// The triggered exposure, once it is over.
     pub fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
-        let (trigger, length) = self.exposure?;
+        let (trigger, length, flash) = self.exposure?;
         let strobe_start = BoardMicros(trigger.0 + 20);
         let strobe_end = BoardMicros(strobe_start.0 + u64::from(length.0));
         if strobe_end >= now {
             return None;
         }
         self.exposure = None;
-        (!self.faults.no_strobe).then_some(ExposureEdges { trigger, strobe_start, strobe_end })
+        let after = |time: Micros| BoardMicros(trigger.0 + u64::from(time.0));
+        let flash = flash.map(|flash| [after(flash.delay), after(Micros(flash.delay.0 + flash.length.0))]);
+        (!self.faults.no_strobe).then_some(ExposureEdges { trigger, strobe_start, strobe_end, flash })
     }
 
     /// An exposure without a trigger that ended in the last tick and began while somebody listened.
@@ -130,11 +141,12 @@ impl Hardware {
         self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
         self.lens.run(&outputs.lens, now, self.faults.emergency_stop);
         self.dac = outputs.piezo_dac.unwrap_or(self.dac);
-        if let Some(Trigger { at, length }) = outputs.trigger {
+        (self.lights, self.flash_cancelled) = (outputs.lights, outputs.cancel_flash);
+        if let Some(Trigger { at, length, flash }) = outputs.trigger {
             assert!(self.exposure.is_none(), "triggered while exposing");
             assert!(!outputs.listen, "triggered while listening");
             let rises = at.0.max(now + 10);
-            self.exposure = Some((BoardMicros(rises), length));
+            self.exposure = Some((BoardMicros(rises), length, flash));
             self.triggers.push((rises, length));
             self.piezo_at_trigger.push(self.piezo_nm);
         }

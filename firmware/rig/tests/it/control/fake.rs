@@ -160,6 +160,10 @@ impl Board for Fake {
         self.hardware.faults.supply_low
     }
 
+    fn memory_failed(&mut self) -> bool {
+        false
+    }
+
     fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
         self.did(Call::Exposure);
         self.hardware.exposure(now)

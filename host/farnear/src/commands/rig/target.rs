@@ -6,10 +6,13 @@ use anyhow::{Result, bail};
 use clap::Args;
 use farnear_capture::camera::Setting;
 use farnear_depth::psf::Psf;
-use farnear_protocol::Micros;
+use farnear_protocol::{Micros, message::LightLevels};
 use farnear_scene::Noise;
 use farnear_workflows::{
-    rig::{RigAddress, camera::CameraSettings},
+    rig::{
+        RigAddress,
+        camera::{CameraSettings, parse_light},
+    },
     simulator::Scenery,
 };
 
@@ -138,6 +141,10 @@ pub struct CameraArguments {
     /// trigger_source; may be given several times. `farnear camera show` has the ranges.
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<Setting>,
+    /// Switch the board's light outputs on during each exposure, in percent. Needs exposures that the board triggers
+    /// [default: off].
+    #[arg(long, value_name = "FIRST[,SECOND]", value_parser = parse_light)]
+    light: Option<LightLevels>,
 }
 
 impl CameraArguments {
@@ -148,6 +155,7 @@ impl CameraArguments {
             exposure: Micros(self.exposure_us),
             image_wait: Duration::from_secs(self.image_wait_s),
             settings: self.set.clone(),
+            light: self.light,
         })
     }
 }

@@ -1,0 +1,93 @@
+//! Two outputs for a lamp, a flash or a projector: TIM12, channels 1 and 2, PB14 and PB15, pulse width modulation of 21 kHz.
+//!
+//! A flash is switched by the compare interrupts of the camera's timer ([`crate::camera`]); here is what the outputs do
+//! outside it.
+
+use core::cell::Cell;
+
+use critical_section::Mutex;
+use embassy_stm32::{
+    Peri,
+    gpio::OutputType,
+    pac::{self, timer::vals},
+    peripherals::{PB14, PB15, TIM12},
+    rcc,
+    timer::{Ch1, Ch2, simple_pwm::PwmPin},
+};
+use farnear_protocol::message::{LIGHT_LEVEL_MAX, LightLevels};
+
+/// 84 MHz by 4 by 1000: 21 kHz, which no exposure of 1 ms resolves (5 % of a period).
+const PRESCALER: u16 = 4 - 1;
+
+/// What [`LightPort::set`] asked for, and whether a flash overrides it.
+static STEADY: Mutex<Cell<(LightLevels, bool)>> = Mutex::new(Cell::new((LightLevels::OFF, false)));
+
+/// Brightness from now on. The counter restarts, so that a period begins with its bright part.
+fn put(levels: LightLevels) {
+    let timer = pac::TIM12;
+    timer.ccr(0).write(|w| w.set_ccr(levels.first));
+    timer.ccr(1).write(|w| w.set_ccr(levels.second));
+    timer.egr().write(|w| w.set_ug(true));
+}
+
+/// A flash begins.
+pub fn begin_flash(levels: LightLevels) {
+    critical_section::with(|cs| {
+        let steady = STEADY.borrow(cs);
+        steady.set((steady.get().0, true));
+        put(levels);
+    });
+}
+
+/// A flash ends.
+pub fn end_flash() {
+    critical_section::with(|cs| {
+        let steady = STEADY.borrow(cs);
+        steady.set((steady.get().0, false));
+        put(steady.get().0);
+    });
+}
+
+/// Both outputs.
+pub struct LightPort {
+    _first: PwmPin<'static, TIM12, Ch1>,
+    _second: PwmPin<'static, TIM12, Ch2>,
+}
+
+impl LightPort {
+    /// Sets both up, off.
+    pub fn new(_timer: Peri<'static, TIM12>, first: Peri<'static, PB14>, second: Peri<'static, PB15>) -> Self {
+        rcc::enable_and_reset::<TIM12>();
+        let timer = pac::TIM12;
+        timer.psc().write_value(PRESCALER);
+        timer.arr().write(|w| w.set_arr(LIGHT_LEVEL_MAX - 1));
+        timer.ccmr_output(0).write(|w| {
+            w.set_ocm(0, vals::Ocm::PWM_MODE1);
+            w.set_ocm(1, vals::Ocm::PWM_MODE1);
+        });
+        put(LightLevels::OFF);
+        timer.ccer().write(|w| {
+            w.set_cce(0, true);
+            w.set_cce(1, true);
+        });
+        timer.cr1().write(|w| w.set_cen(true));
+        Self {
+            _first: PwmPin::new(first, OutputType::PushPull),
+            _second: PwmPin::new(second, OutputType::PushPull),
+        }
+    }
+
+    /// Brightness outside flashes.
+    pub fn set(&mut self, levels: LightLevels) {
+        critical_section::with(|cs| {
+            let steady = STEADY.borrow(cs);
+            let (before, flashes) = steady.get();
+            if levels != before {
+                steady.set((levels, flashes));
+                if !flashes {
+                    put(levels);
+                }
+            }
+        });
+    }
+}
