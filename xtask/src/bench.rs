@@ -314,11 +314,10 @@ fn page_of(tables: &str) -> String {
          ratios travel better. A ratio above 1 means that ours is faster.\n\n\
          ## Depth\n\n`chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
          confidence. `chain_640x480_side_by_side` is the time per pair when four chains of one thread each run at once and share \
-         nothing: its ratio to one thread alone is what this machine gives to four threads, whatever the program does; other load on \
-         the machine lowers it. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
+         nothing: its ratio to one thread is the scaling limit of this machine; other load lowers it. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
          allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n\
-         `fma_peak` is a loop of independent multiply-adds in registers: what one core can do. The 7x7 convolution is counted \
-         twice: with 49 multiply-adds per pixel, as its definition says, and with what is executed: the kernels are eight-fold \
+         `fma_peak` is a loop of independent multiply-adds in registers: the limit of one core. The 7x7 convolution is counted \
+         twice: with 49 multiply-adds per pixel, as defined, and as executed: the kernels are eight-fold \
          symmetric, so 12 multiply-adds, 4 products and 10 sums suffice ([`convolve.rs`](../host/depth/src/simd/convolve.rs)). \
          It can therefore exceed the peak. Executed multiply-adds and sums have units of their own on many processors, so a share \
          below 100 % need not mean that the core waits.\n\n{tables}"

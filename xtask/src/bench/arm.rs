@@ -55,7 +55,7 @@ fn count_all() -> Result<String> {
     }
     let mut text = format!(
         "{HEADING}\nInstructions per pixel of `chain_640x480`'s run time (one thread, a pair of 128x96 with its rims, so rather too many), counted by qemu's user mode, which \
-         executes one at a time and writes each down (`cargo xtask bench --arm`): the difference between {TIMES} chains and one. Built as `cargo xtask demo` builds the programs. A NEON vector has 4 lanes, one of AVX2 8. No times: there was no such processor.\n\n\
+         executes one at a time and writes each down (`cargo xtask bench --arm`): the difference between {TIMES} chains and one. Built as `cargo xtask demo` builds the programs. A NEON vector has 4 lanes, one of AVX2 8. No times: no such processor was available.\n\n\
          | processor | vector unit | instructions per pixel |\n|---|---|--:|\n"
     );
     for (processor, target, emulator, units) in [

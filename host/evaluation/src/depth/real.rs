@@ -19,7 +19,7 @@ use crate::{
 /// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Accuracy on real scenes
 
-Written by `cargo xtask evaluate` where the data are at hand; they are not part of this repository. Accuracy with known truth stands in
+Written by `cargo xtask evaluate` where the data are available; they are not part of this repository. Accuracy with known truth is in
 [accuracy.md](accuracy.md).";
 
 /// Measures what is there.
