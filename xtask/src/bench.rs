@@ -26,7 +26,6 @@ const PEER_SCRIPT: &str = "host/depth/benches/peer_opencv.py";
 /// Size of the images that ours and the peer's chain run on.
 const SIZE: (usize, usize) = (640, 480);
 
-/// What to time.
 #[derive(Args)]
 pub struct Arguments {
     /// Also run the same on numpy and OpenCV, and on scikit-learn, and print the ratios; needs python3 with them.
@@ -112,7 +111,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The page's place.
 fn page_file() -> PathBuf {
     ROOT.join("docs/speed.md")
 }
@@ -153,7 +151,7 @@ fn depth(peers: bool, mut scripts: Vec<PathBuf>) -> Result<String> {
     Ok(tables(&rows, &peers))
 }
 
-/// Fails with what is missing unless python3 is there with these modules.
+/// Fails with the missing parts unless python3 and these modules are installed.
 fn modules(names: &[&str]) -> Result<()> {
     let advice = "the peers need python3 with numpy, opencv-python-headless, scipy and scikit-learn; without them run \
                   `cargo xtask bench`";

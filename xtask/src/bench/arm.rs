@@ -37,7 +37,7 @@ pub fn renew(write: bool) -> Result<()> {
     Ok(())
 }
 
-/// The section at the end of the present page; empty if there is none.
+/// The section at the end of the present page; empty if missing.
 pub fn kept() -> Result<String> {
     let page = page()?;
     Ok(page.find(HEADING).map_or(String::new(), |start| page[start..].to_owned()))

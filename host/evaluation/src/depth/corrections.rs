@@ -24,7 +24,6 @@ const PSF: &str = "gaussian:k=0.4578";
 /// Regions of the 3x3 methods end here; what a row jumps by at these columns is their step.
 const SEAMS: [usize; 2] = [213, 426];
 
-/// A measured plane.
 struct Plane {
     true_mm: f64,
     depth_mm: Array2<f32>,

@@ -83,7 +83,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
 fn sand_with_disc(repeat: u64) -> Result<Picture> {
     let lens = rig::lens(false)?;
     let camera = Camera::new(TEXTURE.0, TEXTURE.1, Noise::None);
-    // At its focus the surface is seen as it is painted.
+    // At its focus the surface is imaged sharply.
     let scene = rig::plane(lens.far_mm)?;
     let renderer = Renderer::new(&scene, &lens, &"pillbox".parse()?, &camera, SEED + repeat)?;
     let mut sand = renderer.radiance(lens.sensor_far_mm)?;

@@ -28,7 +28,6 @@ const SAME: [(&str, &str); 6] = [
 /// UTKinect waves with both hands, which the strips tell from one: names where the two are distinguished.
 const BOTH_HANDS: (&str, &str) = ("wave hands", "wave two hands");
 
-/// A pair of sets.
 struct Pair {
     name: &'static str,
     activities: Vec<&'static str>,
@@ -61,7 +60,7 @@ const WAYS: [Way; 6] = [
     },
 ];
 
-/// Mode, what it is called, and its network for full frames and for 100x100.
+/// Mode, its name, and its network for full frames and for 100x100.
 const MODES: [(Mode, &str, [&[u8]; 2]); 2] = [
     (
         Mode::Ordered,
@@ -163,7 +162,7 @@ fn accuracy(pair: &Pair, mode: Mode, cut_out: bool, network: &[u8], way: &Way) -
     let kept = |clips: &[Clip], mark: &str| -> Vec<Clip> {
         let mut clips = clips.to_vec();
         for clip in &mut clips {
-            // Subjects of different sets are different people, whatever they are called.
+            // Subjects of different sets are different people, even with equal names.
             clip.subject = format!("{mark} {}", clip.subject);
             if cut_out {
                 clip.views.iter_mut().for_each(|view| view.boxes = None);

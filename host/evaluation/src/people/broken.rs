@@ -1,4 +1,4 @@
-//! Really broken silhouettes: two people of the KTH set walking, as a background model cut them out, recognised by what was
+//! Really broken silhouettes: two people of the KTH set walking, as a background model cut them out, recognised after training
 //! learned from synthetic people only.
 
 use anyhow::{Context, Result};

@@ -70,7 +70,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// What the thesis says of the figures, and what is found.
+/// The thesis' remarks on the figures, and our findings.
 fn said(page: &mut Page, embedded: &Embedded, objects: &[Vec<bool>]) {
     let cells = |object: &[bool]| object.iter().filter(|visited| **visited).count();
     let all = cells(&visited(embedded, None));

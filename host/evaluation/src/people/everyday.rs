@@ -43,7 +43,7 @@ const SAME: [(&str, &str); 7] = [
     ("tight lace", "tie laces"),
 ];
 
-/// An answer and what is true, in the model's words.
+/// An answer and the truth, in the model's labels.
 struct Judged {
     truth: String,
     answer: Answer,
@@ -134,7 +134,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// What says next to a trained model what is unknown, of `everyday` and the activity that is left out.
+/// The auxiliary model next to a trained model, from `everyday` and the left-out activity.
 type Second = fn(&Recogniser, &str) -> Option<Recogniser>;
 
 /// The ways in which clips are strange.

@@ -20,7 +20,7 @@ use crate::{
     panels::{self, Panel, Scale},
 };
 
-/// Grey levels of a person, their shadow and what is neither.
+/// Grey levels of person, shadow and background.
 const PERSON: f32 = 0.0;
 const SHADOW: f32 = 0.6;
 const NEITHER: f32 = 1.0;

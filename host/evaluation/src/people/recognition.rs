@@ -1,4 +1,4 @@
-//! Leave-one-subject-out on every set: accuracies with intervals, what was chosen, confusion matrices; like Li 2014, tables 9.1 to 9.3.
+//! Leave-one-subject-out on every set: accuracies with intervals, chosen parameters, confusion matrices; like Li 2014, tables 9.1 to 9.3.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,6 @@ pub const METHODS: [Method; 5] = [
     Method { name: "ordered", classifier: "SVC", kind: Kind::Vectors(Mode::Ordered) },
 ];
 
-/// A way to recognise.
 #[derive(Clone, Copy)]
 pub struct Method {
     name: &'static str,
@@ -78,7 +77,7 @@ impl Method {
         }
     }
 
-    /// What is asked of it: one view and fused, per cent.
+    /// Required accuracy: one view and fused, per cent.
     fn asked(self, set: &Set) -> [Option<f64>; 2] {
         match self.kind {
             Kind::Vectors(Mode::OrderFree) => [set.asked[0], set.asked[1]],

@@ -109,7 +109,7 @@ fn tables_8(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The thesis' method with ranges that do not end at what is chosen: K of N - 1 (principal components), gamma, grids, neighbours.
+/// The thesis' method with parameter ranges wider than the thesis': K of N - 1 (principal components), gamma, grids, neighbours.
 fn tuned(gammas: &[f32]) -> Experiment {
     let grid = |bins: [usize; 3]| PatternKind::Thesis(bins.to_vec());
     let plain = Experiment::thesis();

@@ -20,7 +20,7 @@ struct Recording {
     truth: Vec<(usize, String)>,
 }
 
-/// What was found in recordings.
+/// Segmentation results of recordings.
 #[derive(Default)]
 struct Found {
     frames: usize,

@@ -1,4 +1,4 @@
-//! Chapters 4 to 6: rational operators against four other methods through one imperfect lens, and the corrections of what it does.
+//! Chapters 4 to 6: rational operators and four other methods with one imperfect lens, and its corrections.
 
 mod bench;
 mod costs;

@@ -19,7 +19,7 @@ use crate::{
 };
 
 const SEED: u64 = 5_200;
-/// Where the focus is best, px: the centre of the ellipses, and half of what is looked at around it.
+/// Where the focus is best, px: the centre of the ellipses, and half the size of the evaluated region around it.
 const CENTRE: (usize, usize) = (288, 416);
 const HALF_PX: usize = 128;
 

@@ -21,7 +21,7 @@ const SEED: u64 = 5_400;
 /// The methods of fig. 6.4; "Li" is GGRO.
 const OF_CHAPTER_6: [Method; 4] = [Method::Subbarao, Method::Favaro, Method::Raj, Method::Ggro];
 
-/// What is drawn over depth, and how it is taken from a flat target.
+/// A quantity plotted over depth, and its measurement on a flat target.
 type Figure = (&'static str, fn(&Flat) -> f64);
 
 /// A flat surface as every method measures it, in the order of [`Method::ALL`].
@@ -37,7 +37,7 @@ pub struct Planes {
     corrections: Vec<(Method, Taught, Correction)>,
 }
 
-/// What is taught to a method.
+/// Training data of a method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Taught {
     TwoStep,
