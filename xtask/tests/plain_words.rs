@@ -10,9 +10,30 @@ use std::{
 
 /// Phrases with a plainer equivalent: "nobody" is mostly "no client", "beside" is "next to", "is told" is "receives".
 const PHRASES: [&str; 24] = [
-    "nobody", "somebody", "whoever", "whatever", "whichever", "beside", "anew", "is told", "are told", "is said", "are said", "is asked for",
-    "looked at", "at ease", "of its own", "all the same", "as it is", "stands in", "stands for", "in place of", "has to say", "knows it not",
-    "mended", "owes",
+    "nobody",
+    "somebody",
+    "whoever",
+    "whatever",
+    "whichever",
+    "beside",
+    "anew",
+    "is told",
+    "are told",
+    "is said",
+    "are said",
+    "is asked for",
+    "looked at",
+    "at ease",
+    "of its own",
+    "all the same",
+    "as it is",
+    "stands in",
+    "stands for",
+    "in place of",
+    "has to say",
+    "knows it not",
+    "mended",
+    "owes",
 ];
 
 /// Folders or files, and the number of phrases that they may have.
@@ -31,7 +52,10 @@ fn files(path: &Path, found: &mut Vec<PathBuf>) {
         if !["target", "vendor", "node_modules"].contains(&&*name) && !name.starts_with('.') {
             fs::read_dir(path).unwrap().for_each(|entry| files(&entry.unwrap().path(), found));
         }
-    } else if path.extension().is_some_and(|ending| ["md", "rs", "py", "js", "html"].iter().any(|it| ending == *it)) {
+    } else if path
+        .extension()
+        .is_some_and(|ending| ["md", "rs", "py", "js", "html"].iter().any(|it| ending == *it))
+    {
         found.push(path.into());
     }
 }
@@ -75,13 +99,21 @@ fn documents_comments_and_messages_use_plain_words() {
                 let found = count(prose(line, &ending));
                 total += found;
                 if found > 0 {
-                    hits.push(format!("{}:{}: {}", file.strip_prefix(root).unwrap().display(), number + 1, line.trim()));
+                    hits.push(format!(
+                        "{}:{}: {}",
+                        file.strip_prefix(root).unwrap().display(),
+                        number + 1,
+                        line.trim()
+                    ));
                 }
             }
         }
         println!("{paths:?}: {total}, ceiling {ceiling}");
         if total > ceiling {
-            failures.push(format!("{}\n{paths:?}: {total} phrases, ceiling {ceiling}; see PHRASES", hits.join("\n")));
+            failures.push(format!(
+                "{}\n{paths:?}: {total} phrases, ceiling {ceiling}; see PHRASES",
+                hits.join("\n")
+            ));
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
