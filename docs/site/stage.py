@@ -43,7 +43,7 @@ def main():
 
 
 def staged(text, place, folder):
-    """A page's text with formulas and links as the site has them; code stays as it is."""
+    """A page's text with formulas and links as the site has them; code is unchanged."""
     parts = FENCED.split(text)
     for i in range(0, len(parts), 2):
         spans = INLINE_CODE.split(parts[i])

@@ -26,7 +26,6 @@ const PEER_SCRIPT: &str = "host/depth/benches/peer_opencv.py";
 /// Size of the images that ours and the peer's chain run on.
 const SIZE: (usize, usize) = (640, 480);
 
-/// What to time.
 #[derive(Args)]
 pub struct Arguments {
     /// Also run the same on numpy and OpenCV, and on scikit-learn, and print the ratios; needs python3 with them.
@@ -112,7 +111,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The page's place.
 fn page_file() -> PathBuf {
     ROOT.join("docs/speed.md")
 }
@@ -153,7 +151,7 @@ fn depth(peers: bool, mut scripts: Vec<PathBuf>) -> Result<String> {
     Ok(tables(&rows, &peers))
 }
 
-/// Fails with what is missing unless python3 is there with these modules.
+/// Fails with the missing parts unless python3 and these modules are installed.
 fn modules(names: &[&str]) -> Result<()> {
     let advice = "the peers need python3 with numpy, opencv-python-headless, scipy and scikit-learn; without them run \
                   `cargo xtask bench`";
@@ -314,11 +312,10 @@ fn page_of(tables: &str) -> String {
          ratios travel better. A ratio above 1 means that ours is faster.\n\n\
          ## Depth\n\n`chain_640x480` is the whole run time: pre-filter, operators, smoothing of the coefficients, cubic, 3x3 median, depth in mm, \
          confidence. `chain_640x480_side_by_side` is the time per pair when four chains of one thread each run at once and share \
-         nothing: its ratio to one thread alone is what this machine gives to four threads, whatever the program does; other load on \
-         the machine lowers it. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
+         nothing: its ratio to one thread is the scaling limit of this machine; other load lowers it. The peer ([`peer_opencv.py`](../host/depth/benches/peer_opencv.py)) does the same with numpy and OpenCV, all buffers \
          allocated beforehand, on one thread, once before and once after our benches; its better time counts.\n\n\
-         `fma_peak` is a loop of independent multiply-adds in registers: what one core can do. The 7x7 convolution is counted \
-         twice: with 49 multiply-adds per pixel, as its definition says, and with what is executed: the kernels are eight-fold \
+         `fma_peak` is a loop of independent multiply-adds in registers: the limit of one core. The 7x7 convolution is counted \
+         twice: with 49 multiply-adds per pixel, as defined, and as executed: the kernels are eight-fold \
          symmetric, so 12 multiply-adds, 4 products and 10 sums suffice ([`convolve.rs`](../host/depth/src/simd/convolve.rs)). \
          It can therefore exceed the peak. Executed multiply-adds and sums have units of their own on many processors, so a share \
          below 100 % need not mean that the core waits.\n\n{tables}"

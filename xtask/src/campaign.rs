@@ -16,7 +16,7 @@ pub struct Arguments {
     /// How many random scenarios, each a rig, a host and what happens to them: seeds 1, 2, 3 ...
     #[arg(long, default_value_t = 100)]
     seeds: u64,
-    /// The first seed.
+    /// First seed
     #[arg(long, default_value_t = 1)]
     first: u64,
     /// Only a part of the seeds, e.g. 2/8, the second of eight: for several machines. No other tests run then.

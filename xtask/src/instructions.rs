@@ -26,7 +26,6 @@ const CEILINGS: [(&str, f64); 5] = [
     ("sun, shadow angle and its standard deviation", 25_000.0),
     ("control tick, both steppers at 40 kHz and the piezo, the longest", 33_600.0),
 ];
-/// The chip's clock.
 const MHZ: f64 = 168.0;
 
 /// A line of the count: what `farnear-sim count` prints.

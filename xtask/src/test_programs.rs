@@ -88,7 +88,6 @@ impl Programs {
         Ok(total)
     }
 
-    /// Compiles everything.
     pub fn build(elf: &Path) -> Result<Self> {
         look_again()?;
         let mut command =
@@ -146,8 +145,7 @@ fn look_again() -> Result<()> {
     fs::write(&record, now).with_context(|| format!("cannot write {}", record.display()))
 }
 
-/// Tells a call of cargo, or a test program, where the firmware is. Calls that are told different things compile anew what asks
-/// for it.
+/// Passes the firmware's path to cargo or a test program. Another path makes cargo recompile the crates that read it.
 pub fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
     command
         .env("FARNEAR_FIRMWARE", elf)

@@ -15,7 +15,6 @@ use anyhow::{Result, bail};
 
 use crate::run::{finish, has, has_target, output, step, succeeds};
 
-/// The board's target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// Debian's packages that build the target: compiler, cargo, sources of `core`, clippy.

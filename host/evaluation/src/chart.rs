@@ -53,7 +53,6 @@ pub struct Curve {
 
 /// One of several charts in a picture.
 pub struct Plot {
-    /// What stands above it.
     pub title: String,
     /// What the horizontal and the vertical axis are.
     pub labels: [&'static str; 2],

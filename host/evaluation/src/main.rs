@@ -141,7 +141,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     if !data.is_dir() {
         eprintln!(
-            "real: skipped, no real data ({} is no folder); docs/accuracy-real.md stays",
+            "real: skipped, no real data ({} is not a folder); docs/accuracy-real.md stays",
             data.display()
         );
         return Ok(());
@@ -152,7 +152,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     finish(page, arguments, "accuracy-real.md")
 }
 
-/// Writes the page, or prints it where only parts of it were asked for.
+/// Writes the page, or prints it if only parts were selected.
 fn finish(page: Page, arguments: &Arguments, name: &str) -> Result<()> {
     if !arguments.only.is_empty() {
         print!("{}", page.text());

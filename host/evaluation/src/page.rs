@@ -19,7 +19,6 @@ impl Page {
         Self { images: images.to_path_buf(), text: format!("{}\n", introduction.trim_end()) }
     }
 
-    /// What was written so far.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -34,7 +33,7 @@ impl Page {
         self.text.push_str(&format!("\n### {heading}\n"));
     }
 
-    /// Markdown as it is, such as a table that somebody else wrote.
+    /// Verbatim Markdown, such as a table from another module.
     pub fn block(&mut self, markdown: &str) {
         self.text.push_str(&format!("\n{}\n", markdown.trim_end()));
     }
@@ -58,7 +57,7 @@ impl Page {
         }
     }
 
-    /// A picture: its file name, the bytes of its PNG, and what it shows.
+    /// A picture: file name, PNG bytes and caption.
     pub fn picture(&mut self, name: &str, png: &[u8], caption: &str) -> Result<()> {
         let path = self.images.join(name);
         fs::write(&path, png).with_context(|| format!("cannot write {}", path.display()))?;
@@ -77,7 +76,7 @@ impl Page {
     }
 }
 
-/// A number of mm as the tables show it: three decimals, or a dash where there is none.
+/// A number of mm as the tables show it: three decimals, or a dash for a missing value.
 pub fn mm(value: f64) -> String {
     if value.is_finite() { format!("{value:.3}") } else { "-".into() }
 }

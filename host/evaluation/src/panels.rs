@@ -14,7 +14,6 @@ const LEVELS: usize = 40;
 const NO_VALUE: [u8; 3] = [150, 150, 152];
 
 pub struct Panel<'a> {
-    /// What stands above it.
     pub title: String,
     /// The map, (height, width).
     pub map: ArrayView2<'a, f32>,

@@ -1,4 +1,4 @@
-//! The rig that is rendered, its pairs, and what is compared with what.
+//! The rendered rig, its pairs, and the comparisons.
 
 use anyhow::{Context, Result};
 use farnear_depth::{

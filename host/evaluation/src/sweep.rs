@@ -9,8 +9,8 @@ use crate::{
     rig::{self, Exposure},
 };
 
-/// RMSE in mm over planes from far to near focus, `[clean, 8-bit]` for each of the operators. A plane has a texture and
-/// noise of its own and is rendered once for all of them.
+/// RMSE in mm over planes from far to near focus, `[clean, 8-bit]` for each of the operators. Each plane has its texture and
+/// noise and is rendered once for all operators.
 pub fn planes(psf: &str, count: usize, seed: u64, by: &[(Operators, Optics)]) -> Result<Vec<[f64; 2]>> {
     let (depths, lens) = (rig::depths(count, 0.0)?, rig::lens(false)?);
     let mut found = vec![[f64::NAN; 2]; by.len()];

@@ -19,6 +19,4 @@ pub const PARTS: [Part; 2] =
 /// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# The thesis, redone
 
-Written by `cargo xtask evaluate --page thesis`. Ang Li's PhD thesis (University of Warwick, 2014) is where this project comes from; its images were never
-published, so nobody could check its figures. Here each experiment is done again with pictures that anybody can make, each figure beside the thesis' own, which stands
-in brackets or under *Li 2014*. Seeds are fixed, so that two runs on one kind of processor write the same bytes, except for the table of times.";
+Written by `cargo xtask evaluate --page thesis`. Ang Li's PhD thesis (University of Warwick, 2014) is where this project comes from; its images were never published, so its figures could not be checked. This page repeats each experiment with reproducible images. The thesis' figures are in brackets or under *Li 2014*. Seeds are fixed, so that two runs on one kind of processor write the same bytes, except for the table of times.";

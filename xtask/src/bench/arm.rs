@@ -37,7 +37,7 @@ pub fn renew(write: bool) -> Result<()> {
     Ok(())
 }
 
-/// The section at the end of the present page; empty if there is none.
+/// The section at the end of the present page; empty if missing.
 pub fn kept() -> Result<String> {
     let page = page()?;
     Ok(page.find(HEADING).map_or(String::new(), |start| page[start..].to_owned()))
@@ -55,7 +55,7 @@ fn count_all() -> Result<String> {
     }
     let mut text = format!(
         "{HEADING}\nInstructions per pixel of `chain_640x480`'s run time (one thread, a pair of 128x96 with its rims, so rather too many), counted by qemu's user mode, which \
-         executes one at a time and writes each down (`cargo xtask bench --arm`): the difference between {TIMES} chains and one. Built as `cargo xtask demo` builds the programs. A NEON vector has 4 lanes, one of AVX2 8. No times: there was no such processor.\n\n\
+         executes one at a time and writes each down (`cargo xtask bench --arm`): the difference between {TIMES} chains and one. Built as `cargo xtask demo` builds the programs. A NEON vector has 4 lanes, one of AVX2 8. No times: no such processor was available.\n\n\
          | processor | vector unit | instructions per pixel |\n|---|---|--:|\n"
     );
     for (processor, target, emulator, units) in [

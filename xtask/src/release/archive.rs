@@ -11,7 +11,6 @@ use anyhow::{Context, Result};
 use super::{Extras, Release, copy, lay_documents, lay_programs, programs::Target};
 use crate::run::{ROOT, finish, step};
 
-/// Writes the archive.
 pub fn write(
     release: &Release,
     target: &Target,

@@ -35,7 +35,7 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
     finish(Command::new("tar").arg("--extract").arg("--file").arg(packed).arg("--directory").arg(&root))?;
     let folder = root.join(&name);
     let Some(runner) = runner else {
-        // As the only thing there is: no library, no shell, no /proc. Where this user may not change the root, beside the rest.
+        // In an empty root: no library, no shell, no /proc. Without the right to change the root, in the normal file system.
         let inside = |program: &str| {
             let mut command = Command::new("unshare");
             command.args(["--map-root-user", "--root"]).arg(&root).arg(format!("/{name}/{program}"));

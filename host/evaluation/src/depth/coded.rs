@@ -33,7 +33,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
         "Operators for a point spread function that no formula gave: an image of the aperture ({IMAGE_PX} x {IMAGE_PX} px, as `farnear depth --psf aperture.png` takes \
          it) becomes a profile of 48 rings, and the operators are designed for its transform. Here the middle of the aperture is covered, the simplest code; \
          the lens is rendered with the ring itself. RMSE over {PLANES} planes, clean / 8-bit; the camera gets as much light in each line (a real covered \
-         aperture loses its square). *Pill-box* is what is measured when nobody is told of the code."
+         aperture loses its square). *Pill-box*: the result when the code is ignored."
     ));
     let mut rows = Vec::new();
     for inner in [0.0, 0.3, 0.6, 0.8] {
@@ -61,7 +61,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
         &rows,
     );
     page.paragraph(
-        "What is not round in these images are the steps of their edges. Codes without rotational symmetry are averaged over the circle, with a warning: the kernels have \
+        "Only the pixel steps of the edges break the rotational symmetry of these images. Codes without rotational symmetry are averaged over the circle, with a warning: the kernels have \
          eight-fold symmetry, and a lens turns its point spread function by half a turn at the focus.",
     );
     Ok(())

@@ -24,7 +24,6 @@ const PSF: &str = "gaussian:k=0.4578";
 /// Regions of the 3x3 methods end here; what a row jumps by at these columns is their step.
 const SEAMS: [usize; 2] = [213, 426];
 
-/// A measured plane.
 struct Plane {
     true_mm: f64,
     depth_mm: Array2<f32>,
@@ -44,8 +43,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
          image, semi-axes 0.75 and 0.6), Gaussian PSF, 8-bit. The corrections learn from {PATTERNS} planes from far to near focus and are judged on \
          {HELD_OUT} other planes with other textures and noise. *Step at seams* is the jump between the pixels on either side of the vertical borders of the 3x3 \
          regions, its mean along each border of each plane (160 px), so that noise counts little: root mean square and largest over all {HELD_OUT} planes. \
-         What no correction has is the noise of this figure. *Formula undone* solves the formula above for alpha, which no rig could: what it leaves is the \
-         noise of the pairs, and no correction can do much better."
+         *None* (no correction) shows the noise of this figure. *Formula undone* inverts the formula above, which is impossible on a rig. It leaves only the noise of the pairs: the lower bound for a correction."
     ));
     let learn = planes(&rig::depths(PATTERNS, 0.0)?, SEED)?;
     let judge = planes(&rig::depths(HELD_OUT, 0.5)?, SEED + PATTERNS as u64)?;

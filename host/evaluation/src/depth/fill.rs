@@ -31,10 +31,10 @@ const OF_THESIS: f32 = 0.0144;
 const REPEATS: u64 = 3;
 
 pub fn measure(page: &mut Page) -> Result<()> {
-    page.heading("Filling where there is no texture");
+    page.heading("Filling regions without texture");
     page.paragraph(&format!(
-        "A disc of {RADIUS_PX:.0} px radius without any texture, 110 px beside the image's middle; `--fill` fits a surface to a margin around it. RMSE inside the \
-         disc as measured and filled, over {REPEATS} textures with their noise. Beside it, for comparison, Li 2014's section 6.5 (`--fill=thesis`): regions one after the other, each by seven terms from the \
+        "A disc of {RADIUS_PX:.0} px radius without any texture, 110 px from the image's centre; `--fill` fits a surface to a margin around it. RMSE inside the \
+         disc as measured and filled, over {REPEATS} textures with their noise. For comparison, Li 2014's section 6.5 (`--fill=thesis`): regions one after the other, each by seven terms from the \
          rectangle around it with a pixel to spare; and its criterion with a threshold that suits these scenes (`--low-texture variance:{SUITED}`) and its own of {OF_THESIS} \
          (in brackets the part of the map that was filled; its inequality is put right). By its own threshold everything is low texture, and nothing is left to fill from; by any threshold the middle of the \
          range is, where both images are alike, however much texture there is."
@@ -83,7 +83,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
 fn sand_with_disc(repeat: u64) -> Result<Picture> {
     let lens = rig::lens(false)?;
     let camera = Camera::new(TEXTURE.0, TEXTURE.1, Noise::None);
-    // At its focus the surface is seen as it is painted.
+    // At its focus the surface is imaged sharply.
     let scene = rig::plane(lens.far_mm)?;
     let renderer = Renderer::new(&scene, &lens, &"pillbox".parse()?, &camera, SEED + repeat)?;
     let mut sand = renderer.radiance(lens.sensor_far_mm)?;

@@ -29,8 +29,8 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let (images, truth) = rig::stack(&scene, &lens, PSF, &places, SEED)?;
     let usual = StackSettings::default();
     page.paragraph(&format!(
-        "The staircase, Gaussian PSF, 8-bit: {IMAGES} images {:.0} um of sensor travel apart about the middle of the pair's, by `farnear focus-stack` as it is by itself \
-         (`{}`, images blurred by {} px, median {}x{}, guided within {} px, up to {} points, reliability {}) but for what is said. Beside it the pair, by `ro` with a window of 7. Away from \
+        "The staircase, Gaussian PSF, 8-bit: {IMAGES} images {:.0} um of sensor travel apart about the middle of the pair's, by `farnear focus-stack` with its defaults \
+         (`{}`, images blurred by {} px, median {}x{}, guided within {} px, up to {} points, reliability {}) unless stated otherwise. For comparison the pair, by `ro` with a window of 7. Away from \
          steps: more than 8 px. *No value*: too little reliability, or sharpest in the first or last image.",
         1e3 * STEP_MM,
         usual.measure,
@@ -49,7 +49,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
         let depth =
             map.place.mapv(|place| depth_mm(f64::from(place), places[0], rig::FOCAL_LENGTH_MM) as f32);
         let how = match settings {
-            settings if settings == usual => " (as it is by itself)",
+            settings if settings == usual => " (default)",
             settings if settings.guided_px == 0.0 => ", not guided",
             _ => "",
         };

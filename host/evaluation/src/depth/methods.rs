@@ -54,10 +54,9 @@ impl Prepared {
 pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("Methods");
     page.paragraph(&format!(
-        "RMSE by rational operators (`ro`) and by the baselines, each told the lens's own PSF and given the same windows: `subbarao` is the S-transform \
+        "RMSE by rational operators (`ro`) and by the baselines, each with the lens's true PSF and the same windows: `subbarao` is the S-transform \
          (Subbarao & Surya 1994), `subbarao-fourier` the ratio of local spectra (Subbarao 1988), `favaro` null-space projectors (Favaro & Soatto \
-         2005). Clean / 8-bit, over {PLANES} planes, on the staircase (8 px around steps left out) and on the cone. *No value* is the part of the planes' \
-         pixels, 8-bit, for which a method gives no depth; they are not counted."
+         2005). Clean / 8-bit, over {PLANES} planes, on the staircase (8 px around steps left out) and on the cone. *No value*: share of the planes' pixels (8-bit) without a depth; they are not counted."
     ));
     let mut scenes: Vec<(Scene, u64, bool)> = Vec::new();
     for (index, depth_mm) in rig::depths(PLANES, 0.0)?.into_iter().enumerate() {

@@ -17,7 +17,7 @@ const SEED: u64 = 100;
 pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("Planes");
     page.paragraph(&format!(
-        "{PLANES} planes from far to near focus, each with a texture of its own; RMSE over all of them."
+        "{PLANES} planes from far to near focus, each with a different texture; RMSE over all planes."
     ));
     let depths = rig::depths(PLANES, 0.0)?;
     let lens = rig::lens(false)?;

@@ -1,4 +1,4 @@
-//! Real scenes: Watanabe & Nayar's pair, and two slices of focal stacks whose optics nobody knows.
+//! Real scenes: Watanabe & Nayar's pair, and two slices of focal stacks with unknown optics.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ use crate::{
 /// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Accuracy on real scenes
 
-Written by `cargo xtask evaluate` where the data are at hand; they are not part of this repository. Accuracy with known truth stands in
+Written by `cargo xtask evaluate` where the data are available; they are not part of this repository. Accuracy with known truth is in
 [accuracy.md](accuracy.md).";
 
-/// Measures what is there.
+/// Measures the available scenes.
 pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     let breakfast = data.join("breakfast");
     if breakfast.is_dir() {

@@ -1,4 +1,4 @@
-//! Focal stacks whose optics nobody knows, by two of their slices and by depth from focus over all: is nearer nearer?
+//! Focal stacks with unknown optics: order of depths from two slices, and from depth from focus over all slices.
 
 use std::path::{Path, PathBuf};
 
@@ -50,9 +50,8 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
         "Focal stacks of {STACK} slices made from the HCI 4D light fields (as published with Ashfaq & Mahmood, Pattern Recognition 170, 2026, 112112), of which \
          slices {} and {} are taken as a pair. Their optics and PSF are not known and the pair's blur is far beyond what the operators are made for, so \
          only the order of depths is judged: Spearman's rank correlation with the given depth over pixels of confidence {LEAST_CONFIDENCE} or \
-         more. Pill-box, smoothing 15, median 7. Early slices are focused near, as the pictures show, and given values rise with distance. Beside them depth from \
-         focus over all {STACK} slices (`farnear focus-stack` as it is by itself): over the same pixels, over all pixels, with `--guided-px 0` over all pixels, and over those whose reliability is at least \
-         {USUAL_RELIABILITY}, which are those that the command gives a depth. A wall without texture, as behind Antinous and Greek, has no depth in any stack; over all pixels it is counted with whatever noise says.",
+         more. Pill-box, smoothing 15, median 7. Early slices are focused near, as the pictures show, and given values rise with distance. For comparison depth from focus over all {STACK} slices (`farnear focus-stack`, defaults): over the same pixels, over all pixels, with `--guided-px 0` over all pixels, and over those whose reliability is at least \
+         {USUAL_RELIABILITY}, which are those that the command gives a depth. A wall without texture, as behind Antinous and Greek, has no depth in any stack; over all pixels its noise is counted.",
         SLICES[0], SLICES[1]
     ));
     let mut names: Vec<PathBuf> = std::fs::read_dir(folder)?

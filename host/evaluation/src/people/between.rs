@@ -28,7 +28,6 @@ const SAME: [(&str, &str); 6] = [
 /// UTKinect waves with both hands, which the strips tell from one: names where the two are distinguished.
 const BOTH_HANDS: (&str, &str) = ("wave hands", "wave two hands");
 
-/// A pair of sets.
 struct Pair {
     name: &'static str,
     activities: Vec<&'static str>,
@@ -61,7 +60,7 @@ const WAYS: [Way; 6] = [
     },
 ];
 
-/// Mode, what it is called, and its network for full frames and for 100x100.
+/// Mode, its name, and its network for full frames and for 100x100.
 const MODES: [(Mode, &str, [&[u8]; 2]); 2] = [
     (
         Mode::Ordered,
@@ -92,8 +91,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
         "Trained on the clips of one set that do what the other set holds too, every view by itself, tested on all views of the other by themselves, default settings. *Codebook* learns \
          everything from the training set. *Spread aligned* and *CORAL* bring the mean and spread, or covariance, of the test clips' frames to those of the training clips (`--align`), *self-training* learns on from the \
          surest answers for the test clips in three rounds (`--adapt`); none of them looks at a test clip's name. *Features* are what the network of a model that comes with the program makes of a clip, with a \
-         classifier trained on the training set (`--features everyday`). The way was chosen after these figures had been seen. Sitting down and standing up are each other's reverse: where order does not count they are told apart by \
-         how clips are cut at best. UTKinect's waving is with both hands, Florence's with one. In brackets the 95 % interval (Wilson) for as many trials as there are test clips.",
+         classifier trained on the training set (`--features everyday`). The way was chosen after these figures had been seen. Sitting down and standing up are each other's reverse: without order, only the cut of the clips distinguishes them. UTKinect's waving is with both hands, Florence's with one. In brackets the 95 % interval (Wilson) for as many trials as there are test clips.",
     );
     let pairs = pairs(&utkinect.clips, &florence.clips, &strips.clips);
     let mut rows = Vec::new();
@@ -164,7 +162,7 @@ fn accuracy(pair: &Pair, mode: Mode, cut_out: bool, network: &[u8], way: &Way) -
     let kept = |clips: &[Clip], mark: &str| -> Vec<Clip> {
         let mut clips = clips.to_vec();
         for clip in &mut clips {
-            // Subjects of different sets are different people, whatever they are called.
+            // Subjects of different sets are different people, even with equal names.
             clip.subject = format!("{mark} {}", clip.subject);
             if cut_out {
                 clip.views.iter_mut().for_each(|view| view.boxes = None);

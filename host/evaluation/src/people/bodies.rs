@@ -118,7 +118,7 @@ fn from_eight_sides(page: &mut Page) -> Result<()> {
         "Ten activities from eight sides, 45 deg apart, fig. 7.10: a row per activity, the middle of one synthetic person's performance",
     )?;
     page.paragraph(
-        "Drawn from capsules instead of markers, so that heads are round and coats and hair are missing. Like the thesis' silhouettes all are scaled to one size, which makes crouching look large; unlike them, front and back differ only by what is held.",
+        "Drawn from capsules instead of markers, so that heads are round and coats and hair are missing. Like the thesis' silhouettes all are scaled to one size, which makes crouching look large; unlike them, front and back differ only by held objects.",
     );
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Really broken silhouettes: two people of the KTH set walking, as a background model cut them out, recognised by what was
+//! Really broken silhouettes: two people of the KTH set walking, as a background model cut them out, recognised after training
 //! learned from synthetic people only.
 
 use anyhow::{Context, Result};
@@ -76,8 +76,8 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
         (shift / masks.len().max(1) as f64).sqrt(),
     ));
     page.paragraph(
-        "What a recogniser makes of them that has seen synthetic people only, from eight sides, one view at a time, and no video ever: answers for whole passages. Walking with and without a bag \
-         look much alike from the side, so both are counted beside.",
+        "Answers of a recogniser trained on synthetic people only, from eight sides, one view at a time, and no video ever: answers for whole passages. Walking with and without a bag \
+         look much alike from the side, so both count as right.",
     );
     let mut rows = Vec::new();
     for (name, mode) in [("order-free", Mode::OrderFree), ("ordered", Mode::Ordered)] {

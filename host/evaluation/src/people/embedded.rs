@@ -70,7 +70,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// What the thesis says of the figures, and what is found.
+/// The thesis' remarks on the figures, and our findings.
 fn said(page: &mut Page, embedded: &Embedded, objects: &[Vec<bool>]) {
     let cells = |object: &[bool]| object.iter().filter(|visited| **visited).count();
     let all = cells(&visited(embedded, None));
@@ -101,8 +101,8 @@ fn said(page: &mut Page, embedded: &Embedded, objects: &[Vec<bool>]) {
         }
     }
     page.paragraph(&format!(
-        "The thesis sees the least variety in walking, a variety of postures in digging, and patterns that can be told apart. Here the fewest cells are visited by *{}*; walking visits {}, digging {}. The two activities most alike, *{}* and *{}*, share {:.0} % of the \
-         cells that either visits: nearly everything begins and ends with walking, so that patterns differ by what is added to it.",
+        "The thesis sees the least variety in walking, a variety of postures in digging, and distinguishable patterns. Here the fewest cells are visited by *{}*; walking visits {}, digging {}. The two activities most alike, *{}* and *{}*, share {:.0} % of the \
+         cells that either visits: nearly everything begins and ends with walking, so patterns differ only by the remaining cells.",
         ACTIVITIES[least],
         counts[0],
         counts[9],

@@ -43,7 +43,7 @@ const SAME: [(&str, &str); 7] = [
     ("tight lace", "tie laces"),
 ];
 
-/// An answer and what is true, in the model's words.
+/// An answer and the truth, in the model's labels.
 struct Judged {
     truth: String,
     answer: Answer,
@@ -91,11 +91,11 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
         "known called unknown, %",
     ];
     page.table(3, &head, &rows);
-    page.subheading("What nobody has taught");
+    page.subheading("Untaught activities");
     page.paragraph(
         "Models trained on a set itself, default settings, all views fused: each activity in turn is left out of the training on half of the subjects, the other half does all activities, and the other way round \
-         (`farnear activity evaluate --open-set`). The limit is the conformal rule's for 5 % of false alarms among right answers; wrong ones are called unknown oftener. A *auxiliary model* is what `everyday` says of a clip against what it said of the training clips of the activity answered; the distance to the \
-         *nearest clip* of the training is what streaming answers and un-segmented recordings have. All the activities left out are among those that `everyday` knows; *one that knows it not* is \
+         (`farnear activity evaluate --open-set`). The limit is the conformal rule's for 5 % of false alarms among right answers; wrong ones are called unknown oftener. An *auxiliary model* compares the answer of `everyday` for a clip with its answers for the training clips of the same activity; the distance to the \
+         *nearest clip* of the training is what streaming answers and un-segmented recordings have. All the activities left out are among those that `everyday` knows; *model without this class* is \
          `everyday` without the activity left out, as it would be for something truly new. Half of the strips are 15 clips, of which no limit can keep the promise.",
     );
     let mut rows = Vec::new();
@@ -134,13 +134,13 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// What says next to a trained model what is unknown, of `everyday` and the activity that is left out.
+/// The auxiliary model next to a trained model, from `everyday` and the left-out activity.
 type Second = fn(&Recogniser, &str) -> Option<Recogniser>;
 
 /// The ways in which clips are strange.
 const BY: [(&str, Second); 3] = [
     ("auxiliary model", |everyday, _| Some(everyday.clone())),
-    ("one that knows it not", |everyday, left_out| Some(without(everyday, called(left_out)))),
+    ("model without this class", |everyday, left_out| Some(without(everyday, called(left_out)))),
     ("nearest clip", |_, _| None),
 ];
 

@@ -20,7 +20,7 @@ use crate::{
     panels::{self, Panel, Scale},
 };
 
-/// Grey levels of a person, their shadow and what is neither.
+/// Grey levels of person, shadow and background.
 const PERSON: f32 = 0.0;
 const SHADOW: f32 = 0.6;
 const NEITHER: f32 = 1.0;
@@ -80,7 +80,7 @@ pub fn shadows_off(page: &mut Page, scenes: u64) -> Result<()> {
     page.picture(
         "thesis-shadows.png",
         &panels::grid(across, &shown)?,
-        "Shadow off, fig. 8.6: a row per scene; the truth (person black, shadow grey), then what is left by chromaticity, physical model, geometry, small and large regions' texture, and `hybrid`",
+        "Shadow off, fig. 8.6: a row per scene; the truth (person black, shadow grey), then the result by chromaticity, physical model, geometry, small and large regions' texture, and `hybrid`",
     )
 }
 
@@ -114,7 +114,7 @@ pub fn centroid_distances(page: &mut Page) -> Result<()> {
     )?;
     let differences: Vec<String> = differences.iter().map(|value| format!("{value:.3}")).collect();
     page.paragraph(&format!(
-        "The thesis shows that gaps hardly change the curves and gives no number. Here they differ by {} RMS, of a range of 0.7: rays march from the outside in and see most gaps as the silhouette behind them; at some angles all is gone, and a curve falls.",
+        "The thesis shows that gaps hardly change the curves and gives no number. Here they differ by {} RMS, of a range of 0.7: rays march from the outside in and see most gaps as the silhouette behind them; at some angles nothing remains, and a curve falls.",
         differences.join(", ")
     ));
     Ok(())

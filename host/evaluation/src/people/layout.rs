@@ -37,7 +37,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let gallery = all.select(Axis(0), &rows);
 
     let layouts = layouts(gallery.view())?;
-    // Landmarks only stand in the table: their curves lie on one another.
+    // Landmarks are only in the table: their curves overlap.
     let curves: Vec<Curve> = layouts[..layouts.len() - LANDMARKS.len()]
         .iter()
         .map(|(name, values)| Curve {

@@ -1,4 +1,4 @@
-//! Confusion matrices as PNG: rows are what was done, columns what was answered, in per cent of the row.
+//! Confusion matrices as PNG: rows are true activities, columns answers, in per cent of the row.
 
 use anyhow::{Result, anyhow};
 use farnear_recognition::evaluation::confusion::Confusion;

@@ -1,4 +1,4 @@
-//! Leave-one-subject-out on every set: accuracies with intervals, what was chosen, confusion matrices; like Li 2014, tables 9.1 to 9.3.
+//! Leave-one-subject-out on every set: accuracies with intervals, chosen parameters, confusion matrices; like Li 2014, tables 9.1 to 9.3.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,6 @@ pub const METHODS: [Method; 5] = [
     Method { name: "ordered", classifier: "SVC", kind: Kind::Vectors(Mode::Ordered) },
 ];
 
-/// A way to recognise.
 #[derive(Clone, Copy)]
 pub struct Method {
     name: &'static str,
@@ -78,7 +77,7 @@ impl Method {
         }
     }
 
-    /// What is asked of it: one view and fused, per cent.
+    /// Required accuracy: one view and fused, per cent.
     fn asked(self, set: &Set) -> [Option<f64>; 2] {
         match self.kind {
             Kind::Vectors(Mode::OrderFree) => [set.asked[0], set.asked[1]],
@@ -91,11 +90,10 @@ impl Method {
 pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("Recognition, leaving one subject out");
     page.paragraph(
-        "Of every subject's clips nothing is seen before they are recognised: layout, weights, residuals and the classifier's parameter are chosen by cross-validation over the \
-         other subjects' clips, anew for each left-out subject. *thesis* is Li's 0/1 grid over three Isomap dimensions with nearest neighbours; *order-free* keeps his promise that shuffling \
+        "No clip of the tested subject is used in training: layout, weights, residuals and the classifier's parameter are chosen by cross-validation over the \
+         other subjects' clips, separately for each left-out subject. *thesis* is Li's 0/1 grid over three Isomap dimensions with nearest neighbours; *order-free* keeps his promise that shuffling \
          the frames changes nothing; *ordered* knows how silhouettes move. *One view* counts the answers of all views, each recognised by itself; *fused* is one answer from all views. In brackets the 95 % interval \
-         (Wilson) for as many independent trials as there are clips: the views of a clip are not independent, the clips of a subject not quite. What could be chosen is not blind to these sets: residuals beside the \
-         codebook and the scaling of fused views were added after outer accuracies on UTKinect and Florence had been seen (variants tried on the way gave 82.4 to 86.4 % on UTKinect, \
+         (Wilson) for as many independent trials as there are clips: the views of a clip are not independent, the clips of a subject not quite. What could be chosen is not blind to these sets: residuals in addition to the codebook and the scaling of fused views were added after outer accuracies on UTKinect and Florence had been seen (variants tried on the way gave 82.4 to 86.4 % on UTKinect, \
          order-free, fused), and the sizes of codebook and gallery are fixed.",
     );
     measure_set(page, &sets::synthetic()).context("synthetic people")
@@ -160,9 +158,9 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
     page.picture(
         &format!("activity-{}.png", set.short),
         &png,
-        &format!("{}: confusion in per cent of what was done (rows), {seen}", set.name),
+        &format!("{}: confusion in per cent of the true activity (rows), {seen}", set.name),
     )?;
-    page.paragraph(&format!("Order-free, SVC, {seen}, in per cent of what was done (rows):"));
+    page.paragraph(&format!("Order-free, SVC, {seen}, in per cent of the true activity (rows):"));
     page.block(&free.to_markdown());
     Ok(())
 }

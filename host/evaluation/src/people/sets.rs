@@ -71,7 +71,7 @@ pub fn synthetic() -> Set {
     }
 }
 
-/// Folders of the strips and what is done in them.
+/// Folders of the strips and their activities.
 const WEIZMANN: [(&str, &str); 4] = [("0", "wave one"), ("1", "wave two"), ("3", "jack"), ("4", "bend")];
 /// Strips of one subject, mirrors too, have numbers that share this quotient.
 const STRIPS_PER_SUBJECT: u64 = 8;

@@ -50,8 +50,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
 
     page.heading("Shadows off by colour and texture");
     page.paragraph(&format!(
-        "The detectors that Li (2014) compares with, on {MADE_SCENES} of the same scenes coloured in (paving, clothes, sun and sky of different colour, camera noise), beside \
-         the geometric cutters on the same masks. Colour tells more than geometry where there is colour; the cutters need a mask, the sun and the camera's place only."
+        "The detectors that Li (2014) compares with, on {MADE_SCENES} of the same scenes coloured in (paving, clothes, sun and sky of different colour, camera noise), compared with the geometric cutters on the same masks. Where there is colour it is the better cue; the cutters need a mask, the sun and the camera's place only."
     ));
     let mut rows = Vec::new();
     for (name, kind) in KINDS.into_iter().take(1) {
@@ -188,7 +187,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
         "The highway sequence of ChangeDetection.net (Goyette et al. 2012), {scored} frames with ground truth at hand, on the foreground of the Gaussian mixture model (Zivkovic 2004). The scene has {} labelled shadow pixels in that \
          foreground{}.",
         plain.shadow_pixels,
-        if plain.shadow_pixels == 0 { ", so that only what is wrongly removed can be told" } else { "" },
+        if plain.shadow_pixels == 0 { ", so only wrong removals can be counted" } else { "" },
     ));
     let name = "highway";
     let mut rows =

@@ -1,7 +1,7 @@
 //! Silhouettes from strips of 64x64 frames before a plain wall, where the person hardly moves from the spot.
 //!
 //! The usual background model would take a standing body for background. Here the wall is known instead: per row it has the
-//! colours of the columns at the left and right edge over the whole strip, as one Gaussian; what lies far from it is the person. Moving
+//! colours of the columns at the left and right edge over the whole strip, as one Gaussian; pixels far from it are the person. Moving
 //! pixels need less evidence.
 
 use anyhow::{Context, Result, ensure};
@@ -29,7 +29,7 @@ const FAR: f64 = 4.0;
 const FAR_MOVING: f64 = 2.5;
 const MOVING: f64 = 40.0;
 
-/// The frames of a strip, side by side in the file, whatever its ending says it is.
+/// The frames of a strip, side by side in the file; its file ending is ignored.
 pub fn read(path: &Path) -> Result<Vec<RgbImage>> {
     let reader = image::ImageReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let strip = reader

@@ -125,7 +125,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
         rows.push(std::iter::once(name.to_owned()).chain(found.cells()).collect());
     }
     page.paragraph(&format!(
-        "Against {count} values that NREL's own program gives for 1910 to 2210 with the sun at least {UP_DEG} deg up, azimuth as it is (asked for: 0.01 in elevation, 0.05 in azimuth); refraction, which they include, is added by SPA's \
+        "Against {count} values that NREL's own program gives for 1910 to 2210 with the sun at least {UP_DEG} deg up, azimuth unchanged (required: 0.01 in elevation, 0.05 in azimuth); refraction, which they include, is added by SPA's \
          equation 42. SPA here is an independent implementation that \
          estimates how far Earth's rotation lags behind uniform time; the published values take that as 0."
     ));

@@ -51,8 +51,7 @@ const PEOPLE: usize = 9;
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     page.heading("Chapters 7 to 9: silhouettes, shadows and activities");
     page.paragraph(
-        "The thesis' recordings of people (21 actors, five scenes in the sun) were never published either, so that no number here is on the same pictures as \
-         the one beside it; what differs is said under each table.",
+        "The thesis' recordings of people (21 actors, five scenes in the sun) were never published either, so the numbers here and the thesis' are from different pictures; each table lists the differences.",
     );
     bodies::measure(page, data)?;
     tables_8(page)?;
@@ -110,7 +109,7 @@ fn tables_8(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The thesis' method with ranges that do not end at what is chosen: K of N - 1 (principal components), gamma, grids, neighbours.
+/// The thesis' method with parameter ranges wider than the thesis': K of N - 1 (principal components), gamma, grids, neighbours.
 fn tuned(gammas: &[f32]) -> Experiment {
     let grid = |bins: [usize; 3]| PatternKind::Thesis(bins.to_vec());
     let plain = Experiment::thesis();

@@ -20,7 +20,7 @@ struct Recording {
     truth: Vec<(usize, String)>,
 }
 
-/// What was found in recordings.
+/// Segmentation results of recordings.
 #[derive(Default)]
 struct Found {
     frames: usize,
@@ -32,7 +32,7 @@ struct Found {
 }
 
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
-    page.heading("Recordings that nobody cut");
+    page.heading("Un-segmented recordings");
     page.paragraph(
         "The first performance of every activity by one person, one after the other in the set's order as one recording, the box led on without a leap, cut by a model that the other people's whole clips taught (ordered, default settings, all views fused). A frame is right where the \
          answer for its stretch is; a border is off by as many frames as the nearest one found. *Windows*: answers for windows of a typical clip's length, as before; *semi-Markov*: a hidden semi-Markov model over the model's answers for whole stretches \

@@ -35,7 +35,7 @@ pub struct Disturbance {
     pub vignetting: f64,
     /// How the near image lies.
     pub view: View,
-    /// Whether moving the sensor leaves the magnification as it is.
+    /// Whether the magnification is independent of the sensor's position.
     pub telecentric: bool,
     /// By how much an object of a seventh of the image moved, px.
     pub moved_px: f64,
@@ -166,7 +166,7 @@ pub struct Outcome {
     /// Part of the pixels that have one.
     pub valid: f64,
     pub said: Vec<String>,
-    /// Depth and what is known of it, if there is any.
+    /// Depth with its uncertainty, if measured.
     pub found: Option<Measurement>,
 }
 

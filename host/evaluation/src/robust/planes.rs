@@ -1,4 +1,4 @@
-//! Planes from far before to far beyond the working range: what is out of range must say so.
+//! Planes from far before to far beyond the working range: pixels out of range must be flagged.
 
 use anyhow::Result;
 use farnear_depth::operators::Operators;

@@ -32,7 +32,7 @@ struct Case {
 }
 
 impl Case {
-    /// Whether it is wrong and nothing says so.
+    /// Wrong without a flag.
     fn silent(&self) -> bool {
         self.error_mm > SILENT_MM && self.said.is_empty()
     }

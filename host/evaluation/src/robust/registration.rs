@@ -8,7 +8,7 @@ use crate::page::Page;
 const TABLE: &str = include_str!("registration.md");
 
 pub fn measure(page: &mut Page) -> Result<()> {
-    page.heading("Registration beside OpenCV's ECC");
+    page.heading("Registration compared with OpenCV's ECC");
     page.paragraph(
         "How far the found place of a pixel lies from the true one, root mean square over the image, when the near image is shifted, \
          magnified and turned and both are blurred as the scene's depth has it: planes at far focus, in the middle and at near focus, and a scene that is half the one and \

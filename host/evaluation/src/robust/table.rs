@@ -76,7 +76,7 @@ fn rows() -> Vec<Row> {
 pub fn measure(page: &mut Page) -> Result<()> {
     page.heading("One disturbance at a time");
     page.paragraph(
-        "The staircase, 640 x 480. What is said is said of the second way; the page of `farnear depth` has the meaning of each message.",
+        "The staircase, 640 x 480. Messages are those of the second method; `farnear depth --help` explains them.",
     );
     let measured = rows().par_iter().map(one).collect::<Result<Vec<_>>>()?;
     let head: Vec<String> = ["disturbance".to_owned(), "before".to_owned()]

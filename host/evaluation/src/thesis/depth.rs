@@ -1,4 +1,4 @@
-//! Chapters 4 to 6: rational operators against four other methods through one imperfect lens, and the corrections of what it does.
+//! Chapters 4 to 6: rational operators and four other methods with one imperfect lens, and its corrections.
 
 mod bench;
 mod costs;
@@ -112,7 +112,7 @@ fn normalised_ratio(page: &mut Page) -> Result<()> {
     page.table(1, &["PSF", "first frequency whose NIR stops rising, rad/px"], &rows);
     page.paragraph(
         "As in the thesis the high frequencies of the pill-box turn back, those of the Gaussian never do, those of p = 4 do. The sign is that of M = I2 - I1, with which the \
-         ratio rises with alpha; eq. 5.2 has the other one. The thesis says that all curves stay within [-1, 1]: the pill-box leaves it beyond the common zeros of \
+         ratio rises with alpha; eq. 5.2 has the other one. In the thesis all curves stay within [-1, 1]: the pill-box leaves it beyond the common zeros of \
          its transfer functions (cut off at 1.25 here), and its \"0.1963 Hz\" are rad/px.",
     );
     Ok(())

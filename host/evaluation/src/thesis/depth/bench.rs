@@ -19,7 +19,7 @@ use crate::{
 };
 
 const SEED: u64 = 5_200;
-/// Where the focus is best, px: the centre of the ellipses, and half of what is looked at around it.
+/// Where the focus is best, px: the centre of the ellipses, and half the size of the evaluated region around it.
 const CENTRE: (usize, usize) = (288, 416);
 const HALF_PX: usize = 128;
 
@@ -148,8 +148,7 @@ impl Bench {
         page.table(1, &["", "GRO: k", "GGRO: p", "GGRO: k", "unexplained part, GRO / GGRO"], &rows);
         page.paragraph(
             "From two pairs, of a plane at the far and one at the near focus. Whole images are used, as the thesis did: their field is curved, so that much of what should be \
-             sharp is not. The second line is free of most of that; the lens has 1.8 and 0.4802. All methods below that are told a point spread function are told the \
-             first line's; Raj's operators are made for a pill-box, whatever the lens.",
+             sharp is not. The second line is free of most of that; the lens has 1.8 and 0.4802. Methods below that need a point spread function use the first line's; Raj's operators always assume a pill-box.",
         );
         Ok(())
     }

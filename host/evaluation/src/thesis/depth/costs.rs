@@ -76,9 +76,8 @@ pub fn measure(page: &mut Page, bench: &Bench, planes: &Planes) -> Result<()> {
     rows.push(vec!["depth by GGRO".into(), "-".into(), "-".into(), "-".into(), format!("{depth:.2}")]);
     page.table(1, &["ms, one thread", "63 x 86", "Li 2014, 63 x 86", "times faster", "640 x 480"], &rows);
     page.paragraph(&format!(
-        "The least of {TIMES} runs on whatever ran the evaluation (the thesis: the mean of five in MATLAB on a Core i7 at 3.40 GHz), by the profile that `cargo xtask demo` builds or a faster one. \
-         Section 5.5 gives 0.35 s for depth and correction of 640 x 480 on a Pentium Dual-Core at 2.16 GHz. The order is the thesis': CLSF and the two steps cost next to nothing beside \
-         depth itself, CDC most. The correction of section 5.3 was 4 to 8 % of depth there. [speed.md](speed.md) has the run time in detail."
+        "The least of {TIMES} runs on the machine of the evaluation (the thesis: the mean of five in MATLAB on a Core i7 at 3.40 GHz), by the profile that `cargo xtask demo` builds or a faster one. \
+         Section 5.5 gives 0.35 s for depth and correction of 640 x 480 on a Pentium Dual-Core at 2.16 GHz. The order is the thesis': CLSF and the two steps cost little compared with depth itself; CDC costs most. The correction of section 5.3 was 4 to 8 % of depth there. [speed.md](speed.md) has the run time in detail."
     ));
     Ok(())
 }

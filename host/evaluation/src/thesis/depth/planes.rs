@@ -21,7 +21,7 @@ const SEED: u64 = 5_400;
 /// The methods of fig. 6.4; "Li" is GGRO.
 const OF_CHAPTER_6: [Method; 4] = [Method::Subbarao, Method::Favaro, Method::Raj, Method::Ggro];
 
-/// What is drawn over depth, and how it is taken from a flat target.
+/// A quantity plotted over depth, and its measurement on a flat target.
 type Figure = (&'static str, fn(&Flat) -> f64);
 
 /// A flat surface as every method measures it, in the order of [`Method::ALL`].
@@ -37,7 +37,7 @@ pub struct Planes {
     corrections: Vec<(Method, Taught, Correction)>,
 }
 
-/// What is taught to a method.
+/// Training data of a method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Taught {
     TwoStep,
@@ -275,7 +275,7 @@ fn claims_of_5_4(page: &mut Page, all: &[Vec<(f64, Flat)>]) {
     ];
     page.table(3, &["what the thesis says of fig. 5.4", "here", "figures"], &rows);
     page.paragraph(
-        "The thesis compares corrected GRO and GGRO with Raj's operators *un*corrected. The line *Raj corrected* above is what it leaves out: a correction that is learned from \
+        "The thesis compares corrected GRO and GGRO with Raj's operators *un*corrected. The line *Raj corrected* above fills this gap: a correction that is learned from \
          the method's own maps also takes away most of what a wrong point spread function does to a flat surface.",
     );
 }
@@ -310,7 +310,7 @@ pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
     page.picture(
         "thesis-patterns.png",
         &panels::grid(3, &panels)?,
-        "Subbarao's method, fig. 6.1: a far and a near surface as measured, with the pattern of its own end taken off, and with that of the other end",
+        "Subbarao's method, fig. 6.1: a far and a near surface as measured, with its own pattern subtracted, and with the other's",
     )?;
     // Noise of single pixels is many times the bowl: its size is judged by means over 40 x 40 px.
     let bowl = |map: &Array2<f32>, true_mm: f64| {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// (height, width) of the maps, a value per pixel.
 const SIZE: (usize, usize) = (480, 640);
-/// Pixels of a flat surface so near to its edge do not count: windows see what lies next to it.
+/// Pixels of a flat surface this near to its edge are excluded: windows reach over the edge.
 const EDGE_PX: usize = 9;
 /// Contrast of sandpaper, and of skin.
 const CONTRAST: [f32; 2] = [0.2, 0.05];
