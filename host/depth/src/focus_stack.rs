@@ -12,8 +12,10 @@
 //! Cost: the focus measure for each image, and about 40 operations per pixel and image; memory: the stack, and as much again
 //! for the rows at work (a fraction).
 
+mod error;
 mod guided;
 mod sharpness;
+mod tip;
 
 use std::ops::Range;
 
@@ -21,9 +23,11 @@ use ndarray::{Array2, ArrayView2, Axis, Zip, s};
 use rayon::prelude::*;
 
 use crate::{metrics::dilate_square, prepare::band::box_mean};
+pub use error::StackError;
 use guided::{Guide, mended};
 pub use sharpness::{Sharpness, UnknownSharpness};
 use sharpness::{blur_reach_px, blurred};
+use tip::{Tip, tip};
 
 /// Images that make a stack.
 pub const LEAST_IMAGES: usize = 3;
@@ -70,79 +74,6 @@ impl Default for StackSettings {
             min_reliability: USUAL_RELIABILITY,
         }
     }
-}
-
-/// Why a stack gives no depth.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StackError {
-    /// Too few images.
-    #[error("a stack of {count} images: at least {LEAST_IMAGES} are needed")]
-    TooFew {
-        /// How many there are.
-        count: usize,
-    },
-    /// Images of different sizes.
-    #[error(
-        "image {number} has {width}x{height} px and the first one {}x{}: they must have one size", of.1, of.0
-    )]
-    Size {
-        /// Which one, from 1.
-        number: usize,
-        /// Its width.
-        width: usize,
-        /// Its height.
-        height: usize,
-        /// The first one's (height, width).
-        of: (usize, usize),
-    },
-    /// Too small for the window.
-    #[error("images of {width}x{height} px are smaller than the window of {window_px}")]
-    TooSmall {
-        /// Width.
-        width: usize,
-        /// Height.
-        height: usize,
-        /// Side of the window.
-        window_px: usize,
-    },
-    /// A number that must be odd and in a range.
-    #[error("{what} is {value}: an odd number from {least} to {most} is needed")]
-    Odd {
-        /// What.
-        what: &'static str,
-        /// Its value.
-        value: usize,
-        /// Smallest.
-        least: usize,
-        /// Largest.
-        most: usize,
-    },
-    /// A blur that is none.
-    #[error("the images are to be blurred by {0} px: 0 to {MOST_SMOOTHING_PX} is possible")]
-    Smoothing(f32),
-    /// A reach that is none.
-    #[error("places are to be mended within {0} px: 0 (not at all) or 1 to {MOST_GUIDED_PX} is possible")]
-    Guided(f32),
-    /// Positions that are not one for each image, or do not rise or fall.
-    #[error(
-        "{positions} positions of {images} images: one for each is needed, all different, rising or falling"
-    )]
-    Positions {
-        /// Images.
-        images: usize,
-        /// Positions.
-        positions: usize,
-    },
-    /// A pixel without a value.
-    #[error("image {number}: the pixel in column {column}, row {row} is not finite")]
-    NotFinite {
-        /// Which one, from 1.
-        number: usize,
-        /// Column.
-        column: usize,
-        /// Row.
-        row: usize,
-    },
 }
 
 /// What a stack says of each pixel; all maps are (height, width).
@@ -356,115 +287,9 @@ fn between(images: &[ArrayView2<f32>], place: f32, at: (usize, usize)) -> f32 {
     seen.min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or(0.0, |index| images[index][at])
 }
 
-/// The tip of a curve.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Tip {
-    place: f32,
-    reliability: f32,
-    /// The curve's largest value.
-    sharpness: f32,
-    /// How far that is above the curve's mean, as a part of it.
-    rise: f32,
-}
-
-/// The tip of a curve of sharpness over the positions of the stack; NaN = not seen.
-fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
-    let seen = || (0..curve.len()).filter(|i| curve[*i].is_finite());
-    let count = seen().count();
-    let largest = seen().max_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
-    let most = if count == 0 { 0.0 } else { curve[largest] };
-    let mean = seen().map(|i| curve[i]).sum::<f32>() / count.max(1) as f32;
-    let rise = if most > 0.0 { (1.0 - mean / most).clamp(0.0, 1.0) } else { 0.0 };
-    let unreliable = Tip { place: largest as f32, reliability: 0.0, sharpness: most, rise };
-    if 2 * count < curve.len() {
-        // Nor has it a say in its surroundings.
-        return Tip { rise: 0.0, ..unreliable };
-    }
-    if largest == 0 || largest + 1 == curve.len() || most <= 0.0 {
-        return unreliable;
-    }
-    if !(curve[largest - 1].is_finite() && curve[largest + 1].is_finite()) {
-        return Tip { rise: 0.0, ..unreliable };
-    }
-    let half = fit_points / 2;
-    let window = largest.saturating_sub(half)..(largest + half + 1).min(curve.len());
-    // In units of the spacing around the largest value.
-    let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
-    let mut fit = Parabola::default();
-    for i in window.filter(|i| curve[*i].is_finite()) {
-        let value = f64::from((curve[i] / most).max(1e-6));
-        fit.add((positions[i] - positions[largest]) / unit, value.ln(), value * value);
-    }
-    let Some((tip, determination)) = fit.tip() else { return unreliable };
-    let place = place_of(positions, positions[largest] + tip * unit);
-    // A tip beyond the neighbours is none of this curve's: of two peaks, or of noise.
-    if (place - largest as f64).abs() > 1.5 || tip.abs() > 3.0 {
-        return unreliable;
-    }
-    let reliability = rise * determination.clamp(0.0, 1.0) as f32;
-    Tip { place: place as f32, reliability, sharpness: most, rise }
-}
-
-/// The number of the image, from 0 and between images as a fraction, at a position; the first or last beyond the ends.
-fn place_of(positions: &[f64], position: f64) -> f64 {
-    let falling = positions.len() > 1 && positions[1] < positions[0];
-    let sign = if falling { -1.0 } else { 1.0 };
-    let after = positions.partition_point(|p| sign * p < sign * position);
-    match after {
-        0 => 0.0,
-        after if after == positions.len() => (after - 1) as f64,
-        after => {
-            let [low, high] = [positions[after - 1], positions[after]];
-            (after - 1) as f64 + (position - low) / (high - low)
-        }
-    }
-}
-
-/// Weighted least squares of a parabola, by its sums.
-#[derive(Debug, Default)]
-struct Parabola {
-    /// Sums of the weights times `t^0` to `t^4`.
-    powers: [f64; 5],
-    /// Sums of the weights times `v t^0` to `v t^2`.
-    values: [f64; 3],
-    /// Sum of the weights times `v^2`.
-    square: f64,
-}
-
-impl Parabola {
-    fn add(&mut self, t: f64, v: f64, weight: f64) {
-        let mut power = weight;
-        for i in 0..5 {
-            self.powers[i] += power;
-            if i < 3 {
-                self.values[i] += power * v;
-            }
-            power *= t;
-        }
-        self.square += weight * v * v;
-    }
-
-    /// Where the tip is, and the part of the variance that the parabola explains; `None` where it has no tip above.
-    fn tip(&self) -> Option<(f64, f64)> {
-        let [s0, s1, s2, s3, s4] = self.powers;
-        let [v0, v1, v2] = self.values;
-        let minors = [s2 * s4 - s3 * s3, s1 * s4 - s2 * s3, s1 * s3 - s2 * s2];
-        let determinant = s0 * minors[0] - s1 * minors[1] + s2 * minors[2];
-        if determinant.abs() < 1e-12 * s0 * s0 * s0 {
-            return None;
-        }
-        let a = (v0 * minors[0] - v1 * minors[1] + v2 * minors[2]) / determinant;
-        let b = (-v0 * minors[1] + v1 * (s0 * s4 - s2 * s2) - v2 * (s0 * s3 - s1 * s2)) / determinant;
-        let c = (v0 * minors[2] - v1 * (s0 * s3 - s1 * s2) + v2 * (s0 * s2 - s1 * s1)) / determinant;
-        let explained = a * v0 + b * v1 + c * v2 - v0 * v0 / s0;
-        let total = self.square - v0 * v0 / s0;
-        (c < 0.0 && total > 0.0).then(|| (-b / (2.0 * c), explained / total))
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{tip::place_of, *};
 
     #[test]
     fn the_tip_of_a_gaussian_curve_is_found_between_the_images() {

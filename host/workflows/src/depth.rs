@@ -34,7 +34,10 @@ use crate::{
     psf::PsfSource,
     request::{self, PathKind, Request},
 };
-use farnear_files::{image_file::Samples, quantiles::Quantiles};
+use farnear_files::{
+    image_file::{Grey, ReadSettings, Samples},
+    quantiles::Quantiles,
+};
 use method::{Method, Prepared};
 use noise::{CameraNoise, Source, Uncertainty};
 use output::{Outputs, Results};
@@ -95,6 +98,13 @@ pub struct DepthRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "METHOD", default_value_t))]
     #[serde_as(as = "DisplayFromStr")]
     pub balance: Balance,
+    /// How colour becomes grey: mean, luma, red, green or blue.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub grey: Grey,
+    /// Code at which the camera saturates, such as 4095 for 12 bits in 16 [default: from the files].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CODE"))]
+    pub white_level: Option<u32>,
     /// Part of the images: column, row, width and height in pixels. Maps have its size; depth.toml gives its position.
     #[cfg_attr(feature = "clap", arg(long, value_name = "X,Y,W,H"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
@@ -160,6 +170,8 @@ impl Default for DepthRequest {
             median_px: 3,
             align: Align::default(),
             balance: Balance::default(),
+            grey: Grey::default(),
+            white_level: None,
             region: None,
             bin: None,
             camera_frames: None,
@@ -415,7 +427,8 @@ impl Inputs {
             }
             None => (optics, doubts),
         };
-        let mut pair = Pair::read(&settings.far, &settings.near)?;
+        let reading = ReadSettings { grey: settings.grey, white_level: settings.white_level };
+        let mut pair = Pair::read(&settings.far, &settings.near, &reading)?;
         let (optics, mut doubts) = (optics, doubts);
         let bin = settings.bin_for(&optics, &mut doubts);
         if bin > 1 {

@@ -15,7 +15,7 @@ use farnear_depth::{
     prepare::{align::Model, straightened},
 };
 use farnear_files::{
-    image_file::{self, Grey, ReadSettings},
+    image_file::{self, Grey, GreyImage, ReadSettings, shared_white_level},
     npy, stack, view,
 };
 use ndarray::{Array2, ArrayView2};
@@ -80,6 +80,9 @@ pub struct FocusStackRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL", default_value_t))]
     #[serde_as(as = "DisplayFromStr")]
     pub grey: Grey,
+    /// Code at which the camera saturates, such as 4095 for 12 bits in 16 [default: from the files].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CODE"))]
+    pub white_level: Option<u32>,
     /// Focus measure (a wrong name lists all).
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", default_value_t = Self::default().measure))]
     #[serde_as(as = "DisplayFromStr")]
@@ -134,6 +137,7 @@ impl Default for FocusStackRequest {
             positions_um: None,
             optics: None,
             grey: Grey::default(),
+            white_level: None,
             measure,
             smoothing_px,
             median_px,
@@ -254,6 +258,7 @@ struct Record<'a> {
     min_reliability: f32,
     align: Option<Model>,
     grey: Grey,
+    white_level: Option<u32>,
     images: &'a [String],
     left_out: &'a [String],
     /// Where the images are focused, in the unit.
@@ -330,6 +335,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         min_reliability: request.min_reliability,
         align: request.align.0,
         grey: request.grey,
+        white_level: request.white_level,
         images: &names,
         left_out: &figures.left_out,
         positions: &listed.positions,
@@ -359,7 +365,7 @@ fn read(
     warnings: &mut Vec<String>,
     context: &Context<'_>,
 ) -> Result<Vec<Array2<f32>>> {
-    let settings = ReadSettings { grey: request.grey, white_level: None };
+    let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
     let read = stack::read(images, &settings, |index| -> Result<()> {
         context.cancel.check("reading the stack")?;
         context.progress.advance("images", index + 1, Some(images.len()));
@@ -368,7 +374,12 @@ fn read(
     if request.grey == Grey::Mean && read.iter().any(|image| image.colour) {
         warnings.push("colour images: grey is the mean of red, green and blue (--grey)".into());
     }
-    Ok(read.into_iter().map(|image| image.pixels).collect())
+    let white = shared_white_level(read.iter());
+    let relative = |image: GreyImage| match white {
+        Some(white) => image.relative_to(white),
+        None => image,
+    };
+    Ok(read.into_iter().map(|image| relative(image).pixels).collect())
 }
 
 /// Removes the lens' distortion from all images. Where it showed nothing, which is the same in all, they keep their own pixels, and

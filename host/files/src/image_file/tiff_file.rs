@@ -124,6 +124,16 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
             compression(page.directory.compression)
         ));
     }
+    if page.directory.fill_order == 2 {
+        return Err("its bits are in reverse order (FillOrder 2), which is not read: rewrite it (`tiffcp -f msb2lsb`)".into());
+    }
+    // The decoder does not expect these.
+    if page.directory.planar == 2 && samples_per_pixel > 1 && page.directory.tile_width.is_some() {
+        return Err(
+            "its channels are separate planes in tiles, which is not read: store it in strips (`tiffcp -s`)"
+                .into(),
+        );
+    }
     let decoded_bytes = (width * height).saturating_mul(samples_per_pixel).saturating_mul(bits.max(8) / 8);
     if decoded_bytes > most_bytes(bytes.len()) {
         return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));

@@ -22,6 +22,12 @@ pub(crate) struct Directory {
     /// Tag 255, the old form of it: 2 = reduced resolution.
     pub old_subfile: u64,
     pub photometric: u64,
+    /// Tag 266: 2 = the lowest bit of a byte comes first.
+    pub fill_order: u64,
+    /// Tag 284: 2 = a plane for each channel.
+    pub planar: u64,
+    /// Tag 322.
+    pub tile_width: Option<u64>,
     /// Tag 274, 1 to 8.
     pub orientation: u64,
     pub samples_per_pixel: u64,
@@ -157,6 +163,9 @@ impl<'a> File<'a> {
             258 => directory.bits = first(),
             259 => directory.compression = first(),
             262 => directory.photometric = first(),
+            266 => directory.fill_order = first(),
+            284 => directory.planar = first(),
+            322 => directory.tile_width = value(0),
             270 => directory.description = text(),
             271 => directory.make = text(),
             273 => (directory.strip_offset, directory.strips) = (first(), count),

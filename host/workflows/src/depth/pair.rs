@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use farnear_capture::record::CAPTURE_FILE;
-use farnear_files::image_file::{Samples, read_grey, shared_white_level};
+use farnear_files::image_file::{ReadSettings, Samples, read_grey_with, shared_white_level};
 use ndarray::Array2;
 
 use crate::error::{Result, WorkflowError};
@@ -21,9 +21,10 @@ pub struct Pair {
 impl Pair {
     /// Reads both images. Their pixels must mean the same: integers of any depth share one scale, float files have their
     /// own. Where a camera of fewer bits saturates below the full scale, its white becomes 1.
-    pub fn read(far: &Path, near: &Path) -> Result<Self> {
+    pub fn read(far: &Path, near: &Path, reading: &ReadSettings) -> Result<Self> {
         // Side by side: unpacking is what reading takes.
-        let (far_image, near_image) = rayon::join(|| read_grey(far), || read_grey(near));
+        let (far_image, near_image) =
+            rayon::join(|| read_grey_with(far, reading), || read_grey_with(near, reading));
         let (mut far_image, mut near_image) = (far_image?, near_image?);
         if let Some(white) = shared_white_level([&far_image, &near_image].into_iter()) {
             (far_image, near_image) = (far_image.relative_to(white), near_image.relative_to(white));

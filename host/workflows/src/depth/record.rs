@@ -3,7 +3,7 @@
 use farnear_depth::{
     operators::Operators, optics::Optics, pipeline::Settings, prepare::Report, validity::Lost,
 };
-use farnear_files::map::Scale;
+use farnear_files::{image_file::Grey, map::Scale};
 use serde::Serialize;
 
 use super::{Computed, DepthRequest, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part};
@@ -34,6 +34,11 @@ struct Record<'a> {
     /// What was asked for; what was done stands under `prepared`.
     align: String,
     balance: String,
+    /// How colour became grey, where not by the mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    grey: Option<Grey>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    white_level: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
     min_confidence: f32,
@@ -78,6 +83,8 @@ pub fn record(
         correction: settings.correction.as_deref().map(name_of),
         align: settings.align.to_string(),
         balance: settings.balance.to_string(),
+        grey: (settings.grey != Grey::default()).then_some(settings.grey),
+        white_level: settings.white_level,
         camera: settings.camera_frames.as_deref().map(name_of),
         min_confidence: settings.min_confidence,
         part: inputs.cut.map(|cut| cut.part()),

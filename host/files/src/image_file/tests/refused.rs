@@ -45,6 +45,17 @@ fn rejects_truncated_files_of_every_format() {
 }
 
 #[test]
+fn rejects_reversed_bits_and_tiles_of_planes() {
+    let reversed = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[2])]);
+    assert!(refusal(&reversed).contains("FillOrder"));
+    let plain = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[1])]);
+    assert!(decode_grey(&plain).is_ok());
+    let planes = Page::grey(16, 16, 8, vec![1; 768]).with(258, &[8, 8, 8]).with(262, &[2]).with(277, &[3]);
+    let tiled = planes.with(284, &[2]).with(322, &[16]).with(323, &[16]);
+    assert!(refusal(&tiff(CLASSIC, &[tiled])).contains("separate planes in tiles"));
+}
+
+#[test]
 fn rejects_raw_files_of_cameras_with_what_to_do() {
     let page = || Page::grey(4, 3, 8, vec![0; 12]);
     let dng = tiff(CLASSIC, &[page().with(254, &[1]).with(50706, &[0x0401])]);

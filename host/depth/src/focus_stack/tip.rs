@@ -1,0 +1,107 @@
+//! The tip of a curve of sharpness: log-sharpness as a parabola, by weighted least squares (see the parent module).
+
+/// The tip of a curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tip {
+    pub place: f32,
+    pub reliability: f32,
+    /// The curve's largest value.
+    pub sharpness: f32,
+    /// How far that is above the curve's mean, as a part of it.
+    pub rise: f32,
+}
+
+/// The tip of a curve of sharpness over the positions of the stack; NaN = not seen.
+pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
+    let seen = || (0..curve.len()).filter(|i| curve[*i].is_finite());
+    let count = seen().count();
+    let largest = seen().max_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
+    let most = if count == 0 { 0.0 } else { curve[largest] };
+    let mean = seen().map(|i| curve[i]).sum::<f32>() / count.max(1) as f32;
+    let rise = if most > 0.0 { (1.0 - mean / most).clamp(0.0, 1.0) } else { 0.0 };
+    let unreliable = Tip { place: largest as f32, reliability: 0.0, sharpness: most, rise };
+    if 2 * count < curve.len() {
+        // Nor has it a say in its surroundings.
+        return Tip { rise: 0.0, ..unreliable };
+    }
+    if largest == 0 || largest + 1 == curve.len() || most <= 0.0 {
+        return unreliable;
+    }
+    if !(curve[largest - 1].is_finite() && curve[largest + 1].is_finite()) {
+        return Tip { rise: 0.0, ..unreliable };
+    }
+    let half = fit_points / 2;
+    let window = largest.saturating_sub(half)..(largest + half + 1).min(curve.len());
+    // In units of the spacing around the largest value.
+    let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
+    let mut fit = Parabola::default();
+    for i in window.filter(|i| curve[*i].is_finite()) {
+        let value = f64::from((curve[i] / most).max(1e-6));
+        fit.add((positions[i] - positions[largest]) / unit, value.ln(), value * value);
+    }
+    let Some((tip, determination)) = fit.tip() else { return unreliable };
+    let place = place_of(positions, positions[largest] + tip * unit);
+    // A tip beyond the neighbours is none of this curve's: of two peaks, or of noise.
+    if (place - largest as f64).abs() > 1.5 || tip.abs() > 3.0 {
+        return unreliable;
+    }
+    let reliability = rise * determination.clamp(0.0, 1.0) as f32;
+    Tip { place: place as f32, reliability, sharpness: most, rise }
+}
+
+/// The number of the image, from 0 and between images as a fraction, at a position; the first or last beyond the ends.
+pub(super) fn place_of(positions: &[f64], position: f64) -> f64 {
+    let falling = positions.len() > 1 && positions[1] < positions[0];
+    let sign = if falling { -1.0 } else { 1.0 };
+    let after = positions.partition_point(|p| sign * p < sign * position);
+    match after {
+        0 => 0.0,
+        after if after == positions.len() => (after - 1) as f64,
+        after => {
+            let [low, high] = [positions[after - 1], positions[after]];
+            (after - 1) as f64 + (position - low) / (high - low)
+        }
+    }
+}
+
+/// Weighted least squares of a parabola, by its sums.
+#[derive(Debug, Default)]
+struct Parabola {
+    /// Sums of the weights times `t^0` to `t^4`.
+    powers: [f64; 5],
+    /// Sums of the weights times `v t^0` to `v t^2`.
+    values: [f64; 3],
+    /// Sum of the weights times `v^2`.
+    square: f64,
+}
+
+impl Parabola {
+    fn add(&mut self, t: f64, v: f64, weight: f64) {
+        let mut power = weight;
+        for i in 0..5 {
+            self.powers[i] += power;
+            if i < 3 {
+                self.values[i] += power * v;
+            }
+            power *= t;
+        }
+        self.square += weight * v * v;
+    }
+
+    /// Where the tip is, and the part of the variance that the parabola explains; `None` where it has no tip above.
+    fn tip(&self) -> Option<(f64, f64)> {
+        let [s0, s1, s2, s3, s4] = self.powers;
+        let [v0, v1, v2] = self.values;
+        let minors = [s2 * s4 - s3 * s3, s1 * s4 - s2 * s3, s1 * s3 - s2 * s2];
+        let determinant = s0 * minors[0] - s1 * minors[1] + s2 * minors[2];
+        if determinant.abs() < 1e-12 * s0 * s0 * s0 {
+            return None;
+        }
+        let a = (v0 * minors[0] - v1 * minors[1] + v2 * minors[2]) / determinant;
+        let b = (-v0 * minors[1] + v1 * (s0 * s4 - s2 * s2) - v2 * (s0 * s3 - s1 * s2)) / determinant;
+        let c = (v0 * minors[2] - v1 * (s0 * s3 - s1 * s2) + v2 * (s0 * s2 - s1 * s1)) / determinant;
+        let explained = a * v0 + b * v1 + c * v2 - v0 * v0 / s0;
+        let total = self.square - v0 * v0 / s0;
+        (c < 0.0 && total > 0.0).then(|| (-b / (2.0 * c), explained / total))
+    }
+}
