@@ -1,5 +1,5 @@
-//! The camera's images: renders each exposure at the place where the sensor really was, on a thread of its own,
-//! so that the emulator waits for a picture only where many are due ([`crate::pictures`]).
+//! Renders each exposure at the sensor's true position, on its own thread. The emulator waits only while many
+//! pictures are due ([`crate::pictures`]).
 
 use std::{
     sync::{
@@ -17,18 +17,17 @@ use farnear_scene::{Camera, Lens, Psf, Renderer, Scene, View};
 
 use crate::{error::SimError, parts::HalfMirrorParts, pictures::Pictures, wiring::Shot};
 
-/// A picture with when it was taken, for a camera that stamps its frames by a clock of its own.
+/// A picture with its capture time, for cameras that stamp frames by their own clock.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Picture {
-    /// Start of the exposure, virtual nanoseconds.
+    /// Start of the exposure.
     pub begin_ns: u64,
     pub header: FrameHeader,
-    /// As the endpoint sends it.
+    /// Encoded for the endpoint.
     frame: Vec<u8>,
 }
 
 impl Picture {
-    /// A picture of these pixels.
     pub fn new(begin_ns: u64, header: FrameHeader, pixels: &[u16]) -> Self {
         let mut frame = Vec::with_capacity(4 + header.length() as usize);
         frame.extend(header.length().to_le_bytes());
@@ -37,34 +36,30 @@ impl Picture {
         Self { begin_ns, header, frame }
     }
 
-    /// For the GigE Vision server.
     fn for_gige(&self) -> farnear_gige::Picture {
         let pixels = self.frame.get(4 + FRAME_HEADER..).unwrap_or_default().to_vec();
         farnear_gige::Picture { begin_ns: self.begin_ns, header: self.header, pixels }
     }
 }
 
-/// Sets the second camera's noise apart from the first's, and from that of the rigs of the seeds beside.
+/// Separates the second camera's noise from the first's and from rigs with nearby seeds.
 const OF_THE_SECOND: u64 = 0x5ec0_0d00_0000_0000;
 
 pub struct Imager {
     renderer: Renderer,
     camera: Camera,
-    /// How the camera stands to the lens.
     view: View,
-    /// How fast the scene moves, px/s right and down.
+    /// Scene motion, px/s right and down.
     speed_px_per_s: [f64; 2],
-    /// How much further from the lens the sensor stands than the stage says.
+    /// Extra sensor distance from the lens.
     further_mm: f64,
     mirrored: bool,
     exposures: u32,
 }
 
 impl Imager {
-    /// A camera before a scene; the seed makes its texture and noise.
-    ///
-    /// # Errors
-    /// [`SimError::Scene`] where the scene, the lens or the camera make no picture.
+    /// `seed` sets texture and noise.
+    /// Errors: [`SimError::Scene`] if scene, lens or camera cannot produce a picture.
     pub fn new(scene: &Scene, lens: &Lens, psf: &Psf, camera: Camera, seed: u64) -> Result<Self, SimError> {
         let renderer = Renderer::new(scene, lens, psf, &camera, seed)
             .map_err(|error| SimError::Scene(error.to_string()))?;
@@ -78,8 +73,7 @@ impl Imager {
         Ok(Self { renderer, camera, view, speed_px_per_s, further_mm: 0.0, mirrored: false, exposures: 0 })
     }
 
-    /// The second camera behind a half mirror, before the same scene: its sensor stands further from the lens, and has noise and hot
-    /// pixels of its own.
+    /// The second camera behind a half mirror: sensor further away, its own noise and hot pixels.
     #[must_use]
     pub fn as_second(self, further_mm: f64, mirror: &HalfMirrorParts, seed: u64) -> Self {
         let view = mirror.second_view();
@@ -87,8 +81,8 @@ impl Imager {
         Self { renderer, view, further_mm, mirrored: mirror.second_mirrored, ..self }
     }
 
-    /// The same before a scene that moves across the image, from where it was at power-on. What moves less than a pixel during an
-    /// exposure is sharp; more would be smeared, which is left out.
+    /// Moves the scene across the image from power-on. Motion blur is not modelled; less than a pixel per
+    /// exposure is exact.
     #[must_use]
     pub fn moving(self, speed_px_per_s: [f64; 2]) -> Self {
         Self { speed_px_per_s, ..self }
@@ -128,11 +122,9 @@ impl Imager {
     }
 }
 
-/// Renders what comes and is wanted until nothing can come any more, each exposure by every camera for its own client. `gige` gets all of
-/// the first one's, too.
-///
-/// # Errors
-/// [`SimError::Io`] where no thread can be started.
+/// Renders exposures until the channel closes, one per camera and client. `gige` gets all pictures of the
+/// first camera.
+/// Errors: [`SimError::Io`] if no thread can be started.
 pub fn watch(
     mut cameras: Vec<(Imager, SyncSender<Vec<u8>>)>,
     shots: Receiver<Shot>,
@@ -152,7 +144,7 @@ pub fn watch(
                     match imager.picture(&shot) {
                         Ok(picture) => {
                             if at == 0 {
-                                // A client that has ended is missed by nobody.
+                                // A client that has disconnected is removed.
                                 gige = gige.take().filter(|gige| gige.send(picture.for_gige()).is_ok());
                             }
                             if frames.send(picture.frame).is_err() {
@@ -187,7 +179,6 @@ mod tests {
         Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth }
     }
 
-    /// Codes of a picture of 64 x 48 px.
     fn codes(imager: &mut Imager, shot: &Shot) -> Vec<i32> {
         let picture = imager.picture(shot).expect("a picture");
         picture
@@ -214,15 +205,15 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_moves_is_found_again_where_it_has_moved_to() {
+    fn a_moving_scene_shifts_the_image() {
         let (mut imager, far_mm) = imager("[imaging]\nscene_px_per_s = [40.0, -20.0]");
         let (before, after) = (shot(0, far_mm), shot(100_000_000, far_mm));
         let (before, after) = (codes(&mut imager, &before), codes(&mut imager, &after));
-        // 4 px to the right and 2 px up, away from the borders that the blur reaches from.
+        // Shift of 4 px right and 2 px up, away from the borders that the blur reaches.
         for row in 10..38 {
             for column in 10..54 {
                 let (was, is) = (before[row * 64 + column - 4], after[(row - 2) * 64 + column]);
-                // Whole pixels need no interpolation; rounding of the sum in f32, of 65,535.
+                // Whole pixels need no interpolation; only f32 sums round.
                 assert!((was - is).abs() <= 2, "{was} {is} at row {row}, column {column}");
             }
         }
@@ -230,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn the_second_camera_stands_further_and_has_noise_of_its_own() {
+    fn the_second_camera_is_further_away_with_independent_noise() {
         let parts = Parts::parse("[half_mirror]\nsecond_shift_px = [3.0, -2.0]").expect("good parts");
         let (moved, plain) = (parts.half_mirror, Parts::default().half_mirror);
         let ((mut near, far_mm), (behind, _), (aside, _)) = (imager(""), imager(""), imager(""));
@@ -242,7 +233,7 @@ mod tests {
         for row in 10..38 {
             for column in 10..54 {
                 let (was, is) = (near[row * 64 + column - 3], aside[(row - 2) * 64 + column]);
-                // Whole pixels need no interpolation; rounding of the sum in f32, of 65,535.
+                // Whole pixels need no interpolation; only f32 sums round.
                 assert!((was - is).abs() <= 2, "{was} {is} at row {row}, column {column}");
             }
         }
@@ -262,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_say_what_lens_and_light_are_like() {
+    fn the_parts_file_sets_lens_and_light() {
         let (mut plain, far_mm) = imager("");
         let plain = codes(&mut plain, &shot(0, far_mm));
         for parts in [
