@@ -234,7 +234,7 @@ fn axis(name: &str) -> PyResult<Axis> {
 
 fn position(to_um: f64) -> PyResult<Nanometres> {
     nanometres(to_um).ok_or_else(|| {
-        FarnearError::new_err(format!("{to_um} um is no position; expected -2147483 to 2147483 um"))
+        FarnearError::new_err(format!("{to_um} um is out of range; expected -2147483 to 2147483 um"))
     })
 }
 

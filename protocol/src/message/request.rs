@@ -1,4 +1,4 @@
-//! What the host can ask: the table of requests.
+//! The table of requests.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -6,185 +6,168 @@ use serde::{Deserialize, Serialize};
 use super::{Axis, Codes, CoefficientBits, CorrectionInfo, LinkRate, Routine, SettingKey, Shot, SunQuery};
 use crate::units::{Micros, Nanometres};
 
-/// What the host can ask. Each request carries an id, larger than all before it; the board answers a repeated id with
-/// the remembered answer and does not act again.
+/// A request. Ids increase; the board answers a repeated id from memory and does not act again.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Request {
-    /// Who are you? Changes nothing, needs no session and no new id. The only request that may
-    /// carry boot number 0 ("I do not know yet"). Answer: [`super::Response::Hello`].
+    /// Identify the board. Changes nothing, needs no session or new id, and may carry boot number 0
+    /// (unknown). Answer: [`super::Response::Hello`].
     Hello,
-    /// How are you? Answer: [`super::Response::Status`].
+    /// Read the board's state. Answer: [`super::Response::Status`].
     Status,
-    /// Find the home switch of an axis and make it position 0. Answer: [`super::Response::Accepted`]; ends with
+    /// Home an axis: its home switch becomes position 0. Answer: [`super::Response::Accepted`]; ends with
     /// [`super::EventKind::Homed`] or [`super::EventKind::Failed`].
     Home {
-        /// The axis; only axes with a home switch can be homed.
+        /// Axis with a home switch.
         axis: Axis,
-        /// How long the host may say nothing, see [`Request::Move`].
+        /// Silence deadline, see [`Request::Move`].
         silence: Micros,
     },
-    /// Go to an absolute position. Answer: [`super::Response::Accepted`]; ends with [`super::EventKind::MoveDone`] or
-    /// [`super::EventKind::Failed`]. Other axes may move at the same time.
+    /// Move to an absolute position; other axes may move simultaneously. Answer:
+    /// [`super::Response::Accepted`]; ends with [`super::EventKind::MoveDone`] or
+    /// [`super::EventKind::Failed`].
     Move {
-        /// The axis that moves.
         axis: Axis,
-        /// Where to; outside the limits of [`super::Hello::limits`] it is refused, never clamped.
+        /// Target; refused, never clamped, outside of [`super::Hello::limits`].
         target: Nanometres,
-        /// How long the host may say nothing while this is under way, within [`super::Limits::silence_min`] and
-        /// [`super::Limits::silence_max`]. After half of it the board says [`super::EventKind::StillThere`]; any request of
-        /// the session answers that. After all of it everything stops with [`super::Alarm::HostSilence`].
+        /// Silence deadline of the host, within [`super::Limits::silence_min`] and
+        /// [`super::Limits::silence_max`]. After half of it the board sends [`super::EventKind::StillThere`],
+        /// which any request of the session answers. At the deadline everything stops with
+        /// [`super::Alarm::HostSilence`].
         silence: Micros,
     },
-    /// Stop all motion along the ramps and end a running program. Answer: [`super::Response::Accepted`], also when nothing moves; what
-    /// was running ends with [`super::EventKind::Failed`] and [`super::Failure::Stopped`].
+    /// Stop all motion along the ramps and end a running program. Answer: [`super::Response::Accepted`], also
+    /// without motion; active work ends with [`super::EventKind::Failed`] and [`super::Failure::Stopped`].
     Stop,
-    /// Put one shot into the exposure program, which then must be armed again. Refused while a program runs. Answer:
+    /// Load one shot; the program must be armed again. Refused while a program runs. Answer:
     /// [`super::Response::Accepted`].
     LoadShot {
-        /// Place in the program, from 0; at most [`super::Limits::shots_max`] - 1.
+        /// Index from 0, below [`super::Limits::shots_max`].
         index: u8,
-        /// The shot.
         shot: Shot,
     },
-    /// Run the armed program: move, settle, trigger, time-stamp, each shot in turn. Answer: [`super::Response::Accepted`];
-    /// ends with [`super::EventKind::ProgramDone`] or [`super::EventKind::Failed`]. The program stays armed and may be run again.
-    RunProgram {
-        /// How long the host may say nothing, see [`Request::Move`].
-        silence: Micros,
-    },
-    /// Send an event again (the host saw a gap in the event numbers). Answer: [`super::Response::Event`].
-    ReadEvent {
-        /// The event's number.
-        number: u32,
-    },
-    /// Stop everything, answer, then reset. The next boot has another boot number, so a retry is refused.
-    /// Answer: [`super::Response::Accepted`].
-    Reboot,
-    /// Emergency stop by the host: the last STEP pulse comes within a millisecond, and an axis that moved has lost its
-    /// position. Latches [`super::Alarm::Halt`]. Answer: [`super::Response::Accepted`].
-    Halt,
-    /// Check the shots 0 to `shots` - 1 as a program: all loaded, inside the limits, axes homed. Answer:
-    /// [`super::Response::Accepted`] and the program is armed.
-    ArmProgram {
-        /// How many of the loaded shots.
-        shots: u8,
-    },
-    /// Stand still after the exposure that is under way. Answer: [`super::Response::Accepted`]; [`super::EventKind::Paused`] follows.
-    PauseProgram,
-    /// Go on after a pause; the position is settled anew. Answer: [`super::Response::Accepted`].
-    ResumeProgram,
-    /// Measure the mechanics. Answer: [`super::Response::Accepted`]; ends with [`super::EventKind::Calibrated`] or
+    /// Run the armed program: move, settle, trigger and time-stamp each shot. It stays armed. Answer:
+    /// [`super::Response::Accepted`]; ends with [`super::EventKind::ProgramDone`] or
     /// [`super::EventKind::Failed`].
-    Calibrate {
-        /// What.
-        routine: Routine,
-        /// How long the host may say nothing, see [`Request::Move`].
+    RunProgram {
+        /// Silence deadline, see [`Request::Move`].
         silence: Micros,
     },
-    /// Read a past alarm by its number (the last eight are kept). Answer: [`super::Response::Alarm`].
+    /// Read an event again after a gap in the numbers. Answer: [`super::Response::Event`].
+    ReadEvent { number: u32 },
+    /// Stop everything, answer, then reset. The boot number changes, so a repeat is refused. Answer:
+    /// [`super::Response::Accepted`].
+    Reboot,
+    /// Emergency stop: the last STEP pulse comes within a millisecond, and a moving axis loses its position.
+    /// Latches [`super::Alarm::Halt`]. Answer: [`super::Response::Accepted`].
+    Halt,
+    /// Check and arm shots 0 to `shots` - 1: all loaded, in range, axes homed. Answer:
+    /// [`super::Response::Accepted`].
+    ArmProgram { shots: u8 },
+    /// Pause after the current exposure. Answer: [`super::Response::Accepted`]; [`super::EventKind::Paused`]
+    /// follows.
+    PauseProgram,
+    /// Resume after a pause; the position settles again. Answer: [`super::Response::Accepted`].
+    ResumeProgram,
+    /// Calibrate the mechanics. Answer: [`super::Response::Accepted`]; ends with
+    /// [`super::EventKind::Calibrated`] or [`super::EventKind::Failed`].
+    Calibrate {
+        routine: Routine,
+        /// Silence deadline, see [`Request::Move`].
+        silence: Micros,
+    },
+    /// Read one of the last eight alarms. Answer: [`super::Response::Alarm`].
     ReadAlarm {
-        /// Its number; 0 = the last.
+        /// Number; 0 = the last alarm.
         number: u32,
     },
-    /// Clear the latched alarm. Answer: [`super::Response::Accepted`], or [`super::RequestError::AlarmRemains`] while its cause does.
+    /// Clear the latched alarm. Answer: [`super::Response::Accepted`], or
+    /// [`super::RequestError::AlarmRemains`] while its cause persists.
     ClearAlarm {
-        /// Its number: only what was read can be cleared.
+        /// Number: only a reported alarm can be cleared.
         number: u32,
     },
     /// Read a setting. Answer: [`super::Response::Setting`].
-    ReadSetting {
-        /// Which.
-        key: SettingKey,
-    },
-    /// Change a setting, now and for later boots. Refused while anything moves. Answer: [`super::Response::Setting`].
+    ReadSetting { key: SettingKey },
+    /// Change a setting permanently. Refused during motion. Answer: [`super::Response::Setting`].
     WriteSetting {
-        /// Which.
         key: SettingKey,
-        /// Its new value, in the unit of its name.
+        /// New value, in the unit of the key's name.
         value: i32,
     },
-    /// Read the counters of the board's life. Answer: [`super::Response::Counters`].
+    /// Read the lifetime counters. Answer: [`super::Response::Counters`].
     ReadCounters,
-    /// Where is the sun, and how does a subject's shadow lie? Answer: [`super::Response::Sun`].
+    /// Calculate the sun and a subject's shadow. Answer: [`super::Response::Sun`].
     Sun(SunQuery),
-    /// Begin an empty correction: coefficients come by [`Request::PutCoefficients`], or samples by
-    /// [`Request::FitSamples`]. Maths requests are refused with `Busy` while a stepper moves. Answer:
-    /// [`super::Response::Accepted`].
+    /// Open an empty correction, to be filled by [`Request::PutCoefficients`] or [`Request::FitSamples`].
+    /// Maths requests are refused with `Busy` while a stepper moves. Answer: [`super::Response::Accepted`].
     OpenCorrection(CorrectionInfo),
-    /// Take the stored correction as the open one. Answer: [`super::Response::Correction`].
+    /// Open the stored correction. Answer: [`super::Response::Correction`].
     LoadCorrection,
-    /// Keep the open correction without power. Answer: [`super::Response::Accepted`].
+    /// Store the open correction permanently. Answer: [`super::Response::Accepted`].
     StoreCorrection,
-    /// Set some coefficients of the open correction. Answer: [`super::Response::Accepted`].
+    /// Set coefficients of the open correction. Answer: [`super::Response::Accepted`].
     PutCoefficients {
-        /// Number of the first.
+        /// Index of the first.
         first: u8,
-        /// Their Q2.29 bits.
+        /// Q2.29 values.
         bits: CoefficientBits,
     },
-    /// Read some coefficients of the open correction. Answer: [`super::Response::Coefficients`].
+    /// Read coefficients of the open correction. Answer: [`super::Response::Coefficients`].
     GetCoefficients {
-        /// Number of the first.
+        /// Index of the first.
         first: u8,
-        /// How many, at most [`super::COEFFICIENTS_MAX`].
+        /// At most [`super::COEFFICIENTS_MAX`].
         count: u8,
     },
-    /// Add pixels of a flat target to the fit of the open correction. Answer: [`super::Response::Accepted`].
+    /// Add pixels of a flat target to the fit. Answer: [`super::Response::Accepted`].
     FitSamples {
-        /// Row of the depth map.
         row: u16,
         /// Column of the first pixel.
         first: u16,
-        /// From one pixel to the next.
+        /// Column step.
         step: u16,
         /// Code of the target's true depth.
         truth: i16,
-        /// Codes of the depths.
         codes: Codes,
     },
-    /// Solve the fit; its coefficients become those of the open correction. Answer: [`super::Response::Accepted`].
+    /// Solve the fit and put the coefficients into the open correction. Answer:
+    /// [`super::Response::Accepted`].
     SolveFit,
-    /// Put pixels into the row buffer. Answer: [`super::Response::Accepted`].
+    /// Write pixels to the row buffer. Answer: [`super::Response::Accepted`].
     PutRow {
-        /// Column of the first.
+        /// Column of the first pixel.
         first: u16,
-        /// Codes of the depths.
         codes: Codes,
     },
     /// Correct the row buffer as this row of the map. Answer: [`super::Response::Accepted`].
-    CorrectRow {
-        /// Row of the depth map.
-        row: u16,
-    },
-    /// Read pixels from the row buffer. Answer: [`super::Response::Row`].
+    CorrectRow { row: u16 },
+    /// Read pixels of the row buffer. Answer: [`super::Response::Row`].
     GetRow {
-        /// Column of the first.
+        /// Column of the first pixel.
         first: u16,
-        /// How many, at most [`super::CODES_MAX`].
+        /// At most [`super::CODES_MAX`].
         count: u8,
     },
-    /// Open the session whose number the frame carries, any number but 0, best drawn at random; its id must be new, see
-    /// [`super::Hello::last_id`]. What the session before had begun ends as by [`Request::Stop`], and its requests are
-    /// refused from now on. Answer: [`super::Response::Accepted`].
+    /// Open the session in the frame (not 0, best random) with a new id, see [`super::Hello::last_id`]. Work
+    /// of the previous session ends as by [`Request::Stop`], its requests are refused. Answer:
+    /// [`super::Response::Accepted`].
     OpenSession,
-    /// Run the armed program again and again, from its last shot to its first: move, settle, trigger, time-stamp. Each exposure is
-    /// told by [`super::EventKind::FrameTaken`], each moment of the pace without one by [`super::EventKind::FrameDropped`]. Answer:
-    /// [`super::Response::Accepted`]; ends with [`super::EventKind::ContinuousDone`] after so many exposures, with
-    /// [`super::EventKind::Failed`] where it is stopped or breaks.
+    /// Repeat the armed program endlessly: move, settle, trigger, time-stamp. Each period ends with
+    /// [`super::EventKind::FrameTaken`] or [`super::EventKind::FrameDropped`]. Answer:
+    /// [`super::Response::Accepted`]; ends with [`super::EventKind::ContinuousDone`] after `exposures`, or
+    /// [`super::EventKind::Failed`].
     RunContinuously {
-        /// From one trigger to the next, to the microsecond; 0 = each exposure as soon as position and camera are ready. At least
-        /// the longest exposure and the camera's read-out, else refused with [`super::RequestError::Period`].
+        /// Trigger period, exact to the microsecond; 0 = as fast as position and camera permit. Refused with
+        /// [`super::RequestError::Period`] if shorter than exposure and read-out.
         period: Micros,
-        /// Exposures after which it ends; 0 = none, it goes on until it is stopped.
+        /// Number of exposures; 0 = until stopped.
         exposures: u32,
-        /// How long the host may say nothing, see [`Request::Move`].
+        /// Silence deadline, see [`Request::Move`].
         silence: Micros,
     },
-    /// Change the link's rate, while nothing is under way: the answer still comes at the old one. Where no good request comes in
-    /// at the new one within [`super::LINK_TRIAL`], the board goes back; each reset begins with [`LinkRate::START`]. Answer:
-    /// [`super::Response::Accepted`].
-    SetLinkRate {
-        /// The new rate.
-        rate: LinkRate,
-    },
+    /// Change the link rate while idle; the answer still has the old rate. Without a valid request within
+    /// [`super::LINK_TRIAL`] the board returns to the old rate; each reset starts with [`LinkRate::START`].
+    /// Answer: [`super::Response::Accepted`].
+    SetLinkRate { rate: LinkRate },
 }

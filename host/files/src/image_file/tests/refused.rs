@@ -1,4 +1,4 @@
-//! Files that are refused, each with what to do.
+//! Refused files with their remedies.
 
 use super::super::*;
 use super::made::{CLASSIC, Page, bmp, jpeg, jpeg_turned, tiff};
@@ -11,12 +11,12 @@ fn refusal(bytes: &[u8]) -> String {
 fn rejects_a_truncated_jpeg() {
     let whole = jpeg(64, 48);
     assert!(decode_grey(&whole).is_ok());
-    // What follows the end does not matter.
+    // Data after the end is ignored.
     assert!(decode_grey(&[&whole[..], b"preview"].concat()).is_ok());
     for end in [whole.len() - 2, whole.len() - 1, whole.len() * 3 / 4, whole.len() / 2] {
         assert!(refusal(&whole[..end]).contains("incomplete"), "{end}");
     }
-    // A program closed the file properly where the data had ended.
+    // The file ends properly although its data were cut.
     for end in [whole.len() / 2, whole.len() * 3 / 4] {
         let closed = [&whole[..end], &[0xff, 0xd9]].concat();
         assert!(refusal(&closed).contains("incomplete"), "{end}");
@@ -37,7 +37,7 @@ fn rejects_truncated_files_of_every_format() {
     ];
     for (number, whole) in files.iter().enumerate() {
         assert_eq!(decode_grey(whole).unwrap().pixels.dim(), (30, 40), "{number}");
-        // The end of a PNG's last chunk has no pixels.
+        // The last chunk of a PNG has no pixels.
         for lost in [whole.len() / 10, whole.len() / 2, whole.len() - 20] {
             assert!(decode_grey(&whole[..whole.len() - lost]).is_err(), "{number}, {lost} bytes lost");
         }
@@ -45,7 +45,7 @@ fn rejects_truncated_files_of_every_format() {
 }
 
 #[test]
-fn rejects_raw_files_of_cameras_with_what_to_do() {
+fn rejects_raw_files_with_a_remedy() {
     let page = || Page::grey(4, 3, 8, vec![0; 12]);
     let dng = tiff(CLASSIC, &[page().with(254, &[1]).with(50706, &[0x0401])]);
     let mosaic = tiff(CLASSIC, &[page().with(262, &[32803])]);
@@ -62,7 +62,7 @@ fn rejects_raw_files_of_cameras_with_what_to_do() {
         let said = refusal(&raw);
         assert!(said.contains("raw file") && said.contains("develop"), "{said}");
     }
-    // As a NEF: a thumbnail first, the image inside.
+    // As in a NEF: a thumbnail first, the image in a sub-directory.
     let preview = refusal(&tiff(CLASSIC, &[page().with(254, &[1])]));
     assert!(preview.contains("preview of 4x3 px") && preview.contains("develop"), "{preview}");
 }
@@ -89,7 +89,7 @@ fn rejects_a_page_whose_image_is_in_a_sub_directory() {
 }
 
 #[test]
-fn names_formats_that_are_not_read() {
+fn names_unsupported_formats() {
     for (bytes, name) in [
         (&b"\0\0\0\x18ftypheic\0\0"[..], "HEIC"),
         (b"GIF89a\0\0", "GIF"),
@@ -107,7 +107,7 @@ fn names_formats_that_are_not_read() {
 }
 
 #[test]
-fn a_turned_jpeg_comes_the_right_way_up() {
+fn rotates_a_jpeg_by_its_orientation() {
     let plain = decode_grey(&jpeg(48, 32)).unwrap().pixels;
     let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().pixels;
     assert_eq!(turned.dim(), (48, 32));
