@@ -1,8 +1,7 @@
-//! The camera's trigger and its exposure-active signal (strobe), both on TIM2, which counts board microseconds.
+//! Camera trigger and exposure-active signal (strobe) on TIM2, which counts board microseconds.
 //!
-//! Trigger: channel 3, PB10. Both edges are compare matches, so they come at their microsecond whatever the
-//! program does; the interrupt only prepares the next. Strobe: channel 4, PB11, captured by the hardware, after a trigger
-//! or, where the camera exposes by itself, while somebody listens.
+//! Trigger: channel 3, PB10. Both edges are compare matches, exact to the microsecond; the interrupt only
+//! prepares the next. Strobe: channel 4, PB11, captured in hardware after a trigger or while listening.
 
 use core::cell::RefCell;
 
@@ -28,15 +27,15 @@ use crate::{
     registers,
 };
 
-/// Channel 3 and 4 in the register arrays, which start at 0.
+/// Array indices of channels 3 and 4.
 const TRIGGER: usize = 2;
 const STROBE: usize = 3;
-/// From the order to the rising edge: long enough to set the compare match up.
+/// From the order to the rising edge: time to set up the compare match.
 const LEAD_US: u32 = 10;
-/// An edge this close would be missed by the comparator.
+/// The comparator would miss a closer edge.
 const MARGIN_US: u32 = 1;
 
-/// The edges of one exposure as TIM2 stamps them.
+/// Edges of an exposure, TIM2 stamps.
 #[derive(Clone, Copy)]
 struct Exposure {
     length_us: u32,
@@ -46,13 +45,12 @@ struct Exposure {
     strobe_end: Option<u32>,
 }
 
-/// What the strobe input is for.
+/// Use of the strobe input.
 #[derive(Clone, Copy)]
 enum Strobe {
     Ignored,
-    /// The exposure that was triggered.
     Triggered(Exposure),
-    /// Exposures that come by themselves: the start of the one under way, and the last whole one.
+    /// Untriggered exposures: start of the current one, and the last complete one.
     Listening {
         start: Option<u32>,
         ended: Option<(u32, u32)>,
@@ -85,7 +83,7 @@ fn TIM2() {
     critical_section::with(|cs| {
         let mut exposure = EXPOSURE.borrow_ref_mut(cs);
         if flags.ccif(TRIGGER) {
-            // Flags are cleared by writing 0; ones leave the others alone.
+            // Flags are cleared by writing 0; ones have no effect.
             timer.sr().write(|w| {
                 w.0 = u32::MAX;
                 w.set_ccif(TRIGGER, false);
@@ -99,7 +97,7 @@ fn TIM2() {
     });
 }
 
-/// The trigger has risen: prepare its fall. Or it has fallen: done.
+/// Prepares the falling edge after the rising one; then done.
 fn trigger_edge(exposure: Option<&mut Exposure>) {
     let timer = pac::TIM2;
     let Some(exposure) = exposure else { return };
@@ -110,7 +108,7 @@ fn trigger_edge(exposure: Option<&mut Exposure>) {
         if (fall.wrapping_sub(timer.cnt().read()) as i32) > MARGIN_US as i32 {
             return;
         }
-        // Too late for the comparator (this handler was held up for the whole exposure): end it now.
+        // Too late for the comparator (the handler was delayed for the whole exposure): end it now.
         drive(vals::Ocm::FORCE_INACTIVE);
     }
     timer.dier().modify(|w| w.set_ccie(TRIGGER, false));
@@ -141,14 +139,13 @@ fn strobe_edge(strobe: &mut Strobe, stamp: u32) {
     }
 }
 
-/// Trigger output and strobe input.
 pub struct CameraPort {
     _trigger: PwmPin<'static, TIM2, Ch3>,
     _strobe: CapturePin<'static, TIM2, Ch4>,
 }
 
 impl CameraPort {
-    /// Sets TIM2 to the board's time and both pins up; the trigger is low.
+    /// Sets TIM2 to board time and configures both pins; trigger low.
     pub fn new(
         _timer: Peri<'static, TIM2>,
         trigger: Peri<'static, PB10>,
@@ -163,7 +160,7 @@ impl CameraPort {
         timer.ccmr_output(1).modify(|w| w.set_ocm(TRIGGER - 2, vals::Ocm::FORCE_INACTIVE));
         timer.ccmr_input(1).modify(|w| {
             w.set_ccs(STROBE - 2, vals::CcmrInputCcs::TI4);
-            // 4 samples of the 84 MHz clock: keeps out spikes below 48 ns.
+            // 4 samples of the 84 MHz clock: suppresses spikes below 48 ns.
             w.set_icf(STROBE - 2, vals::FilterValue::FCK_INT_N4);
         });
         timer.ccer().write(|w| {
@@ -174,7 +171,7 @@ impl CameraPort {
         timer.dier().write(|w| w.set_ccie(STROBE, true));
         let trigger = PwmPin::new(trigger, OutputType::PushPull);
         let strobe = CapturePin::new(strobe, Pull::Down);
-        // The same crystal drives TIM5 and TIM2: set alike once, they stay within a microsecond.
+        // TIM5 and TIM2 share a crystal: set once, they stay within a microsecond.
         critical_section::with(|_| {
             timer.cnt().write_value(clock::now().0 as u32);
             timer.cr1().modify(|w| w.set_cen(true));
@@ -183,13 +180,13 @@ impl CameraPort {
         Self { _trigger: trigger, _strobe: strobe }
     }
 
-    /// Gives a trigger pulse when it is due, a few microseconds ahead at least, and captures what the camera answers.
+    /// Schedules a trigger pulse, at least a few microseconds ahead, and captures the edges.
     pub fn expose(&mut self, order: Trigger) {
         let timer = pac::TIM2;
         critical_section::with(|cs| {
             capture_rising(true);
             let soonest = timer.cnt().read().wrapping_add(LEAD_US);
-            // TIM2 holds the lower half of the board's time; what lies behind the soonest moment is over.
+            // TIM2 is the lower half of board time; earlier times are past.
             let due = order.at.0 as u32;
             let rising = if due.wrapping_sub(soonest) as i32 > 0 { due } else { soonest };
             *EXPOSURE.borrow_ref_mut(cs) = Strobe::Triggered(Exposure {
@@ -210,14 +207,14 @@ impl CameraPort {
         });
     }
 
-    /// Measures exposures that come without a trigger from now on, or no longer.
+    /// Starts or stops measuring untriggered exposures.
     pub fn listen(&mut self, listen: bool) {
         critical_section::with(|cs| {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);
             match (listen, &*strobe) {
                 (true, Strobe::Ignored) => {
                     *strobe = Strobe::Listening { start: None, ended: None };
-                    // An edge that came before belongs to an exposure that had begun.
+                    // An earlier edge belongs to an exposure begun before.
                     pac::TIM2.sr().write(|w| {
                         w.0 = u32::MAX;
                         w.set_ccif(STROBE, false);
@@ -233,7 +230,7 @@ impl CameraPort {
         });
     }
 
-    /// The last exposure that began while somebody listened and has ended, once.
+    /// The last complete exposure while listening, once.
     pub fn take_strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges> {
         critical_section::with(|cs| match &mut *EXPOSURE.borrow_ref_mut(cs) {
             Strobe::Listening { ended, .. } => ended.take().map(|(start, end)| StrobeEdges {
@@ -244,7 +241,7 @@ impl CameraPort {
         })
     }
 
-    /// The edges of the last triggered exposure, once, when all are known.
+    /// Edges of the last triggered exposure, once, when complete.
     pub fn take_edges(&mut self, now: BoardMicros) -> Option<ExposureEdges> {
         critical_section::with(|cs| {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);

@@ -1,43 +1,42 @@
-//! The camera: when it may be exposed, and what its strobe says.
+//! When the camera may be exposed, and the meaning of its strobe.
 //!
-//! The read-out of an exposure overlaps the next move, but the camera must not be triggered before it is over:
-//! [`CameraSettings::readout`] after the end of the exposure. Known from the strobe; until that is in, from the
-//! length of the trigger pulse and the longest answer a camera may take.
+//! Read-out overlaps the next move, but the next trigger waits for [`CameraSettings::readout`] after the
+//! exposure. Its end is known from the strobe, before that estimated from pulse length and the longest
+//! permitted latency.
 //!
-//! A strobe that is shorter than the pulse has lost its beginning (a loose contact): it would put the exposure at a wrong moment, so
-//! it is none.
+//! A strobe shorter than the pulse has lost its beginning (loose contact) and counts as missing, because its
+//! time would be wrong.
 //!
-//! An exposure that the board does not trigger (by the host, or of a camera that runs freely) is listened for: the first
-//! one that begins after listening did is it.
+//! For exposures not triggered by the board (host, free running) the first one that begins after listening
+//! started counts.
 
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::io::{ExposureEdges, Inputs, Trigger};
 use crate::settings::CameraSettings;
 
-/// What a strobe may be shorter than its pulse: cameras count their exposure in lines of some 10 us.
+/// Permitted shortening of the strobe: cameras count exposure in lines of some 10 us.
 const SHORTER_US: u64 = 100;
 
-/// How an awaited exposure comes about.
+/// Source of the awaited exposure.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Awaited {
-    /// By the board's pulse.
+    /// The board's pulse.
     Triggered,
-    /// By itself, beginning at this moment or later.
+    /// Free running or by the host, from this time on.
     Since(BoardMicros),
 }
 
-/// An exposure whose edges are not in yet.
+/// An exposure with unknown edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Pending {
     number: u32,
     deadline: BoardMicros,
     awaited: Awaited,
-    /// A shorter one is none.
+    /// A shorter strobe is invalid.
     shortest_us: u64,
 }
 
-/// The camera as the board knows it.
 #[derive(Clone, Debug)]
 pub(crate) struct Camera {
     settings: CameraSettings,
@@ -57,22 +56,21 @@ impl Camera {
         self.settings = settings;
     }
 
-    /// Exposures begun since the reset; the next one's number.
+    /// Exposures since the reset; number of the next one.
     pub(crate) const fn triggers(&self) -> u32 {
         self.triggers
     }
 
-    /// Whether it may be exposed at a moment.
     pub(crate) fn is_ready(&self, at: BoardMicros) -> bool {
         self.pending.is_none() && at >= self.ready_at
     }
 
-    /// From the start of an exposure until it may be exposed again, at least.
+    /// Shortest time from one exposure to the next.
     pub(crate) const fn period(&self, exposure: Micros) -> Micros {
         Micros(exposure.0.saturating_add(self.settings.readout.0))
     }
 
-    /// Orders an exposure at a moment; gives its number, from 0. The camera is ready then.
+    /// Schedules an exposure; returns its number, from 0. The camera must be ready.
     pub(crate) fn trigger(&mut self, exposure: Micros, at: BoardMicros) -> u32 {
         let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
         self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
@@ -81,7 +79,7 @@ impl Camera {
         self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
     }
 
-    /// Listens for an exposure that begins from now on; gives its number.
+    /// Listens for an exposure from now on; returns its number.
     pub(crate) fn listen(&mut self, now: BoardMicros) -> u32 {
         let deadline = BoardMicros(now.0 + u64::from(self.settings.patience.0));
         self.expect(deadline, Awaited::Since(now), 0)
@@ -94,27 +92,27 @@ impl Camera {
         number
     }
 
-    /// Nobody waits any more for an exposure that the board did not trigger.
+    /// Stops listening.
     pub(crate) fn give_up(&mut self) {
         self.pending = self.pending.filter(|pending| pending.awaited == Awaited::Triggered);
     }
 
-    /// The exposure ordered in this tick, for the board.
+    /// Takes the exposure scheduled in this tick.
     pub(crate) const fn take_order(&mut self) -> Option<Trigger> {
         self.order.take()
     }
 
-    /// Whether no exposure is ordered or awaited.
+    /// No exposure is scheduled or awaited.
     pub(crate) const fn is_idle(&self) -> bool {
         self.pending.is_none() && self.order.is_none()
     }
 
-    /// Whether the board is to report exposures that come without a trigger.
+    /// The board shall report exposures without trigger.
     pub(crate) fn is_listening(&self) -> bool {
         self.pending.is_some_and(|pending| pending.awaited != Awaited::Triggered)
     }
 
-    /// Reads the board. Edges that nobody waits for are dropped.
+    /// Reads the board; unexpected edges are dropped.
     pub(crate) fn sense(&mut self, inputs: &Inputs) {
         self.edges = None;
         let Some(pending) = self.pending else { return };
@@ -135,7 +133,7 @@ impl Camera {
         }
     }
 
-    /// The edges of an exposure, in the tick they came; an error once they should have come.
+    /// Edges of an exposure in the tick of their arrival; an error at the deadline.
     pub(crate) fn result(&self, number: u32) -> Option<Result<ExposureEdges, NoAnswer>> {
         match self.edges {
             Some((of, edges)) if of == number => Some(Ok(edges)),
@@ -145,7 +143,7 @@ impl Camera {
     }
 }
 
-/// The camera's exposure-active signal did not come, or not whole.
+/// The exposure signal was missing or incomplete.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct NoAnswer;
 
@@ -156,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_strobe_that_has_lost_its_beginning_is_none_and_the_read_out_is_waited_for_all_the_same() {
-        // Found by the campaign: a wire came back within an exposure, which was told 0.86 ms late.
+        // Found by the campaign: a wire reconnected during an exposure, which was reported 0.86 ms late.
         let answer = |lost_us: u64| {
             let mut camera = Camera::new(Settings::DEFAULT.camera);
             let number = camera.trigger(Micros(5_884), BoardMicros(1_000));

@@ -1,24 +1,22 @@
-//! The fine axis: piezo, strain gauge and the loop between them.
+//! The fine axis: piezo, strain gauge and control loop.
 //!
-//! Each tick the gauge corrects an observer of position, velocity and disturbance; the command is the shaped
-//! set-point, less the estimated disturbance (hysteresis, creep, gauge offset: this is the integral action), less
-//! state feedback on the difference from the undisturbed model's motion, which damps what shaping left. See
-//! [`crate::gains`] for the equations.
+//! Each tick the gauge corrects an observer of position, velocity and disturbance. The command is the shaped
+//! set-point minus the estimated disturbance (hysteresis, creep, gauge offset: integral action) minus state
+//! feedback on the deviation from the undisturbed model, which damps residual vibration. Equations:
+//! [`crate::gains`].
 //!
-//! What the calibration has found of hysteresis and creep is taken off the command ahead of time ([`model`]); the observer
-//! learns what is left of them.
+//! Calibrated hysteresis and creep are subtracted in advance ([`model`]); the observer learns the rest.
 //!
-//! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a reset of the board, so at
-//! the start the piezo may stand anywhere: nothing is played until the gauge has said where, and it is led down from there,
-//! for a stack that is let go at once swings into tension. If the gauge fails, the command is held and the loop opens until
-//! the next move. So it does where the piezo does not move as it should: a loop that feeds a mode of the flexure which it does
-//! not know is opened before the stack is pulled apart.
+//! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a
+//! reset, so the piezo may be anywhere: nothing is output until the gauge has given the position, then it is
+//! lowered smoothly, because a stack released at once swings into tension. If the gauge fails or the piezo
+//! does not follow, the command is held and the loop opens until the next move. A loop that excites an
+//! unknown mode of the flexure is thus opened before the stack is torn apart.
 //!
-//! A piezo that has stood at its target for a second is idle: then it is enough to look rarely, for creep is all that moves it. The
-//! model of the resonance knows control ticks only, so after a rest the gauge corrects disturbance and drift alone, slowly.
+//! A piezo at its target for a second is idle: only creep moves it, so rare ticks suffice. The resonance
+//! model assumes control ticks, so after a rest the gauge corrects only disturbance and drift, slowly.
 //!
-//! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64; saturating, so no input can wrap it. Cost: about 35
-//! multiplications a tick.
+//! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64, saturating. Cost: about 35 multiplications a tick.
 
 mod model;
 mod trend;
@@ -32,29 +30,30 @@ use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO, TICK_HZ, TICK_US};
 use crate::settings::FineSettings;
 use crate::shaper::Shaper;
 
-/// A piezo this near its target is at rest ...
+/// At rest within this distance of the target ...
 const AT_REST: Nanometres = Nanometres(100);
-/// ... and swings by no more than this about the middle of what was measured lately: half the stated error less the gauge's noise, for what
-/// is told on one side may have swung to the other when it is heard.
+/// ... and within this swing about the recent middle: half the stated error minus the gauge's noise, because
+/// a reported position may have swung to the other side when it arrives.
 const SWING: i32 = 45 << BITS;
-/// Ticks of that middle, as a shift: two thirds of a period of the resonance, of which a quarter is left in it.
+/// Averaging ticks of the middle, as a shift: two thirds of a resonance period, of which a quarter remains.
 const MIDDLE_SHIFT: u32 = 4;
-/// For so long: a period of the resonance, in which what swings farther is seen to.
+/// Duration: one period of the resonance, in which a larger swing shows.
 const NEAR_TICKS: u16 = 25;
-/// Ticks near the target after which it is idle.
+/// Ticks near the target until idle.
 const IDLE_TICKS: u16 = TICK_HZ as u16;
-/// Shares, as shifts, of what it is off after a rest that are disturbance and drift in a control tick: critically damped, with 64 rests (0.13 s) as
-/// time constant. At the resonance, of a Q of 30, the loop's gain is a half.
+/// Shares, as shifts, of the error after a rest that go to disturbance and drift: critically damped, time
+/// constant 64 rests (0.13 s). At a resonance with Q = 30 the loop gain is a half.
 const EASE_DISTURBANCE: u32 = 5;
 const EASE_DRIFT: u32 = 15;
-/// Mean innovation beyond which the piezo does not follow. The fast loop's stays below 2 um, also with a resonance a quarter off, and the gentle loop's below
-/// 11 um; one that feeds a mode with a share of 2 % goes to 18 um and more within 0.1 s, with 5 % to 60.
+/// Mean innovation beyond which the piezo does not follow. The fast loop stays below 2 um, also with a
+/// resonance 25 % off, the gentle one below 11 um. A loop that excites a mode with a share of 2 % reaches 18
+/// um within 0.1 s, with 5 % 60.
 const INNOVATION_LIMIT: i32 = 15_000 << BITS;
-/// Ticks of that mean, as a shift: 3 ms.
+/// Averaging ticks of the innovation, as a shift: 3 ms.
 const INNOVATION_SHIFT: u32 = 4;
-/// No tick counts for more, for a single reading may be all wrong.
+/// Limit per tick, because a single reading may be wrong.
 const INNOVATION_CLIP: i32 = 2 * INNOVATION_LIMIT;
-/// Ticks of the way down at the start, and the codes (3 um) below which it is none.
+/// Ticks of the lowering at the start, and the codes (3 um) below which none is needed.
 const RELAX: u32 = TICK_HZ / 10;
 const RELAXED: u16 = 1_000;
 
@@ -67,19 +66,19 @@ type State = [i32; 4];
 #[derive(Clone, Debug)]
 struct Loop {
     shaper: Shaper,
-    /// Where the undisturbed model is: position and scaled velocity.
+    /// Undisturbed model: position and scaled velocity.
     model: [i32; 2],
-    /// What is expected of this tick, corrected once the gauge is read.
+    /// Prediction for this tick, corrected by the gauge.
     state: State,
-    /// The shaped set-point of the tick before.
+    /// Shaped set-point of the last tick.
     reference_before: i32,
     trend: Trend,
-    /// Running mean of how far the gauge is beside what was expected of the tick, without sign.
+    /// Running mean of the absolute innovation.
     innovation: i32,
 }
 
 impl Loop {
-    /// Believes that it stands at its target, after so many ticks; what the gauge says beside that is disturbance.
+    /// After a rest of this many ticks: assumes the target position; the gauge's difference is disturbance.
     fn correct_after_rest(&mut self, measured: i32, target: i32, ticks: u32) {
         let off = i64::from(measured.saturating_sub(target)) << Trend::BITS;
         let (mut disturbance, mut drift) = self.trend.now();
@@ -93,14 +92,14 @@ impl Loop {
     }
 }
 
-/// How the piezo comes to rest after a start.
+/// Relaxation after a start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Start {
-    /// The gauge has not said where it stands.
+    /// The gauge has not given the position.
     Unknown,
-    /// It is led down from a code.
+    /// Lowered from a code.
     Down { from: u16, ticks: u32 },
-    /// It is relaxed, or does what it was told.
+    /// Relaxed or controlled.
     Over,
 }
 
@@ -110,27 +109,27 @@ pub(crate) struct Piezo {
     scale: Scale,
     gauge: GaugeScale,
     start: Start,
-    /// What hysteresis and creep should be, as the calibration found them.
+    /// Calibrated hysteresis and creep.
     lag: Lag,
     control: Option<Loop>,
-    /// A move was ordered: close the loop as soon as the gauge says where it is.
+    /// A move was ordered: close the loop at the next valid reading.
     closing: bool,
     target: Nanometres,
-    /// Command in nm in 2^-10, as the DAC plays it.
+    /// Command as output by the DAC, nm in 2^-10.
     command: i32,
     code: u16,
     measured: Nanometres,
     gauge_missing_ticks: u32,
     failed: bool,
-    /// A sweep drives it without the loop, and reads the gauge.
+    /// Open-loop sweep with gauge readings.
     driven: bool,
-    /// Ticks for which it has been near its target.
+    /// Ticks near the target.
     near_ticks: u16,
-    /// Those of them, the last ones, in which it has hardly swung.
+    /// Last ticks of these with little swing.
     still_ticks: u16,
-    /// The middle about which it swings there, nm in 2^-10.
+    /// Middle of the swing, nm in 2^-10.
     middle: i32,
-    /// Control ticks since the one before: more than one after a rest.
+    /// Control ticks since the last executed one; more than one after a rest.
     passed: u32,
 }
 
@@ -158,24 +157,24 @@ impl Piezo {
         }
     }
 
-    /// So many control ticks' time after the tick before comes the one that follows.
+    /// Sets the interval to the next control tick, in ticks.
     pub(crate) const fn after(&mut self, ticks: u32) {
         self.passed = ticks;
     }
 
-    /// Whether it is enough to look rarely: it stands where it was sent for long, or nobody leads it, and the gauge speaks.
+    /// Long at its target or uncontrolled, with a valid gauge: rare ticks suffice.
     pub(crate) fn is_settled_idle(&self) -> bool {
         let led = self.control.is_some() || self.closing || self.driven;
         let stands = self.arrived() && self.near_ticks >= IDLE_TICKS;
         self.start == Start::Over && self.gauge_fresh() && (stands || !led)
     }
 
-    /// What the gauge says; the last believable value where it says nothing.
+    /// Gauge position; the last plausible one while it fails.
     pub(crate) const fn measured(&self) -> Nanometres {
         self.measured
     }
 
-    /// How far it is stretched: what the gauge says or, where that is silent, nothing where nothing is played.
+    /// Extension by gauge; without it, 0 if nothing is output.
     pub(crate) fn extension(&self) -> Option<Nanometres> {
         if !self.gauge_failed() {
             return Some(self.measured);
@@ -183,17 +182,16 @@ impl Piezo {
         (self.played() == Some(0)).then_some(Nanometres(0))
     }
 
-    /// Where it was last sent.
+    /// Last target.
     pub(crate) const fn target(&self) -> Nanometres {
         self.target
     }
 
-    /// Whether the gauge was read in this tick.
     pub(crate) const fn gauge_fresh(&self) -> bool {
         self.gauge_missing_ticks == 0
     }
 
-    /// Takes other numbers; nothing moves.
+    /// Nothing may move.
     pub(crate) const fn apply(&mut self, settings: FineSettings) {
         self.settings = settings;
         self.scale = Scale::new(settings.gain_pm_per_code);
@@ -201,42 +199,42 @@ impl Piezo {
         self.lag = self.lag.with(settings.hysteresis_ppm, settings.creep_ppm_per_decade);
     }
 
-    /// The lowest position on the way that is under way.
+    /// Lowest position of the current move.
     pub(crate) fn lowest(&self) -> Nanometres {
         if self.control.is_some() || self.closing { self.measured.min(self.target) } else { self.measured }
     }
 
-    /// Whether the gauge failed while the loop needed it; given once.
+    /// The gauge failed while the loop needed it; given once.
     pub(crate) const fn take_failure(&mut self) -> bool {
         core::mem::replace(&mut self.failed, false)
     }
 
-    /// Whether the gauge has been silent or saturated for too long: where the piezo stands is not known then.
+    /// Gauge silent or saturated for too long: the position is unknown.
     pub(crate) const fn gauge_failed(&self) -> bool {
         self.gauge_missing_ticks as u64 * TICK_US as u64 > self.settings.gauge_deadline.0 as u64
     }
 
-    /// Whether the shaped set-point has reached the target.
+    /// The shaped set-point has reached the target.
     pub(crate) fn arrived(&self) -> bool {
         let shaper = &self.settings.gains.shaper;
         !self.closing && self.control.as_ref().is_none_or(|control| control.shaper.arrived(shaper))
     }
 
-    /// Whether it moves: its set-point does, or the loop has not brought it there yet, or it is led down after a start.
+    /// The set-point moves, the loop has not settled, or it is being lowered after a start.
     pub(crate) fn is_moving(&self) -> bool {
         !self.arrived()
             || self.control.is_some() && self.still_ticks < NEAR_TICKS
             || self.start != Start::Over
     }
 
-    /// Goes to `target`, closing the loop where it is open.
+    /// Closes the loop if necessary.
     pub(crate) const fn go(&mut self, target: Nanometres) {
         self.target = target;
         self.closing = self.control.is_none();
         self.driven = false;
     }
 
-    /// Opens the loop and plays a code.
+    /// Opens the loop and outputs a code.
     pub(crate) const fn drive(&mut self, code: u16) {
         (self.control, self.closing, self.driven) = (None, false, true);
         self.start = Start::Over;
@@ -245,17 +243,16 @@ impl Piezo {
         self.target = Nanometres(0);
     }
 
-    /// The code that is played.
     pub(crate) const fn code(&self) -> u16 {
         self.code
     }
 
-    /// The same, once it is known.
+    /// The output code, once known.
     pub(crate) fn played(&self) -> Option<u16> {
         (self.start != Start::Unknown).then_some(self.code)
     }
 
-    /// Closes the loop without a jump: standing still, and what the command does not explain is disturbance.
+    /// Closes the loop smoothly: at rest, with the unexplained part as disturbance.
     fn close(&mut self) {
         let here = fixed(self.measured);
         let disturbance = here.saturating_sub(self.command).saturating_sub(self.lag.offset());
@@ -270,7 +267,7 @@ impl Piezo {
         (self.closing, self.start) = (false, Start::Over);
     }
 
-    /// Stays where the gauge says it is now.
+    /// Holds the measured position.
     pub(crate) fn hold(&mut self) {
         (self.closing, self.driven) = (false, false);
         if self.control.is_some() && !self.arrived() {
@@ -316,7 +313,7 @@ impl Piezo {
             control.innovation +=
                 (innovation.saturating_abs().min(INNOVATION_CLIP) - control.innovation) >> INNOVATION_SHIFT;
             if control.innovation > INNOVATION_LIMIT {
-                // The last command is somewhere on its swing; the set-point's does not swing.
+                // The last command is part of its swing; the set-point does not swing.
                 let still = control.reference_before.saturating_sub(self.lag.offset());
                 (self.code, self.command) = self.scale.playable(still);
                 (self.control, self.near_ticks, self.failed) = (None, 0, true);
@@ -324,7 +321,7 @@ impl Piezo {
         }
     }
 
-    /// The gauge has said for the first time where the piezo stands.
+    /// First valid reading after a start.
     fn begin_to_relax(&mut self) {
         let (from, command) = self.scale.playable(fixed(self.measured));
         (self.start, self.code, self.command) = if from > RELAXED {
@@ -334,12 +331,12 @@ impl Piezo {
         };
     }
 
-    /// Leads it down, gently at both ends so that nothing swings.
+    /// Lowers it with smooth ends.
     fn relax(&mut self) {
         let Start::Down { from, ticks } = &mut self.start else { return };
         *ticks += 1;
         let (at, over) = (u64::from(*ticks), u64::from(RELAX));
-        // Three squares less two cubes of the time that is left; 43 bits.
+        // 3 t^2 - 2 t^3 of the remaining time; 43 bits.
         let left = over - at;
         self.code = (u64::from(*from) * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // at most `from`
         if at >= over {
@@ -348,9 +345,9 @@ impl Piezo {
         self.command = self.scale.played(self.code);
     }
 
-    /// The DAC's code of this tick; `None` as long as nobody knows where the piezo stands.
+    /// DAC code of this tick; `None` until the position is known.
     pub(crate) fn act(&mut self) -> Option<u16> {
-        // What was played during the rest.
+        // Output during the rest.
         (1..self.passed).for_each(|_| self.lag.push(self.command));
         self.passed = 1;
         let gains = &self.settings.gains;
@@ -362,7 +359,7 @@ impl Piezo {
                 (gains.feedback[1], velocity.saturating_sub(control.model[1])),
             ]);
             let wanted = reference.saturating_sub(disturbance).saturating_sub(feedback);
-            // What the lag will be depends on the command; with the one before it is nearly known.
+            // The lag depends on the command; the previous one is a good estimate.
             let ahead = self.lag.ahead(wanted.saturating_sub(self.lag.offset()));
             let input_before = self.command.saturating_add(self.lag.offset());
             (self.code, self.command) = self.scale.playable(wanted.saturating_sub(ahead));
@@ -386,7 +383,7 @@ impl Piezo {
     }
 }
 
-/// The undisturbed piezo one tick later; `before` is played until `command` is out.
+/// The undisturbed piezo one tick later; `before` is output until `command` takes effect.
 fn advance(gains: &Gains, [position, velocity]: [i32; 2], before: i32, command: i32) -> [i32; 2] {
     let row = |i: usize| {
         let [a, b] = gains.transition[i];
