@@ -2,8 +2,7 @@
 //!
 //! Each image from the simulator is
 //! ```text
-//! length u32 | shot_id u32 | exposure_us u64 | width u16 | height u16 | bits u8 | pixels u16 * width *
-//! height
+//! length u32 | shot_id u32 | exposure_us u64 | width u16 | height u16 | bits u8 | pixels u16 * width * height
 //! ```
 //! little-endian; `length` counts the bytes after itself. The client may send [`Control`] messages:
 //! `length u32 | postcard body`.

@@ -6,13 +6,13 @@
 //! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise), three-wire CS mode with busy
 //!   indicator. The rising
 //!   edge of CNV (PD1) samples; CNV is high for at least 50 ns (the related AD7685 needs 10 ns) and low again
-//! before the
+//!   before the
 //!   shortest conversion (0.5 us) ends, which no interrupt may delay. After the longest (3.7 us at 3.3 V) the
-//! output, until
+//!   output, until
 //!   then released and pulled up, is low; each clock gives a bit, two's complement, MSB first, SPI mode 0.
-//! After the last bit
+//!   After the last bit
 //!   the output is released and meaningless. The leading 0 distinguishes a converter from a broken wire, as
-//! do codes at
+//!   do codes at
 //!   either end, which the rig rejects.
 //!
 //! A 16-bit word takes 1.5 us: the processor polls rarely, which leaves the bus free (and is most of an

@@ -12,7 +12,7 @@
 //! 4. One thing is done for the host, as a tick has time for one besides two motors and the piezo: send a
 //!   frame (answers and
 //!    events, then the log, which continuous requests cannot block forever), encode an answer, or execute a
-//! request. It is
+//!    request. It is
 //!    deferred in ticks with a memory write or a completed frame.
 //! 5. The watchdog is fed last, so that any hang leaves it unfed.
 //!

@@ -8,8 +8,7 @@
 //!
 //! ```text
 //! control    a board's loop: read, decide, apply, send, feed the watchdog
-//! rig        a tick: alarms, stored state                           identity, settings: who, and with what
-//! numbers
+//! rig        a tick: alarms, stored state                           identity, settings: who, with what numbers
 //! |- session    bytes <-> requests and answers; acts once
 //! |- requests   checks and start of each request                       report: hello and status
 //! |- progress   continuation and end of long work                   work: active work per axis or for the whole rig

@@ -10,7 +10,7 @@
 //! - By kind: cycles per kind from the Cortex-M4 manual (`kinds`), fetches with wait states, instruction
 //!   cache and
 //!   prefetch (`flash`), and bus cycles of peripheral registers. Single-steps, about 100 times slower; for
-//! measurements.
+//!   measurements.
 
 mod cached;
 mod flash;

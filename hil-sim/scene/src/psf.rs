@@ -5,7 +5,7 @@
 //! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`, `sigma =
 //!   k R`
 //!   (Claxton & Staunton 2008, normalised in the plane; Li 2014, eq. 5.16 normalises on the line). `p = 2` is
-//! the Gaussian;
+//!   the Gaussian;
 //!   for other `p` sigma is a scale, not the standard deviation.
 //! * Ring: constant between the radii `inner R` and `R`, the image of a round aperture with a covered centre.
 

@@ -3,17 +3,17 @@
 //! - `thesis`: run-point cut at angles within beta plus or minus its standard deviation, at most 10 degrees
 //!   apart; the longest
 //!   run wins. Shadows straight down are cut by length. Removes much, with a good part of the person if legs
-//! break the run.
+//!   break the run.
 //! - `hybrid`: with a known light position the silhouette is split into body and cast shadow
 //!   ([`super::cast`]); for sideways
 //!   shadows the run-point cut over +-3 degrees removes the rest. Without a split, or with a measured
-//! direction, only angles
+//!   direction, only angles
 //!   are used: sideways shadows (|sin eta| < 0.45) get the run-point cut over +-3 degrees, or a half-plane
-//! through the feet
+//!   through the feet
 //!   if that would remove more than 60 %; others get the half-plane. Its edge is the bisector of body and
-//! shadow; for a
+//!   shadow; for a
 //!   shadow pointing away only a person-wide strip of ground is cut. Shadows behind the person need colour:
-//! such frames are
+//!   such frames are
 //!   flagged.
 //!
 //! Angles are evaluated on the outline ([`super::envelope`]): a fraction of a millisecond for 640 x 480; a
