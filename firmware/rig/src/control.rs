@@ -4,13 +4,13 @@
 //! within a tick:
 //!
 //! 1. The gauge is sampled first, so that samples are evenly spaced; the converter is read at the end of step
-//!   2.
+//!    2.
 //! 2. Bytes from the link go to the rig, then the hardware is read. The emergency stop is read after the step
-//!   timers: its
+//!    timers: its
 //!    circuit stops them in hardware, and opening between both reads must not look like an underrun.
 //! 3. The rig decides, and its outputs are applied. A stop request waits only for earlier requests.
 //! 4. One thing is done for the host, as a tick has time for one besides two motors and the piezo: send a
-//!   frame (answers and
+//!    frame (answers and
 //!    events, then the log, which continuous requests cannot block forever), encode an answer, or execute a
 //!    request. It is
 //!    deferred in ticks with a memory write or a completed frame.

@@ -3,15 +3,15 @@
 //! # Model
 //!
 //! 1. **Surface.** A height field over the image ([`scene`]) with a texture of two samples per pixel
-//!   ([`texture`]), bilinear.
+//!    ([`texture`]), bilinear.
 //! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind it,
-//!   a sensor at `s`
+//!    a sensor at `s`
 //!    sees blur of radius `|s - w| D / 2F`, and moving the sensor keeps the magnification.
 //! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its blur radius, integrated over cell and pixel
-//!   ([`kernel`]);
+//!    ([`kernel`]);
 //!    nearer surfaces hide farther ones ([`blur`]).
 //! 4. **Exposure.** Optional shading and hot pixels ([`defects`]); electrons, noise, full well, quantisation
-//!   ([`camera`]).
+//!    ([`camera`]).
 //!
 //! [`wave`] has a lens by wave optics for flat surfaces: diffraction, spherical aberration, astigmatism, several wavelengths.
 //!

@@ -6,9 +6,9 @@
 //!
 //! 1. The relaxed piezo's reading is the zero.
 //! 2. After homing the switch is met from above with the piezo alternately low and high, a pulse per
-//!   millisecond.
+//!    millisecond.
 //! 3. Encoder distance over gauge distance is the gain. The stage is homed again, because the piezo's share
-//!   has changed.
+//!    has changed.
 //!
 //! Remaining error: the switch's repeatability and the screw's error within a third of a turn, together 0.3
 //! %.

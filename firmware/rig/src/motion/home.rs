@@ -3,11 +3,11 @@
 //! 1. Search towards the switch, braking when it closes; skipped if already closed.
 //! 2. Leave until it opens, then a little further.
 //! 3. Approach, a pulse per millisecond, until it closes again; this edge, corrected for backlash and the
-//!   piezo's
+//!    piezo's
 //!    displacement of the tab, becomes position 0. Requires an open switch.
 //!
 //!    The switch must close where it first closed, and open where its hysteresis predicts: other edges
-//! indicate a broken wire
+//!    indicate a broken wire
 //!    or a dead contact.
 //! 4. Return to position 0 from below, like every move.
 //!
